@@ -53,3 +53,16 @@ def test_a_program_that_is_refused_says_what_speaks_against_it(planned):
     assert said["files"] == []
     assert any(finding["level"] == "error" for finding in said["findings"])
     assert said["faults"]
+
+
+def test_the_script_of_the_job_is_exported_under_its_name(tmp_path):
+    with serving(write_job(tmp_path)) as client, talking(client) as page:
+        assert client.get("/export/script").status_code == 409
+        page.done(1)
+        said = [m for m in page.heard if m["type"] == "outcome"][-1]
+        assert {e["name"]: e["ready"] for e in said["exports"]}["script"]
+        answer = client.get("/export/script")
+        assert answer.status_code == 200
+        assert "job.py" in answer.headers["content-disposition"]
+        compile(answer.text, "job.py", "exec")
+        assert "What job.toml asks for" in answer.text

@@ -26,9 +26,11 @@ from kerfpath.job.output import make_folder as make_folder
 from kerfpath.job.output import plan_file_text as plan_file_text
 from kerfpath.job.output import program_places as program_places
 from kerfpath.job.output import program_texts as program_texts
+from kerfpath.job.output import python_script as python_script
 from kerfpath.job.output import require_folder as require_folder
 from kerfpath.job.output import require_language as require_language
 from kerfpath.job.output import result_texts as result_texts
+from kerfpath.job.output import script_refusal as script_refusal
 from kerfpath.job.output import stale_program as stale_program
 from kerfpath.job.output import write_result as write_result
 from kerfpath.job.plan_file import AuditReport as AuditReport

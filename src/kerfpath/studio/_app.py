@@ -137,6 +137,11 @@ async def _export(request: Request) -> Response:
     if name == "job":
         document = session.document
         return _download(File(document.path.name, "text/plain", document.text.encode()))
+    if name == "script":
+        try:
+            return _download(await session.script())
+        except KerfpathError as error:
+            return PlainTextResponse(f"{error}\n", status_code=409)
     if name not in ("program", "plan.json", "trajectory.csv"):
         return PlainTextResponse("there is nothing of this name\n", status_code=404)
     try:

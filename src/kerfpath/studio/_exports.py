@@ -17,6 +17,7 @@ from kerfpath.job import (
     ProgramTable,
     program_options,
     program_places,
+    script_refusal,
 )
 from kerfpath.post import Line, ProgramIssue, TimedLine, languages
 from kerfpath.studio._messages import Export, FileEntry, FindingEntry, ProgramTextMessage
@@ -51,11 +52,13 @@ def exports_of(result: JobResult, *, settled: bool) -> list[Export]:
     elif result.job.program.language == "none":
         program = 'the job asks for none: language = "none" in [program]; ask for one by name'
     files = "" if settled else WAIT
+    script = script_refusal(result.job, [cut.request for cut in result.cuts])
     return [
         Export(name="job", href="/export/job", ready=True),
         Export(name="program", href="/export/program", ready=not program, why=program),
         Export(name="plan.json", href="/export/plan.json", ready=settled, why=files),
         Export(name="trajectory.csv", href="/export/trajectory.csv", ready=settled, why=files),
+        Export(name="script", href="/export/script", ready=not script, why=script),
         Export(name="report", href="/report", ready=settled, why=files),
     ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import TypeVarTuple
 
 from kerfpath.errors import InputError, KerfpathError
@@ -14,6 +15,7 @@ from kerfpath.job import (
     JobResult,
     PreparedJob,
     program_texts,
+    python_script,
     read_job,
     result_texts,
     with_loops,
@@ -37,7 +39,7 @@ from kerfpath.studio._asks import (
     TextOf,
 )
 from kerfpath.studio._document import Change, Document
-from kerfpath.studio._exports import WAIT, in_language, program_text
+from kerfpath.studio._exports import WAIT, File, in_language, program_text
 from kerfpath.studio._hub import Hub, Page
 from kerfpath.studio._job_entry import faults_of, job_message
 from kerfpath.studio._kept import Kept
@@ -134,6 +136,21 @@ class Session:
         if self._files is None or self._files[0] is not planned.result:
             self._files = planned.result, await asyncio.to_thread(result_texts, planned.result)
         return self._files[1]
+
+    async def script(self) -> File:
+        """Return the job as a Python script.
+
+        Raises
+        ------
+        InputError
+            The job as it is now is not planned yet, or has what a script has no lines for.
+        """
+        self._planned()
+        prepared, path = self._planning.prepared, self.document.path
+        assert prepared is not None
+        named = replace(prepared, job=replace(prepared.job, path=path))
+        text = await asyncio.to_thread(python_script, named)
+        return File(f"{path.stem}.py", "text/x-python", text.encode())
 
     def _planned(self) -> Outcome:
         planned = self._planning.result

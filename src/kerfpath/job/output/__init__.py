@@ -12,3 +12,5 @@ from kerfpath.job.output._files import stale_program as stale_program
 from kerfpath.job.output._files import write_result as write_result
 from kerfpath.job.output._places import ProgramPlaces as ProgramPlaces
 from kerfpath.job.output._places import program_places as program_places
+from kerfpath.job.output._script import python_script as python_script
+from kerfpath.job.output._script import script_refusal as script_refusal

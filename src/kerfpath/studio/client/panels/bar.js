@@ -109,15 +109,17 @@ function menu(store) {
 
 /** @param {string} path */
 const describe = (path) =>
-  path.includes("job")
-    ? "the job file, comments kept"
-    : path.includes("program")
-      ? "in the language of the job"
-      : path.includes("trajectory")
-        ? "one row for each node"
-        : path.includes("report")
-          ? "a page of its own"
-          : "";
+  path.includes("script")
+    ? "in Python: the same plans by the public functions"
+    : path.includes("job")
+      ? "the job file, comments kept"
+      : path.includes("program")
+        ? "in the language of the job"
+        : path.includes("trajectory")
+          ? "one row for each node"
+          : path.includes("report")
+            ? "a page of its own"
+            : "";
 
 /**
  * @param {Store} store

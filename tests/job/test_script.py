@@ -1,0 +1,88 @@
+"""A job as a Python script: run, it comes to what the run of the job comes to."""
+
+import json
+import runpy
+import shutil
+
+import pytest
+
+from jobs import CONTOURS, DEMO, HEAD, SMALL, WHOLE
+from kerfpath.errors import InputError
+from kerfpath.job import prepare, program_texts, python_script, read_job, run_job
+
+QUICK = SMALL.replace("[plan]", "[plan]\ncertify = false")
+SHAPED = HEAD + CONTOURS.replace('start = "best"\ncandidates = 2\n', "").replace(
+    'direction = "best"', 'direction = "reversed"'
+)
+FEATURES = (
+    SHAPED
+    + """\
+[plan]
+gamma_step_deg = 10
+posture = "front/up"
+certify = false
+weights = [0.3, 0.3, 0.3, 0.2, 0.2, 0.1]
+method = "exact"
+[comfort]
+wrist_margin_deg = 2
+[audit]
+path_tolerance_mm = 0.5
+axis_tolerance_deg = 3
+[program]
+language = "rapid"
+name = "shaped"
+pierce_time_s = 0.2
+"""
+)
+"""Leads, a kerf, joints, corners, weights and margins."""
+
+
+def scripted(folder, text):
+    """The job of a text beside the part of the demo, and its script there."""
+    shutil.copy(DEMO / "b_pillar.step", folder)
+    path = folder / "job.toml"
+    path.write_text(text)
+    job = read_job(path)
+    script = folder / "job.py"
+    script.write_text(python_script(prepare(job)))
+    return job, script
+
+
+@pytest.mark.parametrize("text", [QUICK, FEATURES], ids=["plain", "features"])
+def test_the_script_comes_to_the_plans_and_the_program_of_the_job(tmp_path, text):
+    job, script = scripted(tmp_path, text)
+    made = runpy.run_path(str(script))
+    result = run_job(job)
+    assert [plan.name for plan in made["plans"]] == [cut.name for cut in result.cuts]
+    for plan, cut in zip(made["plans"], result.cuts, strict=True):
+        # The same numbers go the same way.
+        assert plan.cost == pytest.approx(cut.plan.cost, rel=1e-9)
+        assert plan.q == pytest.approx(cut.plan.q, abs=1e-9)
+    texts = program_texts(result)
+    for name in texts.program:
+        assert (tmp_path / "out" / name).read_text() == texts.files[name]
+
+
+def test_the_script_says_units_and_keeps_what_the_job_says(tmp_path):
+    _, script = scripted(tmp_path, QUICK)
+    text = script.read_text()
+    assert "gamma_step=np.radians(3)" in text
+    assert "acceleration=np.radians([320, 270, 420, 1300, 1400, 2000])" in text
+    assert "path.resample(spacing=1 * MM)" in text
+    assert "3 * M_MIN" in text
+    assert max(map(len, text.splitlines())) < 110
+
+
+def test_names_cannot_become_code(tmp_path):
+    name = """x\"\"\" # ' \\ {y} é"""
+    text = QUICK.replace('name = "slot"', f"name = {json.dumps(name)}")
+    job, script = scripted(tmp_path, text)
+    assert name in [spec.name for spec in job.contours]
+    made = runpy.run_path(str(script))
+    assert [plan.name for plan in made["plans"]] == [spec.name for spec in job.contours]
+
+
+def test_what_a_script_has_no_lines_for_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"\[sequence\].*best") as refused:
+        scripted(tmp_path, WHOLE)
+    assert "\n" not in str(refused.value)
