@@ -8,8 +8,9 @@ import { byId, el, icon } from "../dom.js";
 /**
  * @param {Store} store
  * @param {Link} connection
+ * @param {import("../scene/record.js").Extra[]} extras  files that the page makes itself
  */
-export function topBar(store, connection) {
+export function topBar(store, connection, extras) {
   const send = (/** @type {string} */ type) => () => void connection.send({ type });
   const buttons = /** @type {const} */ ([
     ["undo", "undo", ""],
@@ -23,7 +24,7 @@ export function topBar(store, connection) {
   byId("export").append(icon("export"), "Export");
   byId("open-text").append(icon("file"), "Job file");
   byId("open-program").append(icon("file"), "Program");
-  menu(store);
+  menu(store, extras);
   store.on(["job", "connection", "outcome"], draw);
   draw();
 
@@ -46,8 +47,11 @@ export function topBar(store, connection) {
   }
 }
 
-/** @param {Store} store */
-function menu(store) {
+/**
+ * @param {Store} store
+ * @param {import("../scene/record.js").Extra[]} extras
+ */
+function menu(store, extras) {
   const [button, list] = [byId("export"), byId("export-menu")];
   const show = (/** @type {boolean} */ open) => {
     list.hidden = !open;
@@ -83,8 +87,14 @@ function menu(store) {
               el("small", {}, "Files can be taken along once every contour is planned."),
             ),
           ]),
+      ...extras.map(({ name, about, why, make }) => {
+        const [bar, says] = [why(), el("small", {}, why() || about)];
+        return bar
+          ? el("div", { class: "off" }, name, says)
+          : el("button", { class: "entry", onclick: make }, name, says);
+      }),
     );
-    /** @type {HTMLElement | null} */ (list.querySelector("a"))?.focus();
+    /** @type {HTMLElement | null} */ (list.querySelector("a, button"))?.focus();
   };
   button.addEventListener("click", () => show(Boolean(list.hidden)));
   document.addEventListener("pointerdown", (event) => {
@@ -96,8 +106,8 @@ function menu(store) {
       show(false);
       button.focus();
     }
-    const links = [...list.querySelectorAll("a")];
-    const at = links.indexOf(/** @type {HTMLAnchorElement} */ (document.activeElement));
+    const links = /** @type {HTMLElement[]} */ ([...list.querySelectorAll("a, button")]);
+    const at = links.indexOf(/** @type {HTMLElement} */ (document.activeElement));
     const to = { ArrowDown: at + 1, ArrowUp: at - 1 }[event.key];
     if (to !== undefined) {
       links[(to + links.length) % links.length]?.focus();

@@ -42,6 +42,8 @@ export class Stage {
     this.sun = new DirectionalLight(0xffffff, 1.7);
     this.scene.add(this.sky, this.sun, this.camera);
     this.size = new Vector2();
+    /** Called with each frame, while it can be copied. @type {() => void} */
+    this.drawn = () => {};
     this.waiting = false;
     this.frames = 0;
     this.cost = 0;
@@ -68,6 +70,7 @@ export class Stage {
     const begin = performance.now();
     this.sun.position.copy(this.camera.position).add(new Vector3(0.6, -0.4, 1.6));
     this.renderer.render(this.scene, this.camera);
+    this.drawn();
     this.cost = performance.now() - begin;
     this.frames++;
   }
