@@ -75,7 +75,11 @@ class Hub:
         kind, text = str(getattr(message, "type", "")), message.model_dump_json()
         contour = getattr(message, "contour", None)
         key: object = kind
-        if kind in ("plan", "nopath"):
+        if kind == "clearance":
+            name = f"clearance {getattr(message, 'name', '')}"
+            self._of_contour.setdefault(str(contour), OrderedDict())[name] = text
+            key = contour, name
+        elif kind in ("plan", "nopath"):
             key = self._keep(str(contour), kind, message, text)
         else:
             self._last[kind] = text

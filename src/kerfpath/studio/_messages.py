@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from kerfpath.studio._clearance_messages import ClearanceMessage
 from kerfpath.studio._numbers import Message, Numbers
 from kerfpath.studio._part_messages import FaceEntry, LoopEntry, PartMessage
 from kerfpath.studio._program_messages import FileEntry, FindingEntry, ProgramTextMessage
@@ -11,6 +12,7 @@ from kerfpath.studio._program_messages import FileEntry, FindingEntry, ProgramTe
 __all__ = [
     "BodyEntry",
     "CheckEntry",
+    "ClearanceMessage",
     "CodeLayer",
     "ContourEntry",
     "ContourName",

@@ -24,12 +24,14 @@ from kerfpath.job import (
 )
 from kerfpath.plans import Plan
 from kerfpath.studio._bench import Bench
+from kerfpath.studio._clearance import clearance_message
 from kerfpath.studio._clock import cycle_of, program_message
 from kerfpath.studio._exports import exports_of
 from kerfpath.studio._fastest import fastest_message
 from kerfpath.studio._keys import motion_key, part_key, setup_key
 from kerfpath.studio._loops import part_message
 from kerfpath.studio._messages import (
+    ClearanceMessage,
     ErrorMessage,
     OutcomeMessage,
     ProgressMessage,
@@ -91,6 +93,7 @@ class Planning:
         self._before: tuple[str, dict[str, Plan]] = ("", {})
         """What drafts begin from: the motions of contours, and what they share."""
         self._scene, self._looked = "", ""
+        self._clearances: dict[str, ClearanceMessage] = {}
         self._part: tuple[str, Part] | None = None
         self.meshes = self._shown = Meshes()
         self.prepared: PreparedJob | None = None
@@ -202,6 +205,7 @@ class Planning:
         self._look_ahead(prepared, revision, run)
         self._settle(run.ordered(tried), revision, settled=False)
         assert self.result is not None
+        self._measure(self.result, stop)
         self._settle(run.settled(self.result.result, first), revision, settled=True)
         self._say(ProgressMessage(busy=False))
 
@@ -209,6 +213,24 @@ class Planning:
         """Keep and say what a revision comes to."""
         self.result = Outcome(revision, result, settled)
         self._say(_outcome(result, revision, settled=settled))
+
+    def _measure(self, found: Outcome, stop: Stop) -> None:
+        """Say how near the robot comes to what stands in its cell, where there is one."""
+        cell, known = found.result.cell, self._clearances
+        self._clearances = {}
+        if cell is None:
+            return
+        setup = setup_key(found.result.job)
+        self._say(ProgressMessage(busy=True, label="distances in the cell"))
+        for cut in found.result.cuts:
+            if cut.plan is None:
+                continue
+            key = f"{setup} {cut.plan.name} {hash(cut.plan.q.tobytes())}"
+            made = known.get(key) or clearance_message(cell, cut, found.revision, stop)
+            if made is None:
+                continue
+            self._clearances[key] = made.model_copy(update={"revision": found.revision})
+            self._say(self._clearances[key])
 
     def _look_ahead(self, prepared: PreparedJob, revision: int, run: Run) -> None:
         """Say what forbids a program whatever the plans are, once for each job."""

@@ -159,6 +159,18 @@
  * @property {number} seconds
  */
 
+/**
+ * @typedef {object} ClearanceMessage
+ * @property {"clearance"} type
+ * @property {number} revision
+ * @property {string} contour
+ * @property {string} name
+ * @property {(number | null)[]} distance
+ * @property {(number | null)[]} over
+ * @property {number[]} pair
+ * @property {string[][]} pairs
+ */
+
 /** @typedef {{label: string, edits: Edit[]}} Relaxation */
 
 /**
@@ -290,7 +302,7 @@
 /** @typedef {{type: "error", message: string, about: string | null}} ErrorMessage */
 
 /**
- * @typedef {JobMessage | PartMessage | SceneMessage | ProgressMessage | PlanMessage | NoPathMessage
+ * @typedef {JobMessage | PartMessage | ClearanceMessage | SceneMessage | ProgressMessage | PlanMessage | NoPathMessage
  *   | ProgramMessage | OutcomeMessage | MapMessage | PoseMessage | FastestMessage
  *   | ProgramTextMessage | KeptMessage | ErrorMessage} ServerMessage
  */

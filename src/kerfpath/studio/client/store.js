@@ -6,7 +6,7 @@
 /** @typedef {import("./messages.js").MapMessage} MapMessage */
 
 /**
- * @typedef {"connection" | "job" | "part" | "pointed" | "scene" | "plan" | "program" | "outcome" | "progress" | "map"
+ * @typedef {"connection" | "job" | "part" | "pointed" | "clearance" | "scene" | "plan" | "program" | "outcome" | "progress" | "map"
  *   | "pose" | "fastest" | "program_text" | "error" | "selected" | "kept" | "compare"} Topic
  */
 
@@ -49,6 +49,8 @@ export class Store {
     this.asked = new WeakMap();
     /** @type {Map<string, NoPathMessage>} */
     this.nopaths = new Map();
+    /** @type {Map<string, import("./messages.js").ClearanceMessage>} by the names of plans */
+    this.clearances = new Map();
     /** @type {Map<string, MapMessage>} */
     this.maps = new Map();
     /** @type {string | null} the loop whose contour is chosen once there is one */
@@ -152,6 +154,9 @@ export class Store {
       case "nopath":
         this.takeNoPath(message);
         return;
+      case "clearance":
+        this.clearances.set(message.name, message);
+        break;
       case "map":
         this.maps.set(message.contour, message);
         break;
@@ -227,6 +232,16 @@ export class Store {
     const both = [this.plans.get(contour)?.[0], this.before.get(contour)?.[0]];
     const [now, before] = both.map((plan) => plan && this.asked.get(plan));
     return now !== undefined && now === before;
+  }
+
+  /**
+   * Return the distances along a plan, or null where they are not known yet.
+   * @param {PlanMessage} plan
+   */
+  clearanceOf(plan) {
+    const known = this.clearances.get(plan.name);
+    const fits = known?.contour === plan.contour && known.pair.length === plan.time.length;
+    return fits && known.revision >= plan.revision ? known : null;
   }
 
   /** @param {NoPathMessage} answer */

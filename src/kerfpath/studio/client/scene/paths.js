@@ -10,13 +10,14 @@ import { alongScale } from "./scale.js";
 
 /** @typedef {import("../messages.js").PlanMessage} PlanMessage */
 /** @typedef {import("../timeline.js").Timeline} Timeline */
-/** @typedef {"kind" | "speed" | "load"} ColourBy */
+/** @typedef {"kind" | "speed" | "load" | "clearance"} ColourBy */
 
 /**
  * A line through nodes as the scene draws it: of a plan, or of a contour without one.
  * @typedef {object} Track
  * @property {string} contour
  * @property {PlanMessage | null} plan
+ * @property {number[] | null} clearance  K, m, where it is known
  * @property {number[]} points  K 3
  * @property {string[]} kind
  */
@@ -44,6 +45,9 @@ export function line(width, more = {}) {
   made.userData.width = width;
   return made;
 }
+
+/** m: distances from here on are coloured alike. */
+export const FAR = 0.2;
 
 export class Paths {
   constructor() {
@@ -102,16 +106,22 @@ export class Paths {
    */
   colour(by = this.by) {
     this.by = by;
-    const values = this.tracks.flatMap(({ plan }) => (plan ? valuesOf(plan, by) : []));
-    this.range = by === "load" ? [0, 1] : [Math.min(...values), Math.max(...values)];
+    const values = this.tracks.flatMap((track) => valuesOf(track, by) ?? []);
+    this.range =
+      by === "load"
+        ? [0, 1]
+        : by === "clearance"
+          ? [0, FAR]
+          : [least(values), -least(values.map((v) => -v))];
     if (!this.tracks.length) return;
     const waiting = new Color(themeColour("--moving"));
     /** @type {number[]} */
     const colours = [];
-    for (const { plan, points, kind } of this.tracks) {
-      const shown = plan && by !== "kind" ? valuesOf(plan, by) : null;
+    for (const track of this.tracks) {
+      const { plan, points, kind } = track;
+      const shown = plan && by !== "kind" ? valuesOf(track, by) : null;
       const at = (/** @type {number} */ k) =>
-        !plan
+        !plan || (by !== "kind" && !shown)
           ? waiting
           : shown
             ? alongScale(
@@ -199,11 +209,20 @@ export class Paths {
   }
 }
 
+/** @param {number[]} values */
+const least = (values) => values.reduce((low, value) => Math.min(low, value), Infinity);
+
 /**
- * @param {PlanMessage} plan
+ * @param {Track} track
  * @param {ColourBy} by
  */
-const valuesOf = (plan, by) => (by === "speed" ? plan.speed : plan.joint_load);
+function valuesOf({ plan, clearance }, by) {
+  // What overlaps has the colour of what is too much; all that is far has one colour.
+  if (by === "clearance")
+    return clearance?.map((each) => (each < 0 ? 2 * FAR : Math.min(each, FAR))) ?? null;
+  if (!plan) return null;
+  return by === "speed" ? plan.speed : plan.joint_load;
+}
 
 /**
  * Return the segments between successive points.

@@ -5,9 +5,10 @@ import { Box3, Vector3 } from "three";
 import { byId, el, icon } from "../dom.js";
 import { fixed, percent } from "../format.js";
 import { Machine } from "./machine.js";
+import { legend } from "./legend.js";
+import { Near } from "./near.js";
 import { Picking } from "./picking.js";
 import { Paths } from "./paths.js";
-import { SCALE_GRADIENT } from "./scale.js";
 import { Stage } from "./stage.js";
 
 /** @typedef {import("../store.js").Store} Store */
@@ -33,6 +34,7 @@ export class SceneView {
     this.paths = new Paths();
     this.stage.scene.add(this.machine.group, this.machine.ghost, this.paths.group);
     this.picking = new Picking(this, connection);
+    this.near = new Near(this);
     this.built = "";
     this.ready = false;
     this.follow = false;
@@ -52,7 +54,7 @@ export class SceneView {
   bind() {
     const { store, player, canvas } = this;
     store.on(["scene"], () => this.build());
-    store.on(["scene", "plan"], () => this.draw());
+    store.on(["scene", "plan", "clearance"], () => this.draw());
     store.on(["selected", "plan"], () => this.mark());
     store.on(["connection", "job", "progress"], () => this.state());
     player.on((moment) => this.show(moment));
@@ -157,8 +159,14 @@ export class SceneView {
     for (const { name: contour, points, kind } of scene?.contours ?? []) {
       const found = plans.get(contour) ?? [];
       for (const plan of found)
-        tracks.push({ contour, plan, points: plan.points, kind: plan.kind });
-      if (!found.length) tracks.push({ contour, plan: null, points, kind });
+        tracks.push({
+          contour,
+          plan,
+          points: plan.points,
+          kind: plan.kind,
+          clearance: this.near.along(plan),
+        });
+      if (!found.length) tracks.push({ contour, plan: null, points, kind, clearance: null });
     }
     this.paths.load(tracks);
     this.paths.choose(this.store.selected);
@@ -188,6 +196,7 @@ export class SceneView {
     this.paths.shine(cutting ? tip : null);
     this.paths.cutUntil(moment?.t ?? 0);
     const at = new Vector3(tip[3], tip[7], tip[11]);
+    this.near.show(this.paths.by === "clearance" ? moment : null, at);
     if (this.follow && moment) {
       if (this.carried) this.stage.carry(at.clone().sub(this.carried));
       this.carried = at;
@@ -305,31 +314,7 @@ export class SceneView {
 
   /** Say what the colours of the contours mean. */
   scale() {
-    const { by, range } = this.paths;
-    const key = (/** @type {string} */ colour, /** @type {string} */ text) => {
-      const chip = el("i", { class: "key" });
-      chip.style.background = `var(${colour})`;
-      return el("span", { class: "chip" }, chip, text);
-    };
-    const kinds = new Set(this.paths.tracks.flatMap(({ plan, kind }) => (plan ? kind : [])));
-    const shown = [];
-    if (by === "kind") {
-      shown.push(key("--kerf", "cut so far"));
-      if ([...kinds].some((kind) => kind.startsWith("lead"))) shown.unshift(key("--lead", "lead"));
-      if ([...kinds].some((kind) => kind !== "cut" && !kind.startsWith("lead")))
-        shown.unshift(key("--other", "other"));
-      shown.unshift(key("--cut", "cut"));
-    } else {
-      const strip = el("i", { class: "ramp" });
-      strip.style.background = SCALE_GRADIENT;
-      const [low, high] =
-        by === "load" ? ["0", "100 % of limit"] : range.map((each) => fixed(each * 60, 1));
-      if (Number.isFinite(range[0]))
-        shown.unshift(
-          el("span", { class: "chip" }, low, strip, by === "load" ? high : `${high} m/min`),
-        );
-    }
-    byId("scale").replaceChildren(...shown);
+    byId("scale").replaceChildren(...legend(this.paths, this.near.why()));
   }
 
   /** Say what is going on while there is nothing to see. */

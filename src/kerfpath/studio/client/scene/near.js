@@ -1,0 +1,107 @@
+/** What comes nearest to what: the two bodies lit, and their distance written beside the tip. */
+
+import { Color, Mesh, MeshBasicMaterial, Vector3 } from "three";
+
+import { byId, el, themeColour } from "../dom.js";
+import { millimetres } from "../format.js";
+import { creased, mesh } from "./meshes.js";
+
+/** @typedef {import("../messages.js").PlanMessage} PlanMessage */
+/** @typedef {import("../timeline.js").Moment} Moment */
+/** @typedef {import("./view.js").SceneView} SceneView */
+
+export class Near {
+  /** @param {SceneView} view */
+  constructor(view) {
+    this.view = view;
+    this.label = byId("near");
+    this.at = new Vector3();
+    this.material = new MeshBasicMaterial({ transparent: true, opacity: 0.45, depthWrite: false });
+    /** @type {Mesh[]} */
+    this.lit = [];
+    this.shown = "";
+    view.stage.controls.addEventListener("change", () => this.place());
+  }
+
+  /**
+   * Return the distances along a plan in m, or null where they are not known.
+   * @param {PlanMessage} plan
+   */
+  along(plan) {
+    const known = this.view.store.clearanceOf(plan);
+    return known && known.distance.map((each) => each ?? Infinity);
+  }
+
+  /** Say why there are no distances. */
+  why() {
+    return this.view.store.scene?.cell
+      ? "distances are measured once all contours are planned"
+      : "the job has no [cell]: nothing is measured";
+  }
+
+  /**
+   * Light the pair that is nearest at a moment, and say how far it is apart; null: none.
+   * @param {Moment | null} moment
+   * @param {Vector3} at  the tip
+   */
+  show(moment, at) {
+    const plan = moment?.span.plan;
+    const known = plan && this.view.store.clearanceOf(plan);
+    const k = moment?.node ?? 0;
+    const distance = known ? known.distance[k] : null;
+    this.label.hidden = !known || distance === null;
+    const pair = known && distance !== null ? known.pairs[known.pair[k]] : [];
+    this.light(pair);
+    if (!known || distance === null) return;
+    const [one, other] = pair;
+    const over = known.over[k] ?? 0;
+    this.label.classList.toggle("bad", over <= 0);
+    this.label.replaceChildren(
+      el("b", {}, millimetres(distance)),
+      `: ${one} \u2013 ${other}`,
+      over <= 0 ? el("small", {}, " nearer than it must be") : "",
+    );
+    this.at.copy(at);
+    this.place();
+  }
+
+  /** Put the label beside the tip. */
+  place() {
+    if (this.label.hidden) return;
+    const { stage, canvas } = this.view;
+    stage.camera.updateMatrixWorld();
+    const { x, y } = stage.project(this.at);
+    const right = Math.min(Math.max(x + 18, 8), canvas.clientWidth - this.label.offsetWidth - 8);
+    const top = Math.min(Math.max(y - 44, 8), canvas.clientHeight - this.label.offsetHeight - 8);
+    this.label.style.transform = `translate(${right}px, ${top}px)`;
+  }
+
+  /**
+   * Light bodies by their names; the part is drawn as one.
+   * @param {string[]} names
+   */
+  async light(names) {
+    const key = names.join("\n");
+    if (key === this.shown) return;
+    this.shown = key;
+    const { machine, store, stage } = this.view;
+    for (const each of this.lit.splice(0)) {
+      each.removeFromParent();
+      each.geometry.dispose();
+    }
+    this.material.color = new Color(themeColour("--caution-line"));
+    const bodies = (store.scene?.bodies ?? []).filter(({ name }) => names.includes(name));
+    const made = await Promise.all(
+      bodies.map(async (body) => creased(await mesh(body.mesh)).faces),
+    );
+    if (key !== this.shown) return made.forEach((each) => each.dispose());
+    bodies.forEach(({ frame }, i) => {
+      const lit = new Mesh(made[i], this.material);
+      lit.renderOrder = 8;
+      machine.frames[frame]?.add(lit);
+      this.lit.push(lit);
+    });
+    stage.invalidate();
+    return undefined;
+  }
+}

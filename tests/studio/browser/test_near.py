@@ -1,0 +1,42 @@
+"""Contours by clearance: the nearest pair is lit, and its distance stands beside the tip."""
+
+from studio.browser.test_page import ready, serious, until
+
+
+def test_the_nearest_pair_is_said_and_lit_where_the_robot_is(page, studio, first):
+    studio.open(*first)
+    ready(page)
+    by = page.locator("#colour-by")
+    by.select_option("clearance")
+    assert "no [cell]" in page.locator("#scale").inner_text()
+    plan = next(m for m in first if m["type"] == "plan" and m["contour"] == "slot")
+    count = len(plan["time"])
+    pairs = [["link 3", "part"], ["head", "part"]]
+    half = [int(k > count / 2) for k in range(count)]
+    studio.say(
+        {
+            "type": "clearance",
+            "revision": 1,
+            "contour": "slot",
+            "name": plan["name"],
+            "distance": [(0.0123, 0.004)[k] for k in half],
+            "over": [(0.0073, -0.001)[k] for k in half],
+            "pair": half,
+            "pairs": pairs,
+        }
+    )
+    until(page, lambda: "200 mm and more" in page.locator("#scale").inner_text())
+    go = """(share) => {
+        const span = studio.player.timeline.spans.find((s) => s.plan?.contour === "slot");
+        studio.player.seek(span.begin + share * (span.end - span.begin));
+    }"""
+    page.evaluate(go, 0.2)
+    label = page.locator("#near")
+    assert label.inner_text() == "12.3 mm: link 3 \u2013 part"
+    until(page, lambda: page.evaluate("() => studio.view.near.lit.length") == 2)
+    page.evaluate(go, 0.9)
+    assert label.inner_text() == "4.0 mm: head \u2013 part nearer than it must be"
+    assert serious(page) == []
+    by.select_option("kind")
+    assert label.is_hidden()
+    until(page, lambda: page.evaluate("() => studio.view.near.lit.length") == 0)
