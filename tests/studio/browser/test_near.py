@@ -40,3 +40,27 @@ def test_the_nearest_pair_is_said_and_lit_where_the_robot_is(page, studio, first
     by.select_option("kind")
     assert label.is_hidden()
     until(page, lambda: page.evaluate("() => studio.view.near.lit.length") == 0)
+
+
+def test_ghosts_stay_where_the_robot_was_until_they_are_cleared(page, studio, first):
+    studio.open(*first)
+    ready(page)
+    poses = """() => studio.view.ghosts.group.children.map(
+        (ghost) => ghost.children.map(({ matrix }) => [...matrix.elements])
+    )"""
+    robot = "() => studio.view.machine.frames.map(({ matrix }) => [...matrix.elements])"
+    stood = []
+    for share in (0.2, 0.6):
+        page.evaluate("(s) => studio.player.seek(s * studio.player.timeline.total)", share)
+        stood.append(page.evaluate(robot))
+        page.keyboard.press("g")
+    assert page.evaluate(poses) == stood
+    page.locator("#ghost-keep").click()
+    assert page.evaluate("() => studio.view.ghosts.group.children.length") == 3
+    clear = page.get_by_role("button", name="Clear 3 ghosts")
+    clear.click()
+    assert page.evaluate(poses) == []
+    assert clear.is_hidden()
+    for _ in range(8):
+        page.locator("#ghost-keep").click()
+    assert page.evaluate("() => studio.view.ghosts.group.children.length") == 6

@@ -119,6 +119,7 @@ document.addEventListener("keydown", (event) => {
     else player.step(direction);
     event.preventDefault();
   } else if (key === "f" && target === document.body) view.look("fit");
+  else if (key === "g" && target === document.body) view.ghosts.keep();
 });
 
 connection.open();

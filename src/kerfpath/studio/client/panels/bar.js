@@ -139,7 +139,7 @@ export function foot(store, connection) {
   const [link, doing, cancel] = [byId("link"), byId("doing"), byId("cancel")];
   const bar = byId("bar", HTMLProgressElement);
   cancel.addEventListener("click", () => void connection.send({ type: "cancel" }));
-  byId("hint").textContent = "Space plays, arrow keys step, F fits the view";
+  byId("hint").textContent = "Space plays, arrow keys step, F fits the view, G keeps a ghost";
   store.on(["connection", "progress", "job"], draw);
   draw();
 

@@ -5,6 +5,7 @@ import { Box3, Vector3 } from "three";
 import { byId, el, icon } from "../dom.js";
 import { fixed, percent } from "../format.js";
 import { Machine } from "./machine.js";
+import { Ghosts } from "./ghosts.js";
 import { legend } from "./legend.js";
 import { Near } from "./near.js";
 import { Picking } from "./picking.js";
@@ -35,6 +36,7 @@ export class SceneView {
     this.stage.scene.add(this.machine.group, this.machine.ghost, this.paths.group);
     this.picking = new Picking(this, connection);
     this.near = new Near(this);
+    this.ghosts = new Ghosts(this);
     this.built = "";
     this.ready = false;
     this.follow = false;
@@ -71,7 +73,10 @@ export class SceneView {
       this.label.hidden = true;
       if (this.picking.menu.hidden) this.picking.hover(null);
     });
-    canvas.addEventListener("keydown", (event) => event.key === "f" && this.look("fit"));
+    canvas.addEventListener("keydown", ({ key, ctrlKey, metaKey }) => {
+      if (key === "f") this.look("fit");
+      if (key === "g" && !ctrlKey && !metaKey) this.ghosts.keep();
+    });
     for (const button of document.querySelectorAll("[data-view]")) {
       const { view } = /** @type {HTMLElement} */ (button).dataset;
       if (view === "fit") button.append(icon("fit"));
@@ -127,6 +132,7 @@ export class SceneView {
     const first = this.built === "";
     this.built = key;
     try {
+      this.ghosts.clear();
       await this.machine.build(scene);
       this.trouble = "";
     } catch (fault) {
@@ -359,6 +365,7 @@ export class SceneView {
     this.machine.paint();
     this.paths.paint();
     this.picking.loops.paint();
+    this.ghosts.paint();
     this.lay();
     this.scale();
     this.stage.invalidate();
