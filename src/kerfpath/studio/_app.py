@@ -17,7 +17,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kerfpath.errors import KerfpathError
-from kerfpath.studio._asks import OfContour, ReasonOf, TextOf, parse
+from kerfpath.studio._asks import OfContour, PointOf, ReasonOf, TextOf, parse
 from kerfpath.studio._document import Document
 from kerfpath.studio._exports import File, zipped
 from kerfpath.studio._guard import Guard
@@ -189,7 +189,10 @@ async def _socket(socket: WebSocket) -> None:
             except ValidationError as error:
                 page.say(ErrorMessage(message=_not_understood(error)))
                 continue
-            if isinstance(ask, OfContour | ReasonOf | TextOf) and len(looking) < MOST_LOOKS:
+            if (
+                isinstance(ask, OfContour | PointOf | ReasonOf | TextOf)
+                and len(looking) < MOST_LOOKS
+            ):
                 # What takes a while and changes nothing does not keep changes waiting.
                 look = asyncio.create_task(session.hear(ask, page))
                 looking.add(look)

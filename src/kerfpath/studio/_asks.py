@@ -11,11 +11,13 @@ __all__ = [
     "Cut",
     "Edit",
     "Edits",
+    "FrontOf",
     "Keep",
     "Leave",
     "OfContour",
     "OfKept",
     "Plain",
+    "PointOf",
     "ReasonOf",
     "Relax",
     "Rename",
@@ -152,6 +154,23 @@ class OfKept(_Strict):
     id: Index
 
 
+class FrontOf(_Strict):
+    """Look for the Pareto set of a contour."""
+
+    type: Literal["front"]
+    contour: Words
+    criteria: Annotated[tuple[Words, ...], Field(min_length=2, max_length=5, strict=False)]
+    runs: Annotated[int, Field(ge=10, le=1000)]
+
+
+class PointOf(_Strict):
+    """The motion of a point of the Pareto set."""
+
+    type: Literal["point"]
+    contour: Words
+    number: Index
+
+
 class TextOf(_Strict):
     """The program as text."""
 
@@ -173,6 +192,8 @@ Ask = (
     | Keep
     | Rename
     | OfKept
+    | FrontOf
+    | PointOf
     | TextOf
 )
 """What a page may say."""

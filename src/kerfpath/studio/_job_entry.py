@@ -10,6 +10,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from kerfpath.errors import InputError
+from kerfpath.front import CRITERIA
 from kerfpath.job import Job, JobFile
 from kerfpath.post import languages
 from kerfpath.robots import Robot
@@ -105,6 +106,7 @@ def _choices() -> dict[str, list[str]]:
     """Return the words that each key takes which takes some of a few."""
     found: dict[str, list[str]] = {}
     _gather(JobFile, (), found)
+    found["pareto.criteria"] = list(CRITERIA)
     found["program.language"] = [*sorted(languages()), "none"]
     return found
 

@@ -23,13 +23,17 @@ from kerfpath.job import (
     warm_up,
 )
 from kerfpath.plans import Plan
+from kerfpath.studio._asks import FrontOf, PointOf
 from kerfpath.studio._bench import Bench
 from kerfpath.studio._clearance import clearance_message
 from kerfpath.studio._clock import cycle_of, program_message
+from kerfpath.studio._decide_messages import CandidateMessage
 from kerfpath.studio._exports import exports_of
 from kerfpath.studio._fastest import fastest_message
+from kerfpath.studio._front import Fronts
 from kerfpath.studio._keys import motion_key, part_key, setup_key
 from kerfpath.studio._loops import part_message
+from kerfpath.studio._map import map_id
 from kerfpath.studio._messages import (
     ClearanceMessage,
     ErrorMessage,
@@ -90,6 +94,7 @@ class Planning:
         self._runs = Newest("run", self._failed)
         self._drafts = Newest("draft", self._failed)
         self._speeds = Newest("speed", self._failed)
+        self._fronts = Fronts(say, self._failed)
         self._before: tuple[str, dict[str, Plan]] = ("", {})
         """What drafts begin from: the motions of contours, and what they share."""
         self._scene, self._looked = "", ""
@@ -102,6 +107,7 @@ class Planning:
 
     def take(self, job: Job, revision: int, first: str | None) -> None:
         """Plan a job in place of any other, one of its contours first."""
+        self._fronts.cancel()
         hurry = Event()
         if first is not None and motion_key(job) == self._before[0] and first in self._before[1]:
             self._drafts.ask(partial(self._draft, job, revision, first, hurry))
@@ -147,15 +153,40 @@ class Planning:
 
         self._speeds.ask(work)
 
+    def front(self, ask: FrontOf, revision: int) -> None:
+        """Look for the Pareto set of a contour.
+
+        Raises
+        ------
+        InputError
+            It is not planned yet.
+        """
+        planned = self.result
+        cuts = self.cuts.get(ask.contour)
+        if planned is None or planned.revision != revision or self.prepared is None or not cuts:
+            raise InputError("front: the job as it is now is not planned yet; wait until it is")
+        self._fronts.look(self.prepared, cuts[0], ask.criteria, ask.runs, revision)
+
+    def candidate(self, ask: PointOf) -> CandidateMessage:
+        """Return the motion of a point of that set.
+
+        Raises
+        ------
+        InputError
+            There is none; the contour is not planned.
+        """
+        _, _, _, graph = self.whole(ask.contour)
+        return self._fronts.candidate(ask.contour, ask.number, map_id(graph))
+
     def cancel(self) -> None:
         """Stop whatever is being done."""
-        for each in (self._drafts, self._runs, self._speeds):
+        for each in (self._drafts, self._runs, self._speeds, self._fronts):
             each.cancel()
         self._say(ProgressMessage(busy=False))
 
     def close(self) -> None:
         """Stop for good."""
-        for each in (self._drafts, self._runs, self._speeds):
+        for each in (self._drafts, self._runs, self._speeds, self._fronts):
             each.close()
 
     def _draft(self, job: Job, revision: int, contour: str, hurry: Event, stop: Stop) -> None:

@@ -95,8 +95,9 @@ class Run:
             ]
             self._seconds[name] = perf_counter() - begun
             shown = next((c for c in tried[name] if all(cut.passed for cut in c)), tried[name][0])
-            self._show(shown)
+            # A page that hears of a plan asks for its map at once.
             took(name, shown)
+            self._show(shown)
         return [tried[request.task.name] for request in requests]
 
     def ordered(self, tried: Sequence[Sequence[tuple[CutResult, ...]]]) -> JobResult:

@@ -26,11 +26,13 @@ from kerfpath.studio._asks import (
     Cut,
     Edit,
     Edits,
+    FrontOf,
     Keep,
     Leave,
     OfContour,
     OfKept,
     Plain,
+    PointOf,
     ReasonOf,
     Relax,
     Rename,
@@ -196,6 +198,10 @@ class Session:
                 self._replace(without_contour(await self._job_now(), ask.index))
             case Keep() | Rename() | OfKept():
                 self._keep(ask)
+            case FrontOf():
+                self._planning.front(ask, self.document.revision)
+            case PointOf():
+                page.say(await asyncio.to_thread(self._planning.candidate, ask))
             case TextOf():
                 revision = self.document.revision
                 result, texts = await self.program(ask.language)

@@ -7,6 +7,7 @@ from kerfpath.study._job import digest as digest
 from kerfpath.study._job import load_job as load_job
 from kerfpath.study._pareto import JobFront as JobFront
 from kerfpath.study._pareto import pareto_of_job as pareto_of_job
+from kerfpath.study._pareto import problem_of_job as problem_of_job
 from kerfpath.study._pareto_files import Pick as Pick
 from kerfpath.study._pareto_files import axes_of as axes_of
 from kerfpath.study._pareto_files import plan_picked as plan_picked

@@ -12,6 +12,7 @@ import numpy as np
 
 from kerfpath._repr import short_repr
 from kerfpath.auditor import Check
+from kerfpath.cad import Part
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -32,7 +33,7 @@ from kerfpath.progress import Progress, no_progress
 from kerfpath.study._job import LoadedJob, digest, load_job
 from kerfpath.sweep import Result, Sweep
 
-__all__ = ["JobFront", "pareto_of_job"]
+__all__ = ["JobFront", "pareto_of_job", "problem_of_job"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -174,11 +175,35 @@ def _evaluation(result: Result) -> Evaluation | str:
 def _problem(path: str, digest_then: str, contour: str, criteria: tuple[str, ...]) -> ParetoProblem:
     """Return what the runs of a contour have in common, kept for the next task of a worker."""
     known = load_job(path, digest_then)
-    job, part = known.job, known.part
+    cell = cell_of_job(known.job, known.part)
+    return problem_of_job(known.job, known.part, contour, criteria, cell)
+
+
+def problem_of_job(
+    job: Job, part: Part, contour: str, criteria: Sequence[str], cell: Cell | None
+) -> ParetoProblem:
+    """Return what the runs of a contour of a job have in common.
+
+    Parameters
+    ----------
+    job : Job
+    part : Part
+        Its drawing.
+    contour : str
+        Name of one of its contours.
+    criteria : sequence of str
+        As in `kerfpath.pareto`.
+    cell : Cell or None
+        That of the job.
+
+    Raises
+    ------
+    InputError
+        Criteria that are none, or for which something is missing.
+    """
     task = next(task for task in job.tasks(part) if task.name == contour)
     drawn = task.candidates(part)[0]
     nodes = task.sample(drawn)
-    cell = cell_of_job(job, part)
     options = replace(job.options, feed="constant", refine=False, certify=None)
     home = None if job.sequence is None else job.sequence.home_deg
     home_rad = None if home is None else np.radians(home)

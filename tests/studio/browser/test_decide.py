@@ -1,4 +1,4 @@
-"""What one decides with: plans side by side, and a control for every option."""
+"""What one decides with: plans side by side, a control for every option, Pareto sets."""
 
 import json
 
@@ -122,3 +122,71 @@ def test_the_keys_of_the_controls_are_keys_of_the_job(page, studio, first, messa
             for part in way if way != ["contour"] else []:
                 table = table[part]
             assert last in table, key
+
+
+def pareto(plan, **more):
+    """A set of three points, of which the last is beaten, and the second is no job's."""
+    axes = [
+        {"name": "displacement", "words": "total displacement", "unit": "s", "better": "less"},
+        {"name": "velocity", "words": "peak velocity", "unit": "share", "better": "less"},
+        {"name": "limits", "words": "limits", "unit": "rad", "better": "more"},
+    ]
+    edits = [{"path": ["plan", "weights"], "value": [1, 2, 3, 4, 5, 6]}]
+    points = [
+        {"number": 0, "values": [1.0, 0.9, 0.5], "best": True, "edits": edits},
+        {"number": 4, "values": [2.0, 0.4, 0.6], "best": True, "edits": None},
+        {"number": 7, "values": [2.5, 0.95, 0.4], "best": False, "edits": edits},
+    ]
+    known = {"type": "front", "revision": plan["revision"], "contour": plan["contour"]}
+    known |= {"axes": axes, "points": points, "done": 10, "total": 10, "state": "done"}
+    return known | more
+
+
+def test_a_point_of_the_pareto_set_is_shown_and_taken(page, studio, first, messages):
+    plan = next(each for each in messages["plan"] if each["contour"] == "slot")
+    other = plan | {"gamma": [g + 0.5 for g in plan["gamma"]], "cost": 99.0, "passed": None}
+
+    def react(message):
+        if message["type"] == "front":
+            studio.say(pareto(plan))
+        elif message["type"] == "point":
+            number = message["number"]
+            studio.say({"type": "candidate", "contour": "slot", "number": number, "plan": other})
+
+    studio.react = react
+    studio.open(*(m | {"choices": m["choices"] | {"pareto.criteria": ["displacement", "velocity",
+                  "range", "limits"]}} if m["type"] == "job" else m for m in first))  # fmt: skip
+    ready(page)
+    page.locator("#contours button", has_text="slot").click()
+    page.get_by_text("Criteria and runs").click()
+    page.get_by_label("limits", exact=True).check()
+    page.locator("#front").get_by_role("button", name="Look for it").click()
+    page.get_by_text("2 plans that no other beats").wait_for()
+    asked = sent(studio, "front")[0]
+    assert asked["criteria"] == ["displacement", "velocity", "range", "limits"]
+    page.get_by_label("Criterion by colour").select_option("limits")
+    canvas = page.locator("canvas.scatter")
+    canvas.focus()
+    for _ in range(2):
+        page.keyboard.press("ArrowRight")
+    page.get_by_text("peak velocity 40.0 % limit").wait_for()
+    page.keyboard.press("Enter")
+    page.get_by_text("kerfpath pareto --pick").wait_for()  # it was held to what no job can say
+    assert page.get_by_role("button", name="Take it").count() == 0
+    assert page.locator("#cost").inner_text() == "99.00"
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("Enter")
+    take = page.get_by_role("button", name="Take it")
+    take.wait_for()
+    assert serious(page) == []
+    take.click()
+    until(page, lambda: sent(studio, "edits"))
+    assert sent(studio, "edits")[0]["edits"] == pareto(plan)["points"][0]["edits"]
+    page.get_by_role("button", name="Back to the job's plan").click()
+    assert page.evaluate("() => studio.store.plans.get('slot')[0].gamma[0]") == plan["gamma"][0]
+    # What the job is planned to be takes the place of a point that is shown.
+    canvas.focus()
+    page.keyboard.press("Enter")
+    until(page, lambda: page.evaluate("() => studio.store.candidate !== null"))
+    studio.say(plan | {"revision": plan["revision"] + 1})
+    until(page, lambda: page.evaluate("() => studio.store.candidate === null"))

@@ -6,6 +6,7 @@ import { MapView } from "./map/view.js";
 import { foot, notices, topBar } from "./panels/bar.js";
 import { comparePanel } from "./panels/compare.js";
 import { contourList } from "./panels/contours.js";
+import { frontPanel } from "./panels/front.js";
 import { jobSheet } from "./panels/jobtext.js";
 import { jointsPanel } from "./panels/joints.js";
 import { morePanel } from "./panels/more.js";
@@ -51,6 +52,7 @@ notices(store, connection);
 contourList(store);
 resultPanel(store, connection, view);
 comparePanel(store, connection, player, view);
+const front = frontPanel(store, connection);
 jointsPanel(store, connection);
 optionsPanel(store, connection);
 morePanel(store, connection, player);
@@ -62,6 +64,7 @@ theme(byId("theme"), icon, () => {
   view.paint();
   map.paint();
   plots.invalidate();
+  front.paint();
 });
 
 // Whoever watches sees the contour that is being cut; whoever chooses one goes there.

@@ -235,6 +235,28 @@
  * @property {boolean} settled
  */
 
+/**
+ * @typedef {object} FrontPoint
+ * @property {number} number
+ * @property {number[]} values  of the axes, in their units
+ * @property {boolean} best
+ * @property {Edit[] | null} edits
+ */
+
+/**
+ * @typedef {object} FrontMessage
+ * @property {"front"} type
+ * @property {number} revision
+ * @property {string} contour
+ * @property {{name: string, words: string, unit: string, better: "more" | "less"}[]} axes
+ * @property {FrontPoint[]} points
+ * @property {number} done
+ * @property {number} total
+ * @property {"running" | "done" | "stopped"} state
+ */
+
+/** @typedef {{type: "candidate", contour: string, number: number, plan: PlanMessage}} CandidateMessage */
+
 /** @typedef {{type: "kept", plans: KeptEntry[]}} KeptMessage */
 
 /**
@@ -304,7 +326,8 @@
 /**
  * @typedef {JobMessage | PartMessage | ClearanceMessage | SceneMessage | ProgressMessage | PlanMessage | NoPathMessage
  *   | ProgramMessage | OutcomeMessage | MapMessage | PoseMessage | FastestMessage
- *   | ProgramTextMessage | KeptMessage | ErrorMessage} ServerMessage
+ *   | ProgramTextMessage | KeptMessage | FrontMessage
+ *   | CandidateMessage | ErrorMessage} ServerMessage
  */
 
 /** @typedef {{type: string} & Record<string, unknown>} ClientMessage */

@@ -7,7 +7,8 @@
 
 /**
  * @typedef {"connection" | "job" | "part" | "pointed" | "clearance" | "scene" | "plan" | "program" | "outcome" | "progress" | "map"
- *   | "pose" | "fastest" | "program_text" | "error" | "selected" | "kept" | "compare"} Topic
+ *   | "pose" | "fastest" | "program_text" | "error" | "selected" | "kept" | "compare" | "front"
+ *   | "candidate"} Topic
  */
 
 /** @typedef {import("./messages.js").KeptEntry} KeptEntry */
@@ -59,6 +60,10 @@ export class Store {
     this.kept = [];
     /** @type {Against | null} the one of them that is compared */
     this.against = null;
+    /** @type {import("./messages.js").FrontMessage | null} */
+    this.front = null;
+    /** @type {{contour: string, number: number, own: PlanMessage[]} | null} shown in place of the job's plan */
+    this.candidate = null;
     /** @type {Course[]} of the chosen contour, to compare its own with */
     this.compare = [];
     /** @type {string | null} the chosen contour */
@@ -178,6 +183,12 @@ export class Store {
       case "program_text":
         this.programText = message;
         break;
+      case "front":
+        this.front = message;
+        break;
+      case "candidate":
+        this.propose(message);
+        return;
       case "kept":
         this.kept = message.plans;
         break;
@@ -188,8 +199,41 @@ export class Store {
     this.emit(message.type, message);
   }
 
+  /**
+   * Show a motion in place of the plan of its contour, until that is planned again.
+   * @param {import("./messages.js").CandidateMessage} message
+   */
+  propose({ contour, number, plan }) {
+    this.withdraw();
+    const own = this.plans.get(contour);
+    if (!own || own[0].revision !== plan.revision) return;
+    this.candidate = { contour, number, own };
+    this.asked.set(plan, `candidate ${number}`);
+    this.plans.set(contour, [plan]);
+    this.emit("plan", plan);
+    this.emit("candidate");
+  }
+
+  /** Show the job's own plan again. */
+  withdraw() {
+    if (!this.candidate) return;
+    const { contour, own } = this.candidate;
+    this.candidate = null;
+    this.plans.set(contour, own);
+    this.emit("plan", own[0]);
+    this.emit("candidate");
+  }
+
   /** @param {PlanMessage} plan */
   takePlan(plan) {
+    const { candidate } = this;
+    if (candidate?.contour === plan.contour && candidate.own[0].revision === plan.revision) {
+      // What is proved of the job's own plan comes while a point is looked at.
+      candidate.own = candidate.own.map((each) => (each.name === plan.name ? plan : each));
+      this.asked.set(plan, this.question(plan));
+      return;
+    }
+    if (candidate?.contour === plan.contour) this.withdraw();
     const held = this.plans.get(plan.contour) ?? [];
     this.asked.set(plan, this.question(plan));
     if (held.length && held[0].revision < plan.revision) {
@@ -246,6 +290,7 @@ export class Store {
 
   /** @param {NoPathMessage} answer */
   takeNoPath(answer) {
+    if (this.candidate?.contour === answer.contour) this.withdraw();
     const held = this.plans.get(answer.contour);
     if (held) this.remember(answer.contour, held);
     this.plans.delete(answer.contour);
@@ -256,6 +301,7 @@ export class Store {
   /** Forget what belongs to contours that the job no longer has, and choose one that it has. */
   dropMissing() {
     const names = new Set(this.contours());
+    if (this.candidate && !names.has(this.candidate.contour)) this.withdraw();
     for (const known of [this.plans, this.before, this.nopaths, this.maps])
       for (const name of [...known.keys()]) if (!names.has(name)) known.delete(name);
     if (this.selected === null || !names.has(this.selected))

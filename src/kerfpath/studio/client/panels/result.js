@@ -17,7 +17,7 @@ export function resultPanel(store, connection, view) {
   const [host, audit] = [byId("result"), byId("audit")];
   let open = false;
   let waiting = false;
-  store.on(["plan", "selected", "job", "scene", "progress"], () => {
+  store.on(["plan", "selected", "job", "scene", "progress", "candidate"], () => {
     if (waiting) return;
     waiting = true;
     requestAnimationFrame(() => {
@@ -39,7 +39,9 @@ export function resultPanel(store, connection, view) {
       {},
       el("h2", {}, name),
       el("span", { class: "grow" }),
-      el("span", { class: `badge ${dot}` }, words),
+      store.candidate?.contour === name
+        ? el("span", { class: "badge warn" }, "a point of the Pareto set")
+        : el("span", { class: `badge ${dot}` }, words),
     );
     host.dataset.revision = String(plans[0]?.revision ?? nopath?.revision ?? "");
     if (nopath)
