@@ -38,6 +38,7 @@ NAMES = (
     "continuum_infeasible",
     "certificate_audits",
     "studio",
+    "studio-endurance",
 )
 
 
@@ -169,6 +170,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import cad
 
         return [cad.run(quick=quick)]
+    if name == "studio-endurance":
+        from benchmarks import studio_endurance
+
+        return [studio_endurance.run(quick=quick)]
     if name == "studio":
         from benchmarks import studio
 
