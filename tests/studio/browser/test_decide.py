@@ -101,6 +101,17 @@ def test_every_option_has_a_control_and_is_found_by_its_name(page, studio, first
     until(page, lambda: len(sent(studio, "edits")) == 4)
     step = {"path": ["plan", "gamma_step_deg"], "value": None}
     assert sent(studio, "edits")[-1]["edits"] == [step]
+    page.get_by_label("Find an option").fill("place x")
+    place = page.get_by_label("x, y, z", exact=True)
+    assert place.input_value() == "1200, -600, 500"
+    place.fill("1250 -600, 500")
+    place.press("Enter")
+    until(page, lambda: len(sent(studio, "edits")) == 5)
+    edit = {"path": ["part", "xyz_mm"], "value": [1250, -600, 500]}
+    assert sent(studio, "edits")[-1]["edits"] == [edit]
+    place.fill("here")
+    place.press("Enter")
+    assert place.get_attribute("aria-invalid") == "true"
     assert serious(page) == []
     page.get_by_label("Find an option").fill("nonsense")
     page.get_by_text("No option is called so.").wait_for()

@@ -4,7 +4,7 @@
  * @typedef {object} Key
  * @property {string} key  dotted; "contour.x" is x of the chosen contour's table
  * @property {string} label
- * @property {"number" | "words" | "switch" | "table" | "joints"} kind
+ * @property {"number" | "words" | "switch" | "table" | "list" | "joints"} kind
  * @property {string} [unit]
  * @property {string} [hint]
  * @property {string} [needs]  a key without which this one may not be
@@ -71,6 +71,13 @@ export const GROUPS = [
       words("plan.posture", "Posture"),
       number("plan.eta_velocity", "Share of the speed limits"),
       number("plan.eta_acceleration", "Share of the acceleration limits"),
+    ],
+  },
+  {
+    title: "Place of the part",
+    keys: [
+      { key: "part.xyz_mm", label: "x, y, z", unit: "mm", kind: "list" },
+      { key: "part.rpy_deg", label: "Roll, pitch, yaw", unit: "deg", kind: "list" },
     ],
   },
   {

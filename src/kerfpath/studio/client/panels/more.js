@@ -136,7 +136,10 @@ export function morePanel(store, connection, player) {
   function row(what) {
     const { key, label, unit = "", hint = "", needs } = what;
     const id = `key-${key.replaceAll(".", "-")}`;
-    const control = { number, words, switch: onOff, table: present, joints }[what.kind](what, id);
+    const control = { number, words, switch: onOff, table: present, list, joints }[what.kind](
+      what,
+      id,
+    );
     const reset = el(
       "button",
       {
@@ -268,44 +271,47 @@ export function morePanel(store, connection, player) {
    * @param {string} id
    * @returns {Control}
    */
-  function joints(what, id) {
+  function list(what, id) {
     const input = el("input", {
       ...{ id, class: "wide", placeholder: "none", "aria-describedby": `${id}-fault` },
       onchange: () => {
-        const found = input.value
-          .split(/[\s,;]+/)
-          .filter(Boolean)
-          .map(Number);
+        const parts = input.value.split(/[\s,;]+/).filter(Boolean);
+        const found = parts.map(Number);
         if (found.length && found.every(Number.isFinite)) set(what, found);
-        else if (!input.value.trim() && given(what.key)) set(what, null);
+        else if (!found.length && given(what.key)) set(what, null);
         else input.setAttribute("aria-invalid", "true");
       },
+      onkeydown: (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && input.blur(),
     });
-    const here = el(
-      "button",
-      {
-        ...{
-          class: "tool",
-          title: "The pose that is shown",
-          "aria-label": "Take the pose that is shown",
-        },
-        onclick: () => {
-          const q = player.moment?.q;
-          if (q)
-            set(
-              what,
-              q.map((each) => Number(((each * 180) / Math.PI).toFixed(2))),
-            );
-        },
+    return {
+      element: input,
+      input,
+      show(now, disabled) {
+        input.disabled = disabled;
+        if (document.activeElement !== input) input.value = now === null ? "" : now.join(", ");
       },
-      icon("follow"),
-    );
+    };
+  }
+
+  /**
+   * @param {Key} what
+   * @param {string} id
+   * @returns {Control}
+   */
+  function joints(what, id) {
+    const { input, show } = list(what, id);
+    const take = () => {
+      const q = player.moment?.q.map((each) => Number(((each * 180) / Math.PI).toFixed(2)));
+      if (q) set(what, q);
+    };
+    const words = { title: "The pose that is shown", "aria-label": "Take the pose that is shown" };
+    const here = el("button", { ...words, class: "tool", onclick: take }, icon("follow"));
     return {
       element: el("span", { class: "value" }, input, here),
       input,
       show(now, disabled) {
-        input.disabled = here.disabled = disabled;
-        if (document.activeElement !== input) input.value = now === null ? "" : now.join(", ");
+        here.disabled = disabled;
+        show(now, disabled);
       },
     };
   }
