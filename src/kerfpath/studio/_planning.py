@@ -298,9 +298,12 @@ class Planning:
         """Say what can be picked of the drawing, unless it is as it was."""
         part = self._bench.part(job)
         key = f"{part_key(job)} {job.placement.tolist()}"
-        if self._part is None or self._part[0] != key:
+        before, self._part = (
+            self._part,
+            (key, part),
+        )  # a page may ask for a loop as soon as it hears
+        if before is None or before[0] != key:
             self._say(part_message(job, part, revision))
-        self._part = key, part
 
     def known_part(self) -> Part:
         """Return what the drawing holds.
