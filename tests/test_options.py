@@ -10,7 +10,16 @@ import pytest
 
 import kerfpath
 from conftest import ROOT
-from kerfpath import Band, Certify, Comfort, InputError, OptionConflict, PlanOptions, Tilt
+from kerfpath import (
+    Band,
+    Certify,
+    Comfort,
+    GammaWindow,
+    InputError,
+    OptionConflict,
+    PlanOptions,
+    Tilt,
+)
 from kerfpath.job.format.tables._plan import PlanTable
 from kerfpath.options import OptionData, PlanKeywords
 
@@ -32,11 +41,12 @@ EVERY = PlanOptions(
 )
 
 
+PINNED = PlanOptions(gamma_windows=[GammaWindow(start=0.1, end=0.2, low=3.0, high=-3.0)])
 PIECES = PlanOptions(interruptions="fewest", least_piece=0.02, retract=0.05, floor=-0.6)
 
 
 def test_options_come_back_from_their_data():
-    for options in (PlanOptions(), EVERY, PlanOptions(certify=None), PIECES):
+    for options in (PlanOptions(), EVERY, PlanOptions(certify=None), PIECES, PINNED):
         data = json.loads(json.dumps(options.to_data()))
         assert PlanOptions.from_data(data) == options
     assert PlanOptions() != EVERY
@@ -100,6 +110,7 @@ def test_a_length_of_pieces_needs_pieces():
         ("refine_parts", 0),
         ("weights", [[1.0]]),
         ("rotation", [np.nan]),
+        ("gamma_windows", [(0.0, 1.0, 0.0, 0.1)]),
         ("certify", True),
         ("certify", 0.005),
     ],

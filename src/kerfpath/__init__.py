@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from kerfpath.search import LayeredPath as LayeredPath
     from kerfpath.search import shortest_path as shortest_path
     from kerfpath.tilt import Tilt as Tilt
+    from kerfpath.windows import GammaWindow as GammaWindow
 
 _HOME = {
     "AuditFailed": "errors",
@@ -45,6 +46,7 @@ _HOME = {
     "Certify": "certificate",
     "Comfort": "comfort",
     "Contour": "contour",
+    "GammaWindow": "windows",
     "InputError": "errors",
     "KerfpathError": "errors",
     "LayeredPath": "search",

@@ -34,7 +34,7 @@ class LayeredGraph:
     start : (K+1,) int
         Layer k is ``q[start[k]:start[k+1]]``.
     gamma : (m,) rad
-        The samples of gamma.
+        The samples of gamma, ascending.
     tilt : (V, 2) rad
         Lead and lean of each variant of a layer; without a tolerance all nominal.
     external : (V,) m or rad
@@ -81,6 +81,11 @@ class LayeredGraph:
         """What became of gamma and posture, (K, m, P): admitted if any variant of them is."""
         K, _, P = self.reason.shape
         return np.asarray(self.reason.reshape(K, -1, len(self.gamma), P).min(axis=1))
+
+    def gamma_at(self, place: Ints) -> Array:
+        """Return gamma (...) rad at places among its samples, beyond the last one turned on."""
+        m = len(self.gamma)
+        return np.asarray(self.gamma[place % m] + 2 * np.pi * (place // m))
 
     def counts(self, node: int | None = None) -> dict[str, int]:
         """Count the candidates by `Reason`, over all nodes or at one."""

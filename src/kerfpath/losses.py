@@ -37,6 +37,7 @@ class Loss(IntEnum):
     ACCELERATION = 13, "acceleration, joint {}"
     NO_ROOM = 14, "no room to back off by {}"
     FLOOR = 15, "below the floor"
+    PINNED = 16, "outside the pinned window of gamma"
 
 
 class Reason(str):

@@ -19,6 +19,7 @@ from kerfpath.limits import Limits
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
 from kerfpath.tilt import Tilt, TiltData
+from kerfpath.windows import GammaWindow, WindowData
 
 __all__ = [
     "EXACT_OR_BETTER",
@@ -46,6 +47,7 @@ class GraphKeywords(TypedDict, total=False):
     tilt: Tilt | None
     postures: Sequence[int] | None
     comfort: Comfort | None
+    gamma_windows: Sequence[GammaWindow]
 
 
 class PlanKeywords(GraphKeywords, total=False):
@@ -87,6 +89,7 @@ class OptionData(TypedDict):
     least_piece_m: float | None
     retract_m: float | None
     floor_m: float | None
+    gamma_windows: list[WindowData]
     certify: CertifyData | None
 
 
@@ -137,6 +140,8 @@ class PlanOptions:
     floor : float m, optional
         Height in the robot base below which no node has the elbow, the wrist or the flange; None:
         there is no floor.
+    gamma_windows : tuple of GammaWindow
+        Stretches of the contour on which gamma is kept inside an interval.
     certify : Certify, optional
         How far it is proved how near the plan is to the best motion; None: not at all.
 
@@ -166,6 +171,7 @@ class PlanOptions:
     comfort: Comfort | None = None
     retract: float | None = None
     floor: float | None = None
+    gamma_windows: tuple[GammaWindow, ...] = ()
     certify: Certify | None = USUAL
 
     __repr__ = short_repr
@@ -195,6 +201,10 @@ class PlanOptions:
             )
         if not isinstance(self.certify, Certify | None):
             raise InputError(f"certify: expected kerfpath.Certify or None, got {self.certify!r}")
+        cast["gamma_windows"] = tuple(self.gamma_windows)
+        for window in self.gamma_windows:
+            if not isinstance(window, GammaWindow):
+                raise InputError(f"gamma_windows: expected kerfpath.GammaWindow, got {window!r}")
         for name, value in cast.items():
             object.__setattr__(self, name, value)
         _require_no_conflict(self)
@@ -256,6 +266,7 @@ class PlanOptions:
             values["tilt"] = Tilt.from_data(tilt)
         if (certify := data["certify"]) is not None:
             values["certify"] = Certify(**certify)
+        values["gamma_windows"] = [GammaWindow.from_data(each) for each in data["gamma_windows"]]
         if (comfort := data["comfort"]) is not None:
             values["comfort"] = Comfort(**{name: Band(**band) for name, band in comfort.items()})
         if (rotation := data["rotation_rad"]) is not None:
@@ -277,13 +288,13 @@ _NAMES = {
 
 def _to_json(value: object) -> object:
     """Return the value of an option as JSON holds it, null for infinity."""
-    if isinstance(value, Tilt | Certify):
+    if isinstance(value, Tilt | Certify | GammaWindow):
         return value.to_data()
     if isinstance(value, Comfort):
         return {name: band for name, band in asdict(value).items() if band is not None}
     if isinstance(value, np.ndarray):
         return [number if np.isfinite(number) else None for number in value.tolist()]
-    return list(value) if isinstance(value, tuple) else value
+    return [_to_json(each) for each in value] if isinstance(value, tuple) else value
 
 
 def with_keywords(

@@ -15,6 +15,7 @@ from kerfpath.auditor._nominal import axes_asked_for, tilt_turns
 from kerfpath.auditor._room import retract_checks
 from kerfpath.auditor._rounding import MOST_ROUNDED, Rounding
 from kerfpath.auditor._table import Check, Issue, Level, Unit
+from kerfpath.auditor._windows import window_checks
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -117,8 +118,10 @@ def checks(
             f"of {plan.contour.length:.6f} m"
         )
     reached = bound_between_nodes(plan, chain, motion, interpolation)
+    tool = chain.forward(plan.q) @ plan.T_flange_tip
     return [
-        *_at_nodes(plan, chain.forward(plan.q) @ plan.T_flange_tip),
+        *_at_nodes(plan, tool),
+        *window_checks(plan, tool),
         *_between_nodes(plan, motion, reached, path, path_tolerance, axis_tolerance),
         *_positions(plan, motion, reached, rounding),
         *_rates(plan, reached, rounding),

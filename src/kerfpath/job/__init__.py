@@ -3,6 +3,7 @@
 from kerfpath.job.format import VARIABLES as VARIABLES
 from kerfpath.job.format import Candidate as Candidate
 from kerfpath.job.format import ContourSpec as ContourSpec
+from kerfpath.job.format import ContourTable as ContourTable
 from kerfpath.job.format import CutRequest as CutRequest
 from kerfpath.job.format import Goal as Goal
 from kerfpath.job.format import Job as Job

@@ -248,9 +248,12 @@ def _refine_path(
     if clear is None:
         found = refiner.refine(made, first=FIRST_STEP)
         return found if found.done else None
-    step = 2 * np.pi / len(task.graph.gamma)
-    low = made.gamma - (path.share + clear[0]) * step
-    high = made.gamma + (np.where(path.one == path.other, 0, 1 - path.share) + clear[1]) * step
+    graph = task.graph
+    sample = graph.sample[path.one].astype(np.int64)
+    below, above = graph.gamma_at(sample), graph.gamma_at(sample + (path.one != path.other))
+    at = below + path.share * (above - below)
+    low = made.gamma - (at - graph.gamma_at(sample - clear[0]))
+    high = made.gamma + graph.gamma_at(sample + (path.one != path.other) + clear[1]) - at
     for _ in range(NARROWED):
         found = refiner.refine(made, first=FIRST_STEP, within=(low, high))
         unclear = finder.unclear(found.plan)

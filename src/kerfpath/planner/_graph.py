@@ -9,7 +9,7 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, as_pose, scalar
+from kerfpath._arrays import Array, Bools, as_pose, scalar
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
@@ -19,6 +19,7 @@ from kerfpath.plans import has_room
 from kerfpath.robots import Robot, lowest_joint
 from kerfpath.search import GammaSamples
 from kerfpath.tilt import tilt_frames
+from kerfpath.windows import nodes_of, samples_inside, with_window_ends
 
 __all__ = [
     "layered_graph",
@@ -26,6 +27,7 @@ __all__ = [
     "node_interval",
     "require_even",
     "require_no_empty_layer",
+    "require_windows_fit",
     "samples_of",
     "within_margins",
 ]
@@ -51,32 +53,41 @@ def layered_graph(
     With `nodes` (M,) int it has their layers alone, the very ones of the whole graph.
     """
     asked = with_keywords(options, keywords, GraphKeywords)
-    H = contour.frames(asked.frames)
+    require_windows_fit(contour, robot, asked)
+    H, s = contour.frames(asked.frames), contour.s
     samples = None if asked.tilt is None else asked.tilt.samples()
     if samples is not None and samples.any():
         H = tilt_frames(H[:, None], contour.along[:, None], samples)
     if nodes is not None:
-        H = H[np.asarray(nodes)]
+        H, s = H[np.asarray(nodes)], s[np.asarray(nodes)]
     T_flange_tip = as_pose(tool, "tool")
     H = np.ascontiguousarray(as_pose(placement, "placement") @ H)
     graph = build(
         H,
         robot,
         T_flange_tip=T_flange_tip,
-        gamma=gamma_grid(asked.gamma_step),
+        gamma=with_window_ends(gamma_grid(asked.gamma_step), asked.gamma_windows),
         tilt=samples,
         postures=asked.postures,
         progress=progress,
     )
     if nodes is not None:
         asked = replace(asked, retract=None)  # its first and last layer need not be the ends
-    return within_margins(graph, robot, asked, T_flange_tip)
+    return within_margins(graph, robot, asked, T_flange_tip, s)
 
 
 def within_margins(
-    graph: LayeredGraph, robot: Robot, options: PlanOptions, tool: Array, *, periodic: bool = False
+    graph: LayeredGraph,
+    robot: Robot,
+    options: PlanOptions,
+    tool: Array,
+    s: Array,
+    *,
+    periodic: bool = False,
 ) -> LayeredGraph:
     """Return the graph without the vertices that break a hard margin or the floor, counted.
+
+    And without those outside the windows of gamma; s (K,) m are the arc lengths of its nodes.
 
     So are those of both ends that the tool cannot back off from, where it can from others. With a
     `periodic` closure the first layer and the last are the same but for rounding, and are thinned
@@ -85,10 +96,16 @@ def within_margins(
     comfort, retract = options.comfort, options.retract
     hard, limits = None if comfort is None else comfort.hard, robot.joint_limits()
     arrays = limits.lower, limits.upper, limits.endless, tool
-    asked = robot.id, [a.tobytes() for a in arrays], hard, retract, options.floor, periodic
+    windows = options.gamma_windows
+    asked = robot.id, [a.tobytes() for a in arrays], hard, retract, options.floor, periodic, windows
     if graph.kept == asked:
         return graph
-    near = {} if comfort is None else comfort.too_near(robot, graph.q, tool)
+    near = dict[Reason, Bools]()
+    if windows:
+        layer = np.repeat(np.arange(len(s)), np.diff(graph.start))
+        near[Reason(Loss.PINNED)] = ~samples_inside(windows, s, graph.gamma)[layer, graph.sample]
+    if comfort is not None:
+        near |= comfort.too_near(robot, graph.q, tool)
     if options.floor is not None:
         near[Reason(Loss.FLOOR)] = lowest_joint(robot, graph.q) < options.floor
     first, last = slice(0, graph.start[1]), slice(graph.start[-2], graph.start[-1])
@@ -105,6 +122,21 @@ def within_margins(
             here[first] |= here[last]
             here[last] = here[first]
     return replace(graph.without(near) if near else graph, kept=asked)
+
+
+def require_windows_fit(contour: Contour, robot: Robot, options: PlanOptions) -> None:
+    """Raise InputError where a window of gamma holds at no node, or nothing is free to be kept."""
+    windows = options.gamma_windows
+    if windows and not robot.family.free_rotation:
+        raise InputError("gamma_windows: the robot leaves no rotation free; remove them")
+    for number, window in enumerate(windows, 1):
+        if not nodes_of([window], contour.s).any():
+            raise InputError(
+                f"gamma_windows: window {number}, from {window.start * 1e3:g} to "
+                f"{window.end * 1e3:g} mm, holds at no node of contour {contour.name!r}, whose "
+                f"nodes are from {contour.s[0] * 1e3:g} to {contour.s[-1] * 1e3:g} mm, up to "
+                f"{longest_step(contour) * 1e3:.4g} mm apart; make it longer, or remove it"
+            )
 
 
 def samples_of(graph: LayeredGraph) -> GammaSamples:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
 from kerfpath.planner._certified import with_bound
@@ -17,6 +17,7 @@ from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._continuous import plan_continuous
 from kerfpath.planner._on_grid import plan_on_grid
 from kerfpath.planner._task import task_of
+from kerfpath.planner._words import with_windows_said
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 
@@ -81,6 +82,9 @@ def plan(
             Margins that the nodes keep from singularities and limits, and what coming near costs;
             see `kerfpath.comfort`. Costs are added at every node visited (objective "max":
             maximised); with closure "periodic" the first node is visited twice.
+        gamma_windows : sequence of GammaWindow
+            Stretches of the contour on which gamma is kept inside an interval; default none. Their
+            ends are samples of gamma, too.
         certify : Certify, optional
             The gap to reach between the plan's cost and what is proved of every other motion, and
             the time for it; None: nothing is proved beyond the grid. See `Proof.bound`.
@@ -118,8 +122,11 @@ def plan(
     )
     finder = ClearSearch(task, cell)
     begin = phase or (lambda what: None)
-    if asked.method == "continuous":
-        made = plan_continuous(task, finder, begin)
-    else:
-        made = plan_on_grid(task, finder, begin, refine=asked.refine)
+    try:
+        if asked.method == "continuous":
+            made = plan_continuous(task, finder, begin)
+        else:
+            made = plan_on_grid(task, finder, begin, refine=asked.refine)
+    except NoFeasiblePath as broken:
+        raise with_windows_said(broken, asked) from None
     return with_bound(made, asked.certify, phase=phase)

@@ -16,18 +16,20 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments, wrap
+from kerfpath.losses import Loss
 from kerfpath.options import PlanOptions
 from kerfpath.planner._graph import (
     layered_graph,
     node_interval,
     require_no_empty_layer,
+    require_windows_fit,
     samples_of,
     within_margins,
 )
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.robots import Robot
 from kerfpath.search import ContinuousPath, GammaSamples, SearchProblem
-from kerfpath.tilt import Tilt
+from kerfpath.windows import with_window_ends
 
 __all__ = ["Layered", "PlanningTask", "task_of"]
 
@@ -188,7 +190,9 @@ class PlanningTask:
         With a periodic closure gamma is moved along the path so that it ends where it begins.
         """
         graph, s, near = self.graph, self.settings, path.one
-        gamma = graph.gamma[graph.sample[near]] + path.share * 2 * np.pi / len(graph.gamma)
+        sample = graph.sample[near].astype(np.int64)
+        below, above = graph.gamma_at(sample), graph.gamma_at(sample + 1)
+        gamma = below + path.share * (above - below)
         if s.closure == "periodic":
             gamma = gamma - np.linspace(0.0, wrap(gamma[-1] - gamma[0]), len(gamma))
         made = Plan(
@@ -236,8 +240,9 @@ def task_of(
     if options.closure == "periodic" and not contour.closed:
         raise InputError(f"closure: contour {contour.name!r} is open and cannot be periodic")
     options = options.resolve(robot, dt)
+    require_windows_fit(contour, robot, options)
     if graph is not None:
-        _require_fitting(graph, contour, robot, options.tilt)
+        _require_fitting(graph, contour, robot, options)
     return PlanningTask(
         contour=contour,
         robot=robot,
@@ -273,7 +278,8 @@ def _layers(
     whole = nodes is None or (nodes[0] == 0 and nodes[-1] == len(contour) - 1)
     kept = options if whole else replace(options, retract=None)
     periodic = options.closure == "periodic"
-    graph = within_margins(graph, robot, kept, tool, periodic=periodic)
+    s = contour.s if nodes is None else contour.s[nodes]
+    graph = within_margins(graph, robot, kept, tool, s, periodic=periodic)
     try:
         if nodes is None:
             require_no_empty_layer(contour, graph)
@@ -307,6 +313,9 @@ def _at_any_gamma(
     options: PlanOptions,
 ) -> NoFeasiblePath:
     """Return that nodes are without a pose, and whether one of them is so at every gamma."""
+    if (kept := empty.lost_by(Loss.PINNED)) and empty.counts[kept[0]]:
+        left = empty.counts[kept[0]]
+        empty = empty.with_message(f"{empty}; without the windows of gamma {left} would be left")
     if not robot.encloses or options.tilt is not None:
         return empty
     nodes = np.flatnonzero(np.diff(graph.start) == 0)[:MOST_EMPTY]
@@ -317,9 +326,10 @@ def _at_any_gamma(
 
 
 def _require_fitting(
-    graph: LayeredGraph, contour: Contour, robot: Robot, tilt: Tilt | None
+    graph: LayeredGraph, contour: Contour, robot: Robot, options: PlanOptions
 ) -> None:
-    """Raise InputError where a graph is not one of this contour, robot and tilt."""
+    """Raise InputError where a graph is not one of this contour and robot, of tilt and windows."""
+    tilt, windows = options.tilt, options.gamma_windows
     if len(graph.start) != len(contour) + 1:
         raise InputError(
             f"graph: has {len(graph.start) - 1} layers, but the contour has {len(contour)} nodes"
@@ -327,6 +337,8 @@ def _require_fitting(
     tilts = np.zeros((1, 2)) if tilt is None else tilt.samples()
     if not np.array_equal(graph.tilt, np.repeat(tilts, len(graph.tilt) // len(tilts), axis=0)):
         raise InputError("graph: it was built with another tilt than is planned with")
+    if len(with_window_ends(graph.gamma, windows)) != len(graph.gamma):
+        raise InputError("graph: it was built without the windows of gamma that are planned with")
     if graph.q.shape[1] != robot.joints:
         raise InputError(
             f"graph: its vertices have {graph.q.shape[1]} joints, but the robot has {robot.joints}"

@@ -8,7 +8,11 @@ from __future__ import annotations
 
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 
-__all__ = ["FINER", "ON_THIS_GRID", "at_least", "at_most"]
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.losses import Loss
+from kerfpath.options import PlanOptions
+
+__all__ = ["FINER", "ON_THIS_GRID", "at_least", "at_most", "with_windows_said"]
 
 ON_THIS_GRID = "on this grid of the rotation"
 """Where a statement holds."""
@@ -24,6 +28,15 @@ def at_most(value: float, digits: int = 4) -> str:
 def at_least(value: float, digits: int = 4) -> str:
     """Return a positive value in so many digits, never less than it is."""
     return _rounded(value, digits, ROUND_CEILING)
+
+
+def with_windows_said(broken: NoFeasiblePath, asked: PlanOptions) -> NoFeasiblePath:
+    """Return a refusal that says that windows of gamma hold, where they may be why."""
+    count = len(asked.gamma_windows)
+    if not count or broken.closed is not None or broken.lost_by(Loss.PINNED):
+        return broken
+    hold = "1 window of gamma holds" if count == 1 else f"{count} windows of gamma hold"
+    return broken.with_message(f"{broken}; {hold}, without which there may be a motion")
 
 
 def _rounded(value: float, digits: int, how: str) -> str:

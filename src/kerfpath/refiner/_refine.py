@@ -21,6 +21,7 @@ from kerfpath.refiner._rates import RateLimits
 from kerfpath.refiner._room import room_at_ends
 from kerfpath.robots import lowest_joint
 from kerfpath.search import rotation_limits
+from kerfpath.windows import nearest_inside, room_beside
 
 __all__ = ["Binding", "Refinement", "ease", "promise", "quicken", "refine"]
 
@@ -241,6 +242,12 @@ def _descent(plan: Plan) -> tuple[Descent, MotionState]:
     """Return the task of refining a plan, and where it stands."""
     settings, comfort = plan.settings, plan.settings.comfort
     low, high = room_at_ends(plan)
+    gamma, windows = plan.gamma, settings.gamma_windows
+    if windows:
+        inside = nearest_inside(windows, plan.contour.s, gamma)
+        gamma = np.full(len(gamma), np.nan) if inside is None else inside
+        kept = room_beside(windows, plan.contour.s, gamma)
+        low, high = np.maximum(low, kept[0]), np.minimum(high, kept[1])
     descent = Descent(
         curves=JointCurves(plan.robot, plan.frames, plan.T_flange_tip, plan.posture),
         rates=RateLimits(
@@ -260,7 +267,7 @@ def _descent(plan: Plan) -> tuple[Descent, MotionState]:
         gamma_low=low,
         gamma_high=high,
     )
-    return descent, descent.stand(plan.gamma, plan.unwrapped)
+    return descent, descent.stand(gamma, plan.unwrapped)
 
 
 def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:

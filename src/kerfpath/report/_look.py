@@ -40,6 +40,7 @@ _REASONS = {
     Reason(Loss.UNREACHABLE): "#b4bac4",
     Reason(Loss.UNWANTED): "#d9d4e2",
     Reason(Loss.COLLISION): "#d7263d",
+    Reason(Loss.PINNED): "#c9d3dc",
     **{Reason(Loss.LOW, f"joint {i + 1}"): colour for i, colour in enumerate(_LOW)},
     **{Reason(Loss.HIGH, f"joint {i + 1}"): colour for i, colour in enumerate(_HIGH)},
 }

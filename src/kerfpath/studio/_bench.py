@@ -11,8 +11,9 @@ from typing import Generic, TypeVar
 from kerfpath.cad import Part
 from kerfpath.contour import Contour
 from kerfpath.graph import LayeredGraph
-from kerfpath.job import CutResult, Job, PreparedJob, prepare
+from kerfpath.job import ContourTable, CutRequest, CutResult, Job, PreparedJob, prepare
 from kerfpath.studio._keys import graph_key, part_key, setup_key
+from kerfpath.studio._scene import tables_of
 
 __all__ = ["Bench", "Kept"]
 
@@ -104,9 +105,10 @@ class Bench:
         """
         setup = setup_key(job)
         if self._prepared is not None and self._prepared[0] == setup:
-            before = self._prepared[1]
-            contours = tuple(replace(each, options=job.options) for each in before.contours)
-            return replace(before, job=job, contours=contours)
+            before = replace(self._prepared[1], job=job)
+            tables = [job.contours[i].table for i in tables_of(before)]
+            contours = zip(before.contours, tables, strict=True)
+            return replace(before, contours=tuple(_pinned(each, job, t) for each, t in contours))
         made = prepare(job, self.part(job))
         self._prepared = setup, made
         return made
@@ -140,6 +142,13 @@ class Bench:
             return one.candidate.nodes, one.graph
         nodes = one.request.candidates[0].nodes
         return nodes, self.graph(job, nodes, lambda count: None)
+
+
+def _pinned(request: CutRequest, job: Job, table: ContourTable) -> CutRequest:
+    """Return what is asked for a contour by a job of which options and windows are others."""
+    own = request.task.table.model_copy(update={"gamma_windows": table.gamma_windows})
+    task = replace(request.task, table=own)
+    return replace(request, task=task, options=task.asked(job.options))
 
 
 def _vertices(cuts: tuple[CutResult, ...]) -> int:

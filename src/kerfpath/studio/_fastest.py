@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job import PreparedJob, fastest_along
 from kerfpath.planner import at_most
@@ -25,7 +27,8 @@ def fastest_message(
     nodes = request.task.evenly_fast(prepared.part)
     leaves = job.options.refine or job.options.method == "continuous"
     try:
-        found = fastest_along(job, nodes, prepared.cell, refine=leaves)
+        own = replace(job, options=request.options)
+        found = fastest_along(own, nodes, prepared.cell, refine=leaves)
     except NoFeasiblePath as broken:
         raise broken.with_message(f"{contour}: no speed: {broken}") from None
     speed = float(at_most(found.speed * 60))

@@ -20,6 +20,8 @@ LIGHT = PROVING | {
     "refine", "interruptions", "least_piece_mm",
 }  # fmt: skip
 """Keys of [plan] that neither the nodes nor the layered graph depend on."""
+PINS = "gamma_windows"
+"""Key of [[contour]] that neither the nodes nor their speed depend on."""
 GRAPH = frozenset(["gamma_step_deg", "frames", "tilt_deg", "tilt_steps", "posture"])
 """Keys of [plan] that the layered graph depends on."""
 
@@ -31,9 +33,10 @@ def part_key(job: Job) -> str:
 
 
 def setup_key(job: Job) -> str:
-    """Return the key of all that a job is prepared from: everything but `LIGHT` keys."""
+    """Return the key of all that a job is prepared from: everything but `LIGHT` keys and pins."""
     source = dict(job.source)
     source["plan"] = _but(source.get("plan", {}), LIGHT)
+    source["contour"] = [_but(table, (PINS,)) for table in source["contour"]]
     return _digest(source, _stamps(job))
 
 
@@ -43,7 +46,7 @@ def motion_key(job: Job) -> str:
     source["plan"] = _but(source.get("plan", {}), LIGHT)
     # Where nodes are laid by time, a speed makes other nodes.
     source["contour"] = [
-        table if "time_step_ms" in table else _but(table, ("speed_m_min",))
+        _but(table, (PINS,) if "time_step_ms" in table else (PINS, "speed_m_min"))
         for table in source["contour"]
     ]
     for name in ("sequence", "layout", "program", "audit"):
@@ -62,7 +65,8 @@ def graph_key(job: Job, nodes: Contour) -> str:
     digest = hashlib.sha256()
     for array in arrays:
         digest.update(array.tobytes())
-    kept = [plan, tables, nodes.closed, options.retract, options.floor]
+    windows = [each.to_data() for each in options.gamma_windows]
+    kept = [plan, tables, nodes.closed, options.retract, options.floor, windows]
     return _digest(kept, digest.hexdigest(), _stamps(job))
 
 

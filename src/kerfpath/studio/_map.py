@@ -30,6 +30,7 @@ KINDS = {
     Loss.COLLISION: "cell",
     Loss.NO_ROOM: "margin",
     Loss.FLOOR: "cell",
+    Loss.PINNED: "pinned",
 }
 """What a loss is coloured by; others are "other"."""
 

@@ -219,9 +219,14 @@ def drafts_of(
         Of the job.
     """
     begun, task = perf_counter(), cut.request.task
-    speeds = {spec.name: spec.speed for spec in job.contours if spec.table.pick_all is None}
-    slower = task.speed / speeds.get(task.name, task.speed)
-    made = draft(before, job.options, dt=cut.candidate.dt * slower)
+    specs = {spec.name: spec for spec in job.contours if spec.table.pick_all is None}
+    # Of tables that pick several loops the windows are compared, and none of them is drafted.
+    spec = specs.get(task.name, task)
+    windows = {each.windows for each in job.contours if each.table.pick_all is not None}
+    if spec is task and windows - {task.windows}:
+        return None
+    slower = task.speed / spec.speed
+    made = draft(before, spec.asked(job.options), dt=cut.candidate.dt * slower)
     if made is None:
         return None
     message = plan_message(

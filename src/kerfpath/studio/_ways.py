@@ -20,6 +20,9 @@ def ways_of(cut: CutResult, index: int) -> list[Option]:
     """
     found, advice = list[Option](), cut.advice
     if advice is not None:
+        if advice.without_windows:
+            pins = EditEntry(path=["contour", index, "gamma_windows"], value=None)
+            found.append(Option(label="without the pinned windows of gamma", edits=[pins]))
         if advice.other_method:
             found.append(_plan('search the grid exactly: method = "exact"', "method", "exact"))
         for speed in (advice.refined, advice.speed):

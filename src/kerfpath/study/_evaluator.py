@@ -16,6 +16,7 @@ from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.cell import Cell, CollisionChecker
 from kerfpath.contour import Contour, FrameKind
+from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job, fastest_along
 from kerfpath.planner import FastestSpeed, longest_step, node_interval
@@ -58,7 +59,19 @@ class SampledContour:
 
 
 def sample_contours(job: Job, part: Part, *, as_asked: bool = False) -> tuple[SampledContour, ...]:
-    """Return the contours of a job, sampled at one speed each, or as their speeds are asked for."""
+    """Return the contours of a job, sampled at one speed each, or as their speeds are asked for.
+
+    Raises
+    ------
+    InputError
+        Windows of gamma, which these studies do not keep.
+    """
+    for number, contour in enumerate(job.contours):
+        if contour.windows:
+            raise InputError(
+                f"{job.path}: contour.{number}.gamma_windows: this study does not keep windows of "
+                "gamma; remove them in a copy of the job for it"
+            )
     return tuple(
         SampledContour(
             name=task.name,

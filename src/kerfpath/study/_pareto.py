@@ -204,7 +204,8 @@ def problem_of_job(
     task = next(task for task in job.tasks(part) if task.name == contour)
     drawn = task.candidates(part)[0]
     nodes = task.sample(drawn)
-    options = replace(job.options, feed="constant", refine=False, certify=None)
+    asked = task.asked(job.options)
+    options = replace(asked, feed="constant", refine=False, certify=None)
     home = None if job.sequence is None else job.sequence.home_deg
     home_rad = None if home is None else np.radians(home)
     return ParetoProblem(
@@ -215,7 +216,7 @@ def problem_of_job(
         speed=task.speed if nodes.time is None else None,
         options=options,
         criteria=criteria_named(criteria, job.robot, options=options, cell=cell, home=home_rad),
-        graph=job.graph(nodes),
+        graph=job.graph(nodes, asked),
         cell=cell,
         home=home_rad,
         audit=lambda made: _faults(job, drawn, made, cell),

@@ -14,6 +14,8 @@ from kerfpath.job.format._operations import shape_contour
 from kerfpath.job.format._values import MOST_NODES
 from kerfpath.job.format.tables import ContourTable
 from kerfpath.job.format.tables._contour import SAMPLINGS
+from kerfpath.options import PlanOptions
+from kerfpath.windows import GammaWindow
 
 __all__ = ["ContourSpec", "task_of"]
 
@@ -146,6 +148,23 @@ class ContourSpec:
         count = None if self.count is None else int(np.ceil((self.count - 1) / share)) + 1
         table = self.table.model_copy(update={**update, "count": count})
         return replace(task_of(table), pick=self.pick, name=self.name)
+
+    def asked(self, options: PlanOptions) -> PlanOptions:
+        """Return the options of its job with what its table asks for besides."""
+        return replace(options, gamma_windows=self.windows)
+
+    @property
+    def windows(self) -> tuple[GammaWindow, ...]:
+        """Where gamma is kept inside an interval, by the arc length of its path."""
+        return tuple(
+            GammaWindow(
+                start=first / 1000,
+                end=last / 1000,
+                low=float(np.radians(low)),
+                high=float(np.radians(high)),
+            )
+            for first, last, low, high in self.table.gamma_windows or ()
+        )
 
     @property
     def sampled_by(self) -> str:

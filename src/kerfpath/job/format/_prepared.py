@@ -227,7 +227,11 @@ def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
             for each, sharp in zip(candidates, task.unrounded(part, loop), strict=True)
         )
     return CutRequest(
-        task=task, loop=loop, candidates=candidates, options=job.options, closer=closer
+        task=task,
+        loop=loop,
+        candidates=candidates,
+        options=task.asked(job.options),
+        closer=closer,
     )
 
 

@@ -176,7 +176,7 @@ def _expected(
         T_flange_tip=job.tool,
         T_base_part=job.placement,
         time=whole.dt / parts * np.arange(len(nodes), dtype=float),
-        settings=_options(job, whole.dt, made.settings, picked=picked),
+        settings=_options(prepared, number, whole.dt, made.settings, picked=picked),
         feed=None,
     )
     if job.options.feed == "dip" and made.feed is not None and not picked:
@@ -197,10 +197,13 @@ def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
     return parts if parts > 1 and step > (1 + parts) / 2 else 1
 
 
-def _options(job: Job, dt: float, said: PlanOptions, *, picked: bool) -> PlanOptions:
+def _options(
+    prepared: PreparedJob, number: int, dt: float, said: PlanOptions, *, picked: bool
+) -> PlanOptions:
     """Return how the job asks for a plan; one that was picked may aim at less than the limits."""
+    job, task = prepared.job, prepared.contours[number].task
     # [program] may have been edited since: the retract of now has a check of its own.
-    options = replace(job.options.resolve(job.robot, dt), retract=said.retract)
+    options = replace(task.asked(job.options).resolve(job.robot, dt), retract=said.retract)
     if not picked:
         return options
     return replace(

@@ -13,7 +13,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.front import Subproblem, plan_run
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
-from kerfpath.job.run._remedy import find_remedy
+from kerfpath.job.run._remedy import Remedy, find_remedy, opens_without_windows
 from kerfpath.job.run._result import CutResult
 from kerfpath.planner import clearance_map, plan, plan_in_pieces
 from kerfpath.plans import Plan
@@ -115,9 +115,9 @@ def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> 
 def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutResult:
     """Return a cut with what would open its way, where it has no plan and that is known.
 
-    That is the speed and the limits that would do. With poses everywhere slower would do; for a
-    loop that cannot close, or an axis that may not turn as far, it need not, and a reduced feed has
-    tried.
+    That is to leave out windows of gamma, and the speed and the limits that would do. With poses
+    everywhere slower would do; for a loop that cannot close, or an axis that may not turn as far,
+    it need not, and a reduced feed has tried.
     """
     options, graph = replace(cut.request.options, certify=None), cut.graph
     job, cell, run = replace(prepared.job, options=options), prepared.cell, cut.request.run
@@ -125,12 +125,19 @@ def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutRes
         graph, cell = run.graph(graph, job.robot.endless), run.cell(cell)
     plain = options.closure == "free" and options.rotation is None
     constant = options.feed == "constant" and cut.candidate.nodes.time is None
-    if cut.broken is None or not (np.diff(graph.start).all() and plain and constant):
+    broken = cut.broken
+    if broken is None:
         return cut
     progress(f"{cut.request.task.name}: what would open the way", 0, 0)
-    needed = cut.broken.relaxation
-    found = find_remedy(job, cut.request, cut.candidate, graph, cell, needed)
-    return cut if found is None else replace(cut, advice=found[0], fastest=found[1])
+    if run is None and opens_without_windows(job, cut.request, cut.candidate, cell):
+        cut = replace(cut, advice=Remedy(other_method=False, without_windows=True))
+    if not (np.diff(graph.start).all() and plain and constant):
+        return cut
+    found = find_remedy(job, cut.request, cut.candidate, graph, cell, broken.relaxation)
+    if found is None:
+        return cut
+    free = cut.advice is not None
+    return replace(cut, advice=replace(found[0], without_windows=free), fastest=found[1])
 
 
 def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:

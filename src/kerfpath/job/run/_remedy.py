@@ -23,7 +23,7 @@ from kerfpath.planner import (
     relaxations,
 )
 
-__all__ = ["Remedy", "find_remedy"]
+__all__ = ["Remedy", "find_remedy", "opens_without_windows"]
 
 GIVE = (0.0, 2e-3, 1e-2, 3e-2)
 """Relative amounts by which a value gives way until a plan is found with it."""
@@ -51,6 +51,8 @@ class Remedy:
         Keys whose shares up to 1 all leave the way closed.
     never : str or None
         Speed, m/min, from which on no motion is possible at any rotation, where that is proved.
+    without_windows : bool
+        Without gamma_windows the way is open, whatever else is said.
     """
 
     other_method: bool
@@ -60,11 +62,16 @@ class Remedy:
     shares: Mapping[str, str] = field(default_factory=dict)
     closed: tuple[str, ...] = ()
     never: str | None = None
+    without_windows: bool = False
 
     __repr__ = short_repr
 
     def __str__(self) -> str:
         """Say it in one line."""
+        if self.without_windows:
+            alone = self.speed is None and not self.other_method
+            rest = "" if alone else f"; with them {replace(self, without_windows=False)}"
+            return f"without gamma_windows there is a plan as asked for{rest}"
         how = ' with method = "exact"' if self.other_method else ""
         if self.speed is None:
             return f"{ON_THIS_GRID} a path exists at the speed asked for{how}"
@@ -110,10 +117,11 @@ class _Trial:
         if task.time_step is not None and speed != task.speed:
             nodes = replace(task, speed=speed).sample(self.candidate.path)
             graph = self.job.graph(nodes)
+        at = speed if nodes.time is None else None
         try:
             plan(
                 nodes, self.job.robot, tool=self.job.tool, placement=self.job.placement,
-                speed=speed, options=options, cell=self.cell, graph=graph,
+                speed=at, options=options, cell=self.cell, graph=graph,
             )  # fmt: skip
         except NoFeasiblePath:
             return False
@@ -197,6 +205,18 @@ def find_remedy(
         never=None if fastest.ceiling is None else at_least(fastest.ceiling * 60),
     )
     return made, fastest
+
+
+def opens_without_windows(
+    job: Job, request: CutRequest, candidate: Candidate, cell: Cell | None
+) -> bool:
+    """Return whether a cut without a plan has one without the windows of gamma that it has."""
+    if not job.options.gamma_windows:
+        return False
+    free = replace(job, options=replace(job.options, gamma_windows=()))
+    graph = free.graph(candidate.nodes)
+    trial = _Trial(job=free, request=request, candidate=candidate, graph=graph, cell=cell)
+    return trial.opens(free.options, trial.asked)
 
 
 def _shares(trial: _Trial, relaxation: Relaxation | None) -> tuple[dict[str, str], tuple[str, ...]]:

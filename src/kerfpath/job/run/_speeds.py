@@ -67,15 +67,10 @@ def fastest_speeds(
     for i, task in enumerate(tasks):
         progress("contours", i, len(tasks))
         progress(f"{task.name}: fastest speed", 0, 0)
-        nodes = task.evenly_fast(part)
+        nodes, own = task.evenly_fast(part), replace(job, options=task.asked(job.options))
         try:
-            answers.append(
-                (
-                    task,
-                    nodes,
-                    fastest_along(job, nodes, cell, refine=leaves_grid(job), ceiling=True),
-                )
-            )
+            found = fastest_along(own, nodes, cell, refine=leaves_grid(job), ceiling=True)
+            answers.append((task, nodes, found))
         except NoFeasiblePath as broken:
             answers.append((task, nodes, broken))
     return answers

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from kerfpath.job.format._values import MOST_NODES, NotNegative, Number, Positive, Text, fault, key
 from kerfpath.job.format.tables._cut import (
@@ -22,6 +22,9 @@ __all__ = ["ContourTable"]
 
 SHAPES = ("overlap_mm", "lead_in", "lead_out", "micro_joints", "corners")
 """Keys that give a contour features, whose ends sampling by spacing_mm or time_step_ms keeps."""
+WIDEST_DEG = 359.999
+"""Widest window of gamma."""
+Window = Annotated[list[Number], Field(min_length=4, max_length=4)]
 SAMPLINGS = ("spacing_mm", "time_step_ms", "count", "tolerance_mm")
 
 
@@ -56,6 +59,10 @@ class ContourTable(Table):
     micro_joints: MicroJointsTable | None = None
     corners: CornersTable | None = None
     smooth_axes: SmoothAxesTable | None = None
+    gamma_windows: Annotated[
+        list[Window] | None,
+        key("a list of windows, each [from_mm, to_mm, low_deg, high_deg]", "[[20, 35, -10, 10]]"),
+    ] = None
 
     @property
     def moves_the_path(self) -> bool:
@@ -96,4 +103,23 @@ class ContourTable(Table):
             )
         if self.start != "drawn" and self.start_mm is not None:
             raise fault("start or start_mm", "both", "remove one", ("start_mm",))
+        return self
+
+    @model_validator(mode="after")
+    def _windows_can_be(self) -> ContourTable:
+        for number, (first, last, low, high) in enumerate(self.gamma_windows or ()):
+            at = ("gamma_windows", number)
+            got = f"[{first:g}, {last:g}, {low:g}, {high:g}]"
+            if last < first:
+                expected = "from_mm not beyond to_mm (across the start write two windows)"
+                raise fault(expected, got, "exchange them", at)
+            if max(abs(low), abs(high)) > 360:
+                raise fault("low_deg and high_deg from -360 to 360", got, "correct it", at)
+            if max(abs(high - low), (high - low) % 360) > WIDEST_DEG:
+                what = "an interval of gamma that leaves some of the circle out"
+                raise fault(what, got, "narrow it, or remove it", at)
+        if self.gamma_windows and "best" in (self.start, self.direction):
+            which = "start" if self.start == "best" else "direction"
+            said = f'{which} other than "best" with gamma_windows, which are counted from the start'
+            raise fault(said, '"best"', "say where it begins, for example with start_mm", (which,))
         return self
