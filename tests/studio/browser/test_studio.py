@@ -1,5 +1,6 @@
 """The studio as a whole: a browser on one side, the server with its planner on the other."""
 
+import math
 import re
 import shutil
 import subprocess
@@ -110,6 +111,17 @@ COURSE = "() => studio.store.plans.get(studio.store.selected)?.[0].gamma ?? null
 def settled(page, after=-1):
     """Wait until all of the newest job is planned, and it is newer than a revision."""
     until(page, lambda: page.evaluate(REVISION) > after and page.evaluate(NEWEST), seconds=240)
+
+
+PLACES = """() => {
+    const { chart } = studio.map;
+    const { x, y } = chart.canvas.getBoundingClientRect();
+    const [{ left, top, width, height }, { gamma, s }] = [
+        chart.frame(), studio.store.plans.get(studio.store.selected)[0],
+    ];
+    return { x: x + left, y: y + top, width, height, gamma, s };
+}"""
+WINDOWS = "() => studio.store.job.values.contour[0].gamma_windows"
 
 
 def cost(page):
@@ -258,3 +270,56 @@ def test_two_pages_see_the_same_and_a_new_server_finds_the_work(opened, servers,
     settled(page)
     assert cost(page) == pytest.approx(shown, rel=1e-3)  # four digits are shown
     assert page.locator("#saved").inner_text().startswith("changed")
+
+
+def test_a_rectangle_on_the_map_pins_the_course_until_it_is_undone(opened):
+    page = opened
+    before, at = page.evaluate(COURSE), page.evaluate(PLACES)
+    middle = len(before) // 2
+    high = math.degrees(before[middle]) - 15
+
+    def place(share, angle):
+        return at["x"] + share * at["width"], at["y"] + (0.5 - angle / 360) * at["height"]
+
+    revision = page.evaluate(REVISION)
+    page.mouse.move(*place(0.4, high))
+    page.mouse.down()
+    page.mouse.move(*place(0.5, high - 10))
+    page.mouse.move(*place(0.6, high - 30))
+    page.mouse.up()
+    settled(page, revision)
+    ((start, end, low, up),) = page.evaluate(WINDOWS)
+    # A pixel of the map is about 1 deg.
+    assert [low, up] == pytest.approx([high - 30, high], abs=4)
+    held = [
+        math.degrees(gamma)
+        for gamma, s in zip(page.evaluate(COURSE), at["s"], strict=True)
+        if start <= s * 1e3 <= end
+    ]
+    assert len(held) >= 3
+    # The page has gamma to 1e-9 rad.
+    assert all(low - 1e-6 <= gamma <= up + 1e-6 for gamma in held)
+    # It is chosen: a key widens it, another one removes it.
+    page.locator("#map-canvas").focus()
+    revision = page.evaluate(REVISION)
+    page.keyboard.press("+")
+    settled(page, revision)
+    assert page.evaluate(WINDOWS)[0][2:] == pytest.approx([low - 1, up + 1], abs=1e-9)
+    revision = page.evaluate(REVISION)
+    page.keyboard.press("Delete")
+    settled(page, revision)
+    assert page.evaluate(WINDOWS) is None
+    assert page.evaluate(COURSE) == pytest.approx(before, abs=1e-6)
+    # With the keys alone: the cursor, a pin about the course there, and back.
+    page.keyboard.press("ArrowRight")
+    revision = page.evaluate(REVISION)
+    page.keyboard.press("p")
+    settled(page, revision)
+    ((start, end, low, up),) = page.evaluate(WINDOWS)
+    # Written to a tenth of a degree.
+    assert [low, up] == pytest.approx([math.degrees(before[1]) + by for by in (-10, 10)], abs=0.06)
+    assert page.locator(".pins li").count() == 1
+    revision = page.evaluate(REVISION)
+    page.keyboard.press("Control+z")
+    settled(page, revision)
+    assert page.evaluate(WINDOWS) is None

@@ -7,6 +7,7 @@ import { inks, pixels } from "./paint.js";
 
 /** @typedef {import("../messages.js").PlanMessage} PlanMessage */
 /** @typedef {import("./grid.js").Grid} Grid */
+/** @typedef {(context: CanvasRenderingContext2D, frame: Frame) => void} Under */
 /** @typedef {{left: number, top: number, width: number, height: number, em: number}} Frame CSS px */
 
 /**
@@ -17,6 +18,7 @@ import { inks, pixels } from "./paint.js";
  * @property {number | null} broken  m, where no path goes on
  * @property {{s: number, gamma: number} | null} now
  * @property {{node: number, sample: number} | null} hover
+ * @property {Under} under  draws what is below the courses
  */
 
 const STEPS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000]; // mm
@@ -59,7 +61,7 @@ export class Chart {
   }
 
   /** @param {Drawn} drawn */
-  draw({ plans, before, stale, broken, now, hover }) {
+  draw({ plans, before, stale, broken, now, hover, under }) {
     const { width, height, ratio } = fitCanvas(this.canvas);
     const context = this.canvas.getContext("2d");
     if (!context || !width || !height) return;
@@ -75,6 +77,7 @@ export class Chart {
     context.beginPath();
     context.rect(frame.left, frame.top, frame.width, frame.height);
     context.clip();
+    under(context, frame);
     context.setLineDash([5 * scale, 4 * scale]);
     for (const plan of before)
       this.stroke(context, plan, frame, themeColour("--quiet"), 1.6 * scale);

@@ -8,7 +8,6 @@ export class Grid {
     this.message = message;
     this.nodes = message.nodes;
     this.samples = message.gamma.length;
-    this.step = this.samples > 1 ? message.gamma[1] - message.gamma[0] : 2 * Math.PI;
     this.layers = message.layers.map((layer) => ({ ...layer, codes: bytes(layer.codes) }));
     this.length = message.s[message.s.length - 1] - message.s[0] || 1;
   }
@@ -42,8 +41,17 @@ export class Grid {
    * @param {number} gamma  rad
    */
   sampleAt(gamma) {
-    const at = Math.round((gamma - this.message.gamma[0]) / this.step);
-    return ((at % this.samples) + this.samples) % this.samples;
+    const list = this.message.gamma;
+    const angle = wrapped(gamma);
+    let [low, high] = [-1, list.length]; // the ends of windows are samples, too: no even steps
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (list[middle] <= angle) low = middle;
+      else high = middle;
+    }
+    const [below, above] = [low < 0 ? list.length - 1 : low, high % list.length];
+    const off = (/** @type {number} */ at) => Math.abs(wrapped(list[at] - angle));
+    return off(above) < off(below) ? above : below;
   }
 
   /**

@@ -37,6 +37,7 @@ function patternOf(kind, words) {
   if (kind === "reach") return "dots";
   if (kind === "cell") return "cross";
   if (kind === "margin") return "level";
+  if (kind === "pinned") return "none"; // hatched where the pin is drawn
   return "none";
 }
 

@@ -2,10 +2,12 @@
 
 import { byId, el } from "../dom.js";
 import { deg, degrees, fixed } from "../format.js";
+import { Bands, courseAt } from "./bands.js";
 import { Chart } from "./chart.js";
 import { turnedAbout } from "../inverse.js";
 import { Grid, wrapped } from "./grid.js";
 import { legend } from "./legend.js";
+import { Pins } from "./pins.js";
 
 /** @typedef {import("../store.js").Store} Store */
 /** @typedef {import("../player.js").Player} Player */
@@ -28,6 +30,12 @@ export class MapView {
     this.haunt = haunt;
     this.canvas = byId("map-canvas", HTMLCanvasElement);
     this.chart = new Chart(this.canvas);
+    this.pins = new Pins(store, connection);
+    this.bands = new Bands(this.chart, this.pins, () => {
+      if (this.bands.busy) this.leave();
+      this.describe();
+      this.invalidate();
+    });
     this.tip = byId("map-tip");
     this.said = byId("map-state");
     this.legend = byId("legend");
@@ -58,14 +66,14 @@ export class MapView {
     new ResizeObserver(() => this.invalidate()).observe(canvas);
     canvas.addEventListener("pointermove", (event) => {
       const cell = this.cellAt(event.offsetX, event.offsetY);
-      if (cell) this.enter(cell);
+      if (cell && !this.bands.busy) this.enter(cell);
       else this.leave();
     });
     canvas.addEventListener("pointerleave", () => this.leave());
     canvas.addEventListener("blur", () => this.leave());
     canvas.addEventListener("click", (event) => {
       const cell = this.cellAt(event.offsetX, event.offsetY);
-      if (cell) this.go(cell);
+      if (cell && !this.bands.took) this.go(cell);
     });
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
@@ -136,13 +144,14 @@ export class MapView {
         : []),
     );
     byId("map-said").textContent = grid?.layers.length === 1 ? grid.layers[0].name : "";
-    if (!grid || !grid.layers.length) return this.legend.replaceChildren();
+    if (!grid || !grid.layers.length) return this.legend.replaceChildren(...this.bands.listed());
     Object.assign(this.chart, { grid, layer: this.layer });
     this.legend.replaceChildren(
       ...legend(grid, this.layer, this.chart.inks(), {
         course: store.plans.has(grid.message.contour),
         before: store.before.has(grid.message.contour),
       }),
+      ...this.bands.listed(),
     );
   }
 
@@ -179,6 +188,7 @@ export class MapView {
       broken: store.nopaths.get(name)?.s ?? null,
       now: plan ? { s: plan.s[k], gamma: plan.gamma[k] } : null,
       hover: this.hover,
+      under: (context, frame) => this.bands.draw(context, frame),
     });
   }
 
@@ -349,6 +359,7 @@ export class MapView {
     if (!grid || !grid.layers.length || event.ctrlKey || event.metaKey || event.altKey) return;
     const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
     const move = moves[/** @type {keyof typeof moves} */ (event.key)];
+    if (this.pinned(event)) return;
     if (event.key === "Escape") this.leave();
     if (event.key === "Enter" && this.hover) this.go(this.hover);
     if (!move) return;
@@ -361,6 +372,21 @@ export class MapView {
     });
     event.preventDefault();
     event.stopPropagation();
+  }
+
+  /**
+   * Give a key to the pins; return whether it was one of theirs.
+   * @param {KeyboardEvent} event
+   */
+  pinned(event) {
+    const { message } = /** @type {Grid} */ (this.grid);
+    const node = this.hover?.node ?? 0;
+    const course = courseAt(this.store.plans.get(message.contour) ?? [], message.s[node]);
+    const here = this.hover ? deg(message.gamma[this.hover.sample]) : null;
+    if (!this.bands.key(event, node, course ?? here)) return false;
+    event.preventDefault();
+    event.stopPropagation();
+    return true;
   }
 
   /** Take the colours of the theme. */
