@@ -29,6 +29,10 @@ ARMS = {
 """A robot for each language that has outputs, and where a part lies that it reaches, m."""
 
 
+ZONE = 3e-4
+"""m: that of the golden programs, whose corners are far from half way."""
+
+
 def kinds_of(text):
     """The kind of each stretch, from single letters."""
     return np.array([KINDS.index(LETTERS[letter]) for letter in text])
@@ -128,7 +132,11 @@ class Case:
     @cached_property
     def program(self):
         """The golden program."""
-        return build_program([self.small], **self.build)
+        return self.built([self.small])
+
+    def built(self, plans):
+        """The program of plans, built as the golden one."""
+        return build_program(plans, **{"zone": ZONE, **self.build})
 
     @cached_property
     def golden(self):

@@ -34,7 +34,7 @@ def installed(tmp_path, monkeypatch):
 
 @pytest.fixture
 def example():
-    code, point = re.findall(r"```(?:python|toml)\n(.*?)```", DOCS.read_text(), re.DOTALL)
+    *_, code, point = re.findall(r"```(?:python|toml)\n(.*?)```", DOCS.read_text(), re.DOTALL)
     assert 'acme = "acme_rapid:ACME"' in point
     return code
 

@@ -34,7 +34,7 @@ def program():
         hand_plan(arc(f"hole {i}", radius=0.06 + 0.012 * i, count=12), arm, *frames())
         for i in range(3)
     ]
-    return build_program(plans, name="parts", pierce_time=0.3)
+    return build_program(plans, name="parts", pierce_time=0.3, zone=3e-4)
 
 
 def read_back(program, name):

@@ -51,7 +51,7 @@ def test_positions_are_a_about_z_then_b_about_y_then_c_about_x(program):
 
 def test_speed_and_zone_are_written_only_where_they_change(arm):
     made = hand_plan(arc(count=30), arm, *frames(), speed=0.12)
-    text = post(build_program([made]), "krl", OUTPUTS)["cut_skin_outer.src"]
+    text = post(build_program([made], zone=3e-4), "krl", OUTPUTS)["cut_skin_outer.src"]
     assert text.count("$VEL.CP=") == 3  # to the start, cut, back
     assert text.count("$APO.CDIS=") == 1
     assert text.count(" C_DIS") == 28  # all nodes but the first and the last
@@ -104,7 +104,7 @@ def test_positive_a1_and_a6_turn_clockwise_seen_against_their_axes(arm):
 @pytest.mark.parametrize("posture", range(8))
 def test_turn_has_a_bit_for_each_negative_axis_in_all_eight_postures(posture):
     made = CASE.in_posture(posture)
-    _, read = reads_back(build_program([made]))
+    _, read = reads_back(build_program([made], zone=3e-4))
     cut = [move for move in read.moves if move.kind == "linear"][:-1]
     assert [move.posture[1] for move in cut] == [
         sum(1 << i for i, joint in enumerate(q) if joint < 0)
@@ -152,7 +152,7 @@ def test_a_planned_circle_with_an_endless_axis_reads_back(circle, arm, tool, pla
     made = plan(
         circle, endless, tool=tool, placement=placement, speed=0.1, gamma_step=np.radians(10)
     )
-    program = build_program([made])
+    program = build_program([made], zone=3e-4)
     assert found_codes(program) == ["air-moves"]
     reads_back(program)
 

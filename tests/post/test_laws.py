@@ -51,7 +51,7 @@ def test_the_golden_program_is_plain_text_in_short_lines(case):
 @cases()
 def test_the_same_plans_give_the_same_bytes(case):
     again = hand_plan(case.small.contour, *case.cell, speed=0.12)
-    assert case.post(build_program([again], **case.build)) == case.post(case.program)
+    assert case.post(case.built([again])) == case.post(case.program)
 
 
 # The law: what is read back is what was planned.
@@ -287,7 +287,7 @@ def test_no_text_of_a_person_becomes_a_line_of_the_program(case, name, model, re
         contour=replace(case.small.contour, name=name),
         robot=replace(case.small.robot, model=model, id=model),
     )
-    odd = build_program([made], **case.build)
+    odd = case.built([made])
     odd = with_steps(odd, [Comment(remark), *odd.sections[0].steps])
     if refused := case.codes(odd, "error"):
         assert set(refused) <= {"name-reserved", "name-collision"}

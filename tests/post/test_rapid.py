@@ -100,7 +100,7 @@ def test_the_golden_program_reads_back_as_planned(small, program):
 def test_a_planned_circle_with_endless_joints_reads_back(circle, arm, tool, placement):
     step = np.radians(10)
     made = plan(circle, arm, tool=tool, placement=placement, speed=0.1, gamma_step=step)
-    program = build_program([made])
+    program = build_program([made], zone=3e-4)
     reads_back([made], program)
     assert codes(program) == ["air-moves"]
     q = np.array([move.q for move in moves_of(program.sections[0], LinearMove)])
@@ -112,7 +112,7 @@ def test_several_contours_become_routines_called_in_order(cell):
         hand_plan(arc(name), *cell)
         for name in ("skin/outer", "skin outer", "7. Bohrung ø12", "hole" * 12)
     ]
-    program = build_program(plans, name="B-pillar 4711")
+    program = build_program(plans, name="B-pillar 4711", zone=3e-4)
     names = ["skin_outer", "skin_outer_2", "c_7_Bohrung_12", ("hole" * 12)[:32]]
     assert program.name == "B_pillar_4711"
     assert [section.name for section in program.sections] == names
@@ -126,7 +126,7 @@ def test_several_contours_become_routines_called_in_order(cell):
 def test_configurations_follow_the_posture_in_all_eight_postures(posture):
     """The kernels' postures are an independent account of front/rear, elbow and wrist."""
     made = CASE.in_posture(posture)
-    reads_back([made], build_program([made]))
+    reads_back([made], build_program([made], zone=3e-4))
 
 
 def test_quaternions_do_not_jump_in_sign_along_the_path(cell):
@@ -194,7 +194,7 @@ def test_a_parallel_rod_converts_axis_3_both_ways():
 def test_a_program_for_a_parallel_rod_arm_reads_back(cell):
     arm, (_, tool, placement) = robot("abb_irb2400_155"), cell
     made = hand_plan(arc(), arm, tool, placement)
-    program = build_program([made])
+    program = build_program([made], zone=3e-4)
     reads_back([made], program)
     axis_3 = float(re.search(r"MoveAbsJ \[\[[^,]*,[^,]*,([^,]*),", text_of(post(program)))[1])
     q_in = program.sections[0].moves[0].q

@@ -121,7 +121,7 @@ def test_positions_are_rx_about_x_then_ry_about_y_then_rz_about_z(program):
 
 def test_motions_that_are_alike_share_a_descriptor(cell):
     plans = [hand_plan(arc(name, count=30), *cell) for name in ("one", "two")]
-    data = post(build_program(plans), "val3", OUTPUTS)["cut_one/cut_one.dtx"]
+    data = post(build_program(plans, zone=3e-4), "val3", OUTPUTS)["cut_one/cut_one.dtx"]
     assert data.count('blend="Cartesian"') == 1
     assert 'name="mPath" access="private" xsi:type="array" type="mdesc" size="2"' in data
     assert 'name="mAir" access="private" xsi:type="array" type="mdesc" size="1"' in data

@@ -112,7 +112,7 @@ def finish_run(
                 out.print(f"[bold]{escape(cut.name)}[/]: {cut.plan.feed}")
             if (tilt := _largest_tilt(cut)) is not None:
                 out.print(f"[bold]{escape(cut.name)}[/]: tool axis tilted by up to {tilt:.2f} deg")
-            for check in cut.checks:
+            for check in (*cut.checks, *cut.as_run):
                 if not check.ok:
                     out.print(f"[bold]{escape(cut.name)}[/]: {escape(str(check.issue()))}")
         for note in merge_notes(written.notes, [cut.name for cut in outcome.cuts]):
@@ -169,7 +169,8 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
         "largest_tilt_deg": _largest_tilt(cut),
         "peak_velocity_share": float(criteria.peak_velocity.max()),
         "peak_acceleration_share": float(criteria.peak_acceleration.max()),
-        "issues": [str(c.issue()) for c in cut.checks if not c.ok],
+        "as_run": {check.code.removesuffix("-as-run"): check.value for check in cut.as_run},
+        "issues": [str(c.issue()) for c in (*cut.checks, *cut.as_run) if not c.ok],
     }
 
 

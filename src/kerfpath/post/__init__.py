@@ -63,3 +63,5 @@ from kerfpath.post._writer import post as post
 from kerfpath.post._writer import post_and_read as post_and_read
 from kerfpath.post._writer import read_as_written as read_as_written
 from kerfpath.post._writer import read_program as read_program
+from kerfpath.post._zones import ZONE_STEP as ZONE_STEP
+from kerfpath.post._zones import Zone as Zone

@@ -26,6 +26,7 @@ from kerfpath.post._program import (
     Switch,
     Wait,
 )
+from kerfpath.post._zones import Zone, zones_at
 from kerfpath.robots import Robot, posture_name
 from kerfpath.transfer import End, TransferMove, back_off, least_time, speed_share
 
@@ -49,7 +50,8 @@ def build_program(
     moves: Sequence[TransferMove] = (),
     name: str | None = None,
     retract: float = 0.05,
-    zone: float = 0.0003,
+    zone: Zone = "auto",
+    zone_error: float = 1e-4,
     lead_time: float = 0.02,
     gas_lead: float | None = None,
     pierce_time: float = 0.0,
@@ -76,9 +78,12 @@ def build_program(
         Name of the program, made an identifier; default: "cut" and the first contour.
     retract : float m
         How far the tool backs off before and after a contour.
-    zone : float m
+    zone : float m or "auto"
         Radius in which the corners at the inner nodes may be rounded; halved, where nodes are
-        nearer to each other, until zones do not overlap.
+        nearer to each other, until zones do not overlap. "auto": up to half way to the next node,
+        which keeps the limits between the nodes, see `kerfpath.execution`.
+    zone_error : float m
+        Of "auto": the largest distance by which the tip may pass a node.
     lead_time : float s
         How long before the tip arrives the laser is switched.
     gas_lead : float s, optional
@@ -114,7 +119,8 @@ def build_program(
         _require_same_cell(first, plan)
     process = _Process(
         retract=scalar(retract, "retract", unit="m", above=0.0),
-        zone=not_negative(zone, "zone", unit="m"),
+        zone=zone if zone == "auto" else not_negative(zone, "zone", unit="m"),
+        zone_error=scalar(zone_error, "zone_error", unit="m", above=0.0),
         lead_time=lead_time,
         gas_lead=gas_lead,
         pierce_time=not_negative(pierce_time, "pierce_time", unit="s"),
@@ -154,7 +160,8 @@ class _Process:
     """What is done for each contour, with the parameters of `build_program`."""
 
     retract: float
-    zone: float
+    zone: Zone
+    zone_error: float
     lead_time: float
     gas_lead: float | None
     pierce_time: float
@@ -201,7 +208,7 @@ class _Process:
         took = np.diff(plan.time)
         speed = np.diff(plan.contour.s) / took
         joint = [kind == "micro joint" for kind in plan.contour.kinds]
-        for k, radius in enumerate(_zones(plan.contour.points, self.zone), 1):
+        for k, radius in enumerate(zones_at(plan.contour.points, self.zone, self.zone_error), 1):
             switches: tuple[Switch, ...] = ()
             if k == len(took):
                 # At the end of a micro joint the laser is off already.
@@ -249,16 +256,6 @@ class _Air:
             took = least_time(way, eta_v * limits[0], eta_a * limits[1]) / self._share
             speed = np.clip(speed_share(way, *limits, took), LOWEST_SHARE, 1.0)
             yield JointMove(q=q, speed=float(speed[0]), duration=float(took[0]))
-
-
-def _zones(points: Array, zone: float) -> list[float]:
-    """Return the zone (m) at each node but the first; 0 at the last, where the robot stops."""
-    if zone == 0:
-        return [0.0] * (len(points) - 1)
-    gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    room = np.minimum(gaps[:-1], gaps[1:]) / 2
-    halvings = np.ceil(np.maximum(np.log2(zone / room), 0.0))
-    return [*(zone * 0.5**halvings).tolist(), 0.0]
 
 
 def _corners(

@@ -77,6 +77,8 @@ class Language:
         of all that is left out.
     ahead : bool
         Whether outputs are switched ahead of a target, on the path; else where the tip stands.
+    zones : bool
+        Whether its moves are straight lines and arcs whose corners the controller rounds.
     assumed : mapping of str to value
         Settings that are taken where a person has left them None; the preflight warns of outputs.
     read : Reader, optional
@@ -96,6 +98,7 @@ class Language:
     check: Callable[[Program, Any], Iterator[ProgramIssue]] | None = None
     sayable: Callable[[Program, Any], Program] | None = None
     ahead: bool = True
+    zones: bool = True
     assumed: Mapping[str, Any] = field(default_factory=dict)
     read: Reader | None = None
     axis_3: tuple[str, ...] = AXIS_3

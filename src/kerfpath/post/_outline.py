@@ -12,9 +12,13 @@ from kerfpath.post._names import identifier, identifiers
 from kerfpath.post._preflight import foresee
 from kerfpath.post._program import Handshake, JointMove, LinearMove, Program, Section, Switch, Wait
 from kerfpath.post._settings import LanguageSettings
+from kerfpath.post._zones import Zone
 from kerfpath.robots import Robot
 
 __all__ = ["issues_before_planning"]
+
+SOME_ZONE = 1.23456e-3
+"""m: stands for zones that depend on the spacing of the nodes, which are no round numbers."""
 
 
 def issues_before_planning(
@@ -24,7 +28,7 @@ def issues_before_planning(
     settings: LanguageSettings | None = None,
     *,
     name: str,
-    zone: float,
+    zone: Zone,
     lead_time: float,
     approach_speed: float,
     pierce_time: float = 0.0,
@@ -47,6 +51,7 @@ def issues_before_planning(
     title = identifier(name)
     names = identifiers((cut for cut, _ in cuts), taken=(title,))
     here, q = np.eye(4), np.zeros(robot.joints)
+    radius = SOME_ZONE if zone == "auto" else zone
     sections = []
     for section, (_, speed) in zip(names, cuts, strict=True):
         on = [Switch(signal="laser", on=True, lead_time=lead_time)]
@@ -61,7 +66,7 @@ def issues_before_planning(
                 T_part_tip=here, q=q, speed=approach_speed, duration=1.0, switches=tuple(on)
             ),
             *([Wait(time=pierce_time)] if pierce_time else []),
-            LinearMove(T_part_tip=here, q=q, speed=speed, duration=1.0, zone=zone),
+            LinearMove(T_part_tip=here, q=q, speed=speed, duration=1.0, zone=radius),
             LinearMove(T_part_tip=here, q=q, speed=speed, duration=1.0, switches=tuple(off)),
         )
         sections.append(Section(name=section, steps=steps))

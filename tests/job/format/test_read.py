@@ -129,7 +129,7 @@ def test_plan_and_program_may_be_left_out(read):
     assert job.options == PlanOptions(refine=True, **FOR_PROGRAMS)
     program = job.program
     assert (program.language, program.name) == ("rapid", "job_9_side_panel")
-    assert (program.retract, program.zone, program.lead_time) == (0.05, 0.0003, 0.02)
+    assert (program.retract, program.zone, program.lead_time) == (0.05, "auto", 0.02)
     assert program.settings == RapidSettings()
 
 

@@ -19,6 +19,7 @@ from kerfpath.post import (
     LanguageSettings,
     Program,
     ProgramIssue,
+    Zone,
     build_program,
     issues_before_planning,
 )
@@ -41,15 +42,16 @@ class ProgramOptions:
         Robot language, or "none".
     settings : LanguageSettings or None
         Those of the language.
-    name, retract, zone, lead_time, pierce_time, approach_speed, air_speed, arc_tolerance, gas_lead,
-    handshakes
+    name, retract, zone, zone_error, lead_time, pierce_time, approach_speed, air_speed,
+    arc_tolerance, gas_lead, handshakes
         As in `kerfpath.post.build_program`.
     """
 
     language: str
     name: str
     retract: float
-    zone: float
+    zone: Zone
+    zone_error: float
     settings: LanguageSettings | None
     lead_time: float
     pierce_time: float
@@ -75,6 +77,7 @@ class ProgramOptions:
             name=self.name,
             retract=self.retract,
             zone=self.zone,
+            zone_error=self.zone_error,
             lead_time=self.lead_time,
             gas_lead=self.gas_lead,
             pierce_time=self.pierce_time,
@@ -152,7 +155,8 @@ def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
         language=table.language,
         name=table.name or stem[:_NAME_LENGTH],
         retract=table.retract_mm / 1000,
-        zone=table.zone_mm / 1000,
+        zone=table.zone_mm if table.zone_mm == "auto" else table.zone_mm / 1000,
+        zone_error=table.zone_error_mm / 1000,
         settings=table.settings(),
         lead_time=table.lead_time_s,
         pierce_time=table.pierce_time_s,

@@ -247,6 +247,7 @@ def _program(job: Job) -> list[str]:
     options = job.program
     named = {
         "name": options.name, "retract": options.retract, "zone": options.zone,
+        "zone_error": options.zone_error,
         "lead_time": options.lead_time, "gas_lead": options.gas_lead,
         "pierce_time": options.pierce_time, "approach_speed": options.approach_speed,
         "air_speed": options.air_speed, "arc_tolerance": options.arc_tolerance,

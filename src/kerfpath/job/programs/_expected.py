@@ -14,6 +14,7 @@ from kerfpath.job.format import Candidate, Job, divide_nodes
 from kerfpath.job.programs._read import ReadCut, branch_of, follow_poses, poses_on_arc
 from kerfpath.plans import Plan
 from kerfpath.post import (
+    ZONE_STEP,
     CircularMove,
     JointMove,
     Language,
@@ -125,6 +126,8 @@ def expect_program(
             else step
             for step in section.steps
         ]
+        if options.zone == "auto":
+            steps = _with_zones(steps, cut, asked)
         if options.arc_tolerance is not None:
             steps = _with_arcs(steps, cut, asked)
         sections.append(replace(section, steps=tuple(steps)))
@@ -206,6 +209,21 @@ def _same_pose(program: Program, asked: Array, read: Array, rules: Rules) -> Arr
     turned = np.linalg.norm(T[0, :3, :3] - T[1, :3, :3]) / np.sqrt(2)
     near = off <= POINT + rules.point_step + REACH * left and turned <= ANGLE + left
     return read if near and np.abs(asked - read).max() <= SAME_BRANCH else asked
+
+
+def _with_zones(steps: Sequence[Step], cut: ReadCut, asked: TargetNodes) -> list[Step]:
+    """Return the steps of a cut with the zones that were read, where they are one step away.
+
+    Zones are rounded to steps, and digits of targets may lead to the next one.
+    """
+    path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
+    found = list(steps)
+    for k, move in zip((path[node] for node in asked.at), cut.targets, strict=True):
+        step = found[k]
+        assert isinstance(step, LinearMove)
+        if move.zone and abs(move.zone - step.zone) <= ZONE_STEP * step.zone + POINT:
+            found[k] = replace(step, zone=move.zone)
+    return found
 
 
 def _with_arcs(steps: Sequence[Step], cut: ReadCut, asked: TargetNodes) -> list[Step]:

@@ -45,6 +45,9 @@ class CutResult:
         How clear every pose is in the cell, where the job asks for the map.
     departure : Departure or None
         How far the nodes leave the CAD curve; measured once it is settled what is cut.
+    as_run : tuple of Check
+        What the joints need where the program's corners are rounded; warnings, which no plan file
+        keeps, as they are about the program.
     """
 
     request: CutRequest
@@ -57,6 +60,7 @@ class CutResult:
     checks: tuple[Check, ...] = ()
     clearance: ClearanceMap | None = None
     departure: Departure | None = None
+    as_run: tuple[Check, ...] = ()
 
     __repr__ = short_repr
 

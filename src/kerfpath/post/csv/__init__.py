@@ -18,6 +18,7 @@ CSV = Language(
     formatter=Csv,
     is_reserved=is_reserved,
     check=check_times,
+    zones=False,
     read=read,
 )
 """What is registered."""

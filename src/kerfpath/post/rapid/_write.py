@@ -323,7 +323,7 @@ def zone_data(zone: float) -> str:
     0.1 deg for each mm.
     """
     zone_mm = number(zone * 1e3, 3)
-    zone_deg = number(zone * 1e3 * 0.1, 3)
+    zone_deg = number(float(zone_mm) * 0.1, 3)
     return f"[FALSE,{zone_mm},{zone_mm},{zone_mm},{zone_deg},{zone_mm},{zone_deg}]"
 
 

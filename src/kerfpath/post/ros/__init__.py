@@ -19,6 +19,7 @@ ROS = Language(
     rules=rules,
     formatter=Ros,
     check=check,
+    zones=False,
     read=read,
 )
 """What is registered."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, ValidationError, field_validator, model_validator
 
@@ -27,7 +27,10 @@ class ProgramTable(Table):
     language: Annotated[str, key("a robot language, or none for no program", '"rapid"')] = "rapid"
     name: Identifier = None
     retract_mm: Annotated[Positive, key("a number above 0, in mm", "50")] = 50.0
-    zone_mm: Annotated[NotNegative, key("a number not below 0, in mm", "0.3")] = 0.3
+    zone_mm: Annotated[
+        NotNegative | Literal["auto"], key('"auto" or a number not below 0, in mm', '"auto"')
+    ] = "auto"
+    zone_error_mm: Annotated[Positive, key("a number above 0, in mm", "0.1")] = 0.1
     lead_time_s: Annotated[NotNegative, key("a number not below 0, in s", "0.02")] = 0.02
     arcs_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.01")] = None
     gas_lead_s: Annotated[NotNegative | None, key("a number not below 0, in s", "0.3")] = None

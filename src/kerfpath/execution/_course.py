@@ -1,0 +1,148 @@
+"""Where the tool is over time, from stop to stop, as programmed speeds and zones have it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath._arrays import Array, Bools, Ints, freeze
+from kerfpath._repr import short_repr
+from kerfpath.post import CircularMove, LinearMove, circle_through
+
+__all__ = ["ToolCourse"]
+
+SHORTEST = 1e-9
+"""s: no move and no stretch is shorter."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ToolCourse:
+    """The tool's pose over the time that the programmed speeds leave it.
+
+    Between the zones the tip runs straight, or along an arc, at the programmed speed, and the tool
+    turns evenly about one axis. Within `half` s of a target it goes from one move over to the next
+    at constant acceleration, the tip and the rotation vector alike: along a parabola, tangent to
+    both, where both are straight. That is a model: makers of controllers publish the zones, not
+    what happens in them.
+
+    Parameters
+    ----------
+    T : (K, 4, 4) m
+        Poses of the tip at the targets, in the part; the robot stands at the first and the last.
+    duration : (K-1,) s
+        Of each move.
+    half : (K,) s
+        Before and after each target: half the time in its zone.
+    centre, normal : (K-1, 3) m, 1
+        Circle of each move, in the part; the normal is zero where the move is straight.
+    """
+
+    T: Array
+    duration: Array
+    half: Array
+    centre: Array
+    normal: Array
+    time: Array = field(init=False)
+    _sweep: Array = field(init=False, repr=False)
+    _rate: Array = field(init=False, repr=False)
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        R = self.T[:, :3, :3]
+        turn = Rotation.from_matrix(R[:-1].transpose(0, 2, 1) @ R[1:]).as_rotvec()
+        start, end = self.T[:-1, :3, 3] - self.centre, self.T[1:, :3, 3] - self.centre
+        across = np.cross(self.normal, start)
+        angle = np.arctan2((end * across).sum(1), (end * start).sum(1)) % (2 * np.pi)
+        values = {
+            "time": np.append(0.0, np.cumsum(self.duration)),
+            "_sweep": angle / self.duration,
+            "_rate": turn / self.duration[:, None],
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, freeze(value))
+
+    @classmethod
+    def of(cls, start: Array, moves: Sequence[LinearMove], turning: float = np.inf) -> ToolCourse:
+        """Return the course of moves from a pose, (4, 4) m, to a stop.
+
+        Parameters
+        ----------
+        start : (4, 4) m
+            T_part_tip where the first move begins.
+        moves : sequence of LinearMove
+        turning : float rad/s
+            How fast the tool may turn before the tip goes more slowly.
+        """
+        T = np.array([start, *(move.T_part_tip for move in moves)])
+        centre, normal = np.zeros((2, len(moves), 3))
+        for k, move in enumerate(moves):
+            if isinstance(move, CircularMove):
+                circle = circle_through(T[k, :3, 3], move.T_part_via[:3, 3], T[k + 1, :3, 3])
+                if circle is not None:
+                    centre[k], normal[k], _ = circle
+        still = cls(
+            T=T, duration=np.ones(len(moves)), half=np.zeros(len(T)), centre=centre, normal=normal
+        )
+        speed = np.array([move.speed for move in moves])
+        length, angle = still.lengths, np.linalg.norm(still._rate, axis=1)
+        duration = np.maximum(np.maximum(length / speed, angle / turning), SHORTEST)
+        zone = np.array([move.zone for move in moves[:-1]])
+        fastest = length / duration
+        half = zone / np.maximum(np.maximum(fastest[:-1], fastest[1:]), 1e-12)
+        room = np.minimum(duration[:-1], duration[1:]) / 2
+        half = np.append(0.0, np.append(np.minimum(half, room), 0.0))
+        return cls(T=T, duration=duration, half=half, centre=centre, normal=normal)
+
+    @property
+    def lengths(self) -> Array:
+        """Length of each move, (K-1,) m."""
+        chord = np.linalg.norm(np.diff(self.T[:, :3, 3], axis=0), axis=1)
+        radius = np.linalg.norm(self.T[:-1, :3, 3] - self.centre, axis=1)
+        return np.asarray(np.where(self._round, radius * self._sweep * self.duration, chord))
+
+    @property
+    def borders(self) -> Array:
+        """Times, s, between which the tool moves smoothly: ends of moves and of zones."""
+        every = np.concatenate([self.time, self.time - self.half, self.time + self.half])
+        every = np.unique(np.clip(every, 0.0, self.time[-1]))
+        return np.asarray(every[np.append(True, np.diff(every) > SHORTEST)])
+
+    def poses(self, time: Array) -> Array:
+        """Return T_part_tip, (m, 4, 4) m, at times (m,) s from the start."""
+        k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.duration) - 1)
+        after, before = time - self.time[k], self.time[k + 1] - time
+        near = np.where(after < before, k, k + 1)
+        left, right = np.maximum(near - 1, 0), np.minimum(near, len(self.duration) - 1)
+        away, half = np.where(near == k, after, -before), self.half[near]
+        # What is added to the corner: of constant acceleration, and gone at the ends of the zone.
+        blend = np.maximum(half - np.abs(away), 0.0) ** 2 / np.maximum(4 * half, 1e-12)
+        end_left, end_right = self._velocity(left, ends=True), self._velocity(right, ends=False)
+        T = np.tile(np.eye(4), (len(time), 1, 1))
+        T[:, :3, 3] = self._points(k, after) + blend[:, None] * (end_right - end_left)
+        rate = np.where((near == k)[:, None], self._rate[right], self._rate[left])
+        bend = self._rate[right] - self._rate[left]
+        turn = Rotation.from_rotvec(away[:, None] * rate + blend[:, None] * bend).as_matrix()
+        T[:, :3, :3] = self.T[near, :3, :3] @ turn
+        return T
+
+    @property
+    def _round(self) -> Bools:
+        return np.asarray(self.normal.any(axis=1))
+
+    def _points(self, k: Ints, after: Array) -> Array:
+        """Return the points (m, 3) of moves k (m,), s after each began."""
+        start, along = self.T[k, :3, 3], np.diff(self.T[:, :3, 3], axis=0) / self.duration[:, None]
+        x, at = start - self.centre[k], (self._sweep[k] * after)[:, None]
+        arc = self.centre[k] + np.cos(at) * x + np.sin(at) * np.cross(self.normal[k], x)
+        return np.where(self._round[k, None], arc, start + after[:, None] * along[k])
+
+    def _velocity(self, k: Ints, *, ends: bool) -> Array:
+        """Return the velocities (m, 3) m/s of moves k (m,) where they begin or end."""
+        T, along = self.T[:, :3, 3], np.diff(self.T[:, :3, 3], axis=0) / self.duration[:, None]
+        x = (T[k + 1] if ends else T[k]) - self.centre[k]
+        arc = self._sweep[k, None] * np.cross(self.normal[k], x)
+        return np.where(self._round[k, None], arc, along[k])
