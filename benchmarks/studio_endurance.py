@@ -278,7 +278,7 @@ def run(*, quick: bool = False) -> Report:
         finally:
             served.stop()
     heap, server = _levels(gestures.heap), _levels(gestures.server)
-    faults = [line for line in served.said if "Traceback" in line or "failed" in line]
+    faults = [line.strip() for line in served.said if re.match(r"[\w.]+(Error|Exception)\b", line)]
     return Report(
         title="The studio, for a long time",
         how=HOW,
@@ -292,6 +292,7 @@ def run(*, quick: bool = False) -> Report:
             f"heap of the page {heap[0]:.1f} MB, later {heap[1]:.1f}; "
             f"server {server[0]:.0f} MB, later {server[1]:.0f}",
             f"{PAGES} pages: {len(wrong)} errors {sorted(set(wrong))[:3]}; server "
-            f"{before:.0f} MB before, {after:.0f} after; {len(faults)} faults in its terminal",
+            f"{before:.0f} MB before, {after:.0f} after; {len(faults)} faults in its terminal "
+            f"{sorted(set(faults))[:3]}",
         ],
     )
