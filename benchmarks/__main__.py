@@ -36,6 +36,7 @@ NAMES = (
     "continuum_random",
     "continuum_bounds",
     "continuum_infeasible",
+    "execution",
     "certificate_audits",
     "studio",
     "studio-endurance",
@@ -94,6 +95,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import large_drawings
 
         return [large_drawings.run(quick=quick)]
+    if name == "execution":
+        from benchmarks import execution
+
+        return execution.run(quick=quick)
     if name == "kerf":
         from benchmarks import kerf
 
