@@ -109,20 +109,20 @@ def test_a_graph_is_thinned_once_for_the_same_margins(circle, arm, tool, placeme
     )
     graph = layered_graph(circle, arm, options=options, **given)
     assert 0 < len(graph.q) < len(build_all(circle, arm, tool, placement).q)
-    assert within_margins(graph, arm, options, tool) is graph
+    assert within_margins(graph, arm, options, tool, circle.s) is graph
     # What asks for anything else is looked at again, and finds what it would find by itself.
     for other in (
         replace(options, comfort=Comfort(limits=Band(margin=0.4))),
         replace(options, floor=0.5),
         replace(options, retract=0.2),
     ):
-        again = within_margins(graph, arm, other, tool)
+        again = within_margins(graph, arm, other, tool, circle.s)
         alone = layered_graph(circle, arm, options=other, **given)
         assert again.kept == alone.kept != graph.kept
         np.testing.assert_array_equal(again.q, alone.q)
     narrow = arm.with_limits(upper=arm.upper - 0.3)
-    assert within_margins(graph, narrow, options, tool) is not graph
-    assert within_margins(graph, arm, options, tool, periodic=True) is not graph
+    assert within_margins(graph, narrow, options, tool, circle.s) is not graph
+    assert within_margins(graph, arm, options, tool, circle.s, periodic=True) is not graph
     assert graph.part(3, 9).kept is None
 
 

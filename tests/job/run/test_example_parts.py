@@ -48,6 +48,8 @@ def test_an_example_part_is_planned_audited_and_written(
     text = job.read_text()
     assert f"gamma_step_deg = {step}\n" in text
     text = text.replace(f"gamma_step_deg = {step}\n", f"gamma_step_deg = {coarser}\n")
+    # What is proved of them has tests of its own, and takes as long as all the rest.
+    text = text.replace("[plan]\n", "[plan]\ncertify = false\n")
     if name == "tube":  # half a minute of distances to its walls; the bracket has a cell, too
         text = re.sub(r"\[cell\].*(?=\[program\])", "", text, flags=re.DOTALL)
     job.write_text(text)
