@@ -37,8 +37,8 @@ def test_a_plan_that_is_kept_is_compared_with_the_one_that_is_shown(page, studio
     assert [float(each) for each in row[:2]] == [round(2 * seconds, 2), round(seconds, 2)]
     assert "better" in row[2]
     # Its course is there for the map, its curves for the plot, and its robot in the scene.
-    (course,) = page.evaluate("() => studio.store.compare")
-    assert course["gamma"] == plan["gamma"]
+    (course,) = page.evaluate("() => studio.store.beside('slot')")
+    assert (course["name"], course["gamma"]) == ("A", plan["gamma"])
     until(page, lambda: page.evaluate("() => studio.plots.beside.length") == 7)
     assert page.evaluate("() => studio.plots.plot.scales.x.max") >= 1.9 * seconds
     page.evaluate("() => studio.player.seek(studio.player.timeline.begin('slot') + 0.1)")

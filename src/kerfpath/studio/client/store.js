@@ -127,6 +127,23 @@ export class Store {
     this.compare = plans.map(({ s, gamma, posture }) => ({ name, s, gamma, posture }));
   }
 
+  /**
+   * Return the courses beside a contour's own: of the job that is compared, else before the change.
+   * @param {string} contour
+   * @returns {Course[]}
+   */
+  beside(contour) {
+    return this.against ? this.compare : (this.before.get(contour) ?? []);
+  }
+
+  /**
+   * Return what these are called; null: there are none.
+   * @param {string} contour
+   */
+  besideOf(contour) {
+    return this.beside(contour).length ? (this.against?.entry.name ?? "before") : null;
+  }
+
   /** The names of all contours, in the order of the job. */
   contours() {
     return (this.scene?.contours ?? this.job?.contours ?? []).map((each) => each.name);

@@ -6,6 +6,7 @@ import { wrapped } from "./grid.js";
 import { inks, pixels } from "./paint.js";
 
 /** @typedef {import("../messages.js").PlanMessage} PlanMessage */
+/** @typedef {import("../store.js").Course} Course */
 /** @typedef {import("./grid.js").Grid} Grid */
 /** @typedef {(context: CanvasRenderingContext2D, frame: Frame) => void} Under */
 /** @typedef {{left: number, top: number, width: number, height: number, em: number}} Frame CSS px */
@@ -13,7 +14,7 @@ import { inks, pixels } from "./paint.js";
 /**
  * @typedef {object} Drawn
  * @property {PlanMessage[]} plans
- * @property {PlanMessage[]} before
+ * @property {Course[]} before  drawn dashed
  * @property {boolean} stale
  * @property {number | null} broken  m, where no path goes on
  * @property {{s: number, gamma: number} | null} now
@@ -179,7 +180,7 @@ export class Chart {
   /**
    * Draw a course; faint where it is in another posture than the one that is shown.
    * @param {CanvasRenderingContext2D} context
-   * @param {PlanMessage} plan
+   * @param {Course} plan
    * @param {Frame} frame
    * @param {string} colour
    * @param {number} width

@@ -12,7 +12,7 @@ const SWATCH = 28; // px, drawn at half that size
  * @param {Grid} grid
  * @param {number} layer
  * @param {import("./paint.js").Ink[]} ink
- * @param {{course: boolean, before: boolean}} lines
+ * @param {{course: boolean, before: string | null}} lines  before: whose course is dashed
  * @returns {Node[]}
  */
 export function legend(grid, layer, ink, lines) {
@@ -37,7 +37,7 @@ export function legend(grid, layer, ink, lines) {
     "ul",
     { class: "lines" },
     lines.course ? line("course", "course") : null,
-    lines.before ? line("before", "course before") : null,
+    lines.before === null ? null : line("before", `course ${lines.before}`),
   );
   const hidden = message.hidden.map((each) => el("p", {}, each));
   return [

@@ -60,7 +60,9 @@ export class MapView {
       this.leave();
       this.load();
     });
-    store.on(["map", "plan", "scene", "job", "connection", "progress"], () => this.load());
+    store.on(["map", "plan", "scene", "job", "connection", "progress", "compare"], () =>
+      this.load(),
+    );
     store.on(["pose"], (pose) => this.answered(pose));
     player.on(() => this.invalidate());
     new ResizeObserver(() => this.invalidate()).observe(canvas);
@@ -149,7 +151,7 @@ export class MapView {
     this.legend.replaceChildren(
       ...legend(grid, this.layer, this.chart.inks(), {
         course: store.plans.has(grid.message.contour),
-        before: store.before.has(grid.message.contour),
+        before: store.besideOf(grid.message.contour),
       }),
       ...this.bands.listed(),
     );
@@ -183,7 +185,7 @@ export class MapView {
     const k = Math.min(cutting?.node ?? 0, (plan?.s.length ?? 1) - 1);
     chart.draw({
       plans,
-      before: store.before.get(name) ?? [],
+      before: store.beside(name),
       stale: plans.some((each) => store.stale(each)),
       broken: store.nopaths.get(name)?.s ?? null,
       now: plan ? { s: plan.s[k], gamma: plan.gamma[k] } : null,
