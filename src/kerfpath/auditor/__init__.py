@@ -19,6 +19,7 @@ from kerfpath.auditor._table import Level as Level
 from kerfpath.auditor._table import Unit as Unit
 from kerfpath.auditor._table import format_value as format_value
 from kerfpath.auditor._table import worst_of as worst_of
+from kerfpath.auditor._windows import window_checks as window_checks
 
 
 def __getattr__(name: str) -> object:

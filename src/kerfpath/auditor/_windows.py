@@ -19,8 +19,17 @@ ON_IT = 1e-9
 """m: a node at the end of a stretch, but for rounding, is on it."""
 
 
-def window_checks(plan: Plan, tool: Array) -> list[Check]:
-    """Return the check of the windows of gamma, if there are any; tool (K, 4, 4) are its poses."""
+def window_checks(plan: Plan, tool: Array, *, slack: float = SLACK) -> list[Check]:
+    """Return the check of the windows of gamma, if there are any.
+
+    Parameters
+    ----------
+    plan : Plan
+    tool : (K, 4, 4) m
+        Poses of its tool in the base.
+    slack : float rad
+        By how much gamma may be outside: what digits leave of it.
+    """
     windows = plan.settings.gamma_windows
     if not windows:
         return []
@@ -40,7 +49,7 @@ def window_checks(plan: Plan, tool: Array) -> list[Check]:
             code="gamma-window",
             title="gamma outside its pinned windows at the nodes",
             value=float(out[node]),
-            limit=SLACK,
+            limit=slack,
             unit="rad",
             node=node,
         )

@@ -18,6 +18,7 @@ from kerfpath.job.plan_file import AuditReport, check, check_order, collision_no
 from kerfpath.job.programs._cut_checks import check_cut
 from kerfpath.job.programs._expected import TargetNodes, expect_program
 from kerfpath.job.programs._laser_and_gas import BeamProcess, check_laser_and_gas
+from kerfpath.job.programs._pins import check_pins
 from kerfpath.job.programs._read import (
     ReadCut,
     add_tips,
@@ -29,6 +30,7 @@ from kerfpath.job.programs._read import (
 from kerfpath.plans import Plan
 from kerfpath.post import Language, LanguageSettings, ReadProgram, differences
 from kerfpath.transfer import least_time
+from kerfpath.windows import GammaWindow
 
 __all__ = ["ProgramAudit", "audit_program"]
 
@@ -86,6 +88,8 @@ class ProgramAudit:
     job : Job
     contours : tuple of tuples of Candidate
         The ways in which each of its contours may be cut; their nodes have its name.
+    windows : tuple of tuples of GammaWindow
+        Where each of them keeps gamma.
     cell : Cell or None
     inner_first : tuple of (int, int)
         Contours of which the first is to be cut before the second.
@@ -93,6 +97,7 @@ class ProgramAudit:
 
     job: Job
     contours: tuple[tuple[Candidate, ...], ...]
+    windows: tuple[tuple[GammaWindow, ...], ...]
     cell: Cell | None
     inner_first: tuple[tuple[int, int], ...] = ()
 
@@ -121,6 +126,7 @@ class ProgramAudit:
         return cls(
             job=job,
             contours=tuple(contour.candidates for contour in prepared.contours),
+            windows=tuple(contour.options.gamma_windows for contour in prepared.contours),
             cell=prepared.cell,
             inner_first=prepared.inner_first,
         )
@@ -161,7 +167,10 @@ class ProgramAudit:
             tables[title].append(count("once", "earlier cuts of this contour", done.count(which)))
             done.append(which)
             starts.append(cut.moves[0].place)
-            followed += [] if along is None else [(cut, *along)]
+            if along is not None:
+                followed.append((cut, *along))
+                pins, rules = self.windows[which], chosen.rules(settings)
+                tables[title] += check_pins(job, cut, *along, pins, rules)
         steps = [places[name].index(start) for start in starts]
         tables[name] += [
             row if row.ok else replace(row, node=steps[row.node])

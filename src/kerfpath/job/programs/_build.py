@@ -37,8 +37,13 @@ OTHERWISE = "change the job there and plan it again"
 
 def audit_of_cuts(job: Job, cuts: Sequence[CutResult], cell: Cell | None) -> ProgramAudit:
     """Return the audit of the program of a job's cuts: by their paths, nodes and speeds."""
-    planned = tuple((cut.candidate,) for cut in cuts if cut.plan is not None)
-    return ProgramAudit(job=job, contours=planned, cell=cell)
+    planned = [cut for cut in cuts if cut.plan is not None]
+    return ProgramAudit(
+        job=job,
+        contours=tuple((cut.candidate,) for cut in planned),
+        windows=tuple(cut.request.options.gamma_windows for cut in planned),
+        cell=cell,
+    )
 
 
 def audit_of_plans(job: Job, plans: Sequence[Plan]) -> ProgramAudit:
@@ -48,7 +53,8 @@ def audit_of_plans(job: Job, plans: Sequence[Plan]) -> ProgramAudit:
         dt = float(np.diff(made.time).min())  # where the feed is reduced it is longer
         nodes = replace(made.contour, time=dt * np.arange(len(made.contour), dtype=float))
         contours.append((Candidate(path=made.contour, nodes=nodes),))
-    return ProgramAudit(job=job, contours=tuple(contours), cell=None)
+    windows = tuple(made.settings.gamma_windows for made in plans)
+    return ProgramAudit(job=job, contours=tuple(contours), windows=windows, cell=None)
 
 
 def program_of(

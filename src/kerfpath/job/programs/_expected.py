@@ -28,7 +28,7 @@ from kerfpath.post import (
 )
 from kerfpath.transfer import TransferMove, back_off
 
-__all__ = ["TargetNodes", "expect_program", "nodes_at_targets"]
+__all__ = ["TargetNodes", "expect_program", "nodes_at_targets", "whole_cut"]
 
 REACH = 4.0
 """Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
@@ -114,7 +114,7 @@ def expect_program(
         There is no such program: joints that leave the path, no way to back off.
     """
     rules, options = language.rules(settings), job.program
-    plans = [_whole(job, cut, asked, plan) for cut, asked, plan in cuts]
+    plans = [whole_cut(job, cut, asked, plan) for cut, asked, plan in cuts]
     moves = _moves(job, [cut for cut, _, _ in cuts], plans, home)
     # Arcs are put in where they were read.
     program = replace(options, arc_tolerance=None).program(plans, moves)
@@ -134,7 +134,7 @@ def expect_program(
     return read_as_written(replace(program, sections=tuple(sections)), language, settings)
 
 
-def _whole(job: Job, cut: ReadCut, asked: TargetNodes, plan: Plan) -> Plan:
+def whole_cut(job: Job, cut: ReadCut, asked: TargetNodes, plan: Plan) -> Plan:
     """Return the plan of a cut with a node wherever the job asks for one, along arcs, too."""
     targets, at = cut.ends, asked.at
     K = len(asked.nodes)
