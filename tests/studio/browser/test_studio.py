@@ -90,6 +90,8 @@ NEWEST = """() => {
     const done = (each) => each.revision >= job.revision && each.passed !== null;
     return found.length > 0 && found.every(done);
 }"""
+TWO_FRAMES = "() => new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)))"
+"""What has come is drawn with the next frame."""
 POSE = """async (by) => {
     const { turnedAbout } = await import("/client/inverse.js");
     const { store, map, connection } = studio;
@@ -109,8 +111,9 @@ COURSE = "() => studio.store.plans.get(studio.store.selected)?.[0].gamma ?? null
 
 
 def settled(page, after=-1):
-    """Wait until all of the newest job is planned, and it is newer than a revision."""
+    """Wait until all of the newest job is planned and drawn, and it is newer than a revision."""
     until(page, lambda: page.evaluate(REVISION) > after and page.evaluate(NEWEST), seconds=240)
+    page.evaluate(TWO_FRAMES)
 
 
 PLACES = """() => {
