@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -38,6 +38,13 @@ class ToolCourse:
         Before and after each target: half the time in its zone.
     centre, normal : (K-1, 3) m, 1
         Circle of each move, in the part; the normal is zero where the move is straight.
+
+    Attributes
+    ----------
+    time : (K,) s
+        At the targets.
+    sweep : (K-1,) rad
+        How far the arc of each move turns; 0 where it is straight.
     """
 
     T: Array
@@ -46,7 +53,8 @@ class ToolCourse:
     centre: Array
     normal: Array
     time: Array = field(init=False)
-    _sweep: Array = field(init=False, repr=False)
+    sweep: Array = field(init=False)
+    _along: Array = field(init=False, repr=False)
     _rate: Array = field(init=False, repr=False)
 
     __repr__ = short_repr
@@ -59,7 +67,8 @@ class ToolCourse:
         angle = np.arctan2((end * across).sum(1), (end * start).sum(1)) % (2 * np.pi)
         values = {
             "time": np.append(0.0, np.cumsum(self.duration)),
-            "_sweep": angle / self.duration,
+            "sweep": np.where(self._round, angle, 0.0),
+            "_along": np.diff(self.T[:, :3, 3], axis=0) / self.duration[:, None],
             "_rate": turn / self.duration[:, None],
         }
         for name, value in values.items():
@@ -78,31 +87,41 @@ class ToolCourse:
             How fast the tool may turn before the tip goes more slowly.
         """
         T = np.array([start, *(move.T_part_tip for move in moves)])
-        centre, normal = np.zeros((2, len(moves), 3))
-        for k, move in enumerate(moves):
-            if isinstance(move, CircularMove):
-                circle = circle_through(T[k, :3, 3], move.T_part_via[:3, 3], T[k + 1, :3, 3])
-                if circle is not None:
-                    centre[k], normal[k], _ = circle
-        still = cls(
-            T=T, duration=np.ones(len(moves)), half=np.zeros(len(T)), centre=centre, normal=normal
-        )
+        via = [move.T_part_via if isinstance(move, CircularMove) else None for move in moves]
+        even = cls.through(T, via)
         speed = np.array([move.speed for move in moves])
-        length, angle = still.lengths, np.linalg.norm(still._rate, axis=1)
+        length, angle = even.lengths, np.linalg.norm(even._rate, axis=1)
         duration = np.maximum(np.maximum(length / speed, angle / turning), SHORTEST)
         zone = np.array([move.zone for move in moves[:-1]])
         fastest = length / duration
         half = zone / np.maximum(np.maximum(fastest[:-1], fastest[1:]), 1e-12)
         room = np.minimum(duration[:-1], duration[1:]) / 2
         half = np.append(0.0, np.append(np.minimum(half, room), 0.0))
-        return cls(T=T, duration=duration, half=half, centre=centre, normal=normal)
+        return replace(even, duration=duration, half=half)
+
+    @classmethod
+    def through(cls, T: Array, via: Sequence[Array | None]) -> ToolCourse:
+        """Return the course through poses, (K, 4, 4) m, without zones: each move takes a second.
+
+        It leads along an arc through each of `via`, K-1 poses (4, 4) m, where that is not None.
+        """
+        centre, normal = np.zeros((2, len(via), 3))
+        for k, middle in enumerate(via):
+            circle = None
+            if middle is not None:
+                circle = circle_through(T[k, :3, 3], middle[:3, 3], T[k + 1, :3, 3])
+            if circle is not None:  # None: the three are on a line
+                centre[k], normal[k], _ = circle
+        return cls(
+            T=T, duration=np.ones(len(via)), half=np.zeros(len(T)), centre=centre, normal=normal
+        )
 
     @property
     def lengths(self) -> Array:
         """Length of each move, (K-1,) m."""
         chord = np.linalg.norm(np.diff(self.T[:, :3, 3], axis=0), axis=1)
         radius = np.linalg.norm(self.T[:-1, :3, 3] - self.centre, axis=1)
-        return np.asarray(np.where(self._round, radius * self._sweep * self.duration, chord))
+        return np.asarray(np.where(self._round, radius * self.sweep, chord))
 
     @property
     def borders(self) -> Array:
@@ -135,14 +154,13 @@ class ToolCourse:
 
     def _points(self, k: Ints, after: Array) -> Array:
         """Return the points (m, 3) of moves k (m,), s after each began."""
-        start, along = self.T[k, :3, 3], np.diff(self.T[:, :3, 3], axis=0) / self.duration[:, None]
-        x, at = start - self.centre[k], (self._sweep[k] * after)[:, None]
+        start = self.T[k, :3, 3]
+        x, at = start - self.centre[k], (self.sweep[k] / self.duration[k] * after)[:, None]
         arc = self.centre[k] + np.cos(at) * x + np.sin(at) * np.cross(self.normal[k], x)
-        return np.where(self._round[k, None], arc, start + after[:, None] * along[k])
+        return np.where(self._round[k, None], arc, start + after[:, None] * self._along[k])
 
     def _velocity(self, k: Ints, *, ends: bool) -> Array:
         """Return the velocities (m, 3) m/s of moves k (m,) where they begin or end."""
-        T, along = self.T[:, :3, 3], np.diff(self.T[:, :3, 3], axis=0) / self.duration[:, None]
-        x = (T[k + 1] if ends else T[k]) - self.centre[k]
-        arc = self._sweep[k, None] * np.cross(self.normal[k], x)
-        return np.where(self._round[k, None], arc, along[k])
+        x = self.T[k + 1 if ends else k, :3, 3] - self.centre[k]
+        arc = (self.sweep / self.duration)[k, None] * np.cross(self.normal[k], x)
+        return np.where(self._round[k, None], arc, self._along[k])

@@ -12,7 +12,6 @@ from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.execution._course import ToolCourse
 from kerfpath.post import JointMove, LinearMove, Program, Section
-from kerfpath.robots import Robot
 
 __all__ = ["Executed", "Peak", "executed"]
 
@@ -126,7 +125,8 @@ def _runs(section: Section) -> list[list[LinearMove]]:
 
 
 def _run(program: Program, section: Section, moves: list[LinearMove], turning: float) -> Executed:
-    robot = program.robot
+    robot, base = program.robot, program.T_base_part
+    T_tip_flange = np.linalg.inv(program.T_flange_tip)
     course = ToolCourse.of(moves[0].T_part_tip, moves[1:], turning)
     borders = course.borders
     long = np.diff(borders)
@@ -135,7 +135,8 @@ def _run(program: Program, section: Section, moves: list[LinearMove], turning: f
     planned = np.array([move.q for move in moves])
     near = np.stack([np.interp(time, course.time, joint) for joint in planned.T], axis=1)
     before, q, after = (
-        _joints(program, robot, course.poses(time + sign * step), near) for sign in (-1, 0, 1)
+        robot.nearest(base @ course.poses(time + sign * step) @ T_tip_flange, near)
+        for sign in (-1, 0, 1)
     )
     velocity, acceleration = robot.speed_limits()
     return Executed(
@@ -146,16 +147,3 @@ def _run(program: Program, section: Section, moves: list[LinearMove], turning: f
         velocity_share=(after - before) / (2 * step[:, None]) / velocity,
         acceleration_share=(after - 2 * q + before) / step[:, None] ** 2 / acceleration,
     )
-
-
-def _joints(program: Program, robot: Robot, T: Array, near: Array) -> Array:
-    """Return the joints (m, n) at tip poses in the part, those next to `near`."""
-    poses = program.T_base_part @ T @ np.linalg.inv(program.T_flange_tip)
-    if robot.family.follow_all is not None:
-        return robot.follow(poses, near, np.zeros(len(near), dtype=np.int64))
-    solved, reach = robot.inverse_all(poses)
-    turned = solved + 2 * np.pi * np.round((near[:, None] - solved) / (2 * np.pi))
-    apart = np.where(reach, np.abs(turned - near[:, None]).max(axis=2), np.inf)
-    best = np.argmin(apart, axis=1)
-    rows = np.arange(len(near))
-    return np.where(reach[rows, best, None], turned[rows, best], np.nan)

@@ -9,7 +9,6 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.post._program import Program
-from kerfpath.robots import Robot
 
 __all__ = ["ArcLimits", "Stretch"]
 
@@ -79,8 +78,8 @@ class ArcLimits:
         """
         program, planned = self.program, stretch.q
         T = program.T_base_part @ poses @ np.linalg.inv(program.T_flange_tip)
-        found = _nearest(program.robot, T, planned[1:])
-        if found is None:
+        found = program.robot.nearest(T, planned[1:])
+        if not np.abs(found - planned[1:]).max() < NEAR:  # nor where it is NaN
             return None
         q = np.vstack([planned[:1], found])
         even = np.full(len(poses), stretch.dt.sum() / len(poses))
@@ -101,16 +100,3 @@ class ArcLimits:
         rate = np.diff(q, axis=0) / dt[:, None]
         change = np.diff(rate, axis=0) / ((dt[1:] + dt[:-1]) / 2)[:, None]
         return np.abs(rate) / velocity, np.abs(change) / acceleration
-
-
-def _nearest(robot: Robot, T: Array, near: Array) -> Array | None:
-    """Return the joints (m, n) at flange poses T (m, 4, 4) next to those planned, or None."""
-    if robot.family.follow_all is not None:
-        q = robot.follow(T, near, np.zeros(len(T), dtype=np.int64))
-    else:
-        solved, reach = robot.inverse_all(T)
-        turns = 2 * np.pi * np.round((near[:, None] - solved) / (2 * np.pi))
-        apart = np.abs(solved + turns - near[:, None]).max(axis=2)
-        best = np.argmin(np.where(reach, apart, np.inf), axis=1)
-        q = (solved + turns)[np.arange(len(T)), best]
-    return q if np.abs(q - near).max() < NEAR else None  # not where it is NaN

@@ -174,6 +174,19 @@ class Manipulator:
         self.family.follow_all(self.arm(), self._model_poses(T), found)
         return found
 
+    def nearest(self, T: Array, q: Array) -> Array:
+        """Return the joints (B, n) that bring the flange to T (B, 4, 4), next to each of q (B, n).
+
+        Of any posture, each joint on the turn nearest to its q; NaN where there are none.
+        """
+        if self.family.follow_all is not None:
+            return self.follow(T, q, np.zeros(len(T), dtype=np.int64))
+        solved, reach = self.inverse_all(T)
+        turned = solved + 2 * np.pi * np.round((q[:, None] - solved) / (2 * np.pi))
+        apart = np.where(reach, np.abs(turned - q[:, None]).max(axis=2), np.inf)
+        b, best = np.arange(len(q)), np.argmin(apart, axis=1)
+        return np.where(reach[b, best, None], turned[b, best], np.nan)
+
     def inverse_nodes(self, H: Array, gamma: Array, T_flange_tip: Array) -> tuple[Array, Bools]:
         """Return every posture of task frames H (K, 4, 4) turned by each gamma (m,), with tool.
 

@@ -83,8 +83,7 @@ def cycle_of(message: ProgramMessage) -> Cycle | None:
 def _clock(result: JobResult, revision: int) -> ProgramMessage:
     # Arcs lead by the same places in the same times: the nodes of the plans are shown.
     options = replace(result.job.program, arc_tolerance=None)
-    moves = () if result.part is None else result.part.moves
-    program = options.program(result.plans, moves)
+    program = options.program(result.plans, result.moves)
     segments = list(_segments(program, [cut for cut in result.cuts if cut.plan is not None]))
     notes = []
     if result.part is None:

@@ -298,10 +298,8 @@ class Planning:
         """Say what can be picked of the drawing, unless it is as it was."""
         part = self._bench.part(job)
         key = f"{part_key(job)} {job.placement.tolist()}"
-        before, self._part = (
-            self._part,
-            (key, part),
-        )  # a page may ask for a loop as soon as it hears
+        # Kept before it is said: a page may ask for a loop as soon as it hears.
+        before, self._part = self._part, (key, part)
         if before is None or before[0] != key:
             self._say(part_message(job, part, revision))
 

@@ -248,8 +248,7 @@ class Session:
             case OfKept(type="forget"):
                 self.kept.forget(ask.id)
             case OfKept():
-                self.document.replace(self.kept.text(ask.id))
-                self._changed.set()
+                self._replace(self.kept.text(ask.id))
         self.hub.say(self.kept.message())
 
     def _map(self, contour: str) -> Message:

@@ -5,9 +5,12 @@ import tomllib
 
 import pytest
 
-from jobs import DEMO, WHOLE, write_slit_jobs
+from jobs import DEMO, SLIT_JOB, WHOLE, write_slit_jobs
 from kerfpath.errors import InputError
 from kerfpath.job import read_job, with_loops, without_contour
+
+SLITS_JOB = SLIT_JOB.replace('[[contour]]\npick = "b"\nspeed_m_min = 2\ncount = 11\n', "")
+"""One of the two slits is cut."""
 
 
 def job_of(folder, text):
@@ -93,23 +96,6 @@ def test_an_open_line_has_no_keys_of_closed_ones(tmp_path):
     job = read_job(tmp_path / "slits.toml")
     text = with_loops(job, job.read_part(), ["b"])
     assert tables(text)[1] == {"pick": "b", "speed_m_min": 2, "count": 11}
-
-
-SLITS_JOB = """\
-[robot]
-model = "abb_irb4600_60_205"
-acceleration_ratio = "iontec_20_to_70kg"
-[tool]
-head = "laser-head-45"
-[part]
-file = "slits.csv"
-xyz_mm = [1200, 0, 500]
-rpy_deg = [0, 0, 0]
-[[contour]]
-pick = "a"
-speed_m_min = 2
-count = 11
-"""
 
 
 def test_lines_end_as_they_did(demo, tmp_path):

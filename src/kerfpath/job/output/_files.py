@@ -136,12 +136,11 @@ def write_result(outcome: JobResult, folder: Path, *, strict: bool = False) -> W
 
 def result_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     """Return the files of a run as text; the program only if every audit has passed."""
-    moves = () if outcome.part is None else outcome.part.moves
     made = program_texts(outcome, strict=strict)
     files = {
         **made.files,
         "plan.json": plan_file_text(outcome),
-        "trajectory.csv": trajectory_text(outcome.plans, moves),
+        "trajectory.csv": trajectory_text(outcome.plans, outcome.moves),
         "report.html": report_text(outcome, made.notes, made.faults),
     }
     return replace(made, files=files)
@@ -149,8 +148,7 @@ def result_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
 
 def program_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     """Return the files of a run's program alone, none unless every audit has passed."""
-    job, part = outcome.job, outcome.part
-    moves = () if part is None else part.moves
+    job, part, moves = outcome.job, outcome.part, outcome.moves
     program: dict[str, str] = {}
     refused, unsafe = "", False
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]

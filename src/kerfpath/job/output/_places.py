@@ -54,8 +54,7 @@ def program_places(outcome: JobResult, files: Mapping[str, str]) -> ProgramPlace
     if not outcome.plans or outcome.stuck is not None or options.language == "none":
         return ProgramPlaces()
     try:
-        moves = () if outcome.part is None else outcome.part.moves
-        program = options.program(outcome.plans, moves)
+        program = options.program(outcome.plans, outcome.moves)
         issues = preflight(program, options.language, options.settings)
     except InputError:  # said by whoever writes the program
         return ProgramPlaces()

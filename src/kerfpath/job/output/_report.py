@@ -56,8 +56,8 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
         ),
         ("Endless axes", _row(np.flatnonzero(robot.endless) + 1) or "none"),
     ]
-    moves = () if outcome.part is None else outcome.part.moves
     # From home and back to it the way is long, and would make the part small.
+    moves = outcome.moves
     between = moves[1:-1] if len(moves) > len(outcome.plans) else moves
     return render(
         f"{job.part_file.stem.replace('_', ' ')}",

@@ -10,8 +10,9 @@ import numpy as np
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
+from kerfpath.execution import ToolCourse
 from kerfpath.job.format import Candidate, Job, divide_nodes
-from kerfpath.job.programs._read import ReadCut, branch_of, follow_poses, poses_on_arc
+from kerfpath.job.programs._read import ReadCut, branch_of, follow_poses
 from kerfpath.plans import Plan
 from kerfpath.post import (
     ZONE_STEP,
@@ -147,7 +148,7 @@ def whole_cut(job: Job, cut: ReadCut, asked: TargetNodes, plan: Plan) -> Plan:
             inner = slice(first + 1, last)
             s = asked.nodes.s[first : last + 1]
             parts = ((s - s[0]) / (s[-1] - s[0]))[1:-1]
-            T[inner] = poses_on_arc(T[first], move.T_part_via, T[last], parts)
+            T[inner] = ToolCourse.through(T[[first, last]], [move.T_part_via]).poses(parts)
             q[inner] = follow_poses(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
     time = asked.time
     if job.options.feed != "constant":  # it may be slower, which is judged by itself

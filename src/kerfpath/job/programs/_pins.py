@@ -34,7 +34,7 @@ def check_pins(
     if not windows or job.options.tilt is not None:
         return []
     whole = whole_cut(job, cut, asked, plan)
-    settings = replace(whole.settings, frames=job.options.frames, gamma_windows=tuple(windows))
+    settings = replace(whole.settings, gamma_windows=tuple(windows))
     pinned = replace(whole, contour=asked.nodes, settings=settings)
     tool = job.robot.forward(pinned.q) @ job.tool
     # The digits of three angles, or of four numbers of a quaternion.

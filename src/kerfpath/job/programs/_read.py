@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
+from kerfpath.execution import ToolCourse
 from kerfpath.job.format import Job, ProgramTable
 from kerfpath.post import (
     Language,
@@ -19,7 +19,6 @@ from kerfpath.post import (
     ReadGroup,
     ReadMove,
     ReadProgram,
-    circle_through,
     groups_of,
     languages,
     read_program,
@@ -34,7 +33,6 @@ __all__ = [
     "divide_arcs",
     "follow_poses",
     "language_of",
-    "poses_on_arc",
     "program_on_disk",
     "read_cuts",
 ]
@@ -275,44 +273,18 @@ def _arc(
     They are `ARC_STEP` apart, or as far as the robot comes in an interval (s), but no farther than
     `COARSEST`.
     """
-    circle = circle_through(start[:3, 3], via[:3, 3], end[:3, 3])
-    if circle is None:
+    arc = ToolCourse.through(np.array([start, end]), [via])
+    sweep = float(arc.sweep[0])
+    if sweep == 0:
         return [via, end]  # on one line
-    sweep = _sweep(circle, start, end)
     count = int(np.ceil(sweep / ARC_STEP))
     if interval is not None:
         took = move.duration
         if took is None and move.speed:
-            took = sweep * circle[2] / move.speed
+            took = float(arc.lengths[0]) / move.speed
         if took is not None:
             count = max(round(took / interval), int(np.ceil(sweep / COARSEST)))
-    return list(poses_on_arc(start, via, end, np.linspace(0, 1, max(count, 1) + 1)[1:]))
-
-
-def poses_on_arc(start: Array, via: Array, end: Array, parts: Array) -> Array:
-    """Return the poses (m, 4, 4) at shares (m,) of the arc from `start` by `via` to `end`.
-
-    On a straight line where the three points are.
-    """
-    circle = circle_through(start[:3, 3], via[:3, 3], end[:3, 3])
-    poses = np.tile(np.eye(4), (len(parts), 1, 1))
-    turned = Slerp([0.0, 1.0], Rotation.from_matrix(np.array([start[:3, :3], end[:3, :3]])))
-    poses[:, :3, :3] = turned(parts).as_matrix()
-    if circle is None:
-        poses[:, :3, 3] = start[:3, 3] + parts[:, None] * (end[:3, 3] - start[:3, 3])
-        return poses
-    centre, normal, _ = circle
-    x = start[:3, 3] - centre
-    at = (parts * _sweep(circle, start, end))[:, None]
-    poses[:, :3, 3] = centre + np.cos(at) * x + np.sin(at) * np.cross(normal, x)
-    return poses
-
-
-def _sweep(circle: tuple[Array, Array, float], start: Array, end: Array) -> float:
-    """Return how far (rad) an arc turns from its start to its end."""
-    centre, normal, _ = circle
-    x, last = start[:3, 3] - centre, end[:3, 3] - centre
-    return float(np.arctan2(last @ np.cross(normal, x), last @ x) % (2 * np.pi))
+    return list(arc.poses(np.linspace(0, 1, max(count, 1) + 1)[1:]))
 
 
 def branch_of(robot: Robot, q: Array) -> int:

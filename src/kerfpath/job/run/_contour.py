@@ -13,6 +13,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.front import Subproblem, plan_run
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
+from kerfpath.job.run._as_run import checks_as_run
 from kerfpath.job.run._remedy import Remedy, find_remedy, opens_without_windows
 from kerfpath.job.run._result import CutResult
 from kerfpath.planner import clearance_map, plan, plan_in_pieces
@@ -155,7 +156,8 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
         made = _divided(made, candidate.path, job.options.refine_parts)
     checks = job.tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
     checks += whole.request.drawing_checks(candidate, made.contour, job.tolerances.path)
-    return replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))
+    cut = replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))
+    return replace(cut, as_run=checks_as_run(job, cut))
 
 
 def _divided(made: Plan, path: Contour, parts: int) -> Plan:

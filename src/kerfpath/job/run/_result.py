@@ -16,6 +16,7 @@ from kerfpath.job.run._remedy import Remedy
 from kerfpath.planner import ClearanceMap, FastestSpeed
 from kerfpath.plans import Plan
 from kerfpath.sequence import PartPlan
+from kerfpath.transfer import TransferMove
 
 __all__ = ["CutResult", "JobResult"]
 
@@ -146,6 +147,11 @@ class JobResult:
             return replace(self, cuts=cuts)
         plans = tuple(cut.plan for cut in cuts if cut.plan is not None)
         return replace(self, cuts=cuts, part=replace(self.part, plans=plans))
+
+    @property
+    def moves(self) -> tuple[TransferMove, ...]:
+        """The moves between the cuts; none without [sequence], or where there is no way."""
+        return () if self.part is None else self.part.moves
 
     @property
     def plans(self) -> tuple[Plan, ...]:

@@ -7,7 +7,6 @@ from dataclasses import replace
 from kerfpath.auditor import bound_checks
 from kerfpath.cad import Part
 from kerfpath.job.format import Job, PreparedJob, prepare
-from kerfpath.job.run._as_run import checks_as_run
 from kerfpath.job.run._contour import advised, cut_candidate
 from kerfpath.job.run._foresee import require_foreseen
 from kerfpath.job.run._order import order_cuts
@@ -57,16 +56,16 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
 
 
 def measured(prepared: PreparedJob, result: JobResult) -> JobResult:
-    """Return a result that says how far its nodes leave the CAD curves, and how programs run it."""
+    """Return a result that says how far its nodes leave the CAD curves."""
     part = prepared.part
     moved = {
         contour.task.name: part.departure(contour.task.pick, contour.loop)
         for contour in prepared.contours
         if contour.leaves_the_loop
     }
-    cuts = (cut.measured(part, moved.get(cut.contour)) for cut in result.cuts)
-    job = prepared.job
-    return result.with_cuts(tuple(replace(cut, as_run=checks_as_run(job, cut)) for cut in cuts))
+    return replace(
+        result, cuts=tuple(cut.measured(part, moved.get(cut.contour)) for cut in result.cuts)
+    )
 
 
 def certified(cut: CutResult, progress: Progress) -> CutResult:

@@ -64,8 +64,6 @@ export class Store {
     this.front = null;
     /** @type {{contour: string, number: number, own: PlanMessage[]} | null} shown in place of the job's plan */
     this.candidate = null;
-    /** @type {Course[]} of the chosen contour, to compare its own with */
-    this.compare = [];
     /** @type {string | null} the chosen contour */
     this.selected = null;
     /** @type {Map<string, Set<(about: any) => void>>} */
@@ -106,7 +104,6 @@ export class Store {
   select(contour) {
     if (contour === this.selected) return;
     this.selected = contour;
-    this.gather();
     this.emit("selected");
   }
 
@@ -116,15 +113,7 @@ export class Store {
    */
   compareWith(against) {
     this.against = against;
-    this.gather();
     this.emit("compare");
-  }
-
-  /** Take the courses that are compared. */
-  gather() {
-    const plans = this.against?.plans.get(this.selected ?? "") ?? [];
-    const name = this.against?.entry.name ?? "";
-    this.compare = plans.map(({ s, gamma, posture }) => ({ name, s, gamma, posture }));
   }
 
   /**
@@ -133,7 +122,10 @@ export class Store {
    * @returns {Course[]}
    */
   beside(contour) {
-    return this.against ? this.compare : (this.before.get(contour) ?? []);
+    if (!this.against) return this.before.get(contour) ?? [];
+    const { name } = this.against.entry;
+    const plans = this.against.plans.get(contour) ?? [];
+    return plans.map(({ s, gamma, posture }) => ({ name, s, gamma, posture }));
   }
 
   /**

@@ -88,7 +88,7 @@ export const GROUPS = [
       words("plan.closure", "Closed contours", { hint: "periodic: end as it began" }),
       number("plan.rotation_deg", "Turned on at most", "deg"),
       words("plan.frames", "Frames"),
-      { key: "plan.refine", label: "Refined off the grid", kind: "switch" },
+      yes("plan.refine", "Refined off the grid"),
       number("plan.refine_parts", "Parts of the refinement"),
     ],
   },

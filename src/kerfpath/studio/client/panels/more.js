@@ -179,28 +179,39 @@ export function morePanel(store, connection, player) {
   /** @typedef {{element: HTMLElement, input: HTMLElement, show: (value: any, disabled: boolean) => void}} Control */
 
   /**
-   * @param {Key} what
+   * A field to type in, which is empty where there is no value.
    * @param {string} id
-   * @returns {Control}
+   * @param {Record<string, string>} attributes
+   * @param {(text: string) => void} take
    */
-  function number(what, id) {
+  function typed(id, attributes, take) {
     const input = el("input", {
-      ...{ id, class: "number", type: "number", step: "any", placeholder: "none" },
-      ...{ inputmode: "decimal", "aria-describedby": `${id}-fault` },
-      onchange: () => {
-        if (input.value !== "") set(what, Number(input.value));
-        else if (given(what.key)) set(what, null);
-      },
+      ...{ id, placeholder: "none", "aria-describedby": `${id}-fault`, ...attributes },
+      onchange: () => take(input.value),
       onkeydown: (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && input.blur(),
     });
     return {
       element: input,
       input,
+      /** @type {Control["show"]} */
       show(now, disabled) {
         input.disabled = disabled;
-        if (document.activeElement !== input) input.value = now === null ? "" : String(now);
+        if (document.activeElement !== input) input.value = [now ?? []].flat().join(", ");
       },
     };
+  }
+
+  /**
+   * @param {Key} what
+   * @param {string} id
+   * @returns {Control}
+   */
+  function number(what, id) {
+    const kind = { class: "number", type: "number", step: "any", inputmode: "decimal" };
+    return typed(id, kind, (text) => {
+      if (text !== "") set(what, Number(text));
+      else if (given(what.key)) set(what, null);
+    });
   }
 
   /**
@@ -272,25 +283,16 @@ export function morePanel(store, connection, player) {
    * @returns {Control}
    */
   function list(what, id) {
-    const input = el("input", {
-      ...{ id, class: "wide", placeholder: "none", "aria-describedby": `${id}-fault` },
-      onchange: () => {
-        const parts = input.value.split(/[\s,;]+/).filter(Boolean);
-        const found = parts.map(Number);
-        if (found.length && found.every(Number.isFinite)) set(what, found);
-        else if (!found.length && given(what.key)) set(what, null);
-        else input.setAttribute("aria-invalid", "true");
-      },
-      onkeydown: (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && input.blur(),
+    const field = typed(id, { class: "wide" }, (text) => {
+      const found = text
+        .split(/[\s,;]+/)
+        .filter(Boolean)
+        .map(Number);
+      if (found.length && found.every(Number.isFinite)) set(what, found);
+      else if (!found.length && given(what.key)) set(what, null);
+      else field.input.setAttribute("aria-invalid", "true");
     });
-    return {
-      element: input,
-      input,
-      show(now, disabled) {
-        input.disabled = disabled;
-        if (document.activeElement !== input) input.value = now === null ? "" : now.join(", ");
-      },
-    };
+    return field;
   }
 
   /**
