@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +13,9 @@ import numpy as np
 from benchmarks._certified import in_processes
 from benchmarks._figures import Report, Sheet
 from benchmarks._random_contours import ROBOTS, cut
-from kerfpath import NoFeasiblePath, plan
-from kerfpath.execution import executed
-from kerfpath.post import Zone, build_program
+from kerfpath import NoFeasiblePath, Plan, plan
+from kerfpath.execution import Executed, executed, keep_limits
+from kerfpath.post import Program, Zone, build_program
 
 __all__ = ["run", "zones_of_cut"]
 
@@ -35,6 +37,28 @@ COLUMNS = (
     "over",
     "tip mm",
 )
+ERRORS = (1e-4, 1e-2)
+"""m: by how much the tip may pass a node where plans are held to less; the latter: as it comes."""
+DENSER = 50
+"""Samples to the interval between nodes, where it is looked whether limits are kept."""
+KEPT_COLUMNS = (
+    "zone error",
+    "plans",
+    "kept as planned",
+    "brought in",
+    "not",
+    "cost %",
+    "95 %",
+    "worst",
+    "over, densely",
+    "tip mm",
+    "s",
+)
+HOW_KEPT = """\
+The same plans, held to less at their nodes where the program needs more than a full limit between
+them (`keep_limits`, automatic zones). Kept as planned, brought in, and not: plans. Cost: what the
+plans that were brought in cost more, median, 95 % and worst. Over, densely: plans said to keep the
+limits of which one of 50 samples to the interval, by inverse kinematics, is over one. s: median."""
 HOW = """\
 The random contours of `continuum_random`, planned over continuous gamma, as programs with zones of
 0.3 mm and with automatic ones. At nodes: the highest share of an acceleration limit that the plan
@@ -60,22 +84,18 @@ def run(*, quick: bool) -> list[Report]:
     counts = (3, 3, 3) if quick else COUNTS
     keys = [(name, i) for name, count in zip(ROBOTS, counts, strict=True) for i in range(count)]
     made = in_processes(zones_of_cut, keys, 1 if quick else PROCESSES)
-    return [_report([peaks for each in made for peaks in each], len(keys))]
+    kept = in_processes(kept_of_cut, keys, 1 if quick else PROCESSES)
+    return [
+        _report([peaks for each in made for peaks in each], len(keys)),
+        _kept_report([one for each in kept for one in each], len(keys)),
+    ]
 
 
 def zones_of_cut(key: tuple[str, int]) -> list[Peaks]:
     """Plan a cut, and return what its program needs with each kind of zones."""
-    drawn = cut(*key)
-    try:
-        made = plan(
-            drawn.contour, drawn.robot, tool=drawn.tool, placement=np.eye(4), speed=drawn.speed,
-            certify=None,
-        )  # fmt: skip
-    except NoFeasiblePath:
+    made, found = _planned(key), []
+    if made is None:
         return []
-    limits = drawn.robot.joint_limits()
-    wider = drawn.robot.with_limits(lower=limits.lower - BEYOND, upper=limits.upper + BEYOND)
-    made, found = replace(made, robot=wider), []
     for zone in ZONES:
         (one,) = executed(build_program([made], zone=zone))
         found.append(
@@ -89,6 +109,103 @@ def zones_of_cut(key: tuple[str, int]) -> list[Peaks]:
             )
         )
     return found
+
+
+class Brought(NamedTuple):
+    """What came of holding a plan to less at its nodes."""
+
+    error: float
+    done: bool
+    rounds: int
+    cost: float
+    over: bool
+    missed: float
+    seconds: float
+
+
+def kept_of_cut(key: tuple[str, int]) -> list[Brought]:
+    """Plan a cut, and hold it to less where its program needs more, for each error of zones."""
+    made, found = _planned(key), []
+    if made is None:
+        return []
+    for error in ERRORS:
+        program = partial(_program, error)
+        began = perf_counter()
+        kept = keep_limits(made, program)
+        took = perf_counter() - began
+        assert kept.run is not None
+        over = kept.done and _densest(kept.run, program(kept.plan)) > 1
+        found.append(
+            Brought(
+                error, kept.done, kept.rounds, kept.plan.cost / made.cost - 1, over,
+                kept.run.missed, took,
+            )
+        )  # fmt: skip
+    return found
+
+
+def _planned(key: tuple[str, int]) -> Plan | None:
+    drawn = cut(*key)
+    try:
+        made = plan(
+            drawn.contour, drawn.robot, tool=drawn.tool, placement=np.eye(4), speed=drawn.speed,
+            certify=None,
+        )  # fmt: skip
+    except NoFeasiblePath:
+        return None
+    limits = drawn.robot.joint_limits()
+    wider = drawn.robot.with_limits(lower=limits.lower - BEYOND, upper=limits.upper + BEYOND)
+    return replace(made, robot=wider)
+
+
+def _program(error: float, made: Plan) -> Program:
+    return build_program([made], zone_error=error)
+
+
+def _densest(run: Executed, program: Program) -> float:
+    """Return the largest share of a limit that dense sampling by inverse kinematics shows."""
+    robot, end = program.robot, float(run.course.time[-1])
+    step = end / (len(run.course.T) * DENSER)
+    time, d = np.arange(step, end - step, step), step / 10
+    near = np.stack([np.interp(time, run.time, joint) for joint in run.q.T], axis=1)
+    flange = np.linalg.inv(program.T_flange_tip)
+    before, here, after = (
+        robot.nearest(program.T_base_part @ run.course.poses(time + sign * d) @ flange, near)
+        for sign in (-1, 0, 1)
+    )
+    velocity, acceleration = robot.speed_limits()
+    fast = np.abs((after - before) / (2 * d) / velocity).max()
+    # Differences over d lose digits: joints are good to 1e-13 rad.
+    sharp = np.abs((after - 2 * here + before) / d**2) - 4e-13 / d**2
+    return float(max(fast, (sharp / acceleration).max()))
+
+
+def _kept_report(made: Sequence[Brought], cuts: int) -> Report:
+    rows = [_kept_row(error, [each for each in made if each.error == error]) for error in ERRORS]
+    return Report(
+        title=f"Limits kept between the nodes: {cuts} random contours",
+        how=HOW_KEPT,
+        sheets=[Sheet(columns=KEPT_COLUMNS, rows=rows)],
+        findings=[],
+    )
+
+
+def _kept_row(error: float, made: Sequence[Brought]) -> tuple[str, ...]:
+    brought = [each for each in made if each.done and each.rounds]
+    dearer = 100 * np.array([each.cost for each in brought] or [np.nan])
+    return (
+        f"{error * 1e3:g} mm",
+        str(len(made)),
+        str(sum(each.done and not each.rounds for each in made)),
+        str(len(brought)),
+        str(sum(not each.done for each in made)),
+        f"{np.median(dearer):.2f}",
+        f"{np.quantile(dearer, 0.95):.2f}",
+        f"{dearer.max():.2f}",
+        str(sum(each.over for each in made)),
+        f"{max((each.missed for each in made), default=np.nan) * 1e3:.3f}",
+        f"{np.median([each.seconds for each in made] or [np.nan]):.2f}",
+    )
 
 
 def _report(made: Sequence[Peaks], cuts: int) -> Report:

@@ -55,7 +55,8 @@ def test_options_come_back_from_their_data():
 def test_every_option_is_in_the_data_and_in_the_keywords():
     names = {field.name for field in fields(PlanOptions)}
     assert len(OptionData.__annotations__) == len(names)
-    only_whole = {"refine_parts", "interruptions", "least_piece", "retract", "floor"}
+    only_whole = {"refine_parts", "between_nodes", "interruptions", "least_piece"}
+    only_whole |= {"retract", "floor"}
     assert set(PlanKeywords.__annotations__) == names - only_whole
 
 

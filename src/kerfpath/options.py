@@ -23,6 +23,7 @@ from kerfpath.windows import GammaWindow, WindowData
 
 __all__ = [
     "EXACT_OR_BETTER",
+    "BetweenNodes",
     "FeedKind",
     "GraphKeywords",
     "Interruptions",
@@ -37,6 +38,7 @@ __all__ = [
 PlanMethod = Literal["continuous", Method]
 FeedKind = Literal["constant", "dip"]
 Interruptions = Literal["none", "fewest"]
+BetweenNodes = Literal["reported", "kept", "guaranteed"]
 
 
 class GraphKeywords(TypedDict, total=False):
@@ -85,6 +87,7 @@ class OptionData(TypedDict):
     feed_kind: FeedKind
     refine: bool
     refine_parts: int
+    between_nodes: BetweenNodes
     interruptions: Interruptions
     least_piece_m: float | None
     retract_m: float | None
@@ -128,6 +131,11 @@ class PlanOptions:
     refine_parts : int
         Parts into which the refinement divides every interval between nodes. A job does so; `plan`
         keeps the nodes of its contour.
+    between_nodes : {"reported", "kept", "guaranteed"}
+        The limits hold at the nodes, and what the program needs between them is "reported"; where
+        that is more, the nodes are held to less, until the limits are "kept" at every instant, as
+        far as they can be; or the audit fails unless that is proved, "guaranteed". A job does so;
+        see `kerfpath.execution.keep_limits` for a plan.
     interruptions : {"none", "fewest"}
         Whether a contour that cannot be cut in one go is cut in pieces, see `plan_in_pieces`.
     least_piece : float m, optional
@@ -166,6 +174,7 @@ class PlanOptions:
     feed: FeedKind = "constant"
     refine: bool = False
     refine_parts: int = 1
+    between_nodes: BetweenNodes = "reported"
     interruptions: Interruptions = "none"
     least_piece: float | None = None
     comfort: Comfort | None = None
@@ -334,6 +343,7 @@ _KNOWN: dict[str, tuple[str, ...]] = {
     "metric": get_args(Metric),
     "closure": get_args(Closure),
     "feed": get_args(FeedKind),
+    "between_nodes": get_args(BetweenNodes),
     "interruptions": get_args(Interruptions),
 }
 
@@ -353,6 +363,11 @@ _RULES: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
     ({"closure": "periodic"}, {"method": EXACT_OR_BETTER}),
     ({"rotation": GIVEN}, {"method": EXACT_OR_BETTER}),
     ({"tilt": GIVEN}, {"refine_parts": 1}),
+    (
+        {"between_nodes": "guaranteed"},
+        {"method": EXACT_OR_BETTER, "feed": "constant", "tilt": None},
+    ),
+    ({"between_nodes": "guaranteed", "method": "exact"}, {"refine": True}),
     ({"least_piece": GIVEN}, {"interruptions": "fewest"}),
     ({CLEARANCE: GIVEN}, {"feed": "constant", "interruptions": "none"}),
     ({"feed": "dip", PENALTIES: True}, {"refine": False}),

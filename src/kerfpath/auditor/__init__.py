@@ -10,6 +10,9 @@ from kerfpath.auditor._certificate import bound_checks as bound_checks
 from kerfpath.auditor._certificate import certified_bound as certified_bound
 from kerfpath.auditor._chain import JointChain as JointChain
 from kerfpath.auditor._chain import chain_of as chain_of
+from kerfpath.auditor._course import ENCLOSED as ENCLOSED
+from kerfpath.auditor._course import CoursePieces as CoursePieces
+from kerfpath.auditor._course import rates_along as rates_along
 from kerfpath.auditor._room import retract_checks as retract_checks
 from kerfpath.auditor._rounding import Rounding as Rounding
 from kerfpath.auditor._rounding import rounding_of as rounding_of

@@ -20,7 +20,15 @@ from kerfpath.auditor._postures import POSTURES_OF, TO_WRIST, Pose
 from kerfpath.errors import InputError
 from kerfpath.robots import Robot
 
-__all__ = ["Enclosure", "Status", "enclose", "linear_minimum"]
+__all__ = [
+    "Enclosure",
+    "Status",
+    "enclose",
+    "fixed_poses",
+    "joints_of",
+    "linear_minimum",
+    "require_closed_form",
+]
 
 POSTURES = 8
 AT_ONCE = 2048
@@ -101,9 +109,9 @@ def enclose(
     InputError
         A robot of another family, or with an external axis.
     """
-    _require_closed_form(robot)
+    require_closed_form(robot)
     pieces = []
-    before, after = _fixed(robot, frames, T_flange_tip)
+    before, after = fixed_poses(robot, frames, T_flange_tip)
     for i in range(0, max(len(node), 1), AT_ONCE):
         part = slice(i, i + AT_ONCE)
         with np.errstate(all="ignore"):
@@ -144,7 +152,7 @@ def linear_minimum(
     return np.asarray(least - rounded)
 
 
-def _require_closed_form(robot: Robot) -> None:
+def require_closed_form(robot: Robot) -> None:
     if robot.kinematics not in POSTURES_OF:
         raise InputError(
             f"robot {robot.id!r}: its solutions are enclosed for the families "
@@ -157,7 +165,7 @@ def _require_closed_form(robot: Robot) -> None:
         )
 
 
-def _fixed(robot: Robot, frames: Array, T_flange_tip: Array) -> tuple[Interval, Interval]:
+def fixed_poses(robot: Robot, frames: Array, T_flange_tip: Array) -> tuple[Interval, Interval]:
     """Return what stands before and after the turn of the tool, rows first.
 
     Task frames in the model's base (3, 4, K), and the wrist point and axes of the model's end in
@@ -210,14 +218,23 @@ def _product(A: Interval, B: Interval) -> Interval:
     return stack(rows)
 
 
-def _enclose(robot: Robot, before: Interval, after: Interval, turn: Jet) -> Enclosure:
-    """Enclose the solutions of cells with task frames `before` (3, 4, C) turned by `turn` (C,)."""
-    postures = POSTURES_OF[robot.kinematics](robot.geometry, _turned_pose(before, after, turn))
+def joints_of(robot: Robot, pose: Pose) -> tuple[list[Jet], Bools]:
+    """Return the robot's joints in every posture at poses of its model's end, and where none is.
+
+    The joints are jets that broadcast to (2, 2, 2, C), as in `Postures`, and so is the second.
+    """
+    postures = POSTURES_OF[robot.kinematics](robot.geometry, pose)
     joints = [
         angle.plus(exact(offset)).scaled(sign)
         for angle, offset, sign in zip(postures.angles, robot.offset, robot.sign, strict=True)
     ]
-    none, smooth = postures.none, ~postures.none
+    return joints, postures.none
+
+
+def _enclose(robot: Robot, before: Interval, after: Interval, turn: Jet) -> Enclosure:
+    """Enclose the solutions of cells with task frames `before` (3, 4, C) turned by `turn` (C,)."""
+    joints, none = joints_of(robot, _turned_pose(before, after, turn))
+    smooth = ~none
     for q in joints:
         smooth = smooth & q.at.known() & q.slope.known() & q.bend.known()
     status = np.where(none, Status.NONE, np.where(smooth, Status.SMOOTH, Status.BOX))

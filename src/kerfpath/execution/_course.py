@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath._repr import short_repr
+from kerfpath.auditor import CoursePieces
 from kerfpath.post import CircularMove, LinearMove, circle_through
 
 __all__ = ["ToolCourse"]
@@ -125,28 +126,68 @@ class ToolCourse:
 
     @property
     def borders(self) -> Array:
-        """Times, s, between which the tool moves smoothly: ends of moves and of zones."""
-        every = np.concatenate([self.time, self.time - self.half, self.time + self.half])
-        every = np.unique(np.clip(every, 0.0, self.time[-1]))
+        """Times, s, of ends and middles of moves and of ends of zones: it is smooth in between."""
+        between = (self.time[1:] + self.time[:-1]) / 2
+        ends = [self.time, between, self.time - self.half, self.time + self.half]
+        every = np.unique(np.clip(np.concatenate(ends), 0.0, self.time[-1]))
         return np.asarray(every[np.append(True, np.diff(every) > SHORTEST)])
 
     def poses(self, time: Array) -> Array:
         """Return T_part_tip, (m, 4, 4) m, at times (m,) s from the start."""
-        k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.duration) - 1)
-        after, before = time - self.time[k], self.time[k + 1] - time
-        near = np.where(after < before, k, k + 1)
+        k, near, blend = self._at(time)
         left, right = np.maximum(near - 1, 0), np.minimum(near, len(self.duration) - 1)
-        away, half = np.where(near == k, after, -before), self.half[near]
-        # What is added to the corner: of constant acceleration, and gone at the ends of the zone.
-        blend = np.maximum(half - np.abs(away), 0.0) ** 2 / np.maximum(4 * half, 1e-12)
+        away = time - self.time[near]
         end_left, end_right = self._velocity(left, ends=True), self._velocity(right, ends=False)
         T = np.tile(np.eye(4), (len(time), 1, 1))
-        T[:, :3, 3] = self._points(k, after) + blend[:, None] * (end_right - end_left)
+        T[:, :3, 3] = self._points(k, time - self.time[k]) + blend[:, None] * (end_right - end_left)
         rate = np.where((near == k)[:, None], self._rate[right], self._rate[left])
         bend = self._rate[right] - self._rate[left]
         turn = Rotation.from_rotvec(away[:, None] * rate + blend[:, None] * bend).as_matrix()
         T[:, :3, :3] = self.T[near, :3, :3] @ turn
         return T
+
+    def pieces(self) -> CoursePieces:
+        """Return the course as closed formulas of the time, one between each two borders."""
+        borders = self.borders
+        middle = (borders[1:] + borders[:-1]) / 2
+        k, near, blend = self._at(middle)
+        left, right = np.maximum(near - 1, 0), np.minimum(near, len(self.duration) - 1)
+        zero, half, after = self.time[near], self.half[near], near == k
+        move = np.where(after, right, left)
+        velocity = np.stack([self._velocity(left, ends=True), self._velocity(right, ends=False)])
+        rates = np.stack([self._rate[left], self._rate[right]])
+        bends = np.where((blend > 0) & (half > 0), 1 / np.maximum(4 * half, 1e-12), 0.0)
+
+        def parts(own: Array, change: Array) -> Array:
+            # bends (half -+ t)^2 of the change from one move to the next comes on top
+            b, sign = (bends[:, None] * change, np.where(after, -2.0, 2.0)[:, None])
+            wide = half[:, None]
+            return np.stack([b * wide**2, own + sign * wide * b, 2 * b], axis=1)
+
+        arc = self._round[move]
+        straight = np.where(arc[:, None], 0.0, np.where(after[:, None], velocity[1], velocity[0]))
+        point = parts(straight, velocity[1] - velocity[0])
+        point[:, 0] += np.where(arc[:, None], self.centre[move], self.T[near, :3, 3])
+        x = np.where(arc[:, None], self.T[near, :3, 3] - self.centre[move], 0.0)
+        return CoursePieces(
+            begin=borders[:-1] - zero,
+            end=borders[1:] - zero,
+            R=self.T[near, :3, :3],
+            turn=parts(np.where(after[:, None], rates[1], rates[0]), rates[1] - rates[0]),
+            point=point,
+            x=x,
+            y=np.cross(self.normal[move], x),
+            rate=np.where(arc, self.sweep[move] / self.duration[move], 0.0),
+        )
+
+    def _at(self, time: Array) -> tuple[Ints, Ints, Array]:
+        """Return at times (m,) the move, the target next in time, and the share of the blend, s."""
+        k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.duration) - 1)
+        after, before = time - self.time[k], self.time[k + 1] - time
+        near = np.where(after < before, k, k + 1)
+        away, half = np.minimum(after, before), self.half[near]
+        # What is added to the corner: of constant acceleration, and gone at the ends of the zone.
+        return k, near, np.maximum(half - away, 0.0) ** 2 / np.maximum(4 * half, 1e-12)
 
     @property
     def _round(self) -> Bools:

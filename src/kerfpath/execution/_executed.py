@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
+from kerfpath.auditor import ENCLOSED, rates_along
 from kerfpath.errors import InputError
 from kerfpath.execution._course import ToolCourse
-from kerfpath.post import JointMove, LinearMove, Program, Section
+from kerfpath.post import JointMove, LinearMove, Program
+from kerfpath.robots import Robot
 
-__all__ = ["Executed", "Peak", "executed"]
+__all__ = ["Executed", "Peak", "executed", "from_stop_to_stop", "run_along"]
 
 WHERE = (0.1, 0.5, 0.9)
 """Shares of each smooth stretch at which the joints are looked at."""
+TIGHT = 1.02
+"""Bounds need not be nearer to what is seen."""
 STEP = 0.05
 """Share of it by which they are looked at before and after, for their rates."""
 
@@ -45,6 +50,10 @@ class Executed:
     velocity_share, acceleration_share : (m, n)
         Signed, of the full limit of each joint. Where one is above 1 in size, the robot cannot run
         at the programmed speed: a controller slows down.
+    velocity_bound, acceleration_bound : float
+        No joint uses more of a limit at any instant: proved, without a sample, and at most 2 % more
+        than what was seen, as far as a limit allows. Infinite where nothing is proved: for arms
+        other than OPW and UR, and next to a singularity.
     """
 
     section: str
@@ -53,6 +62,8 @@ class Executed:
     q: Array
     velocity_share: Array
     acceleration_share: Array
+    velocity_bound: float
+    acceleration_bound: float
 
     __repr__ = short_repr
 
@@ -74,9 +85,7 @@ class Executed:
 
     def _peak(self, shares: Array) -> Peak:
         size = np.abs(shares)
-        if np.isnan(size).any():
-            m, joint = divmod(int(np.flatnonzero(np.isnan(size).ravel())[0]), size.shape[1])
-            return Peak(np.inf, joint, float(self.time[m]))
+        size = np.where(np.isnan(size), np.inf, size)
         m, joint = divmod(int(np.argmax(size)), size.shape[1])
         return Peak(float(size[m, joint]), joint, float(self.time[m]))
 
@@ -86,8 +95,8 @@ def executed(program: Program, *, turning_speed: float = np.inf) -> tuple[Execut
 
     The motion is that of `ToolCourse`, at the programmed speeds throughout: neither speeding up
     from the stop nor slowing down for a limit is modelled. The joints follow it exactly. Their
-    velocities and accelerations are looked at three times in each stretch that is smooth, which is
-    a matter of sampling, and proves nothing.
+    velocities and accelerations are looked at three times in each stretch that is smooth; bounds
+    that hold everywhere come with them, see `kerfpath.auditor.rates_along`.
 
     Parameters
     ----------
@@ -100,20 +109,25 @@ def executed(program: Program, *, turning_speed: float = np.inf) -> tuple[Execut
     InputError
         A robot whose limits of velocity and acceleration are not known, or an external axis.
     """
-    if program.robot.external is not None:
-        raise InputError("executed: expected a robot without an external axis")
     return tuple(
-        _run(program, section, moves, turning_speed)
+        run_along(
+            moves,
+            program.robot,
+            T_base_part=program.T_base_part,
+            T_flange_tip=program.T_flange_tip,
+            turning_speed=turning_speed,
+            section=section.name,
+        )
         for section in program.sections
-        for moves in _runs(section)
+        for moves in from_stop_to_stop(section.moves)
     )
 
 
-def _runs(section: Section) -> list[list[LinearMove]]:
-    """Return the moves of a section from stop to stop; each list begins where the robot stands."""
+def from_stop_to_stop(moves: Sequence[JointMove | LinearMove]) -> list[list[LinearMove]]:
+    """Return each run of straight and circular moves; it begins with that to where it starts."""
     found: list[list[LinearMove]] = []
     run: list[LinearMove] = []
-    for move in section.moves:
+    for move in moves:
         if isinstance(move, JointMove):
             run = []
             continue
@@ -124,10 +138,35 @@ def _runs(section: Section) -> list[list[LinearMove]]:
     return found
 
 
-def _run(program: Program, section: Section, moves: list[LinearMove], turning: float) -> Executed:
-    robot, base = program.robot, program.T_base_part
-    T_tip_flange = np.linalg.inv(program.T_flange_tip)
-    course = ToolCourse.of(moves[0].T_part_tip, moves[1:], turning)
+def run_along(
+    moves: Sequence[LinearMove],
+    robot: Robot,
+    *,
+    T_base_part: Array,
+    T_flange_tip: Array,
+    turning_speed: float = np.inf,
+    section: str = "",
+) -> Executed:
+    """Return the run of moves from the target of the first, where the robot stands, to a stop.
+
+    Parameters
+    ----------
+    moves : sequence of LinearMove
+        Three or more, each with the joints at its target.
+    robot : Robot
+    T_base_part, T_flange_tip : (4, 4) m
+    turning_speed, section
+        As in `executed` and `Executed`.
+
+    Raises
+    ------
+    InputError
+        As `executed`.
+    """
+    if robot.external is not None:
+        raise InputError("executed: expected a robot without an external axis")
+    T_tip_flange = np.linalg.inv(T_flange_tip)
+    course = ToolCourse.of(moves[0].T_part_tip, moves[1:], turning_speed)
     borders = course.borders
     long = np.diff(borders)
     time = (borders[:-1, None] + long[:, None] * np.array(WHERE)).ravel()
@@ -135,15 +174,39 @@ def _run(program: Program, section: Section, moves: list[LinearMove], turning: f
     planned = np.array([move.q for move in moves])
     near = np.stack([np.interp(time, course.time, joint) for joint in planned.T], axis=1)
     before, q, after = (
-        robot.nearest(base @ course.poses(time + sign * step) @ T_tip_flange, near)
+        robot.nearest(T_base_part @ course.poses(time + sign * step) @ T_tip_flange, near)
         for sign in (-1, 0, 1)
     )
     velocity, acceleration = robot.speed_limits()
-    return Executed(
-        section=section.name,
+    run = Executed(
+        section=section,
         course=course,
         time=time,
         q=q,
         velocity_share=(after - before) / (2 * step[:, None]) / velocity,
         acceleration_share=(after - 2 * q + before) / step[:, None] ** 2 / acceleration,
+        velocity_bound=np.inf,
+        acceleration_bound=np.inf,
     )
+    fast, sharp = run.peak_velocity.share, run.peak_acceleration.share
+    if robot.kinematics not in ENCLOSED or not np.isfinite(max(fast, sharp)):
+        return run
+    bounds = rates_along(
+        robot,
+        course.pieces(),
+        q[WHERE.index(0.5) :: len(WHERE)],
+        T_base_part=T_base_part,
+        T_flange_tip=T_flange_tip,
+        enough=(_enough(fast) * velocity, _enough(sharp) * acceleration),
+    )
+    shares = [bound / limit for bound, limit in zip(bounds, (velocity, acceleration), strict=True)]
+    return replace(
+        run,
+        velocity_bound=float(shares[0].max()),
+        acceleration_bound=float(shares[1].max()),
+    )
+
+
+def _enough(seen: float) -> float:
+    """Return the share of a limit that a bound need not go below: close, and within the limit."""
+    return min(TIGHT * seen, 1.0) if seen < 1 else TIGHT * seen

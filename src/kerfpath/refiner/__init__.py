@@ -1,5 +1,6 @@
 """Refinement off the grid: gamma continuous, postures and turns fixed."""
 
+from kerfpath.refiner._rates import KeptShares as KeptShares
 from kerfpath.refiner._refine import Binding as Binding
 from kerfpath.refiner._refine import Refinement as Refinement
 from kerfpath.refiner._refine import ease as ease

@@ -143,11 +143,11 @@ def _limits(
     before, after = ((joints + n * at[:, None]).ravel() for at in meetings)
     A = _scaled(np.repeat(1 / span, n), V[after] - V[before])
     for value, slope, limit, of in (
-        (v, V, rates.limits.velocity, owner[:edges]),
-        (a, A, rates.limits.acceleration, owner[edges:]),
+        (v, V, rates.velocity, owner[:edges]),
+        (a, A, rates.acceleration, owner[edges:]),
     ):
-        share = (value / limit.usable).ravel()
-        per_share = _scaled(1 / np.tile(limit.usable, len(value)), slope)
+        share = (value / limit).ravel()
+        per_share = _scaled(1 / limit.ravel(), slope)
         for sign in (1.0, -1.0):
             if beyond is None:
                 rows.at_most(sign * share, sign * per_share, 1 - MARGIN)

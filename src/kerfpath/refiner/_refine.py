@@ -17,7 +17,7 @@ from kerfpath.losses import Loss, Reason
 from kerfpath.plans import Plan, Proof, on_turns, path_cost
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._descent import Descent, MotionState
-from kerfpath.refiner._rates import RateLimits
+from kerfpath.refiner._rates import KeptShares, RateLimits
 from kerfpath.refiner._room import room_at_ends
 from kerfpath.robots import lowest_joint
 from kerfpath.search import rotation_limits
@@ -83,6 +83,7 @@ def refine(
     nodes: Contour | None = None,
     eta_v: float | None = None,
     eta_a: float | None = None,
+    kept: KeptShares | None = None,
     first: float | None = None,
     within: tuple[Array, Array] | None = None,
     least: float = 0.0,
@@ -103,6 +104,8 @@ def refine(
         holds (5) and (6) at the shorter time step.
     eta_v, eta_a : float, optional
         Share of the velocity and acceleration limits; default: the plan's.
+    kept : KeptShares, optional
+        Shares of what eta leaves, in every interval and where two meet; default: all of it.
     first : float rad, optional
         Largest change of gamma in the first iteration, for a motion that is close to the best;
         default: two steps of the plan's grid.
@@ -136,7 +139,7 @@ def refine(
     comfort = plan.settings.comfort
     if comfort is not None and comfort.prices_clearance:
         return _unrefined(plan, "what clearance costs is known on the grid only")
-    descent, start = _descent(asked)
+    descent, start = _descent(asked, kept)
     low, high = within or (-np.inf, np.inf)
     low, high = np.maximum(low, descent.gamma_low), np.minimum(high, descent.gamma_high)
     descent = replace(descent, first=first, gamma_low=low, gamma_high=high)
@@ -238,7 +241,7 @@ def _unrefined(plan: Plan, why: str) -> Refinement:
     )
 
 
-def _descent(plan: Plan) -> tuple[Descent, MotionState]:
+def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, MotionState]:
     """Return the task of refining a plan, and where it stands."""
     settings, comfort = plan.settings, plan.settings.comfort
     low, high = room_at_ends(plan)
@@ -246,14 +249,15 @@ def _descent(plan: Plan) -> tuple[Descent, MotionState]:
     if windows:
         inside = nearest_inside(windows, plan.contour.s, gamma)
         gamma = np.full(len(gamma), np.nan) if inside is None else inside
-        kept = room_beside(windows, plan.contour.s, gamma)
-        low, high = np.maximum(low, kept[0]), np.minimum(high, kept[1])
+        room = room_beside(windows, plan.contour.s, gamma)
+        low, high = np.maximum(low, room[0]), np.minimum(high, room[1])
     descent = Descent(
         curves=JointCurves(plan.robot, plan.frames, plan.T_flange_tip, plan.posture),
         rates=RateLimits(
             tau=np.diff(plan.time),
             limits=settings.limits(plan.robot),
             periodic=settings.closure == "periodic",
+            kept=kept,
         ),
         limits=plan.robot.joint_limits()
         if comfort is None

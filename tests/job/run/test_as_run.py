@@ -1,9 +1,12 @@
 """What a run says of its program's corners: figures, and a warning where they are too sharp."""
 
+import re
+
+import numpy as np
 import pytest
 
 from jobs import DEMO, SMALL
-from kerfpath.job import read_job, run_job, write_result
+from kerfpath.job import audit_program, read_job, run_job, write_result
 
 QUICK = SMALL.replace("[plan]", "[plan]\ncertify = false")
 
@@ -31,7 +34,7 @@ def test_the_corners_of_the_program_are_looked_at(tmp_path):
         assert velocity.ok
         assert acceleration.ok
     write_result(result, tmp_path / "out")
-    assert "corners rounded in zones" in (tmp_path / "out" / "report.html").read_text()
+    assert "share as run, at every instant" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_sharp_corners_are_warned_of_with_what_to_write(tmp_path):
@@ -50,3 +53,73 @@ def test_where_nothing_is_rounded_nothing_is_said(tmp_path, program):
     if "language" in program:
         text = text.replace('language = "rapid"\n', "")
     assert [cut.as_run for cut in cuts_of(tmp_path, text).cuts] == [(), ()]
+
+
+def test_limits_that_hold_at_the_nodes_alone_are_brought_in_between_them(tmp_path):
+    fast = QUICK.replace("[plan]", '[plan]\nbetween_nodes = "reported"')
+    fast = re.sub("eta_acceleration = .*", "eta_acceleration = 1", fast)
+    before = cuts_of(tmp_path, at_its_limits(tmp_path, fast)).cuts
+    over = [cut.name for cut in before for row in cut.as_run if not row.ok]
+    assert over
+    after = cuts_of(tmp_path, at_its_limits(tmp_path, fast).replace("reported", "guaranteed"))
+    assert after.passed
+    for old, cut in zip(before, after.cuts, strict=True):
+        assert all(row.ok and row.level == "error" for row in cut.as_run)
+        # Held to less, a motion can only be dearer; refined again, a start may end a little lower.
+        assert old.plan.cost * (1 - 1e-3) <= cut.plan.cost <= old.plan.cost * 1.02
+
+
+def at_its_limits(folder, text):
+    """The job with accelerations of the robot that its plans just keep at their nodes."""
+    peaks = [cut.plan.criteria.peak_acceleration for cut in cuts_of(folder, text).cuts]
+    limit = np.degrees(read_job(folder / "job.toml").robot.acceleration)
+    most = (np.max(peaks, axis=0).max() * limit * 1.0001).tolist()
+    lines = [line for line in text.splitlines() if not line.startswith("acceleration")]
+    return "\n".join(lines).replace("[robot]", f"[robot]\nacceleration_deg_s2 = {most}", 1)
+
+
+@pytest.mark.parametrize(
+    ("program", "why"),
+    [
+        ("zone_mm = 0", "stops at every node"),
+        ('language = "csv"', "csv has no zones"),
+        ('language = "none"', "there is no program"),
+        ("zone_mm = 0.05", "as run"),
+    ],
+)
+def test_without_a_proof_a_guarantee_fails_the_audit(tmp_path, program, why):
+    text = with_program(program).replace("[plan]", '[plan]\nbetween_nodes = "guaranteed"')
+    if "language" in program:
+        text = text.replace('language = "rapid"\n', "")
+    result = cuts_of(tmp_path, text)
+    assert not result.passed
+    for cut in result.cuts:
+        wrong = [row for row in cut.as_run if not row.ok]
+        assert wrong
+        assert all(row.level == "error" for row in wrong)
+        assert why in wrong[0].issue().message
+    written = write_result(result, tmp_path / "out")
+    assert not list((tmp_path / "out").glob("*.mod")), written
+
+
+def test_a_program_is_judged_by_the_zones_of_its_text(tmp_path):
+    text = QUICK.replace("[plan]", '[plan]\nbetween_nodes = "guaranteed"')
+    result = cuts_of(tmp_path, text)
+    write_result(result, tmp_path / "out")
+    (program,) = (tmp_path / "out").glob("*.mod")
+
+    def rows():
+        tables = audit_program(program, tmp_path / "job.toml").tables
+        return [row for table in tables.values() for row in table if row.code.endswith("as-run")]
+
+    as_planned = {(row.code, round(row.value, 3)) for cut in result.cuts for row in cut.as_run}
+    assert all(row.ok for row in rows())
+    for row in rows():
+        assert any(row.code == code and abs(row.value - value) < 0.02 for code, value in as_planned)
+    narrow = "0.020,0.020,0.020,0.002,0.020,0.002"
+    sharp = re.sub(r"(zCorner\d*:=\[FALSE),[\d.,]+\]", rf"\1,{narrow}]", program.read_text())
+    assert sharp != program.read_text()
+    program.write_text(sharp)
+    wrong = [row for row in rows() if not row.ok]
+    assert {row.code for row in wrong} == {"acceleration-as-run"}
+    assert all(row.level == "error" for row in wrong)

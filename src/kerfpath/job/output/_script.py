@@ -11,6 +11,7 @@ import numpy as np
 
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
+from kerfpath.job.as_run import keeps_between_nodes, turning_speed
 from kerfpath.job.format import ContourSpec, CutRequest, Job, PreparedJob
 from kerfpath.operations import Side
 from kerfpath.options import PlanOptions
@@ -40,7 +41,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath import {used}
-from kerfpath.post import build_program, language, post, write_files
+{execution}from kerfpath.post import build_program, language, post, write_files
 
 HERE = Path(__file__).parent
 MM = 1e-3  # m
@@ -56,12 +57,24 @@ def cut(nodes, path, speed):
     made = plan(
         nodes, arm, tool=T_flange_tip, placement=T_base_part, speed=speed, options=options
     )
-    found = audit(made, reference=path, path_tolerance={path!r}, axis_tolerance={axis!r})
+{keep}    found = audit(made, reference=path, path_tolerance={path!r}, axis_tolerance={axis!r})
     faults.extend(f"{{made.name}}: {{issue}}" for issue in found if issue.level == "error")
     plans.append(made)
     {say}(f"{{made.name}}: cost {{made.cost:.6g}}, {{made.proof.statement}}")
 
 '''
+KEEP = """\
+    kept = keep_limits(made, lambda one: program([one]), turning_speed={turning})
+    made = kept.plan
+    if not kept.done:
+        {say}(f"{{made.name}}: {{kept.statement}}")
+"""
+WRITE = """
+files = post(program(plans), {language!r}, settings)
+(HERE / "out").mkdir(exist_ok=True)
+for written in write_files(HERE / "out", files):
+    {say}(written)
+"""
 REFUSE = """
 if faults:
     raise SystemExit("\\n".join(faults))
@@ -89,16 +102,22 @@ def python_script(prepared: PreparedJob) -> str:
     lines += [f"T_base_part = {_array(job.placement)}", "", _part(job, drawing), ""]
     lines += ["# How every plan is asked for.", _options(job.options)]
     tolerances = job.tolerances
-    lines.append(CUT.format(path=tolerances.path, axis=tolerances.axis, say=SAY))
+    keeps = keeps_between_nodes(job)
+    keep = KEEP.format(turning=_value(turning_speed(job)), say=SAY) if keeps else ""
+    if job.program.language != "none":
+        lines += _program(job)
+    lines.append(CUT.format(path=tolerances.path, axis=tolerances.axis, say=SAY, keep=keep))
     for request in prepared.contours:
         lines += [*_contour(request), ""]
     lines.append(REFUSE)
     if job.program.language != "none":
-        lines += _program(job)
+        lines += [WRITE.format(language=job.program.language, say=SAY)]
     text = "\n".join(lines).replace("\n\n\n\n", "\n\n\n").rstrip() + "\n"
     classes = [name for name in CLASSES if f"{name}(" in text]
     used = ", ".join([*classes, "audit", "cad", "operations", "plan", "robot"])
-    return HEAD.format(job=_plain(job.path.name), drawing=_plain(drawing), used=used) + text
+    execution = "from kerfpath.execution import keep_limits\n" if keeps else ""
+    names = {"job": _plain(job.path.name), "drawing": _plain(drawing)}
+    return HEAD.format(**names, used=used, execution=execution) + text
 
 
 def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
@@ -254,13 +273,15 @@ def _program(job: Job) -> list[str]:
     }  # fmt: skip
     said = {} if options.settings is None else options.settings.model_dump(exclude_defaults=True)
     settings = f"language({options.language!r}).settings({_arguments(said)})"
+    made = _call("return build_program", named, "plans").replace("\n", "\n    ")
     return [
-        _call("program = build_program", named, "plans"),
         f"settings = {settings}",
-        f"files = post(program, {options.language!r}, settings)",
-        '(HERE / "out").mkdir(exist_ok=True)',
-        'for written in write_files(HERE / "out", files):',
-        f"    {SAY}(written)",
+        "",
+        "",
+        "def program(plans):",
+        '    """Return the neutral program that cuts the plans."""',
+        f"    {made}",
+        "",
     ]
 
 
@@ -290,7 +311,7 @@ def _value(value: object, name: str = "") -> str:
         inner = {field.name: getattr(value, field.name) for field in fields(value)}
         given = {key: each for key, each in inner.items() if each is not None}
         return f"{type(value).__name__}({_arguments(given)})"
-    return repr(value)
+    return "np.inf" if value == np.inf else repr(value)
 
 
 def _array(values: np.ndarray) -> str:

@@ -13,6 +13,7 @@ from kerfpath.cell import Cell
 from kerfpath.contour import KINDS, Contour
 from kerfpath.job.format import Candidate, Job
 from kerfpath.job.plan_file import check, count
+from kerfpath.job.programs._as_run import check_run
 from kerfpath.job.programs._expected import TargetNodes, nodes_at_targets
 from kerfpath.job.programs._read import ReadCut
 from kerfpath.plans import Plan, Proof
@@ -54,6 +55,7 @@ def check_cut(
     rows += allowed.checks(made, reference=reference, cell=cell, rounding=digits)
     rows += _process_checks(job, candidate, cut, made, digits.time, ahead=chosen.ahead)
     rows += _postures(job, cut, chosen, settings, digits.q)
+    rows += check_run(job, cut, made, digits, chosen, settings)
     found = nodes_at_targets(job, candidate, cut, s)
     off, alone = int(np.argmax(found.off)), int(np.argmax(found.alone))
     said = "targets, off the nodes that the job asks for"

@@ -12,8 +12,8 @@ from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.front import Subproblem, plan_run
 from kerfpath.graph import LayeredGraph
+from kerfpath.job.as_run import checks_as_run, kept_between_nodes
 from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
-from kerfpath.job.run._as_run import checks_as_run
 from kerfpath.job.run._remedy import Remedy, find_remedy, opens_without_windows
 from kerfpath.job.run._result import CutResult
 from kerfpath.planner import clearance_map, plan, plan_in_pieces
@@ -154,10 +154,11 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
         candidate = Candidate.at(whole.request.task.speed, path, made.contour)
     if job.options.refine_parts > 1:
         made = _divided(made, candidate.path, job.options.refine_parts)
+    made, why = (made, "") if whole.picked else kept_between_nodes(job, made)
     checks = job.tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
     checks += whole.request.drawing_checks(candidate, made.contour, job.tolerances.path)
     cut = replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))
-    return replace(cut, as_run=checks_as_run(job, cut))
+    return replace(cut, as_run=checks_as_run(job, made, why))
 
 
 def _divided(made: Plan, path: Contour, parts: int) -> Plan:

@@ -47,8 +47,8 @@ class CutResult:
     departure : Departure or None
         How far the nodes leave the CAD curve; measured once it is settled what is cut.
     as_run : tuple of Check
-        What the joints need where the program's corners are rounded; warnings, which no plan file
-        keeps, as they are about the program.
+        What the joints need where the program's corners are rounded, which no plan file keeps, as
+        it is about the program. Warnings, or errors where the job asks for a guarantee.
     """
 
     request: CutRequest
@@ -83,9 +83,8 @@ class CutResult:
     @property
     def passed(self) -> bool:
         """True when there is a plan and its audit finds no error."""
-        return self.plan is not None and not any(
-            c.level == "error" and not c.ok for c in self.checks
-        )
+        rows = (*self.checks, *self.as_run)
+        return self.plan is not None and not any(c.level == "error" and not c.ok for c in rows)
 
     def measured(self, part: Part, loop: Departure | None) -> CutResult:
         """Return the cut with the departure of its nodes.

@@ -80,6 +80,7 @@ def rules(settings: FanucSettings) -> Rules:
         longest_lead=LONGEST_LEAD,
         point_step=half_digit * 1e-3,
         angle_step=float(np.radians(half_digit)),
+        zone_lengths=settings.corner == "CR",
     )
 
 

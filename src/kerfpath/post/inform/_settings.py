@@ -78,6 +78,7 @@ def rules(settings: InformSettings) -> Rules:
         speed_step=SPEED_STEP,
         point_step=POINT_STEP,
         angle_step=float(np.radians(max(ANGLE_STEP_DEG, 0.5 / pulses.min()))),
+        zone_lengths=False,  # a position level says how the corner is rounded, not by how much
     )
 
 

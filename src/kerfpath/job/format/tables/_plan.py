@@ -14,6 +14,7 @@ from kerfpath.job.format._values import JointsNotNegative, NotNegative, Positive
 from kerfpath.job.format.tables._table import Table, given
 from kerfpath.options import (
     EXACT_OR_BETTER,
+    BetweenNodes,
     FeedKind,
     Interruptions,
     OptionConflict,
@@ -95,6 +96,7 @@ class PlanTable(Table):
     refine_parts: Annotated[
         int, key("a whole number of parts from 1 to 100", "4", ge=1, le=100)
     ] = 1
+    between_nodes: BetweenNodes = "kept"
     eta_velocity: Annotated[Positive, key("a number above 0, at most 1", "0.95", le=1)] = 1.0
     eta_acceleration: Annotated[Positive, key("a number above 0, at most 1", "0.9", le=1)] = 1.0
     weights: Annotated[
@@ -157,6 +159,7 @@ class PlanTable(Table):
             feed=self.feed,
             refine=self.method in EXACT_OR_BETTER if self.refine is None else self.refine,
             refine_parts=self.refine_parts,
+            between_nodes=self.between_nodes,
             interruptions=self.interruptions,
             least_piece=None if piece is None else piece / 1000,
             comfort=comfort,

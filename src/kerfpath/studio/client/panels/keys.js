@@ -90,6 +90,7 @@ export const GROUPS = [
       words("plan.frames", "Frames"),
       yes("plan.refine", "Refined off the grid"),
       number("plan.refine_parts", "Parts of the refinement"),
+      words("plan.between_nodes", "Limits between the nodes"),
     ],
   },
   {

@@ -1,0 +1,245 @@
+"""How fast the joints turn along a course of the tool at every instant: proven bounds.
+
+The course is smooth pieces, each a closed formula of the time. The solution of the arm's equations
+is enclosed with both its derivatives over short spans of that time, rounding included, and a span
+is divided until what is known of it suffices. Nothing is shared with the kinematics that plans.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import factorial
+
+import numpy as np
+
+from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._repr import short_repr
+from kerfpath.auditor._enclosure import fixed_poses, joints_of, require_closed_form
+from kerfpath.auditor._intervals import Interval, exact
+from kerfpath.auditor._jets import Jet, angle_from, constant
+from kerfpath.auditor._postures import POSTURES_OF, Pose
+from kerfpath.robots import Robot
+
+__all__ = ["ENCLOSED", "CoursePieces", "rates_along"]
+
+ENCLOSED = tuple(POSTURES_OF)
+"""Families of arms whose rates can be bounded."""
+AT_ONCE = 1024
+"""Spans enclosed together."""
+TERMS = 16
+"""Of the series of sine and cosine: enough for half a revolution."""
+CUT_OFF = 1e-15
+"""More than what they leave out, and its first two derivatives, up to half a revolution."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CoursePieces:
+    """The tip's pose over time in P smooth pieces.
+
+    At t s from the piece's own zero, in the part, the tip is at point + velocity t + acceleration
+    t^2 / 2 + cos(rate t) x + sin(rate t) y, and its frame is `R` turned, in its own axes, by the
+    rotation vector turn[0] + turn[1] t + turn[2] t^2 / 2, of less than half a revolution.
+
+    Parameters
+    ----------
+    begin, end : (P,) s
+        Of each piece, from its own zero.
+    R : (P, 3, 3)
+    turn : (P, 3, 3) rad, rad/s, rad/s^2
+    point : (P, 3, 3) m, m/s, m/s^2
+        Point, velocity, acceleration.
+    x, y : (P, 3) m
+        Of an arc; zero where there is none.
+    rate : (P,) rad/s
+    """
+
+    begin: Array
+    end: Array
+    R: Array
+    turn: Array
+    point: Array
+    x: Array
+    y: Array
+    rate: Array
+
+    __repr__ = short_repr
+
+
+def rates_along(
+    robot: Robot,
+    pieces: CoursePieces,
+    q: Array,
+    *,
+    T_base_part: Array,
+    T_flange_tip: Array,
+    enough: tuple[Array, Array],
+    deepest: int = 10,
+) -> tuple[Array, Array]:
+    """Return bounds on the sizes of velocity and acceleration of every joint over each piece.
+
+    Parameters
+    ----------
+    robot : Robot
+        Of family "opw" or "ur", without an external axis.
+    pieces : CoursePieces
+    q : (P, n) rad
+        Joints in the middle of each piece: they say which posture is meant.
+    T_base_part, T_flange_tip : (4, 4) m
+    enough : two of (n,) rad/s, rad/s^2
+        A piece is not looked at more closely once its bounds are no larger.
+    deepest : int
+        Times that a piece is halved at most.
+
+    Returns
+    -------
+    velocity, acceleration : (P, n) rad/s, rad/s^2
+        Infinite where nothing is proved: next to a singularity, or beyond the reach.
+
+    Raises
+    ------
+    InputError
+        A robot of another family, or with an external axis.
+    """
+    require_closed_form(robot)
+    task = _Task(robot, pieces, T_base_part, T_flange_tip)
+    middle, half = (pieces.begin + pieces.end) / 2, (pieces.end - pieces.begin) / 2
+    k = np.arange(len(middle))
+    posture = task.posture(k, middle, q)
+    velocity, acceleration = np.zeros((2, len(middle), robot.joints))
+    for depth in range(deepest + 1):
+        # Rounding leaves no gap between the halves.
+        fast, sharp = task.rates(k, middle, half * (1 + 1e-12), posture[k])
+        done = ((fast <= enough[0]) & (sharp <= enough[1])).all(axis=1) | (depth == deepest)
+        np.maximum.at(velocity, k[done], fast[done])
+        np.maximum.at(acceleration, k[done], sharp[done])
+        k, half = np.repeat(k[~done], 2), np.repeat(half[~done] / 2, 2)
+        middle = np.repeat(middle[~done], 2) + np.tile([-1.0, 1.0], len(k) // 2) * half
+        if not len(k):
+            break
+    return velocity, acceleration
+
+
+class _Task:
+    """The course of a robot, and what stands before and after it."""
+
+    def __init__(
+        self, robot: Robot, pieces: CoursePieces, T_base_part: Array, T_flange_tip: Array
+    ) -> None:
+        self._robot, self._pieces = robot, pieces
+        self._before, self._after = fixed_poses(robot, T_base_part[None], T_flange_tip)
+
+    def posture(self, k: Ints, t: Array, q: Array) -> Ints:
+        """Return the posture (S,) nearest to joints q (S, n) at instants t (S,) of pieces k."""
+        joints, none = self._joints(k, t, np.zeros(len(t)))
+        off = np.zeros((8, len(k)))
+        for joint, own in zip(joints, q.T, strict=True):
+            angle = np.broadcast_to(joint.at.middle(), none.shape).reshape(8, -1)
+            apart = np.abs((angle - own + np.pi) % (2 * np.pi) - np.pi)
+            off = np.maximum(off, np.where(np.isnan(apart), np.inf, apart))
+        return np.asarray(np.argmin(off, axis=0))
+
+    def rates(self, k: Ints, t: Array, half: Array, posture: Ints) -> tuple[Array, Array]:
+        """Return bounds (S, n) on velocity and acceleration over spans t +- half of pieces k."""
+        joints, none = self._joints(k, t, half)
+        rows = np.arange(len(k))
+        found = np.empty((2, len(k), len(joints)))
+        absent = none.reshape(8, -1)[posture, rows]
+        for i, joint in enumerate(joints):
+            for kind, held in enumerate((joint.rate, joint.bend)):
+                size = np.broadcast_to(held.magnitude(), none.shape).reshape(8, -1)[posture, rows]
+                found[kind, :, i] = np.where(np.isnan(size) | absent, np.inf, size)
+        return found[0], found[1]
+
+    def _joints(self, k: Ints, t: Array, half: Array) -> tuple[list[Jet], Bools]:
+        parts = []
+        for i in range(0, len(k), AT_ONCE):
+            rows = slice(i, i + AT_ONCE)
+            with np.errstate(all="ignore"):
+                parts.append(joints_of(self._robot, self._pose(k[rows], t[rows], half[rows])))
+        none = np.concatenate([np.broadcast_to(n, (2, 2, 2, n.shape[-1])) for _, n in parts], -1)
+        return [_joined(each) for each in zip(*(joints for joints, _ in parts), strict=True)], none
+
+    def _pose(self, k: Ints, t: Array, half: Array) -> Pose:
+        """Return the pose of the model's end over spans, as jets of the time."""
+        pieces, before, after = self._pieces, self._before[..., 0], self._after
+        time = angle_from(t, half)
+        turn = [_polynomial(pieces.turn[k, :, i], time) for i in range(3)]
+        E = _rotation(turn)
+        c, s = time.times(exact(pieces.rate[k])).cos_sin()
+        tip = [
+            _polynomial(pieces.point[k, :, i], time)
+            + c.times(exact(pieces.x[k, i]))
+            + s.times(exact(pieces.y[k, i]))
+            for i in range(3)
+        ]
+        R = exact(np.moveaxis(pieces.R[k], 0, -1))
+        columns = []
+        for j in range(4):
+            own = [after[i, j] for i in range(3)]
+            turned = [_sum([E[i][m].times(own[m]) for m in range(3)]) for i in range(3)]
+            inside = [_sum([turned[m].times(R[i, m]) for m in range(3)]) for i in range(3)]
+            if j == 3:
+                inside = [a + b for a, b in zip(inside, tip, strict=True)]
+            column = [_sum([inside[m].times(before[i, m]) for m in range(3)]) for i in range(3)]
+            if j == 3:
+                column = [each.plus(before[i, 3]) for i, each in enumerate(column)]
+            columns.append((column[0], column[1], column[2]))
+        return Pose(x=columns[0], y=columns[1], z=columns[2], point=columns[3])
+
+
+def _polynomial(coefficients: Array, time: Jet) -> Jet:
+    """Return c0 + c1 t + c2 t^2 / 2 of coefficients (S, 3)."""
+    c0, c1, c2 = (exact(c) for c in coefficients.T)
+    return (time.times(c1) + time.square().times(c2.scaled(0.5))).plus(c0)
+
+
+def _rotation(r: list[Jet]) -> list[list[Jet]]:
+    """Return the rotation by a rotation vector: 1 + a [r] + b [r]^2 (Rodrigues)."""
+    squares = [each.square() for each in r]
+    size2 = squares[0] + squares[1] + squares[2]
+    a, b = _series(size2, 1), _series(size2, 2)
+    x, y, z = r
+    ax, ay, az = (a * each for each in r)
+    one = constant(exact(np.ones_like(size2.half)), size2)
+    xy, xz, yz = (b * (u * v) for u, v in ((x, y), (x, z), (y, z)))
+    xx, yy, zz = (b * each for each in squares)
+    return [
+        [one - (yy + zz), xy - az, xz + ay],
+        [xy + az, one - (xx + zz), yz - ax],
+        [xz - ay, yz + ax, one - (xx + yy)],
+    ]
+
+
+def _series(s: Jet, first: int) -> Jet:
+    """Return the sum over k of (-s)^k / (2 k + first)!: sin(x) / x or (1 - cos x) / x^2 of x^2."""
+    out = constant(exact(np.zeros_like(s.half)), s)
+    for k in reversed(range(TERMS)):
+        term = exact(1.0) / exact(float(factorial(2 * k + first)))
+        out = (out * -s).plus(term)
+    # By the chain rule derivatives of the rest come with those of s.
+    off = CUT_OFF * np.maximum(1.0, s.rate.magnitude() ** 2 + s.bend.magnitude())
+    rest = Interval(-off, off)
+    return Jet(
+        out.at + rest, out.slope + rest, out.value + rest, out.rate + rest, out.bend + rest, s.half
+    )
+
+
+def _sum(jets: list[Jet]) -> Jet:
+    return jets[0] + jets[1] + jets[2]
+
+
+def _joined(jets: tuple[Jet, ...]) -> Jet:
+    """Return jets of several batches as one, in every posture."""
+    if len(jets) == 1:
+        return jets[0]
+
+    def along(name: str) -> Interval:
+        held = [getattr(each, name) for each in jets]
+        ends = [
+            np.concatenate([np.broadcast_to(e, (2, 2, 2, e.shape[-1])) for e in end], axis=-1)
+            for end in ([h.lo for h in held], [h.hi for h in held])
+        ]
+        return Interval(*ends)
+
+    half = np.concatenate([each.half for each in jets])
+    return Jet(along("at"), along("slope"), along("value"), along("rate"), along("bend"), half)

@@ -1,0 +1,180 @@
+"""A plan that keeps the limits of its joints between the nodes, too, as its program has it run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfpath._arrays import Array, Ints
+from kerfpath._repr import short_repr
+from kerfpath.execution._executed import Executed, Peak, executed
+from kerfpath.limits import meetings
+from kerfpath.plans import Plan
+from kerfpath.post import Program, build_program
+from kerfpath.refiner import KeptShares, refine
+
+__all__ = ["Kept", "keep_limits", "longest_run"]
+
+ROUNDS = 10
+"""Refinements at most; the first two or three do most of it."""
+AIM = 0.998
+"""Share of the limits that is aimed at: a proof says a little more than there is."""
+CLOSER = 0.003
+"""By how much the aim goes down where only the proof is missing."""
+LEAST = 0.05
+"""Share of a limit that a node keeps at least, however much is needed beside it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Kept:
+    """What came of it.
+
+    Parameters
+    ----------
+    plan : Plan
+        The plan whose program keeps the limits; the one given where `done` is False.
+    done : bool
+        It is proved that no joint exceeds a limit at any instant of the program.
+    rounds : int
+        Refinements that it took.
+    run : Executed or None
+        That plan as it is run; None where the robot stops at every node.
+    statement : str
+        What was done; or what is exceeded where and what would help.
+    """
+
+    plan: Plan
+    done: bool
+    rounds: int
+    run: Executed | None
+    statement: str
+
+    __repr__ = short_repr
+
+
+def _alone(plan: Plan) -> Program:
+    return build_program([plan])
+
+
+def keep_limits(
+    plan: Plan,
+    program: Callable[[Plan], Program] = _alone,
+    *,
+    turning_speed: float = np.inf,
+) -> Kept:
+    """Return a plan whose program keeps every limit of velocity and acceleration at every instant.
+
+    Where the motion of the program, see `executed`, needs more of a limit than the nodes do, the
+    nodes are held to as much less and the plan is refined again, until the bounds that hold at
+    every instant are within the limits. Speed, nodes, postures and turns stay; gamma moves.
+
+    Parameters
+    ----------
+    plan : Plan
+    program : callable
+        Returns the program of a plan; default: `build_program` with automatic zones.
+    turning_speed : float rad/s
+        As in `executed`.
+
+    Raises
+    ------
+    InputError
+        As `executed`.
+    """
+    first = run = longest_run(program(plan), turning_speed)
+    if first is None or run is None:
+        return Kept(plan=plan, done=True, rounds=0, run=None, statement="it stops at every node")
+    intervals, n = np.diff(plan.q, axis=0).shape
+    into, _ = meetings(intervals, periodic=plan.settings.closure == "periodic")
+    kept = KeptShares(np.ones((intervals, n)), np.ones((len(into), n)))
+    made, aim, why = plan, AIM, "holding the nodes to less does not bring it down"
+    for count in range(ROUNDS + 1):
+        if max(run.velocity_bound, run.acceleration_bound) <= 1:
+            said = "it keeps the limits between the nodes, too"
+            return Kept(plan=made, done=True, rounds=count, run=run, statement=said)
+        worst = max(run.peak_velocity.share, run.peak_acceleration.share)
+        if np.isinf(worst) or np.isinf(run.acceleration_bound):
+            why = "nothing can be proved there for this arm"
+            break
+        aim -= CLOSER if worst <= 1 else 0.0
+        kept = _held(made, run, kept, aim)
+        refined = refine(made, kept=kept)
+        if not refined.done:
+            why = refined.statement.removeprefix("not refined: ")
+            break
+        made = refined.plan
+        run = longest_run(program(made), turning_speed) or run
+    said = _need(plan, first, why)
+    return Kept(plan=plan, done=False, rounds=count, run=first, statement=said)
+
+
+def longest_run(program: Program, turning_speed: float = np.inf) -> Executed | None:
+    """Return the run of a program of one plan with the most targets, its cut; None without one."""
+    runs = executed(program, turning_speed=turning_speed)
+    return max(runs, key=lambda each: len(each.course.T), default=None)
+
+
+def _held(plan: Plan, run: Executed, kept: KeptShares, aim: float) -> KeptShares:
+    """Return the shares of the limits with less where the run needs more than is aimed at.
+
+    What is needed between the nodes beyond what is needed at them is taken to stay as it is.
+    """
+    settings, time = plan.settings, plan.time - plan.time[0]
+    intervals, nodes = len(kept.velocity), len(kept.acceleration)
+    of_interval = np.clip(np.searchsorted(time, run.time) - 1, 0, intervals - 1)
+    # The run ends where the plan does: of a closed contour at the node that it began with.
+    of_node = np.abs(run.time[:, None] - time[None]).argmin(axis=1) - 1
+    v, a = plan.velocity_share, np.zeros_like(kept.acceleration)
+    a[: intervals - 1] = plan.acceleration_share  # the robot stops at a seam
+    return KeptShares(
+        _less(kept.velocity, v, run.velocity_share, of_interval, aim, settings.eta_v),
+        _less(
+            kept.acceleration, a, run.acceleration_share, np.clip(of_node, 0, nodes - 1), aim,
+            settings.eta_a,
+        ),
+    )  # fmt: skip
+
+
+def _less(kept: Array, own: Array, needed: Array, place: Ints, aim: float, eta: float) -> Array:
+    """Return shares (M, n), smaller where the needs (m, n) at places (m,) exceed the aim."""
+    most = np.zeros_like(kept)
+    np.maximum.at(most, place, np.abs(needed))
+    allowed = np.maximum(aim - (most - np.abs(own)), LEAST) / eta
+    return np.where(most > aim, np.minimum(kept, allowed), kept)
+
+
+def _need(plan: Plan, run: Executed, why: str) -> str:
+    """Say what a plan needs between its nodes, why it is not brought down, and what would help."""
+    velocity, acceleration = run.peak_velocity, run.peak_acceleration
+    fast = velocity.share > 1
+    peak, what = (velocity, "velocity") if fast else (acceleration, "acceleration")
+    s = np.interp(peak.time, plan.time - plan.time[0], plan.contour.s)
+    said = (
+        f"between the nodes joint {peak.joint + 1} needs {peak.share:.3g} of its {what} limit at "
+        f"s = {s * 1000:.1f} mm, and {why}"
+    )
+    if not np.isfinite(peak.share):
+        return said
+    if peak.share > 1:
+        slower = max(velocity.share, np.sqrt(acceleration.share))
+        said += f"; at {np.floor(99 / slower) / 100:.0%} of the speed it keeps the limits as it is"
+    return said if fast else said + _wider(run, peak)
+
+
+def _wider(run: Executed, peak: Peak) -> str:
+    """Say how near nodes would be, or how far the tip would pass one, for zones that meet."""
+    course = run.course
+    k = int(np.clip(np.abs(course.time - peak.time).argmin(), 1, len(course.time) - 2))
+    share = 2 * course.half[k] / min(course.duration[k - 1], course.duration[k])
+    if share > 0.9:
+        return ""
+    steps = np.diff(course.T[k - 1 : k + 2, :3, 3], axis=0)
+    gaps = np.linalg.norm(steps, axis=1)
+    passed = float(np.linalg.norm(np.diff(steps / gaps[:, None], axis=0)) * gaps.min() / 8)
+    return (
+        f"; the zone there takes {share:.0%} of the way to the next node: nodes at most "
+        f"{gaps.min() * np.sqrt(share) * 1000:.2g} mm apart, or a zone error of "
+        f"{passed * 1000:.2g} mm, let zones meet"
+    )

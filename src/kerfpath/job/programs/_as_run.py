@@ -1,0 +1,82 @@
+"""What the joints need where a controller runs a program as its text stands, corners rounded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kerfpath.auditor import Check, Rounding
+from kerfpath.execution import Executed, from_stop_to_stop, run_along
+from kerfpath.job.as_run import checks_of_run, checks_of_unknown
+from kerfpath.job.format import Job
+from kerfpath.job.programs._read import ReadCut
+from kerfpath.plans import Plan
+from kerfpath.post import CircularMove, Language, LanguageSettings, LinearMove
+
+__all__ = ["check_run"]
+
+SHORTEST = 1e-9
+"""s: no move is shorter."""
+MOST_ROUNDED = 0.05
+"""Share of a limit that the digits of a text may explain at most."""
+
+
+def check_run(
+    job: Job, cut: ReadCut, made: Plan, digits: Rounding, chosen: Language,
+    settings: LanguageSettings,
+) -> list[Check]:  # fmt: skip
+    """Return the checks of a cut's motion between its targets, by its own zones and speeds.
+
+    Digits of the text are allowed for: in a short interval they turn into acceleration.
+    """
+    if not chosen.zones:
+        return [*checks_of_unknown(job, f"{chosen.name} has no zones")]
+    if any(move.zone is None for move in cut.targets):
+        return [*checks_of_unknown(job, f"the zones of {chosen.name} here are no lengths")]
+    runs = [
+        run_along(
+            part, job.robot, T_base_part=job.placement, T_flange_tip=job.tool,
+            turning_speed=chosen.rules(settings).turning_speed,
+        )
+        for part in from_stop_to_stop(_moves(cut))
+    ]  # fmt: skip
+    if not runs:
+        return [*checks_of_unknown(job, "the robot stops at every node")]
+    run = max(runs, key=_needs)
+    dq, dt = np.diff(made.q, axis=0), np.diff(made.time)
+    velocity, acceleration = job.robot.speed_limits()
+    allowed = (
+        (digits.of_velocity(dq, dt) / velocity).max(),
+        (digits.of_acceleration(dq, dt) / acceleration).max(initial=0.0),
+    )
+    rows = checks_of_run(job, run, made)
+    return [
+        replace(row, limit=row.limit + min(float(more), MOST_ROUNDED))
+        for row, more in zip(rows, allowed, strict=True)
+    ]
+
+
+def _needs(run: Executed) -> float:
+    return max(run.peak_velocity.share, run.peak_acceleration.share)
+
+
+def _moves(cut: ReadCut) -> list[LinearMove]:
+    """Return the moves of a cut as its text has them, the first only for where it ends."""
+    found: list[LinearMove] = []
+    before = int(cut.ends[0])
+    for move, node in zip(cut.targets, cut.ends, strict=True):
+        T, q, zone = cut.T_part_tip[node], cut.q[node], move.zone or 0.0
+        took = max(float(cut.took[before:node].sum()), SHORTEST)
+        way = np.diff(cut.T_part_tip[before : node + 1, :3, 3], axis=0)
+        speed = move.speed or float(np.linalg.norm(way, axis=1).sum()) / took
+        if move.T_part_via is None:
+            made = LinearMove(T_part_tip=T, q=q, speed=speed, duration=took, zone=zone)
+        else:
+            made = CircularMove(
+                T_part_tip=T, q=q, speed=speed, duration=took, zone=zone,
+                T_part_via=move.T_part_via, q_via=q,
+            )  # fmt: skip
+        found.append(made)
+        before = int(node)
+    return found

@@ -1,0 +1,93 @@
+"""Plans that keep the limits between the nodes: the proof against dense sampling."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kerfpath import PlanOptions, plan
+from kerfpath.execution import executed, keep_limits
+from kerfpath.post import build_program
+
+DENSER = 50
+"""Samples to the interval between nodes."""
+
+
+@pytest.fixture(scope="module")
+def tight(circle, arm, tool, placement):
+    """A plan at its limits: the acceleration of the circle at twice the speed of others."""
+    made = plan(circle, arm, tool=tool, placement=placement, speed=0.3, certify=None)
+    share = made.criteria.peak_acceleration.max()
+    # The same motion on a robot that can just do it at the nodes.
+    _, acceleration = arm.speed_limits()
+    return replace(made, robot=replace(arm, acceleration=acceleration * share * 1.0001))
+
+
+def densely(run, program):
+    """Return the largest shares of velocity and acceleration by many poses, all solutions."""
+    robot, end = program.robot, run.course.time[-1]
+    step = end / (len(run.course.T) * DENSER)
+    time = np.arange(2 * step, end - 2 * step, step)
+    flange = np.linalg.inv(program.T_flange_tip)
+    d = step / 10
+    near = np.stack([np.interp(time, run.time, joint) for joint in run.q.T], axis=1)
+    q = [
+        robot.nearest(program.T_base_part @ run.course.poses(time + sign * d) @ flange, near)
+        for sign in (-1, 0, 1)
+    ]
+    velocity, acceleration = robot.speed_limits()
+    return (
+        np.abs((q[2] - q[0]) / (2 * d) / velocity).max(),
+        np.abs((q[2] - 2 * q[1] + q[0]) / d**2 / acceleration).max(),
+    )
+
+
+def test_what_is_needed_between_the_nodes_is_brought_within_the_limits(tight):
+    before = longest(tight)
+    assert before.peak_acceleration.share > 1.001
+    kept = keep_limits(tight)
+    assert kept.done
+    assert kept.rounds > 0
+    run = longest(kept.plan)
+    assert max(run.velocity_bound, run.acceleration_bound) <= 1
+    velocity, acceleration = densely(run, build_program([kept.plan]))
+    # Second differences over a tenth of a sample lose digits.
+    assert velocity <= run.velocity_bound * (1 + 1e-6)
+    assert acceleration <= run.acceleration_bound * (1 + 1e-4)
+    np.testing.assert_array_equal(kept.plan.time, tight.time)
+    assert tight.cost * (1 - 1e-3) <= kept.plan.cost <= tight.cost * 1.05
+
+
+def longest(made, **options):
+    (run,) = executed(build_program([made], **options))
+    return run
+
+
+def test_a_plan_that_keeps_them_is_left_as_it_is(circle, arm, tool, placement):
+    made = plan(circle, arm, tool=tool, placement=placement, speed=0.1, certify=None)
+    kept = keep_limits(made)
+    assert (kept.done, kept.rounds) == (True, 0)
+    assert kept.plan is made
+
+
+def test_zones_that_are_too_narrow_are_said_with_what_would_help(tight):
+    kept = keep_limits(tight, lambda one: build_program([one], zone_error=1e-6))
+    assert not kept.done
+    assert kept.plan is tight
+    assert "zone error" in kept.statement
+    assert "mm apart" in kept.statement
+    slower = float(kept.statement.partition("; at ")[2].partition("%")[0]) / 100
+    run = longest(replace(tight, time=tight.time / slower), zone_error=1e-6)
+    assert run.peak_acceleration.share <= 1
+    faster = slower + 0.02
+    run = longest(replace(tight, time=tight.time / faster), zone_error=1e-6)
+    assert run.peak_acceleration.share > 1
+
+
+def test_where_the_robot_stops_at_every_node_there_is_nothing_to_keep(tight):
+    kept = keep_limits(tight, lambda one: build_program([one], zone=0.0))
+    assert (kept.done, kept.run, kept.plan) == (True, None, tight)
+
+
+def test_plan_itself_takes_no_such_option():
+    assert PlanOptions().between_nodes == "reported"
