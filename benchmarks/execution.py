@@ -14,7 +14,7 @@ from benchmarks._certified import in_processes
 from benchmarks._figures import Report, Sheet
 from benchmarks._random_contours import ROBOTS, cut
 from kerfpath import NoFeasiblePath, Plan, plan
-from kerfpath.execution import Executed, executed, keep_limits
+from kerfpath.execution import Executed, executed, keep_limits, timing_of
 from kerfpath.post import Program, Zone, build_program
 
 __all__ = ["run", "zones_of_cut"]
@@ -54,6 +54,13 @@ KEPT_COLUMNS = (
     "tip mm",
     "s",
 )
+TIMED_COLUMNS = ("plans", "programmed s", "predicted s", "slower", "off toppra %", "worst", "ms")
+HOW_TIMED = """\
+The same plans with automatic zones, from rest to rest, no joint beyond a limit (`timing_of`), and
+what TOPP-RA (toppra, Seidel solver) says of the same motion: a cubic spline through joints at 50
+samples to the interval, by inverse kinematics, with the programmed pace as a limit of its own.
+Programmed and predicted: medians. Slower: plans that do not hold the speed between the ramps. Off
+toppra: how far the predicted times are off its times, median and worst. ms: of the prediction."""
 HOW_KEPT = """\
 The same plans, held to less at their nodes where the program needs more than a full limit between
 them (`keep_limits`, automatic zones). Kept as planned, brought in, and not: plans. Cost: what the
@@ -85,9 +92,11 @@ def run(*, quick: bool) -> list[Report]:
     keys = [(name, i) for name, count in zip(ROBOTS, counts, strict=True) for i in range(count)]
     made = in_processes(zones_of_cut, keys, 1 if quick else PROCESSES)
     kept = in_processes(kept_of_cut, keys, 1 if quick else PROCESSES)
+    timed = in_processes(timed_cut, keys, 1)
     return [
         _report([peaks for each in made for peaks in each], len(keys)),
         _kept_report([one for each in kept for one in each], len(keys)),
+        _timed_report([one for each in timed for one in each], len(keys)),
     ]
 
 
@@ -142,6 +151,75 @@ def kept_of_cut(key: tuple[str, int]) -> list[Brought]:
             )
         )  # fmt: skip
     return found
+
+
+class Timed(NamedTuple):
+    """How long a plan takes by its program, by `timing_of` and by toppra, s."""
+
+    programmed: float
+    predicted: float
+    toppra: float
+    held: float
+    took: float
+
+
+def timed_cut(key: tuple[str, int]) -> list[Timed]:
+    """Plan a cut, and predict how long its program takes."""
+    made = _planned(key)
+    if made is None:
+        return []
+    program = build_program([made])
+    (run,) = executed(program)
+    began = perf_counter()
+    timing = timing_of(run, made.robot)
+    took = perf_counter() - began
+    return [Timed(timing.programmed, timing.seconds, _by_toppra(run, program), timing.held, took)]
+
+
+def _by_toppra(run: Executed, program: Program) -> float:
+    """Return how long toppra says that a run takes, s; NaN where it is not installed."""
+    try:
+        import toppra
+    except ImportError:
+        return np.nan
+    toppra.setup_logging("ERROR")
+    from toppra import SplineInterpolator
+    from toppra.algorithm import TOPPRA
+    from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
+
+    time = np.linspace(0.0, run.course.time[-1], len(run.course.T) * DENSER)
+    near = np.stack([np.interp(time, run.time, joint) for joint in run.q.T], axis=1)
+    poses = program.T_base_part @ run.course.poses(time) @ np.linalg.inv(program.T_flange_tip)
+    path = SplineInterpolator(time, np.column_stack([program.robot.nearest(poses, near), time]))
+    velocity, acceleration = program.robot.speed_limits()
+    limits = [
+        JointVelocityConstraint(np.append(velocity, 1.0)[:, None] * [-1.0, 1.0]),
+        JointAccelerationConstraint(np.append(acceleration, 1e6)[:, None] * [-1.0, 1.0]),
+    ]
+    solver = TOPPRA(limits, path, gridpoints=time, solver_wrapper="seidel")
+    _, pace, _ = solver.compute_parameterization(0.0, 0.0)
+    return float((2 * np.diff(time) / (pace[1:] + pace[:-1])).sum())
+
+
+def _timed_report(made: Sequence[Timed], cuts: int) -> Report:
+    values = np.array(made).reshape(-1, len(Timed._fields))
+    programmed, predicted, toppra, held, took = values.T
+    off = 100 * np.abs(predicted / toppra - 1)
+    row = (
+        str(len(made)),
+        f"{np.median(programmed):.2f}",
+        f"{np.median(predicted):.2f}",
+        str(int((held < 1).sum())),
+        f"{np.nanmedian(off):.2f}",
+        f"{np.nanmax(off):.2f}",
+        f"{1e3 * np.median(took):.0f}",
+    )
+    return Report(
+        title=f"Predicted times: {cuts} random contours",
+        how=HOW_TIMED,
+        sheets=[Sheet(columns=TIMED_COLUMNS, rows=[row])],
+        findings=[],
+    )
 
 
 def _planned(key: tuple[str, int]) -> Plan | None:

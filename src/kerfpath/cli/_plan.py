@@ -24,6 +24,7 @@ from kerfpath.cli._show import (
     table,
 )
 from kerfpath.job import (
+    AsRun,
     CutResult,
     JobResult,
     prepare,
@@ -112,7 +113,7 @@ def finish_run(
                 out.print(f"[bold]{escape(cut.name)}[/]: {cut.plan.feed}")
             if (tilt := _largest_tilt(cut)) is not None:
                 out.print(f"[bold]{escape(cut.name)}[/]: tool axis tilted by up to {tilt:.2f} deg")
-            for check in (*cut.checks, *cut.as_run):
+            for check in (*cut.checks, *cut.as_run.checks):
                 if not check.ok:
                     out.print(f"[bold]{escape(cut.name)}[/]: {escape(str(check.issue()))}")
         for note in merge_notes(written.notes, [cut.name for cut in outcome.cuts]):
@@ -169,9 +170,17 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
         "largest_tilt_deg": _largest_tilt(cut),
         "peak_velocity_share": float(criteria.peak_velocity.max()),
         "peak_acceleration_share": float(criteria.peak_acceleration.max()),
-        "as_run": {check.code.removesuffix("-as-run"): check.value for check in cut.as_run},
-        "issues": [str(c.issue()) for c in (*cut.checks, *cut.as_run) if not c.ok],
+        "as_run": _as_run_entry(cut.as_run),
+        "issues": [str(c.issue()) for c in (*cut.checks, *cut.as_run.checks) if not c.ok],
     }
+
+
+def _as_run_entry(run: AsRun) -> dict[str, object]:
+    entry: dict[str, object] = {c.code.removesuffix("-as-run"): c.value for c in run.checks}
+    if run.timing is not None:
+        entry |= {"seconds": run.timing.seconds, "programmed_s": run.timing.programmed}
+        entry |= {"speed_held": run.timing.held, "ramps_m": run.timing.ramps}
+    return entry
 
 
 def _show_cuts(cuts: Sequence[CutResult]) -> None:
@@ -185,13 +194,14 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
         ]
         sampling = _sampling(cut)
         if cut.plan is None:
-            rows.append([*row, *"-------", *sampling, "no feasible path"])
+            rows.append([*row, *"--------", *sampling, "no feasible path"])
             continue
         criteria = cut.plan.criteria
         rows.append(
             [
                 *row,
                 f"{cut.plan.time[-1]:.2f}",
+                "" if cut.as_run.timing is None else f"{cut.as_run.timing.seconds:.2f}",
                 "" if cut.plan.proof.grid_cost is None else f"{cut.plan.proof.grid_cost:.2f}",
                 f"{cut.plan.cost:.2f}",
                 cut.plan.proof.bound_shown,
@@ -202,11 +212,12 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
                 "passed" if cut.passed else "FAILED",
             ]
         )
-    columns = ["contour", "mm", "nodes", "m/min", "s", "grid", "cost"]
+    columns = ["contour", "mm", "nodes", "m/min", "s", "run s", "grid", "cost"]
     columns += ["bound", "gap %", "vel", "acc", "chord mm", "step deg", "audit"]
-    spare = ["step deg", "chord mm", "grid", "bound", "m/min"]
+    spare = ["step deg", "chord mm", "grid", "bound", "m/min", "run s"]
     table(columns, rows, numbers=columns[1:-1], whole=["audit"], spare=spare)
     out.print(
+        "run s: how long it takes from rest to rest, corners rounded and every joint limit kept; "
         "cost: what is minimised; grid: the best on the gamma grid, before the refinement; "
         "bound: no motion that keeps the limits at the nodes costs less, at any gamma, posture and "
         "turn; gap: at most so much of the cost lies above the best motion; "

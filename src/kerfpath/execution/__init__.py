@@ -1,6 +1,8 @@
 """The motion as a controller runs it: straight and circular moves, rounded in zones."""
 
 from kerfpath.execution._course import ToolCourse as ToolCourse
+from kerfpath.execution._deviation import Deviation as Deviation
+from kerfpath.execution._deviation import deviation_of as deviation_of
 from kerfpath.execution._executed import Executed as Executed
 from kerfpath.execution._executed import Peak as Peak
 from kerfpath.execution._executed import executed as executed
@@ -9,3 +11,6 @@ from kerfpath.execution._executed import run_along as run_along
 from kerfpath.execution._keep import Kept as Kept
 from kerfpath.execution._keep import keep_limits as keep_limits
 from kerfpath.execution._keep import longest_run as longest_run
+from kerfpath.execution._timing import AT_SPEED as AT_SPEED
+from kerfpath.execution._timing import Timing as Timing
+from kerfpath.execution._timing import timing_of as timing_of

@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kerfpath._repr import short_repr
 from kerfpath.auditor import ENCLOSED, Check, Level
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.execution import Executed, Peak, keep_limits, longest_run
+from kerfpath.execution import (
+    AT_SPEED,
+    Executed,
+    Peak,
+    Timing,
+    deviation_of,
+    keep_limits,
+    longest_run,
+    timing_of,
+)
 from kerfpath.job.format import Job
 from kerfpath.plans import Plan
 from kerfpath.post import Program, Rules, language
 
 __all__ = [
-    "checks_as_run",
-    "checks_of_run",
+    "AsRun",
+    "as_run",
     "checks_of_unknown",
     "keeps_between_nodes",
     "kept_between_nodes",
+    "run_judged",
     "turning_speed",
 ]
 
@@ -27,8 +39,25 @@ SLACK = 1e-3
 """Share of a limit that the steps of zones in a program take: they are rounded down."""
 
 
-def checks_as_run(job: Job, plan: Plan, why: str = "") -> tuple[Check, ...]:
-    """Return the checks of a plan as its program has it run; none where it does not run straight.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AsRun:
+    """A plan as its program has it run.
+
+    Parameters
+    ----------
+    checks : tuple of Check
+    timing : Timing or None
+        How long it takes and where it slows down; None where that is not known.
+    """
+
+    checks: tuple[Check, ...] = ()
+    timing: Timing | None = None
+
+    __repr__ = short_repr
+
+
+def as_run(job: Job, plan: Plan, path: Contour, why: str = "") -> AsRun:
+    """Return a plan as its program has it run; without checks where it does not run straight.
 
     They hold at every instant where the arm is one whose rates can be bounded, else at samples.
     Where a joint needs more than its full limit between the nodes a controller slows down: that is
@@ -41,8 +70,8 @@ def checks_as_run(job: Job, plan: Plan, why: str = "") -> tuple[Check, ...]:
         except InputError as fault:  # said when it is written
             unknown = str(fault)
     if unknown:
-        return checks_of_unknown(job, unknown)
-    return () if run is None else checks_of_run(job, run, plan, why)
+        return AsRun(checks=checks_of_unknown(job, unknown))
+    return AsRun() if run is None else run_judged(job, run, plan, path, why)
 
 
 def checks_of_unknown(job: Job, why: str) -> tuple[Check, ...]:
@@ -50,17 +79,70 @@ def checks_of_unknown(job: Job, why: str) -> tuple[Check, ...]:
     return (_unknown(why),) if job.options.between_nodes == "guaranteed" else ()
 
 
-def checks_of_run(job: Job, run: Executed, plan: Plan, why: str = "") -> tuple[Check, ...]:
-    """Return the checks of a run along the nodes of a plan, see `checks_as_run`."""
-    rows = (
+def run_judged(job: Job, run: Executed, plan: Plan, path: Contour, why: str = "") -> AsRun:
+    """Return what a run along the nodes of a plan and a path comes to, see `as_run`."""
+    shares = (
         _check("velocity", run.peak_velocity, run.velocity_bound, run, plan),
         _check("acceleration", run.peak_acceleration, run.acceleration_bound, run, plan),
     )
     level: Level = "error" if job.options.between_nodes == "guaranteed" else "warning"
     if job.program.zone != "auto":
         why = f'{why}; write zone_mm = "auto" in [program]'.removeprefix("; ")
-    advice = [f"{row.advice}; {why}".removesuffix("; ") for row in rows]
-    return tuple(replace(r, level=level, advice=a) for r, a in zip(rows, advice, strict=True))
+    advice = [f"{row.advice}; {why}".removesuffix("; ") for row in shares]
+    kept = [replace(r, level=level, advice=a) for r, a in zip(shares, advice, strict=True)]
+    rows = (*kept, *_deviations(job, run, plan, path))
+    if np.isnan(run.acceleration_share).any():
+        return AsRun(checks=rows)
+    timing = timing_of(run, job.robot)
+    return AsRun(checks=(*rows, _speed(run, plan, timing)), timing=timing)
+
+
+def _speed(run: Executed, plan: Plan, timing: Timing) -> Check:
+    """Return by how much the speed falls short between the ramps at both ends."""
+    share, at = timing.slowest
+    time = float(np.interp(at, timing.length, timing.time))
+    return Check(
+        code="speed-as-run",
+        title="speed short of the programmed one, between the ramps",
+        value=1 - share,
+        limit=1 - AT_SPEED,
+        unit="share",
+        node=_node(run, plan, time),
+        level="warning",
+        advice=f"it is held on {timing.held:.1%} of the length, as the joints keep their limits",
+    )
+
+
+def _deviations(job: Job, run: Executed, plan: Plan, path: Contour) -> Iterator[Check]:
+    """Yield how far tip and tool axis leave the path, corners rounded."""
+    off, allowed = deviation_of(run, path), job.tolerances
+    cone = 0.0 if job.options.tilt is None else job.options.tilt.cone
+    yield Check(
+        code="tip-as-run",
+        title="tool tip off the path as run",
+        value=off.tip,
+        limit=allowed.path,
+        unit="m",
+        node=_node(run, plan, off.tip_time),
+        level="warning",
+        advice="lower zone_error_mm in [program], or sample the contour more finely",
+    )
+    yield Check(
+        code="axis-as-run",
+        title="tool axis off that of the path as run",
+        value=off.axis,
+        limit=allowed.axis + cone,
+        unit="rad",
+        node=_node(run, plan, off.axis_time),
+        level="warning",
+        advice="sample the contour more finely, or smooth its axes",
+    )
+
+
+def _node(run: Executed, plan: Plan, time: float) -> int:
+    """Return the node nearest to where the tip is at a time, s."""
+    (there,) = run.course.poses(np.array([time]))[:, :3, 3]
+    return int(np.argmin(np.linalg.norm(plan.T_part_tip[:, :3, 3] - there, axis=1)))
 
 
 def kept_between_nodes(job: Job, plan: Plan) -> tuple[Plan, str]:
@@ -128,8 +210,6 @@ def _unknown(why: str) -> Check:
 
 def _check(what: str, peak: Peak, bound: float, run: Executed, plan: Plan) -> Check:
     """Return a row about the largest share of one kind of limits."""
-    there = run.course.T[int(np.argmin(np.abs(run.course.time - peak.time))), :3, 3]
-    tips = plan.T_part_tip[:, :3, 3]
     proved = plan.robot.kinematics in ENCLOSED
     return Check(
         code=f"{what}-as-run",
@@ -137,6 +217,6 @@ def _check(what: str, peak: Peak, bound: float, run: Executed, plan: Plan) -> Ch
         value=max(peak.share, bound) if proved else peak.share,
         limit=1.0 + SLACK,
         unit="share",
-        node=int(np.argmin(np.linalg.norm(tips - there, axis=1))),
+        node=_node(run, plan, peak.time),
         advice=f"joint {peak.joint + 1} needs it, and a controller slows down there",
     )

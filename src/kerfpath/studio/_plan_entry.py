@@ -86,7 +86,7 @@ def plan_message(
         velocity_share=flat(velocity, 6),
         acceleration_share=flat(acceleration, 6),
         joint_load=flat(_load(velocity, acceleration), 6),
-        checks=check_entries((*cut.checks, *cut.as_run)) if audited else None,
+        checks=check_entries((*cut.checks, *cut.as_run.checks)) if audited else None,
         passed=cut.passed if audited else None,
         feed=None if made.feed is None else str(made.feed),
         seconds=seconds,

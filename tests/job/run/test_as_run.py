@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jobs import DEMO, SMALL
-from kerfpath.job import audit_program, read_job, run_job, write_result
+from kerfpath.job import AsRun, audit_program, read_job, run_job, write_result
 
 QUICK = SMALL.replace("[plan]", "[plan]\ncertify = false")
 
@@ -25,25 +25,34 @@ def with_program(text):
 def test_the_corners_of_the_program_are_looked_at(tmp_path):
     result = cuts_of(tmp_path, QUICK)
     for cut in result.cuts:
-        velocity, acceleration = cut.as_run
+        velocity, acceleration, tip, axis, speed = cut.as_run.checks
         assert (velocity.code, acceleration.code) == ("velocity-as-run", "acceleration-as-run")
         criteria = cut.plan.criteria
         # Zones end at 0.49 of the way, and straight moves of the tool bend the joints' way.
         assert velocity.value == pytest.approx(criteria.peak_velocity.max(), rel=0.02)
         assert acceleration.value == pytest.approx(criteria.peak_acceleration.max(), rel=0.1)
-        assert velocity.ok
-        assert acceleration.ok
+        assert all(row.ok for row in cut.as_run.checks)
+        codes = ("tip-as-run", "axis-as-run", "speed-as-run")
+        assert (tip.code, axis.code, speed.code) == codes
+        assert 0 < tip.value < 1e-4
+        assert 0 < axis.value < 5e-3
+        timing = cut.as_run.timing
+        assert timing.held == 1.0
+        # Ramps up and down; between them as programmed.
+        assert cut.plan.time[-1] < timing.seconds < cut.plan.time[-1] + 0.5
     write_result(result, tmp_path / "out")
     assert "share as run, at every instant" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_sharp_corners_are_warned_of_with_what_to_write(tmp_path):
     result = cuts_of(tmp_path, with_program("zone_mm = 0.05"))
-    wrong = [row for cut in result.cuts for row in cut.as_run if not row.ok]
-    assert {row.code for row in wrong} == {"acceleration-as-run"}
+    wrong = [row for cut in result.cuts for row in cut.as_run.checks if not row.ok]
+    codes = {row.code for row in wrong}
+    assert codes == {"acceleration-as-run", "speed-as-run"}
     for row in wrong:
         assert row.level == "warning"
-        assert 'zone_mm = "auto"' in row.issue().message
+        if row.code != "speed-as-run":
+            assert 'zone_mm = "auto"' in row.issue().message
     assert result.passed
 
 
@@ -52,19 +61,20 @@ def test_where_nothing_is_rounded_nothing_is_said(tmp_path, program):
     text = with_program(program)
     if "language" in program:
         text = text.replace('language = "rapid"\n', "")
-    assert [cut.as_run for cut in cuts_of(tmp_path, text).cuts] == [(), ()]
+    assert [cut.as_run for cut in cuts_of(tmp_path, text).cuts] == [AsRun(), AsRun()]
 
 
 def test_limits_that_hold_at_the_nodes_alone_are_brought_in_between_them(tmp_path):
     fast = QUICK.replace("[plan]", '[plan]\nbetween_nodes = "reported"')
     fast = re.sub("eta_acceleration = .*", "eta_acceleration = 1", fast)
     before = cuts_of(tmp_path, at_its_limits(tmp_path, fast)).cuts
-    over = [cut.name for cut in before for row in cut.as_run if not row.ok]
+    over = [cut.name for cut in before for row in cut.as_run.checks if not row.ok]
     assert over
     after = cuts_of(tmp_path, at_its_limits(tmp_path, fast).replace("reported", "guaranteed"))
     assert after.passed
     for old, cut in zip(before, after.cuts, strict=True):
-        assert all(row.ok and row.level == "error" for row in cut.as_run)
+        assert all(row.ok for row in cut.as_run.checks)
+        assert [row.level for row in cut.as_run.checks[:2]] == ["error", "error"]
         # Held to less, a motion can only be dearer; refined again, a start may end a little lower.
         assert old.plan.cost * (1 - 1e-3) <= cut.plan.cost <= old.plan.cost * 1.02
 
@@ -94,9 +104,9 @@ def test_without_a_proof_a_guarantee_fails_the_audit(tmp_path, program, why):
     result = cuts_of(tmp_path, text)
     assert not result.passed
     for cut in result.cuts:
-        wrong = [row for row in cut.as_run if not row.ok]
+        wrong = [row for row in cut.as_run.checks if not row.ok]
         assert wrong
-        assert all(row.level == "error" for row in wrong)
+        assert wrong[0].level == "error"
         assert why in wrong[0].issue().message
     written = write_result(result, tmp_path / "out")
     assert not list((tmp_path / "out").glob("*.mod")), written
@@ -112,14 +122,16 @@ def test_a_program_is_judged_by_the_zones_of_its_text(tmp_path):
         tables = audit_program(program, tmp_path / "job.toml").tables
         return [row for table in tables.values() for row in table if row.code.endswith("as-run")]
 
-    as_planned = {(row.code, round(row.value, 3)) for cut in result.cuts for row in cut.as_run}
+    planned = [row for cut in result.cuts for row in cut.as_run.checks]
     assert all(row.ok for row in rows())
     for row in rows():
-        assert any(row.code == code and abs(row.value - value) < 0.02 for code, value in as_planned)
+        assert any(row.code == own.code and abs(row.value - own.value) < 0.02 for own in planned)
     narrow = "0.020,0.020,0.020,0.002,0.020,0.002"
     sharp = re.sub(r"(zCorner\d*:=\[FALSE),[\d.,]+\]", rf"\1,{narrow}]", program.read_text())
     assert sharp != program.read_text()
     program.write_text(sharp)
     wrong = [row for row in rows() if not row.ok]
-    assert {row.code for row in wrong} == {"acceleration-as-run"}
-    assert all(row.level == "error" for row in wrong)
+    assert {row.code: row.level for row in wrong} == {
+        "acceleration-as-run": "error",
+        "speed-as-run": "warning",
+    }

@@ -28,7 +28,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
             graph=cut.graph,
             path=cut.candidate.nodes,
             plan=cut.plan,
-            checks=(*cut.checks, *cut.as_run),
+            checks=(*cut.checks, *cut.as_run.checks),
             failure="" if cut.broken is None else str(cut.broken),
             remedy=cut.remedy,
             broken_at=None if cut.broken is None else cut.broken.node + 1,

@@ -10,7 +10,7 @@ from typing import cast
 from kerfpath import __version__
 from kerfpath._repr import short_repr
 from kerfpath.auditor import BOUND, Check, transfer_checks, worst_of
-from kerfpath.job.as_run import checks_as_run
+from kerfpath.job.as_run import as_run
 from kerfpath.job.format import AuditTable, PreparedJob, prepare, read_job, tolerances_of
 from kerfpath.job.plan_file._checks import check, count
 from kerfpath.job.plan_file._compare import compare_jobs, compare_values
@@ -100,7 +100,7 @@ class PlanAudit:
                 continue
             made = job.tolerances.checks(each.plan, reference=each.path, cell=cell)
             made += each.drawing
-            table += checks_as_run(job, each.plan)
+            table += as_run(job, each.plan, each.path or each.plan.contour).checks
             entry = _entry(each.plan, entries[each.name], made, file)
             judged.append(entry)
             table += made

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath.auditor import Check, Rounding
+from kerfpath.contour import Contour
 from kerfpath.execution import Executed, from_stop_to_stop, run_along
-from kerfpath.job.as_run import checks_of_run, checks_of_unknown
+from kerfpath.job.as_run import checks_of_unknown, run_judged
 from kerfpath.job.format import Job
 from kerfpath.job.programs._read import ReadCut
 from kerfpath.plans import Plan
@@ -23,10 +24,10 @@ MOST_ROUNDED = 0.05
 
 
 def check_run(
-    job: Job, cut: ReadCut, made: Plan, digits: Rounding, chosen: Language,
+    job: Job, cut: ReadCut, made: Plan, path: Contour, digits: Rounding, chosen: Language,
     settings: LanguageSettings,
 ) -> list[Check]:  # fmt: skip
-    """Return the checks of a cut's motion between its targets, by its own zones and speeds.
+    """Return the checks of a cut's motion along a path, by its own zones and speeds.
 
     Digits of the text are allowed for: in a short interval they turn into acceleration.
     """
@@ -50,10 +51,12 @@ def check_run(
         (digits.of_velocity(dq, dt) / velocity).max(),
         (digits.of_acceleration(dq, dt) / acceleration).max(initial=0.0),
     )
-    rows = checks_of_run(job, run, made)
+    fast, sharp, *others = run_judged(job, run, made, path).checks
+    more = [min(float(each), MOST_ROUNDED) for each in allowed]
     return [
-        replace(row, limit=row.limit + min(float(more), MOST_ROUNDED))
-        for row, more in zip(rows, allowed, strict=True)
+        replace(fast, limit=fast.limit + more[0]),
+        replace(sharp, limit=sharp.limit + more[1]),
+        *others,
     ]
 
 

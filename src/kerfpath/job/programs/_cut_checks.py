@@ -55,7 +55,7 @@ def check_cut(
     rows += allowed.checks(made, reference=reference, cell=cell, rounding=digits)
     rows += _process_checks(job, candidate, cut, made, digits.time, ahead=chosen.ahead)
     rows += _postures(job, cut, chosen, settings, digits.q)
-    rows += check_run(job, cut, made, digits, chosen, settings)
+    rows += check_run(job, cut, made, reference, digits, chosen, settings)
     found = nodes_at_targets(job, candidate, cut, s)
     off, alone = int(np.argmax(found.off)), int(np.argmax(found.alone))
     said = "targets, off the nodes that the job asks for"

@@ -12,7 +12,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.front import Subproblem, plan_run
 from kerfpath.graph import LayeredGraph
-from kerfpath.job.as_run import checks_as_run, kept_between_nodes
+from kerfpath.job.as_run import as_run, kept_between_nodes
 from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
 from kerfpath.job.run._remedy import Remedy, find_remedy, opens_without_windows
 from kerfpath.job.run._result import CutResult
@@ -158,7 +158,7 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
     checks = job.tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
     checks += whole.request.drawing_checks(candidate, made.contour, job.tolerances.path)
     cut = replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))
-    return replace(cut, as_run=checks_as_run(job, made, why))
+    return replace(cut, as_run=as_run(job, made, candidate.path, why))
 
 
 def _divided(made: Plan, path: Contour, parts: int) -> Plan:

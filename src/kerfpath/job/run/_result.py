@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
@@ -11,6 +11,7 @@ from kerfpath.cad import Departure, Part, departure_from
 from kerfpath.cell import Cell
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
+from kerfpath.job.as_run import AsRun
 from kerfpath.job.format import Candidate, CutRequest, Job
 from kerfpath.job.run._remedy import Remedy
 from kerfpath.planner import ClearanceMap, FastestSpeed
@@ -46,9 +47,9 @@ class CutResult:
         How clear every pose is in the cell, where the job asks for the map.
     departure : Departure or None
         How far the nodes leave the CAD curve; measured once it is settled what is cut.
-    as_run : tuple of Check
-        What the joints need where the program's corners are rounded, which no plan file keeps, as
-        it is about the program. Warnings, or errors where the job asks for a guarantee.
+    as_run : AsRun
+        The plan as its program has it run, corners rounded; no plan file keeps it, as it is about
+        the program.
     """
 
     request: CutRequest
@@ -61,7 +62,7 @@ class CutResult:
     checks: tuple[Check, ...] = ()
     clearance: ClearanceMap | None = None
     departure: Departure | None = None
-    as_run: tuple[Check, ...] = ()
+    as_run: AsRun = field(default_factory=AsRun)
 
     __repr__ = short_repr
 
@@ -83,7 +84,7 @@ class CutResult:
     @property
     def passed(self) -> bool:
         """True when there is a plan and its audit finds no error."""
-        rows = (*self.checks, *self.as_run)
+        rows = (*self.checks, *self.as_run.checks)
         return self.plan is not None and not any(c.level == "error" and not c.ok for c in rows)
 
     def measured(self, part: Part, loop: Departure | None) -> CutResult:

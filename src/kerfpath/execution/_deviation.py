@@ -1,0 +1,56 @@
+"""How far a run leaves the contour that it is cut along: at its targets, and in its zones."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from kerfpath.contour import Contour
+from kerfpath.execution._executed import Executed
+
+__all__ = ["Deviation", "deviation_of"]
+
+SAMPLES = 8
+"""Of the path for each of its nodes, or each target."""
+
+
+class Deviation(NamedTuple):
+    """The largest distance of the tip, m, and angle of the tool axis, rad, and when, s."""
+
+    tip: float
+    tip_time: float
+    axis: float
+    axis_time: float
+
+
+def deviation_of(run: Executed, path: Contour) -> Deviation:
+    """Return how far the tip is from the path, and the tool axis from its axes, where it is near.
+
+    Parameters
+    ----------
+    run : Executed
+        Looked at where its joints were.
+    path : Contour
+        As drawn, in the part.
+    """
+    T = run.course.poses(run.time)
+    tip, axis = T[:, :3, 3], T[:, :3, 2]
+    even = np.linspace(path.s[0], path.s[-1], SAMPLES * max(len(path), len(run.course.T)))
+    at = np.unique(np.concatenate([path.s, even]))
+    points = path.at(at)[0]
+    near = np.asarray(cKDTree(points).query(tip)[1])
+    # On one of the two chords beside the nearest sample.
+    starts = np.clip(near[:, None] + [-1, 0], 0, len(at) - 2)
+    chord = points[starts + 1] - points[starts]
+    along = ((tip[:, None] - points[starts]) * chord).sum(-1) / (chord**2).sum(-1)
+    along = np.clip(along, 0.0, 1.0)
+    apart = np.linalg.norm(points[starts] + along[..., None] * chord - tip[:, None], axis=-1)
+    row, side = np.arange(len(tip)), np.argmin(apart, axis=1)
+    s = at[starts] + along * (at[starts + 1] - at[starts])
+    points, axes = path.at(s[row, side])
+    off = np.linalg.norm(tip - points, axis=1)
+    turned = np.arctan2(np.linalg.norm(np.cross(axes, axis), axis=1), (axes * axis).sum(axis=1))
+    k, m = int(np.argmax(off)), int(np.argmax(turned))
+    return Deviation(float(off[k]), float(run.time[k]), float(turned[m]), float(run.time[m]))
