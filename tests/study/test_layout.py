@@ -19,8 +19,8 @@ from kerfpath.errors import InputError
 from kerfpath.job import cell_of_job, pose, read_job
 from kerfpath.study import digest, layout, ranges_of
 from kerfpath.study._evaluator import EVERY
-from kerfpath.study.placing._evaluate import contours_of, middle_of
-from kerfpath.study.placing._place import move_job, numbers_of, placed_text
+from kerfpath.study.placing._evaluate import contours_of, nodes_of
+from kerfpath.study.placing._place import middle_of, move_job, numbers_of, placed_text
 from layouts import CELL, HEAD, contours, job_file, rings, worth
 
 STANDING = """
@@ -61,7 +61,7 @@ def in_cell(tmp_path_factory):
 
 
 def middle(path, goal="speed"):
-    return middle_of(read_job(path), contours_of(str(path), digest(path), goal))
+    return middle_of(read_job(path), nodes_of(contours_of(str(path), digest(path), goal)))
 
 
 @pytest.mark.parametrize("goal", ["speed", "margin", "motion"])

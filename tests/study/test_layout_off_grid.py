@@ -11,9 +11,9 @@ from commands import run
 from kerfpath.job import fastest_along, read_job
 from kerfpath.planner import plan
 from kerfpath.study import digest, layout
-from kerfpath.study.placing._evaluate import contours_of, middle_of
+from kerfpath.study.placing._evaluate import contours_of, nodes_of
 from kerfpath.study.placing._off_grid import leaves_grid
-from kerfpath.study.placing._place import move_job, numbers_of
+from kerfpath.study.placing._place import middle_of, move_job, numbers_of
 from kerfpath.study.placing._value import is_estimated
 from layouts import CELL, HEAD, contours, job_file, rings, worth
 
@@ -46,7 +46,7 @@ def coarse(tmp_path_factory):
 def moved(path, offsets, goal="speed"):
     """Return the job with a placement, and its contours."""
     job, nodes = read_job(path), contours_of(str(path), digest(path), goal)
-    return move_job(job, numbers_of(job, offsets, middle_of(job, nodes))), nodes
+    return move_job(job, numbers_of(job, offsets, middle_of(job, nodes_of(nodes)))), nodes
 
 
 def whole(path, goal="speed"):

@@ -9,6 +9,7 @@ from kerfpath.job.format import CutRequest as CutRequest
 from kerfpath.job.format import Goal as Goal
 from kerfpath.job.format import Job as Job
 from kerfpath.job.format import JobFile as JobFile
+from kerfpath.job.format import LayoutTable as LayoutTable
 from kerfpath.job.format import PreparedJob as PreparedJob
 from kerfpath.job.format import ProgramOptions as ProgramOptions
 from kerfpath.job.format import ProgramTable as ProgramTable

@@ -17,12 +17,16 @@ from typing import Any
 
 from kerfpath import __version__
 from kerfpath.errors import InputError
+from kerfpath.progress import may_stop
 from kerfpath.sweep._task import Failure, Task, TaskOutcome, attempt
 
 __all__ = ["on_processes"]
 
 AHEAD = 8
 """Number of tasks handed out per process: enough that none is idle, few to lose."""
+
+CHECKED_EVERY = 0.1
+"""s: how often a wait for tasks may be left."""
 
 ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
@@ -82,7 +86,8 @@ def _run_pool(
                     return []
                 yield []
                 continue
-            done = wait(flying, return_when=FIRST_COMPLETED).done
+            while not (done := wait(flying, CHECKED_EVERY, FIRST_COMPLETED).done):
+                may_stop()
             if any(isinstance(future.exception(), BrokenProcessPool) for future in done):
                 break
             yield [future.result() for future in done]

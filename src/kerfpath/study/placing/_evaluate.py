@@ -6,18 +6,15 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from functools import lru_cache
 
-import numpy as np
-
-from kerfpath._arrays import Array
-from kerfpath.job import Job
+from kerfpath.contour import Contour
 from kerfpath.study._evaluator import SampledContour, sample_contours
 from kerfpath.study._job import load_job
 from kerfpath.study.placing._evaluator import PlacementEvaluator
 from kerfpath.study.placing._off_grid import OffGridEvaluator, leaves_grid
-from kerfpath.study.placing._place import move_job, numbers_of
+from kerfpath.study.placing._place import middle_of, move_job, numbers_of
 from kerfpath.study.placing._value import ContourValue, PlacementValue, is_better, worst_of
 
-__all__ = ["contours_of", "evaluate_placements", "middle_of"]
+__all__ = ["contours_of", "evaluate_placements", "nodes_of"]
 
 
 def evaluate_placements(
@@ -57,7 +54,7 @@ def evaluate_placements(
     """
     known = load_job(job, digest)
     contours = contours_of(job, digest, goal)
-    middle = middle_of(known.job, contours)
+    middle = middle_of(known.job, nodes_of(contours))
     of_contours: tuple[ContourValue, ...] = ()
     worst: PlacementValue | None = None
     for i, offsets in enumerate(places):
@@ -119,8 +116,6 @@ def contours_of(job: str, digest: str, goal: str) -> tuple[SampledContour, ...]:
     return sample_contours(known.job, known.part, as_asked=goal == "motion")
 
 
-def middle_of(job: Job, contours: Sequence[SampledContour]) -> Array:
-    """Return the middle (3,) m, in the base, of the box about all nodes in the part frame."""
-    points = np.concatenate([contour.nodes.points for contour in contours])
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    return np.asarray(job.placement[:3, :3] @ middle + job.placement[:3, 3])
+def nodes_of(contours: Sequence[SampledContour]) -> list[Contour]:
+    """Return the nodes of sampled contours."""
+    return [contour.nodes for contour in contours]

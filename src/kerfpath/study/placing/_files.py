@@ -17,7 +17,7 @@ from kerfpath.study.placing._place import placed_text
 from kerfpath.study.placing._search import PlacementTrial
 from kerfpath.study.placing._value import PlacementValue
 
-__all__ = ["layout_entry", "write_layout"]
+__all__ = ["UNITS", "layout_entry", "write_layout"]
 
 SCHEMA = 2
 """Counts the ways in which layout.json was written."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,12 +12,12 @@ import numpy as np
 
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
-from kerfpath.job import Goal, Job, cell_of_job
+from kerfpath.job import Goal, Job, LayoutTable, cell_of_job
 from kerfpath.progress import Progress, no_progress
 from kerfpath.study._job import digest, load_job
-from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, middle_of
+from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, nodes_of
 from kerfpath.study.placing._off_grid import leaves_grid
-from kerfpath.study.placing._place import DEFAULT_RANGES, Numbers, numbers_of
+from kerfpath.study.placing._place import DEFAULT_RANGES, Numbers, middle_of, numbers_of
 from kerfpath.study.placing._search import (
     LEAST_EXACT,
     MOST_EXACT,
@@ -28,7 +28,7 @@ from kerfpath.study.placing._search import (
 from kerfpath.study.placing._value import PlacementValue, Stage, is_estimated
 from kerfpath.sweep import Sweep
 
-__all__ = ["STATUSES", "Layout", "layout"]
+__all__ = ["STATUSES", "Layout", "layout", "layout_as"]
 
 ON_GRID: tuple[Stage, ...] = ("reach", "stretch", "exact")
 OFF_GRID: tuple[Stage, ...] = ("reach", "estimate", "proved", "planned")
@@ -186,9 +186,7 @@ def layout(
     InputError
         As `read_job`, `cell_of_job` and `kerfpath.sweep.run`; numbers out of range.
     """
-    path, then = str(Path(job).resolve()), digest(Path(job).resolve())
-    at = load_job(path, then)
-    cell_of_job(at.job, at.part)  # what is wrong with it is said once, not by every placement
+    path = Path(job).resolve()
     given = _checked(
         goal=goal,
         evaluations=evaluations,
@@ -197,7 +195,47 @@ def layout(
         tolerance_deg=tolerance_deg,
         map_points=map_points,
     )
-    table = at.job.layout.model_copy(update=given)
+    return layout_as(
+        path,
+        load_job(str(path), digest(path)).job.layout.model_copy(update=given),
+        store=store,
+        ranges=ranges,
+        scheduler=scheduler,
+        processes=processes,
+        progress=progress,
+    )
+
+
+def layout_as(
+    job: str | os.PathLike[str],
+    table: LayoutTable,
+    *,
+    store: str | os.PathLike[str],
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    scheduler: str | None = None,
+    processes: int | None = None,
+    progress: Progress = no_progress,
+    found: Callable[[PlacementTrial], None] = lambda trial: None,
+) -> Layout:
+    """Return the best placement as `layout` does, asked for by a table in place of the job's.
+
+    Parameters
+    ----------
+    job, store, ranges, scheduler, processes, progress
+        As in `layout`.
+    table : LayoutTable
+        All else that `layout` can be asked for.
+    found : callable, optional
+        Called with each placement whenever more is known of it: estimated, planned, proved.
+
+    Raises
+    ------
+    InputError
+        As `layout`.
+    """
+    path, then = str(Path(job).resolve()), digest(Path(job).resolve())
+    at = load_job(path, then)
+    cell_of_job(at.job, at.part)  # what is wrong with it is said once, not by every placement
     spans = dict(ranges or table.ranges or DEFAULT_RANGES)
     allowed = {"mm": table.tolerance_mm, "deg": table.tolerance_deg}
     tolerance = {name: allowed[name.rpartition("_")[2]] for name in spans}
@@ -211,6 +249,7 @@ def layout(
             tolerance=tolerance,
             most=max(LEAST_EXACT, int(MOST_EXACT * table.evaluations)),
             progress=progress,
+            found=found,
         )
         before = search.first()
         search.evolve(table.evaluations, table.seed)
@@ -225,7 +264,7 @@ def layout(
         after = None if best is None else search.whole(best)
     numbers: Numbers = {}
     if best is not None:
-        middle = middle_of(at.job, contours_of(path, then, table.goal))
+        middle = middle_of(at.job, nodes_of(contours_of(path, then, table.goal)))
         numbers = numbers_of(at.job, best.offsets, middle)
     return Layout(
         job=at.job,

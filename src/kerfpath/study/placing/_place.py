@@ -13,11 +13,22 @@ import tomlkit
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job import VARIABLES, Job, pose
 from kerfpath.placement import xyz_rpy
 
-__all__ = ["DEFAULT_RANGES", "Numbers", "move_job", "numbers_of", "placed_text", "ranges_of"]
+__all__ = [
+    "DEFAULT_RANGES",
+    "Numbers",
+    "changes_of",
+    "middle_of",
+    "motions_of",
+    "move_job",
+    "numbers_of",
+    "placed_text",
+    "ranges_of",
+]
 
 Numbers = dict[tuple[str | int, ...], list[float]]
 """What a placement changes in a job file: values by the keys that lead to them."""
@@ -53,6 +64,25 @@ def ranges_of(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
             raise InputError(f"vary: {name} comes twice; keep one")
         found[name] = ends
     return found
+
+
+def middle_of(job: Job, contours: Sequence[Contour]) -> Array:
+    """Return the middle (3,) m, in the base, of the box about all nodes in the part frame."""
+    points = np.concatenate([nodes.points for nodes in contours])
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return np.asarray(job.placement[:3, :3] @ middle + job.placement[:3, 3])
+
+
+def motions_of(offsets: Mapping[str, float], middle: Array) -> tuple[Array, Array]:
+    """Return how the part moves in the robot base, and all that does not go with it, (4, 4) m.
+
+    Parameters
+    ----------
+    offsets, middle
+        As in `numbers_of`.
+    """
+    part, base, _ = _motions({name: offsets.get(name, 0.0) for name in VARIABLES}, middle)
+    return np.asarray(base @ part), base
 
 
 def numbers_of(job: Job, offsets: Mapping[str, float], middle: Array) -> Numbers:
@@ -146,22 +176,33 @@ def _of(numbers: Numbers, *where: str | int) -> dict[str, tuple[float, ...]]:
     }
 
 
+def changes_of(job: Job, numbers: Numbers) -> list[tuple[tuple[str | int, ...], object]]:
+    """Return what numbers change in the text of a job: values by their keys; None: it goes.
+
+    Numbers of the part are those of its origin, those of the tool stand in place of its head.
+    """
+    gone: list[tuple[str | int, ...]] = []
+    if ("part", "xyz_mm") in numbers:
+        gone += [("part", key) for key in ("placed_by", "frame") if key in job.source["part"]]
+    if ("tool", "xyz_mm") in numbers:
+        gone += [("tool", key) for key in ("head",) if key in job.source["tool"]]
+    return [*((key, None) for key in gone), *numbers.items()]
+
+
 def placed_text(job: Job, numbers: Numbers, folder: Path, remark: str) -> str:
     """Return the text of the job's file with other numbers, its comments kept, for `folder`.
 
     Files are named relative to `folder`; `remark` becomes the first comment.
     """
-    file = tomlkit.parse(job.path.read_text(encoding="utf-8-sig"))
-    for where, value in numbers.items():
+    file = tomlkit.parse(job.text)
+    for where, value in changes_of(job, numbers):
         table: Any = file
         for step in where[:-1]:
             table = table[step]
-        if where[0] == "tool":
-            table.pop("head", None)
-        if where[0] == "part":
-            for key in ("placed_by", "frame"):
-                table.pop(key, None)  # the numbers are of its origin
-        table[where[-1]] = value
+        if value is None:
+            del table[where[-1]]
+        else:
+            table[where[-1]] = value
     for table, name in _named_files(file):
         table[name] = os.path.relpath(job.path.parent / str(table[name]), folder)
     return f"# {remark}\n{tomlkit.dumps(file)}"

@@ -96,6 +96,7 @@ class PlacementSearch:
     tolerance: Mapping[str, float]
     most: int
     progress: Progress
+    found: Callable[[PlacementTrial], None] = lambda trial: None
     stretches: list[list[int]] = field(default_factory=list)
     best: PlacementTrial | None = None
     exact: int = 0
@@ -121,6 +122,7 @@ class PlacementSearch:
         self.progress("the job's own placement", 0, 1)
         trial = self._trial(np.zeros(len(self.ranges)))
         trial.searched, trial.stretches, trial.result = True, 0, self.whole(trial)
+        self.found(trial)
         self.progress("the job's own placement", 1, 1)
         self._take(trial)
         return trial.result
@@ -198,6 +200,7 @@ class PlacementSearch:
             for trial, result in zip(batch, results, strict=True):
                 trial.searched = True
                 trial.result = replace(result, estimate=trial.result.estimate)
+                self.found(trial)
                 self._take(trial)
             left = self.exact + len(open_) - len(batch)
             self.progress(what, self.exact, max(self.exact, min(left, self.most)))
@@ -232,6 +235,7 @@ class PlacementSearch:
         for trial, result in zip(trials, results, strict=True):
             if result.bound is not None:
                 trial.result = replace(trial.result, stage="proved", bound=result.bound)
+                self.found(trial)
         return any(result.bound is not None for result in results)
 
     def mapped(self, about: PlacementTrial, points: int) -> PlacementMap:
@@ -257,6 +261,7 @@ class PlacementSearch:
         results = self._evaluated([trial.offsets for trial in trials], progress=progress)
         for trial, result in zip(trials, results, strict=True):
             trial.result, trial.stretches = result, len(self.stretches)
+            self.found(trial)
 
     def _refresh(self, trials: Sequence[PlacementTrial]) -> bool:
         """Find bounds again that were found with fewer stretches; return whether there were any."""
