@@ -8,14 +8,14 @@ import pytest
 from pydantic import ValidationError
 
 from conftest import ROOT
-from kerfpath.studio import _asks, _decide_messages, _messages
+from kerfpath.studio import _asks, _decide_messages, _layout_messages, _messages
 from kerfpath.studio._numbers import Message, flat
 
 PAGE = (ROOT / "src" / "kerfpath" / "studio" / "README.md").read_text()
 SAMPLE = json.loads((ROOT / "tests" / "studio" / "sample.json").read_text())
 SAID = {
     kind.model_fields["type"].default: kind
-    for module in (_messages, _decide_messages)
+    for module in (_messages, _decide_messages, _layout_messages)
     for kind in vars(module).values()
     if isinstance(kind, type) and issubclass(kind, Message) and "type" in kind.model_fields
 }

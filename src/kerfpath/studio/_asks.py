@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue, TypeAdapter
+
+from kerfpath.job import VARIABLES, Goal
 
 __all__ = [
     "Ask",
@@ -13,20 +15,25 @@ __all__ = [
     "Edits",
     "FrontOf",
     "Keep",
+    "LayoutOf",
     "Leave",
     "OfContour",
     "OfKept",
+    "Place",
     "Plain",
     "PointOf",
+    "ReachOf",
     "ReasonOf",
     "Relax",
     "Rename",
     "Save",
+    "Take",
     "Text",
     "TextOf",
     "parse",
 ]
 
+_T = TypeVar("_T")
 MOST_KEYS = 6
 """Parts of the path of a key: no job nests deeper."""
 MOST_EDITS = 50
@@ -39,6 +46,23 @@ MOST_TEXT = 10_000_000
 """Characters of a job, as its reader takes them."""
 
 
+FARTHEST = 1e5
+"""mm and deg: no placement is farther off."""
+
+
+def _of_variables(table: dict[str, _T]) -> dict[str, _T]:
+    """Return a table whose keys are variables of a layout."""
+    if not table.keys() <= set(VARIABLES):
+        raise ValueError(f"expected variables of {', '.join(VARIABLES)}")
+    return table
+
+
+def _rising(span: tuple[float, float]) -> tuple[float, float]:
+    if not span[0] < span[1]:
+        raise ValueError("expected the lower end of a range first")
+    return span
+
+
 class _Strict(BaseModel):
     """A table of a message: nothing in it that is not meant, nothing changed in it."""
 
@@ -47,6 +71,10 @@ class _Strict(BaseModel):
 
 Words = Annotated[str, Field(max_length=MOST_WORDS)]
 Index = Annotated[int, Field(ge=0, lt=1_000_000)]
+Offset = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
+Offsets = Annotated[dict[str, Offset], AfterValidator(_of_variables)]
+Span = Annotated[tuple[Offset, Offset], Field(strict=False), AfterValidator(_rising)]
+Ranges = Annotated[dict[str, Span], Field(min_length=1), AfterValidator(_of_variables)]
 Path = Annotated[tuple[Words | Index, ...], Field(min_length=1, max_length=MOST_KEYS, strict=False)]
 
 
@@ -171,6 +199,37 @@ class PointOf(_Strict):
     number: Index
 
 
+class ReachOf(_Strict):
+    """What is in reach where the part, the robot or its head is moved by offsets."""
+
+    type: Literal["reach"]
+    offsets: Offsets
+    number: Index
+
+
+class Place(_Strict):
+    """Have the part, the robot or its head moved by offsets from where the scene has it."""
+
+    type: Literal["place"]
+    offsets: Offsets
+
+
+class LayoutOf(_Strict):
+    """Look for the best placement."""
+
+    type: Literal["layout"]
+    goal: Goal
+    ranges: Ranges
+    evaluations: Annotated[int, Field(ge=8, le=100_000)]
+
+
+class Take(_Strict):
+    """Make a placement that the search has tried the job's."""
+
+    type: Literal["take"]
+    number: Index
+
+
 class TextOf(_Strict):
     """The program as text."""
 
@@ -194,6 +253,10 @@ Ask = (
     | OfKept
     | FrontOf
     | PointOf
+    | ReachOf
+    | Place
+    | LayoutOf
+    | Take
     | TextOf
 )
 """What a page may say."""

@@ -9,7 +9,7 @@ from kerfpath.studio._numbers import Message
 
 __all__ = ["Hub", "Page"]
 
-LAST = ("job", "part", "scene", "program", "outcome", "progress", "kept", "front")
+LAST = ("job", "part", "scene", "program", "outcome", "progress", "kept", "front", "layout")
 """Kinds of messages of which a new page gets the last one; of plans the last of each contour."""
 
 

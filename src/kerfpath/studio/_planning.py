@@ -23,15 +23,17 @@ from kerfpath.job import (
     warm_up,
 )
 from kerfpath.plans import Plan
-from kerfpath.studio._asks import FrontOf, PointOf
+from kerfpath.studio._asks import FrontOf, LayoutOf, Place, PointOf, ReachOf
 from kerfpath.studio._bench import Bench
 from kerfpath.studio._clearance import clearance_message
 from kerfpath.studio._clock import cycle_of, program_message
 from kerfpath.studio._decide_messages import CandidateMessage
+from kerfpath.studio._document import Change
 from kerfpath.studio._exports import exports_of
 from kerfpath.studio._fastest import fastest_message
 from kerfpath.studio._front import Fronts
 from kerfpath.studio._keys import motion_key, part_key, setup_key
+from kerfpath.studio._layout import Layouts, changes_at
 from kerfpath.studio._loops import part_message
 from kerfpath.studio._map import map_id
 from kerfpath.studio._messages import (
@@ -45,6 +47,7 @@ from kerfpath.studio._numbers import Message
 from kerfpath.studio._run import Run, drafts_of
 from kerfpath.studio._scene import Meshes, scene_of, scene_of_robot, tables_of
 from kerfpath.studio._work import Newest, Stop
+from kerfpath.study.placing import placement_of
 
 __all__ = ["Outcome", "Planning"]
 
@@ -95,6 +98,7 @@ class Planning:
         self._drafts = Newest("draft", self._failed)
         self._speeds = Newest("speed", self._failed)
         self._fronts = Fronts(say, self._failed)
+        self.layouts = Layouts(say, self._failed)
         self._before: tuple[str, dict[str, Plan]] = ("", {})
         """What drafts begin from: the motions of contours, and what they share."""
         self._scene, self._looked = "", ""
@@ -107,7 +111,8 @@ class Planning:
 
     def take(self, job: Job, revision: int, first: str | None) -> None:
         """Plan a job in place of any other, one of its contours first."""
-        self._fronts.cancel()
+        for each in (self._fronts, self._speeds, self.layouts):
+            each.cancel()
         hurry = Event()
         if first is not None and motion_key(job) == self._before[0] and first in self._before[1]:
             self._drafts.ask(partial(self._draft, job, revision, first, hurry))
@@ -146,7 +151,10 @@ class Planning:
 
         def work(stop: Stop) -> None:
             self._say(ProgressMessage(busy=True, label=f"{contour}: fastest speed"))
-            found = fastest_message(prepared, contour, index, revision)
+            try:
+                found: Message = fastest_message(prepared, contour, index, revision)
+            except KerfpathError as error:
+                found = ErrorMessage(message=str(error), about="fastest")
             stop.check()
             self._say(found)
             self._say(ProgressMessage(busy=False))
@@ -167,6 +175,44 @@ class Planning:
             raise InputError("front: the job as it is now is not planned yet; wait until it is")
         self._fronts.look(self.prepared, cuts[0], ask.criteria, ask.runs, revision)
 
+    def look(self, ask: LayoutOf, revision: int) -> None:
+        """Look for the best placement.
+
+        Raises
+        ------
+        InputError
+            The job is not planned yet.
+        """
+        planned = self.result
+        if planned is None or planned.revision != revision or self.prepared is None:
+            raise InputError("layout: the job as it is now is not planned yet; wait until it is")
+        self.layouts.look(self.prepared, ask, revision)
+
+    def reach(self, ask: ReachOf, revision: int, answer: Callable[[Message], None]) -> None:
+        """Have an answer what is in reach where offsets from the scene put everything.
+
+        Raises
+        ------
+        InputError
+            There is no scene yet.
+        """
+        self.layouts.reach(self._there(), ask.offsets, ask.number, revision, answer)
+
+    def placed(self, ask: Place) -> list[Change]:
+        """Return what a job has to say so that everything is where offsets from the scene put it.
+
+        Raises
+        ------
+        InputError
+            There is no scene yet.
+        """
+        return changes_at(placement_of(self._there()), ask.offsets)
+
+    def _there(self) -> PreparedJob:
+        if self.prepared is None:
+            raise InputError("the job is not read yet; wait until its part is shown")
+        return self.prepared
+
     def candidate(self, ask: PointOf) -> CandidateMessage:
         """Return the motion of a point of that set.
 
@@ -180,13 +226,13 @@ class Planning:
 
     def cancel(self) -> None:
         """Stop whatever is being done."""
-        for each in (self._drafts, self._runs, self._speeds, self._fronts):
+        for each in (self._drafts, self._runs, self._speeds, self._fronts, self.layouts):
             each.cancel()
         self._say(ProgressMessage(busy=False))
 
     def close(self) -> None:
         """Stop for good."""
-        for each in (self._drafts, self._runs, self._speeds, self._fronts):
+        for each in (self._drafts, self._runs, self._speeds, self._fronts, self.layouts):
             each.close()
 
     def _draft(self, job: Job, revision: int, contour: str, hurry: Event, stop: Stop) -> None:

@@ -28,15 +28,19 @@ from kerfpath.studio._asks import (
     Edits,
     FrontOf,
     Keep,
+    LayoutOf,
     Leave,
     OfContour,
     OfKept,
+    Place,
     Plain,
     PointOf,
+    ReachOf,
     ReasonOf,
     Relax,
     Rename,
     Save,
+    Take,
     Text,
     TextOf,
 )
@@ -202,6 +206,16 @@ class Session:
                 self._planning.front(ask, self.document.revision)
             case PointOf():
                 page.say(await asyncio.to_thread(self._planning.candidate, ask))
+            case ReachOf():
+                self._planning.reach(
+                    ask, self.document.revision, lambda said: self._soon(page.say, said)
+                )
+            case Place():
+                self._change(self._planning.placed(ask))
+            case LayoutOf():
+                self._planning.look(ask, self.document.revision)
+            case Take():
+                self._change(self._planning.layouts.changes(ask.number, self.document.revision))
             case TextOf():
                 revision = self.document.revision
                 result, texts = await self.program(ask.language)

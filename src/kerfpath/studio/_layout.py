@@ -1,0 +1,245 @@
+"""Other places of the part: what is in reach there, and the search for the best one."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import partial
+from os import cpu_count
+from pathlib import Path
+from typing import Literal
+
+from kerfpath.errors import InputError
+from kerfpath.job import PreparedJob
+from kerfpath.studio._asks import LayoutOf
+from kerfpath.studio._document import Change
+from kerfpath.studio._layout_messages import LayoutMessage, OutOfReach, ReachMessage, TryEntry
+from kerfpath.studio._numbers import Message, flat
+from kerfpath.studio._work import Newest, Seldom, Stop
+from kerfpath.study import digest
+from kerfpath.study.placing import (
+    UNITS,
+    Layout,
+    Placement,
+    PlacementTrial,
+    changes_of,
+    contours_of,
+    layout_as,
+    middle_of,
+    nodes_of,
+    placed_text,
+    placement_of,
+)
+
+__all__ = ["Layouts", "changes_at"]
+
+SHOWN = 20
+"""Placements that a page hears of, the best first."""
+SHOWN_EVERY = 0.25
+"""s: how often a page hears of new ones."""
+Say = Callable[[Message], None]
+State = Literal["running", "done", "stopped"]
+
+
+class Layouts:
+    """Says what is in reach elsewhere, and looks for the best placement; the newest is done.
+
+    Parameters
+    ----------
+    say : callable
+        Takes messages, from any thread.
+    failed : callable
+        Takes what went wrong, in a thread.
+    """
+
+    def __init__(self, say: Say, failed: Callable[[BaseException], None]) -> None:
+        self._say = say
+        self._search = Newest("layout", failed)
+        self._hand = Newest("reach", failed)
+        self._study: _Study | None = None
+
+    def reach(
+        self,
+        prepared: PreparedJob,
+        offsets: Mapping[str, float],
+        number: int,
+        revision: int,
+        answer: Say,
+    ) -> None:
+        """Say what is in reach at a placement, unless another one is asked for before."""
+
+        def work(stop: Stop) -> None:
+            at = placement_of(prepared)
+            found = at.out_of_reach(offsets)
+            stop.check()
+            answer(
+                ReachMessage(
+                    revision=revision,
+                    number=number,
+                    middle=flat(at.middle),
+                    contours=[
+                        OutOfReach(
+                            name=request.task.name,
+                            nodes=len(request.candidates[0].nodes),
+                            out=out.tolist(),
+                        )
+                        for request, out in zip(at.requests, found, strict=True)
+                    ],
+                )
+            )
+
+        self._hand.ask(work)
+
+    def look(self, prepared: PreparedJob, ask: LayoutOf, revision: int) -> None:
+        """Begin to look for the best placement, in place of whatever was looked for."""
+        self._search.ask(partial(self._look, prepared, ask, revision))
+
+    def changes(self, number: int, revision: int) -> list[Change]:
+        """Return what makes a placement that was tried the job's.
+
+        Raises
+        ------
+        InputError
+            There is none, or the job has changed since.
+        """
+        study = self._study
+        if study is None or study.revision != revision or number >= len(study.trials):
+            raise InputError("take: there is no such placement any more; look for it again")
+        why = study.trials[number].result.infeasibility
+        if why is not None:
+            raise InputError(f"take: nothing can be cut there: {why.reason}; take another one")
+        return changes_at(study.placement, study.trials[number].offsets)
+
+    def cancel(self) -> None:
+        """Stop the search; what it has found stays."""
+        self._search.cancel()
+
+    def close(self) -> None:
+        """Stop for good."""
+        self._search.close()
+        self._hand.close()
+
+    def _look(self, prepared: PreparedJob, ask: LayoutOf, revision: int, stop: Stop) -> None:
+        """Search, on a copy of the job: the job itself may be saved meanwhile."""
+        folder = Path(tempfile.mkdtemp(prefix="kerfpath-layout-"))
+        study: _Study | None = None
+        try:
+            job = folder / "job.toml"
+            job.write_text(placed_text(prepared.job, {}, folder, "a copy"), encoding="utf-8")
+            nodes = nodes_of(contours_of(str(job), digest(job), ask.goal))
+            at = Placement(
+                job=prepared.job,
+                requests=tuple(prepared.contours),
+                middle=middle_of(prepared.job, nodes),
+            )
+            study = self._study = _Study(at, ask, revision, self._say, stop)
+            table = prepared.job.layout.model_copy(
+                update={"goal": ask.goal, "evaluations": ask.evaluations, "map_points": 0}
+            )
+            found = layout_as(
+                job,
+                table,
+                store=folder / "store.sqlite",
+                ranges=ask.ranges,
+                processes=max(1, (cpu_count() or 1) - 1),
+                progress=study.progress,
+                found=study.found,
+            )
+            study.say("done", found)
+        finally:
+            if study is not None and study.state == "running":
+                study.say("stopped")
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+class _Study:
+    """The placements that one search has tried, as far as it is."""
+
+    def __init__(
+        self, placement: Placement, ask: LayoutOf, revision: int, say: Say, stop: Stop
+    ) -> None:
+        self.placement, self.revision = placement, revision
+        self.trials: list[PlacementTrial] = []
+        self.state: State = "running"
+        self._numbers: dict[PlacementTrial, int] = {}
+        self._goal, self._say, self._stop = ask.goal, say, stop
+        self._seldom, self._at = Seldom(SHOWN_EVERY), ("", 0, 0)
+
+    def progress(self, what: str, done: int, total: int, /) -> None:
+        """Take how far the search is, and stop it where that is asked for.
+
+        Raises
+        ------
+        Superseded
+            It is.
+        """
+        self._stop.check()
+        self._at = what, done, total
+        if self._seldom.may():
+            self.say("running")
+
+    def found(self, trial: PlacementTrial) -> None:
+        """Take a placement of which more is known."""
+        if trial not in self._numbers:
+            self._numbers[trial] = len(self.trials)
+            self.trials.append(trial)
+
+    def say(self, state: State, end: Layout | None = None) -> None:
+        """Say how it stands."""
+        self.state = state
+        label, done, total = self._at
+        self._say(
+            LayoutMessage(
+                revision=self.revision,
+                goal=self._goal,
+                unit=UNITS[self._goal],
+                best=[self._entry(trial) for trial in sorted(self.trials, key=self._rank)[:SHOWN]],
+                tried=len(self.trials),
+                feasible=sum(trial.result.feasible for trial in self.trials),
+                label=label,
+                done=done,
+                total=total,
+                state=state,
+                said="" if end is None else _said(end),
+            )
+        )
+
+    def _rank(self, trial: PlacementTrial) -> tuple[int, float]:
+        """Return what is small for what is good: what was planned, estimates, what cannot be."""
+        result, sign = trial.result, 1 if self._goal == "motion" else -1
+        if result.infeasibility is not None:
+            return 2, -result.infeasibility.progress
+        if result.value is not None:
+            return 0, sign * result.value
+        return 1, 0.0 if result.promise is None else sign * result.promise
+
+    def _entry(self, trial: PlacementTrial) -> TryEntry:
+        result = trial.result
+        part, rest = self.placement.motions(trial.offsets)
+        return TryEntry(
+            number=self._numbers[trial],
+            offsets=dict(trial.offsets),
+            status=result.status,
+            stage=result.stage,
+            value=result.value,
+            about=result.promise,
+            reason=None if result.infeasibility is None else result.infeasibility.reason,
+            part=flat(part),
+            rest=flat(rest),
+        )
+
+
+def _said(end: Layout) -> str:
+    """Return what is known of the placements beside the best one, in words."""
+    if end.best is None:
+        why = end.nearest.result.infeasibility
+        return "No placement is feasible" + (f"; the nearest: {why.reason}" if why else "")
+    if end.proved:
+        return "Proved: no other of those tried is better."
+    return f"{end.estimated} of those tried were judged by an estimate alone, which proves nothing."
+
+
+def changes_at(placement: Placement, offsets: Mapping[str, float]) -> list[Change]:
+    """Return what a job has to say so that everything is where offsets put it."""
+    return list(changes_of(placement.job, placement.numbers(offsets)))
