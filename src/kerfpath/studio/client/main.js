@@ -9,6 +9,7 @@ import { contourList } from "./panels/contours.js";
 import { frontPanel } from "./panels/front.js";
 import { jobSheet } from "./panels/jobtext.js";
 import { jointsPanel } from "./panels/joints.js";
+import { layoutSheet } from "./panels/layout.js";
 import { morePanel } from "./panels/more.js";
 import { optionsPanel } from "./panels/options.js";
 import { resultPanel } from "./panels/result.js";
@@ -59,6 +60,7 @@ morePanel(store, connection, player);
 jobSheet(store, connection);
 programSheet(store, player, connection);
 loopsSheet(store, connection);
+layoutSheet(store, connection, view);
 splitter();
 theme(byId("theme"), icon, () => {
   view.paint();

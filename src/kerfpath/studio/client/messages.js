@@ -255,6 +255,44 @@
  * @property {"running" | "done" | "stopped"} state
  */
 
+/**
+ * @typedef {object} ReachMessage
+ * @property {"reach"} type
+ * @property {number} revision
+ * @property {number} number
+ * @property {number[]} middle
+ * @property {{name: string, nodes: number, out: number[]}[]} contours
+ */
+
+/**
+ * @typedef {object} Try  a placement that the search has tried
+ * @property {number} number
+ * @property {Record<string, number>} offsets
+ * @property {"feasible" | "speed" | "collision" | "unreachable"} status
+ * @property {string} stage
+ * @property {number | null} value
+ * @property {number | null} about
+ * @property {string | null} reason
+ * @property {number[]} part  16, how the part moves in the robot's base
+ * @property {number[]} rest  16, how all else but the robot does
+ */
+
+/**
+ * @typedef {object} LayoutMessage
+ * @property {"layout"} type
+ * @property {number} revision
+ * @property {"speed" | "margin" | "motion"} goal
+ * @property {string} unit
+ * @property {Try[]} best
+ * @property {number} tried
+ * @property {number} feasible
+ * @property {string} label
+ * @property {number} done
+ * @property {number} total
+ * @property {"running" | "done" | "stopped"} state
+ * @property {string} said
+ */
+
 /** @typedef {{type: "candidate", contour: string, number: number, plan: PlanMessage}} CandidateMessage */
 
 /** @typedef {{type: "kept", plans: KeptEntry[]}} KeptMessage */
@@ -327,7 +365,7 @@
  * @typedef {JobMessage | PartMessage | ClearanceMessage | SceneMessage | ProgressMessage | PlanMessage | NoPathMessage
  *   | ProgramMessage | OutcomeMessage | MapMessage | PoseMessage | FastestMessage
  *   | ProgramTextMessage | KeptMessage | FrontMessage
- *   | CandidateMessage | ErrorMessage} ServerMessage
+ *   | CandidateMessage | ReachMessage | LayoutMessage | ErrorMessage} ServerMessage
  */
 
 /** @typedef {{type: string} & Record<string, unknown>} ClientMessage */

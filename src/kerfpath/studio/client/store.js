@@ -8,7 +8,7 @@
 /**
  * @typedef {"connection" | "job" | "part" | "pointed" | "clearance" | "scene" | "plan" | "program" | "outcome" | "progress" | "map"
  *   | "pose" | "fastest" | "program_text" | "error" | "selected" | "kept" | "compare" | "front"
- *   | "candidate"} Topic
+ *   | "candidate" | "reach" | "layout"} Topic
  */
 
 /** @typedef {import("./messages.js").KeptEntry} KeptEntry */
@@ -64,6 +64,10 @@ export class Store {
     this.front = null;
     /** @type {{contour: string, number: number, own: PlanMessage[]} | null} shown in place of the job's plan */
     this.candidate = null;
+    /** @type {import("./messages.js").ReachMessage | null} */
+    this.reach = null;
+    /** @type {import("./messages.js").LayoutMessage | null} */
+    this.layout = null;
     /** @type {string | null} the chosen contour */
     this.selected = null;
     /** @type {Map<string, Set<(about: any) => void>>} */
@@ -194,6 +198,12 @@ export class Store {
         break;
       case "front":
         this.front = message;
+        break;
+      case "reach":
+        this.reach = message;
+        break;
+      case "layout":
+        this.layout = message;
         break;
       case "candidate":
         this.propose(message);

@@ -2,7 +2,7 @@
 
 import { byId, el, icon } from "../dom.js";
 
-/** @typedef {"job" | "program" | "loops"} Name */
+/** @typedef {"job" | "program" | "loops" | "layout"} Name */
 
 /** @type {Name | null} */
 let shown = null;

@@ -33,6 +33,19 @@ const COLOURS = {
 const MOST_EDGES = 60000;
 
 /**
+ * What moves a body: a joint, the part with what holds it, or nothing but the robot's base.
+ * @param {Body} body
+ * @param {string[]} standing  names of the fixtures that do not go with the part
+ * @returns {number | "carried" | "standing"}
+ */
+const carrier = ({ kind, name, frame }, standing) =>
+  kind === "part" || (kind === "fixture" && !standing.includes(name))
+    ? "carried"
+    : kind === "fixture" || kind === "floor"
+      ? "standing"
+      : frame;
+
+/**
  * Return the matrix of a pose.
  * @param {ArrayLike<number>} pose  16, row-major
  */
@@ -47,6 +60,10 @@ export class Machine {
     this.frames = [];
     /** @type {Group[]} */
     this.ghostFrames = [];
+    /** Part and fixtures, and the bodies that do not go with the part: both stand in the base. */
+    this.carried = new Group();
+    this.standing = new Group();
+    this.carried.matrixAutoUpdate = this.standing.matrixAutoUpdate = false;
     /** @type {Record<Kind, MeshStandardMaterial>} */
     this.materials = /** @type {any} */ ({});
     for (const kind of /** @type {Kind[]} */ (Object.keys(COLOURS))) {
@@ -82,12 +99,13 @@ export class Machine {
   /**
    * Build the bodies of a scene; resolves once all are there.
    * @param {SceneMessage} scene
+   * @param {string[]} standing  names of the fixtures that do not go with the part
    */
-  async build(scene) {
+  async build(scene, standing) {
     /** @type {Map<string, Body[]>} */
     const groups = new Map();
     for (const body of scene.bodies) {
-      const key = `${body.frame} ${body.kind} ${body.approximate}`;
+      const key = `${carrier(body, standing)} ${body.kind} ${body.approximate}`;
       groups.set(key, [...(groups.get(key) ?? []), body]);
     }
     const made = await Promise.all(
@@ -98,7 +116,7 @@ export class Machine {
           bodies[0].approximate && bodies[0].kind === "robot" ? Math.PI / 2 : undefined,
         ),
         edged: !(bodies[0].approximate && bodies[0].kind === "robot"),
-        frame: bodies[0].frame,
+        by: carrier(bodies[0], standing),
         kind: bodies[0].kind,
       })),
     );
@@ -111,22 +129,24 @@ export class Machine {
       this.frames.push(frame);
       this.ghostFrames.push(ghost);
     }
+    this.frames[0].add(this.carried, this.standing);
     this.triangles = 0;
-    for (const { faces, edges, edged, frame, kind } of made) {
+    for (const { faces, edges, edged, by, kind } of made) {
+      const parent = typeof by === "number" ? this.frames[by] : this[by];
       const body = new Mesh(faces, this.materials[kind]);
       body.name = kind;
-      this.frames[frame].add(body);
+      parent.add(body);
       this.triangles += faces.getAttribute("position").count / 3;
       if (edged && edges.length && edges.length / 6 < MOST_EDGES) {
         const lines = new BufferGeometry();
         lines.setAttribute("position", new BufferAttribute(edges, 3));
-        this.frames[frame].add(new LineSegments(lines, this.edge));
+        parent.add(new LineSegments(lines, this.edge));
       }
-      if (kind === "robot" || kind === "head")
+      if (typeof by === "number")
         for (const [order, material] of [this.veil, this.ghostMaterial].entries()) {
           const part = new Mesh(faces, material);
           part.renderOrder = 10 + order;
-          this.ghostFrames[frame].add(part);
+          this.ghostFrames[by].add(part);
         }
     }
   }
@@ -137,6 +157,8 @@ export class Machine {
     });
     this.group.clear();
     this.ghost.clear();
+    this.carried.clear();
+    this.standing.clear();
     this.frames = [];
     this.ghostFrames = [];
   }

@@ -144,6 +144,17 @@ export class Stage {
   }
 
   /**
+   * Look at what has moved as before it has.
+   * @param {import("three").Matrix4} motion
+   */
+  move(motion) {
+    this.camera.position.applyMatrix4(motion);
+    this.controls.target.applyMatrix4(motion);
+    this.controls.update();
+    this.invalidate();
+  }
+
+  /**
    * Move camera and its target alike.
    * @param {Vector3} by
    */

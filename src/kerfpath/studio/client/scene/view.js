@@ -10,6 +10,7 @@ import { legend } from "./legend.js";
 import { Near } from "./near.js";
 import { Picking } from "./picking.js";
 import { Paths } from "./paths.js";
+import { Placing } from "./placing.js";
 import { Stage } from "./stage.js";
 
 /** @typedef {import("../store.js").Store} Store */
@@ -37,6 +38,7 @@ export class SceneView {
     this.picking = new Picking(this, connection);
     this.near = new Near(this);
     this.ghosts = new Ghosts(this);
+    this.placing = new Placing(this);
     this.built = "";
     this.ready = false;
     this.follow = false;
@@ -105,6 +107,7 @@ export class SceneView {
    * @param {boolean} right  whether it was the other button
    */
   clicked(x, y, right) {
+    if (this.placing.held || this.placing.moved) return;
     const [found, loop] = [this.pointed(x, y), this.picking.pointed(x, y)];
     if (found && right) this.picking.asked(x, y, found.contour);
     else if (found && !(loop && loop.away < found.away)) this.chosen(found.contour, found.node);
@@ -127,13 +130,15 @@ export class SceneView {
   async build() {
     const { scene } = this.store;
     if (!scene) return;
-    const key = JSON.stringify([scene.robot, scene.bodies]);
-    if (key === this.built) return;
+    this.placing.landed();
+    const standing = this.store.job?.values?.layout?.standing ?? [];
+    const key = JSON.stringify([scene.robot, scene.bodies, standing]);
+    if (key === this.built) return this.placing.apply();
     const first = this.built === "";
     this.built = key;
     try {
       this.ghosts.clear();
-      await this.machine.build(scene);
+      await this.machine.build(scene, standing);
       this.trouble = "";
     } catch (fault) {
       this.trouble = fault instanceof Error ? fault.message : String(fault);
@@ -141,6 +146,7 @@ export class SceneView {
     }
     if (key !== this.built && this.built) return;
     this.ready = true;
+    this.placing.apply();
     this.lay();
     this.note();
     this.show(this.player.moment);
@@ -163,7 +169,9 @@ export class SceneView {
     /** @type {import("./paths.js").Track[]} */
     const tracks = [];
     for (const { name: contour, points, kind } of scene?.contours ?? []) {
-      const found = plans.get(contour) ?? [];
+      // A plan of before the part was moved is elsewhere.
+      const all = plans.get(contour) ?? [];
+      const found = all.filter(({ revision }) => revision >= (scene?.revision ?? 0));
       for (const plan of found)
         tracks.push({
           contour,
@@ -287,8 +295,9 @@ export class SceneView {
    * @param {number} y
    */
   point(x, y) {
-    const near = this.pointed(x, y);
-    const loop = this.picking.pointed(x, y);
+    const busy = this.placing.held || this.placing.moved;
+    const near = busy ? null : this.pointed(x, y);
+    const loop = busy ? null : this.picking.pointed(x, y);
     const found = loop && loop.away < (near?.away ?? Infinity) ? null : near;
     this.canvas.style.cursor = found || loop ? "pointer" : "";
     if (this.picking.menu.hidden && !found) this.picking.hover(loop?.loop ?? null);
@@ -366,6 +375,7 @@ export class SceneView {
     this.paths.paint();
     this.picking.loops.paint();
     this.ghosts.paint();
+    this.placing.paint();
     this.lay();
     this.scale();
     this.stage.invalidate();

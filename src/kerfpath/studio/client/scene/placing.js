@@ -1,0 +1,314 @@
+/** The part, or the robot, taken elsewhere by hand: handles, where all is meanwhile, what is in reach. */
+
+import { Euler, Group, Matrix4, Object3D, Vector3 } from "three";
+import { TransformControls } from "three/addons/controls/TransformControls.js";
+
+import { textSize, themeColour } from "../dom.js";
+import { matrix } from "./machine.js";
+import { fill, line } from "./paths.js";
+
+/** @typedef {import("./view.js").SceneView} SceneView */
+/** @typedef {import("../messages.js").ReachMessage} ReachMessage */
+/** @typedef {"part" | "robot"} What */
+/** @typedef {Record<string, number>} Offsets mm and deg by the variables of a layout */
+
+const MM = 1e3;
+const DEG = 180 / Math.PI;
+
+/**
+ * Return the pose that a job says by a position and roll, pitch and yaw.
+ * @param {number[]} xyz  mm
+ * @param {number[]} rpy  deg
+ */
+export function poseOf(xyz, rpy) {
+  const [roll, pitch, yaw] = rpy.map((each) => each / DEG);
+  const turn = new Matrix4().makeRotationFromEuler(new Euler(roll, pitch, yaw, "ZYX"));
+  return turn.setPosition(new Vector3().fromArray(xyz.map((each) => each / MM)));
+}
+
+/**
+ * Return position and roll, pitch and yaw of a pose, as a job says them.
+ * @param {Matrix4} pose
+ * @returns {{xyz: number[], rpy: number[]}} mm, deg
+ */
+export function numbersOf(pose) {
+  const { x, y, z } = new Euler().setFromRotationMatrix(pose, "ZYX");
+  const at = new Vector3().setFromMatrixPosition(pose).toArray();
+  return {
+    xyz: at.map((each) => rounded(each * MM, 3)),
+    rpy: [x, y, z].map((each) => rounded(each * DEG, 4)),
+  };
+}
+
+/**
+ * @param {number} value
+ * @param {number} places
+ */
+const rounded = (value, places) => Number(value.toFixed(places)) + 0;
+
+export class Placing {
+  /** @param {SceneView} view */
+  constructor(view) {
+    this.view = view;
+    this.open = false;
+    /** @type {What} */
+    this.what = "part";
+    /** How the part has been moved in the scene, and the robot's base. */
+    this.part = new Matrix4();
+    this.base = new Matrix4();
+    this.mount = 0; // deg, of the head
+    /** Whether what is shown is on its way into the job. */
+    this.awaits = false;
+    this.middle = new Vector3();
+    /** @type {{xyz: number[], rpy: number[]} | null} what the job said of the part in the scene */
+    this.numbers = null;
+    /** Where the scene has the part. */
+    this.there = new Matrix4();
+    this.handle = new Object3D();
+    this.group = new Group();
+    this.group.matrixAutoUpdate = false;
+    this.reached = line(3.6);
+    this.lost = line(7);
+    this.reached.renderOrder = 7;
+    this.lost.renderOrder = 8;
+    this.group.add(this.reached, this.lost);
+    const { stage } = view;
+    this.gizmo = new TransformControls(stage.camera, stage.canvas);
+    this.gizmo.setSize(0.9);
+    this.gizmo.showE = this.gizmo.showXYZE = false;
+    stage.scene.add(this.handle, this.group);
+    /** @type {ReachMessage | null} */
+    this.reach = null;
+    /** @type {Set<(done: boolean) => void>} */
+    this.listeners = new Set();
+    this.gizmo.addEventListener("change", () => stage.invalidate());
+    this.gizmo.addEventListener("dragging-changed", ({ value }) => {
+      stage.controls.enabled = !value;
+      if (!value && this.moved) this.tell(true);
+    });
+    this.gizmo.addEventListener("objectChange", () => {
+      this.handle.updateMatrix();
+      const { matrix: at } = this.handle;
+      if (this.what === "robot") this.base.copy(at);
+      else this.part.copy(at).multiply(new Matrix4().setPosition(this.middle.clone().negate()));
+      this.apply();
+      this.tell(false);
+    });
+  }
+
+  /**
+   * Call `listener` whenever all has been moved by hand; with true once it is let go.
+   * @param {(done: boolean) => void} listener
+   */
+  on(listener) {
+    this.listeners.add(listener);
+  }
+
+  /** @param {boolean} done */
+  tell(done) {
+    for (const listener of this.listeners) listener(done);
+  }
+
+  /** Whether anything is elsewhere than in the job. */
+  get moved() {
+    return Object.keys(this.offsets()).length > 0;
+  }
+
+  /** Whether the pointer is on a handle, or drags it. */
+  get held() {
+    return this.open && (this.gizmo.dragging || this.gizmo.axis !== null);
+  }
+
+  /** @param {boolean} open  whether there are handles */
+  show(open) {
+    this.open = open;
+    const { scene } = this.view.stage;
+    if (open) {
+      this.gizmo.attach(this.handle);
+      scene.add(this.gizmo.getHelper());
+    } else {
+      this.gizmo.detach();
+      scene.remove(this.gizmo.getHelper());
+      this.reset();
+    }
+    this.paint();
+    this.draw();
+  }
+
+  /**
+   * Choose what the handles move, and whether they turn it.
+   * @param {What} what
+   * @param {boolean} turns
+   */
+  choose(what, turns) {
+    this.what = what;
+    this.gizmo.setMode(turns ? "rotate" : "translate");
+    this.gizmo.showX = this.gizmo.showY = !(turns && what === "robot");
+    this.apply();
+  }
+
+  /**
+   * Return how far all is from where the job has it; what is not moved is left out.
+   * @returns {Offsets}
+   */
+  offsets() {
+    const shift = this.middle.clone().applyMatrix4(this.part).sub(this.middle);
+    const turn = numbersOf(this.part).rpy;
+    const base = numbersOf(this.base);
+    const all = {
+      ...{ x_mm: shift.x * MM, y_mm: shift.y * MM, z_mm: shift.z * MM },
+      ...{ tilt_x_deg: turn[0], tilt_y_deg: turn[1], yaw_deg: turn[2] },
+      ...{ base_x_mm: base.xyz[0], base_y_mm: base.xyz[1], base_z_mm: base.xyz[2] },
+      ...{ base_yaw_deg: base.rpy[2], mount_deg: this.mount },
+    };
+    const known = Object.entries(all).map(([name, value]) => [name, rounded(value, 4)]);
+    return Object.fromEntries(known.filter(([, value]) => value !== 0));
+  }
+
+  /** The place of the part as the job would say it, or null. */
+  get place() {
+    if (!this.numbers) return null;
+    const { xyz, rpy } = this.numbers;
+    const moved = this.base.clone().invert().multiply(this.part);
+    return numbersOf(moved.multiply(poseOf(xyz, rpy)));
+  }
+
+  /**
+   * Have the part where a job would say it to be.
+   * @param {number[]} xyz  mm
+   * @param {number[]} rpy  deg
+   */
+  put(xyz, rpy) {
+    if (!this.numbers) return;
+    const from = poseOf(this.numbers.xyz, this.numbers.rpy).invert();
+    this.part.copy(this.base).multiply(poseOf(xyz, rpy)).multiply(from);
+    this.apply();
+  }
+
+  /**
+   * Have the robot's base and its head moved.
+   * @param {number[]} xyz  mm
+   * @param {number} yaw  deg
+   * @param {number} mount  deg
+   */
+  moveRobot(xyz, yaw, mount) {
+    this.base.copy(poseOf(xyz, [0, 0, yaw]));
+    this.mount = mount;
+    this.apply();
+  }
+
+  /**
+   * Have all where a placement that was tried has it.
+   * @param {import("../messages.js").Try} tried
+   */
+  preview({ part, rest, offsets }) {
+    this.base.copy(matrix(rest)).invert();
+    this.part.copy(this.base).multiply(matrix(part));
+    this.mount = offsets.mount_deg ?? 0;
+    this.apply();
+  }
+
+  /** Have all where the job has it. */
+  reset() {
+    this.part.identity();
+    this.base.identity();
+    this.mount = 0;
+    this.apply();
+  }
+
+  /** A new scene: what was moved is there now, seen from the robot's base. */
+  landed() {
+    const { stage, store } = this.view;
+    const away = this.base.clone().invert();
+    if (!away.equals(new Matrix4())) stage.move(away);
+    const there = matrix(store.scene?.T_part ?? []);
+    const motion = there.clone().multiply(this.there.invert());
+    this.there = there;
+    this.middle.applyMatrix4(motion);
+    const { xyz_mm, rpy_deg } = store.job?.values?.part ?? {};
+    this.numbers = xyz_mm && rpy_deg ? { xyz: xyz_mm, rpy: rpy_deg } : null;
+    this.reach = null;
+    if (this.gizmo.dragging) this.part.multiply(motion.invert());
+    else {
+      this.part.identity();
+      this.base.identity();
+      this.mount = 0;
+    }
+    this.lay();
+    this.draw();
+  }
+
+  /**
+   * Take what is in reach.
+   * @param {ReachMessage} reach
+   */
+  take(reach) {
+    this.reach = reach;
+    if (!this.gizmo.dragging) {
+      this.middle.fromArray(reach.middle);
+      this.apply();
+    }
+    this.draw();
+  }
+
+  /** Colour the nodes by whether they are in reach. */
+  draw() {
+    const { scene } = this.view.store;
+    /** @type {number[][]} of nodes in reach, and of those out of it */
+    const segments = [[], []];
+    for (const { name, points } of (this.open && this.reach && scene?.contours) || []) {
+      const lost = new Set(this.reach?.contours.find((each) => each.name === name)?.out);
+      for (let k = 0; 3 * k + 5 < points.length; k++)
+        for (let i = 3 * k; i < 3 * k + 6; i++)
+          segments[lost.has(k) || lost.has(k + 1) ? 1 : 0].push(points[i]);
+    }
+    fill(this.reached, segments[0]);
+    fill(this.lost, segments[1]);
+    this.view.stage.invalidate();
+  }
+
+  /** Have all in the scene where it is now. */
+  apply() {
+    const { machine } = this.view;
+    const away = this.base.clone().invert();
+    machine.group.matrixAutoUpdate = false;
+    set(machine.group, this.base);
+    set(machine.standing, away);
+    set(machine.carried, away.clone().multiply(this.part));
+    this.lay();
+  }
+
+  /** Have lines and handles where they are now. */
+  lay() {
+    const { paths, picking, stage } = this.view;
+    for (const each of [paths.group, picking.loops.group, this.group]) {
+      each.matrixAutoUpdate = false;
+      set(each, this.part);
+    }
+    if (this.moved) paths.shine(null);
+    if (!this.gizmo.dragging) {
+      const at = this.middle.clone().applyMatrix4(this.part);
+      const whole = this.what === "robot" ? this.base : this.part.clone().setPosition(at);
+      whole.decompose(this.handle.position, this.handle.quaternion, new Vector3());
+    }
+    stage.invalidate();
+  }
+
+  /** Take the colours and the text size of the theme. */
+  paint() {
+    const scale = textSize() / 13;
+    for (const each of [this.reached, this.lost])
+      each.material.linewidth = each.userData.width * scale;
+    this.reached.material.color.set(themeColour("--accent"));
+    this.lost.material.color.set(themeColour("--alert"));
+  }
+}
+
+/**
+ * @param {Object3D} target
+ * @param {Matrix4} at
+ */
+function set(target, at) {
+  target.matrix.copy(at);
+  target.matrixWorldNeedsUpdate = true;
+}
