@@ -27,20 +27,20 @@ def heard(path):
     """What a page hears that moves the part, and then looks for the best placement."""
     found = {}
     with serving(path) as client, talking(client) as page:
-        page.say("layout", goal="speed", ranges=RANGES, evaluations=8)
+        page.say("layout", goal="speed", ranges=RANGES, evaluations=8, grid=False)
         found["early"] = page.until("error")
         page.done(1)
         for number, offsets in enumerate(({}, FAR, TURNED)):
             page.say("reach", offsets=offsets, number=number)
             found[number] = page.until("reach", number=number)
-        page.say("place", offsets=TURNED)
+        page.say("place", scene=1, offsets=TURNED)
         found["moved"] = page.until("job", revision=2)
         found["scene"] = page.until("scene", revision=2)
         page.done(2)
         page.say("undo")
         found["back"] = page.until("job", revision=3)
         page.done(3)
-        page.say("layout", goal="speed", ranges=RANGES, evaluations=8)
+        page.say("layout", goal="speed", ranges=RANGES, evaluations=8, grid=False)
         found["layout"] = page.until("layout", state="done")
         with talking(client) as second:
             found["later"] = second.until("layout")
@@ -53,13 +53,15 @@ def heard(path):
         page.done(4)
         page.say("fastest", contour=found["there"]["contours"][0]["name"])
         found["fastest"] = page.until("fastest")
-        page.say("place", offsets=FAR)
+        page.say("place", scene=1, offsets=FAR)
+        found["other"] = page.until("error")
+        page.say("place", scene=4, offsets=FAR)
         page.done(5)
         page.say("fastest", contour=found["there"]["contours"][0]["name"])
         found["no speed"] = page.until("error")
         page.say("undo")
         page.done(6)
-        page.say("layout", goal="speed", ranges=RANGES, evaluations=5000)
+        page.say("layout", goal="speed", ranges=RANGES, evaluations=5000, grid=True)
         page.until("layout", state="running", fits=lambda m: m["tried"] > 1)
         page.say("edit", path=["plan", "eta_velocity"], value=0.9)
         found["stopped"] = page.until("layout", fits=lambda m: m["state"] != "running")
@@ -123,4 +125,5 @@ def test_a_change_of_the_job_stops_the_search(heard):
 def test_what_cannot_be_done_is_an_answer(heard):
     assert "not planned yet" in heard["early"]["message"]
     assert "look for it again" in heard["gone"]["message"]
+    assert "move it again" in heard["other"]["message"]
     assert heard["no speed"]["about"] == "fastest"

@@ -19,6 +19,7 @@ import sweep_tasks
 from conftest import ROOT
 from kerfpath import sweep
 from kerfpath.errors import InputError
+from kerfpath.progress import stopped_by
 from kerfpath.sweep import _cluster, _store
 from kerfpath.sweep._task import Task, attempt
 
@@ -412,3 +413,18 @@ def test_a_worker_of_another_version_that_joins_later_does_nothing():
 def test_a_worker_that_cannot_import_the_function_is_told():
     with pytest.raises(InputError, match="cannot import the function of the sweep"):
         attempt(kerfpath.__version__, b"cnowhere\nsquare\n.", Task("key", "{}"))
+
+
+def test_a_wait_for_tasks_is_left_at_once_and_their_processes_end(tmp_path):
+    begun, asked = time.monotonic(), []
+
+    def check():
+        asked.append(time.monotonic())
+        if asked[-1] - asked[0] > 0.3:
+            raise TimeoutError
+
+    tasks = [{"x": 1, "folder": str(tmp_path), "seconds": 60.0}]
+    with pytest.raises(TimeoutError), stopped_by(check):
+        sweep.run(sweep_tasks.marked, tasks, store=tmp_path / "s.sqlite", processes=1)
+    assert time.monotonic() - begun < 30
+    assert not (tmp_path / "1").exists()

@@ -208,9 +208,10 @@ class ReachOf(_Strict):
 
 
 class Place(_Strict):
-    """Have the part, the robot or its head moved by offsets from where the scene has it."""
+    """Have the part, the robot or its head moved by offsets from where a scene has it."""
 
     type: Literal["place"]
+    scene: Index
     offsets: Offsets
 
 
@@ -221,6 +222,7 @@ class LayoutOf(_Strict):
     goal: Goal
     ranges: Ranges
     evaluations: Annotated[int, Field(ge=8, le=100_000)]
+    grid: bool
 
 
 class Take(_Strict):

@@ -12,8 +12,8 @@ from typing import Literal
 
 from kerfpath.errors import InputError
 from kerfpath.job import PreparedJob
-from kerfpath.studio._asks import LayoutOf
-from kerfpath.studio._document import Change
+from kerfpath.studio._asks import LayoutOf, Place, ReachOf
+from kerfpath.studio._document import Change, with_values
 from kerfpath.studio._layout_messages import LayoutMessage, OutOfReach, ReachMessage, TryEntry
 from kerfpath.studio._numbers import Message, flat
 from kerfpath.studio._work import Newest, Seldom, Stop
@@ -32,7 +32,7 @@ from kerfpath.study.placing import (
     placement_of,
 )
 
-__all__ = ["Layouts", "changes_at"]
+__all__ = ["Layouts"]
 
 SHOWN = 20
 """Placements that a page hears of, the best first."""
@@ -58,25 +58,30 @@ class Layouts:
         self._search = Newest("layout", failed)
         self._hand = Newest("reach", failed)
         self._study: _Study | None = None
+        self._stands: tuple[int, PreparedJob] | None = None
 
-    def reach(
-        self,
-        prepared: PreparedJob,
-        offsets: Mapping[str, float],
-        number: int,
-        revision: int,
-        answer: Say,
-    ) -> None:
-        """Say what is in reach at a placement, unless another one is asked for before."""
+    def stands(self, prepared: PreparedJob, revision: int) -> None:
+        """Take the job of the scene that is said now, from which offsets count."""
+        self._stands = revision, prepared
+
+    def reach(self, ask: ReachOf, revision: int, answer: Say) -> None:
+        """Have an answer what is in reach, unless that of another place is asked for before.
+
+        Raises
+        ------
+        InputError
+            There is no scene yet.
+        """
+        _, prepared = self._there()
 
         def work(stop: Stop) -> None:
             at = placement_of(prepared)
-            found = at.out_of_reach(offsets)
+            found = at.out_of_reach(ask.offsets)
             stop.check()
             answer(
                 ReachMessage(
                     revision=revision,
-                    number=number,
+                    number=ask.number,
                     middle=flat(at.middle),
                     contours=[
                         OutOfReach(
@@ -90,6 +95,19 @@ class Layouts:
             )
 
         self._hand.ask(work)
+
+    def placed(self, ask: Place) -> list[Change]:
+        """Return what a job has to say so that everything is where offsets put it.
+
+        Raises
+        ------
+        InputError
+            There is no such scene, or another one by now.
+        """
+        scene, prepared = self._there()
+        if scene != ask.scene:
+            raise InputError("place: the scene is another one by now; move it again")
+        return _changes(placement_of(prepared), ask.offsets)
 
     def look(self, prepared: PreparedJob, ask: LayoutOf, revision: int) -> None:
         """Begin to look for the best placement, in place of whatever was looked for."""
@@ -109,7 +127,7 @@ class Layouts:
         why = study.trials[number].result.infeasibility
         if why is not None:
             raise InputError(f"take: nothing can be cut there: {why.reason}; take another one")
-        return changes_at(study.placement, study.trials[number].offsets)
+        return _changes(study.placement, study.trials[number].offsets)
 
     def cancel(self) -> None:
         """Stop the search; what it has found stays."""
@@ -120,13 +138,21 @@ class Layouts:
         self._search.close()
         self._hand.close()
 
+    def _there(self) -> tuple[int, PreparedJob]:
+        if self._stands is None:
+            raise InputError("the job is not read yet; wait until its part is shown")
+        return self._stands
+
     def _look(self, prepared: PreparedJob, ask: LayoutOf, revision: int, stop: Stop) -> None:
         """Search, on a copy of the job: the job itself may be saved meanwhile."""
         folder = Path(tempfile.mkdtemp(prefix="kerfpath-layout-"))
         study: _Study | None = None
         try:
             job = folder / "job.toml"
-            job.write_text(placed_text(prepared.job, {}, folder, "a copy"), encoding="utf-8")
+            text = placed_text(prepared.job, {}, folder, "a copy")
+            if ask.grid:
+                text = with_values(text, [(("plan", "method"), "exact")])
+            job.write_text(text, encoding="utf-8")
             nodes = nodes_of(contours_of(str(job), digest(job), ask.goal))
             at = Placement(
                 job=prepared.job,
@@ -163,7 +189,7 @@ class _Study:
         self.trials: list[PlacementTrial] = []
         self.state: State = "running"
         self._numbers: dict[PlacementTrial, int] = {}
-        self._goal, self._say, self._stop = ask.goal, say, stop
+        self._ask, self._say, self._stop = ask, say, stop
         self._seldom, self._at = Seldom(SHOWN_EVERY), ("", 0, 0)
 
     def progress(self, what: str, done: int, total: int, /) -> None:
@@ -192,8 +218,9 @@ class _Study:
         self._say(
             LayoutMessage(
                 revision=self.revision,
-                goal=self._goal,
-                unit=UNITS[self._goal],
+                goal=self._ask.goal,
+                grid=self._ask.grid,
+                unit=UNITS[self._ask.goal],
                 best=[self._entry(trial) for trial in sorted(self.trials, key=self._rank)[:SHOWN]],
                 tried=len(self.trials),
                 feasible=sum(trial.result.feasible for trial in self.trials),
@@ -207,7 +234,7 @@ class _Study:
 
     def _rank(self, trial: PlacementTrial) -> tuple[int, float]:
         """Return what is small for what is good: what was planned, estimates, what cannot be."""
-        result, sign = trial.result, 1 if self._goal == "motion" else -1
+        result, sign = trial.result, 1 if self._ask.goal == "motion" else -1
         if result.infeasibility is not None:
             return 2, -result.infeasibility.progress
         if result.value is not None:
@@ -240,6 +267,6 @@ def _said(end: Layout) -> str:
     return f"{end.estimated} of those tried were judged by an estimate alone, which proves nothing."
 
 
-def changes_at(placement: Placement, offsets: Mapping[str, float]) -> list[Change]:
+def _changes(placement: Placement, offsets: Mapping[str, float]) -> list[Change]:
     """Return what a job has to say so that everything is where offsets put it."""
     return list(changes_of(placement.job, placement.numbers(offsets)))

@@ -47,6 +47,7 @@ class LayoutMessage(Message):
     type: Literal["layout"] = "layout"
     revision: int
     goal: str
+    grid: bool
     unit: str
     best: list[TryEntry]
     tried: int

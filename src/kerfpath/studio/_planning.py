@@ -23,17 +23,16 @@ from kerfpath.job import (
     warm_up,
 )
 from kerfpath.plans import Plan
-from kerfpath.studio._asks import FrontOf, LayoutOf, Place, PointOf, ReachOf
+from kerfpath.studio._asks import FrontOf, LayoutOf, PointOf
 from kerfpath.studio._bench import Bench
 from kerfpath.studio._clearance import clearance_message
 from kerfpath.studio._clock import cycle_of, program_message
 from kerfpath.studio._decide_messages import CandidateMessage
-from kerfpath.studio._document import Change
 from kerfpath.studio._exports import exports_of
 from kerfpath.studio._fastest import fastest_message
 from kerfpath.studio._front import Fronts
 from kerfpath.studio._keys import motion_key, part_key, setup_key
-from kerfpath.studio._layout import Layouts, changes_at
+from kerfpath.studio._layout import Layouts
 from kerfpath.studio._loops import part_message
 from kerfpath.studio._map import map_id
 from kerfpath.studio._messages import (
@@ -47,7 +46,6 @@ from kerfpath.studio._numbers import Message
 from kerfpath.studio._run import Run, drafts_of
 from kerfpath.studio._scene import Meshes, scene_of, scene_of_robot, tables_of
 from kerfpath.studio._work import Newest, Stop
-from kerfpath.study.placing import placement_of
 
 __all__ = ["Outcome", "Planning"]
 
@@ -84,6 +82,8 @@ class Planning:
         What came of each contour, by its name.
     result : Outcome or None
         What the job that was planned last comes to.
+    layouts : Layouts
+        Other places of the part.
     """
 
     def __init__(
@@ -187,31 +187,6 @@ class Planning:
         if planned is None or planned.revision != revision or self.prepared is None:
             raise InputError("layout: the job as it is now is not planned yet; wait until it is")
         self.layouts.look(self.prepared, ask, revision)
-
-    def reach(self, ask: ReachOf, revision: int, answer: Callable[[Message], None]) -> None:
-        """Have an answer what is in reach where offsets from the scene put everything.
-
-        Raises
-        ------
-        InputError
-            There is no scene yet.
-        """
-        self.layouts.reach(self._there(), ask.offsets, ask.number, revision, answer)
-
-    def placed(self, ask: Place) -> list[Change]:
-        """Return what a job has to say so that everything is where offsets from the scene put it.
-
-        Raises
-        ------
-        InputError
-            There is no scene yet.
-        """
-        return changes_at(placement_of(self._there()), ask.offsets)
-
-    def _there(self) -> PreparedJob:
-        if self.prepared is None:
-            raise InputError("the job is not read yet; wait until its part is shown")
-        return self.prepared
 
     def candidate(self, ask: PointOf) -> CandidateMessage:
         """Return the motion of a point of that set.
@@ -335,7 +310,9 @@ class Planning:
         setup = setup_key(prepared.job)
         if setup == self._scene:
             return
-        self._show(*scene_of(prepared, revision))
+        scene, meshes = scene_of(prepared, revision)
+        self.layouts.stands(prepared, revision)
+        self._show(scene, meshes)
         self._scene = setup
         known = set(prepared.names)
         self.cuts = {name: cuts for name, cuts in self.cuts.items() if name in known}

@@ -207,11 +207,11 @@ class Session:
             case PointOf():
                 page.say(await asyncio.to_thread(self._planning.candidate, ask))
             case ReachOf():
-                self._planning.reach(
+                self._planning.layouts.reach(
                     ask, self.document.revision, lambda said: self._soon(page.say, said)
                 )
             case Place():
-                self._change(self._planning.placed(ask))
+                self._change(self._planning.layouts.placed(ask))
             case LayoutOf():
                 self._planning.look(ask, self.document.revision)
             case Take():

@@ -282,6 +282,7 @@
  * @property {"layout"} type
  * @property {number} revision
  * @property {"speed" | "margin" | "motion"} goal
+ * @property {boolean} grid
  * @property {string} unit
  * @property {Try[]} best
  * @property {number} tried

@@ -18,7 +18,7 @@ const VARIABLES = /** @type {const} */ ({
   base_y_mm: ["Robot base y", "mm", 200],
   base_z_mm: ["Robot base z", "mm", 200],
   base_yaw_deg: ["Robot base about z", "deg", 30],
-  mount_deg: ["Head about its flange", "deg", 90],
+  mount_deg: ["Head about flange", "deg", 90],
 });
 const USUAL = ["x_mm", "y_mm", "yaw_deg"];
 const EVALUATIONS = 64;
@@ -43,6 +43,12 @@ export function candidates(store, connection, placing, moved) {
     "select",
     { "aria-label": "What is best" },
     ...Object.entries(GOALS).map(([value, { words }]) => el("option", { value }, words)),
+  );
+  const judged = el(
+    "select",
+    { "aria-label": "Judged by", onchange: draw },
+    el("option", { value: "grid" }, "Judged on the grid: quicker"),
+    el("option", { value: "plans" }, "Judged by plans over continuous gamma"),
   );
   const evaluations = el("input", {
     ...{ class: "number", type: "number", min: 8, max: 100000, step: 8, value: EVALUATIONS },
@@ -76,6 +82,7 @@ export function candidates(store, connection, placing, moved) {
     { class: "card" },
     el("header", {}, el("h3", {}, "Best place"), el("span", { class: "grow" }), start),
     el("p", { class: "field" }, goal),
+    el("p", { class: "field" }, judged),
     el(
       "details",
       { class: "group-of-keys" },
@@ -116,7 +123,10 @@ export function candidates(store, connection, placing, moved) {
     placing.reset();
     moved();
     const count = Math.min(100000, Math.max(8, Math.round(Number(evaluations.value)) || 64));
-    connection.send({ type: "layout", goal: goal.value, ranges: spans, evaluations: count });
+    connection.send({
+      ...{ type: "layout", goal: goal.value, ranges: spans, evaluations: count },
+      grid: judged.value === "grid",
+    });
   }
 
   /** Take what the job says of a search, once. */
@@ -151,6 +161,7 @@ export function candidates(store, connection, placing, moved) {
     const { layout, job } = store;
     const planned = store.outcome?.revision === job?.revision;
     const live = store.connection === "open" && Boolean(job?.values);
+    judged.hidden = job?.values?.plan?.method !== "continuous";
     start.textContent = running() ? "Stop" : layout ? "Look again" : "Look for it";
     start.disabled = !live || (!running() && (!planned || !ranges()));
     bar.hidden = !running();
@@ -173,12 +184,12 @@ export function candidates(store, connection, placing, moved) {
   function say(stale) {
     const { layout } = store;
     const words = !layout
-      ? "The library's layout search, from where the part lies. It takes from seconds to many minutes; a change of the job stops it."
+      ? "The library's layout search, from where the part lies. It takes from seconds to many minutes, and a change of the job stops it."
       : stale
         ? "Of the job before its last change. Look again for that of the job as it is."
         : running()
           ? `${layout.label}: ${layout.total ? `${layout.done} of ${layout.total}` : "under way"}. ${counted(layout.tried, "placement")} tried.`
-          : `${counted(layout.tried, "placement")} tried, ${layout.feasible} feasible${layout.state === "stopped" ? "; stopped" : ""}. ${layout.said}`;
+          : `${counted(layout.tried, "placement")} tried, ${layout.feasible} feasible${layout.state === "stopped" ? "; stopped" : ""}. ${layout.said}${layout.grid ? " Values are those of the grid; plans over continuous gamma may be faster." : ""}`;
     if (said.textContent !== words) said.textContent = words;
   }
 

@@ -120,7 +120,8 @@ export function layoutSheet(store, connection, view) {
   /** Have what is moved in the job: one step of undo. */
   function commit() {
     const offsets = placing.offsets();
-    if (Object.keys(offsets).length) placing.awaits = connection.send({ type: "place", offsets });
+    if (Object.keys(offsets).length)
+      placing.awaits = connection.send({ type: "place", scene: store.scene?.revision, offsets });
     moved();
   }
 
@@ -188,8 +189,8 @@ export function layoutSheet(store, connection, view) {
       : count
         ? `Out of reach: ${count} of ${counted(nodes, "node")}, on ${lost.length} of ${counted(contours.length, "contour")}.`
         : `All ${counted(nodes, "node")} of ${counted(contours.length, "contour")} are within reach.`;
-    const swatch = (/** @type {string} */ kind) => el("i", { class: `swatch ${kind}` });
-    const said = el("p", { class: count ? "fault" : "" }, swatch(count ? "lost" : "here"), words);
+    const stroke = (/** @type {string} */ kind) => el("i", { class: `stroke ${kind}` });
+    const said = el("p", { class: count ? "fault" : "" }, stroke(count ? "lost" : "here"), words);
     if (reach.textContent === words + lost.map(where).join("") && reach.childElementCount) return;
     reach.replaceChildren(
       said,
@@ -218,11 +219,13 @@ export function layoutSheet(store, connection, view) {
     if (idle && placing.reach && !out && looked !== key && !here) find(key);
     const row = (/** @type {string} */ name, /** @type {number | null | undefined} */ value) =>
       el("dd", {}, value === undefined || value === null ? name : `${fixed(value, 2)} m/min`);
-    const was = here ? known?.before : known?.now;
+    const was = here && !placing.moved ? known?.before : known?.now;
     const gain =
-      here && known?.now && was ? el("span", { class: "quiet" }, ` ${change(known.now, was)}`) : "";
+      here && !placing.moved && known?.now && was
+        ? el("span", { class: "quiet" }, ` ${change(known.now, was)}`)
+        : "";
     const state = placing.moved
-      ? "once it is let go"
+      ? "once it is in the job"
       : out
         ? "none: nodes are out of reach"
         : looking

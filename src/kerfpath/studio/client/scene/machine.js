@@ -63,6 +63,9 @@ export class Machine {
     /** Part and fixtures, and the bodies that do not go with the part: both stand in the base. */
     this.carried = new Group();
     this.standing = new Group();
+    /** The part where the job has it, seen while it is shown elsewhere. */
+    this.left = new Group();
+    this.left.visible = false;
     this.carried.matrixAutoUpdate = this.standing.matrixAutoUpdate = false;
     /** @type {Record<Kind, MeshStandardMaterial>} */
     this.materials = /** @type {any} */ ({});
@@ -84,6 +87,11 @@ export class Machine {
       opacity: 0.42,
       roughness: 0.8,
     });
+    this.leftMaterial = new MeshBasicMaterial({
+      transparent: true,
+      opacity: 0.22,
+      depthWrite: false,
+    });
     this.triangles = 0;
     this.paint();
   }
@@ -93,6 +101,7 @@ export class Machine {
     for (const [kind, material] of Object.entries(this.materials))
       material.color = new Color(themeColour(COLOURS[/** @type {Kind} */ (kind)]));
     this.edge.color = new Color(themeColour("--edge"));
+    this.leftMaterial.color = new Color(themeColour("--part"));
     this.ghostMaterial.color = new Color(themeColour("--ghost"));
   }
 
@@ -130,6 +139,7 @@ export class Machine {
       this.ghostFrames.push(ghost);
     }
     this.frames[0].add(this.carried, this.standing);
+    this.standing.add(this.left);
     this.triangles = 0;
     for (const { faces, edges, edged, by, kind } of made) {
       const parent = typeof by === "number" ? this.frames[by] : this[by];
@@ -141,6 +151,11 @@ export class Machine {
         const lines = new BufferGeometry();
         lines.setAttribute("position", new BufferAttribute(edges, 3));
         parent.add(new LineSegments(lines, this.edge));
+      }
+      if (kind === "part") {
+        const left = new Mesh(faces, this.leftMaterial);
+        left.raycast = () => {}; // nobody points at it
+        this.left.add(left);
       }
       if (typeof by === "number")
         for (const [order, material] of [this.veil, this.ghostMaterial].entries()) {
@@ -159,6 +174,7 @@ export class Machine {
     this.ghost.clear();
     this.carried.clear();
     this.standing.clear();
+    this.left.clear();
     this.frames = [];
     this.ghostFrames = [];
   }

@@ -274,6 +274,7 @@ export class Placing {
     machine.group.matrixAutoUpdate = false;
     set(machine.group, this.base);
     set(machine.standing, away);
+    machine.left.visible = this.moved;
     set(machine.carried, away.clone().multiply(this.part));
     this.lay();
   }
