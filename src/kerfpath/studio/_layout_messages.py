@@ -35,7 +35,8 @@ class TryEntry(Message):
     status: str
     stage: str
     value: float | None
-    about: float | None
+    bound: float | None
+    estimate: float | None
     reason: str | None
     part: Numbers
     rest: Numbers

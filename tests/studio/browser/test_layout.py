@@ -20,6 +20,11 @@ HANDLE = """() => {
     const [{ x, y }, at] = [stage.project(placing.handle.position), canvas.getBoundingClientRect()];
     return [at.left + x, at.top + y];
 }"""
+SEEN = "placing.middle"
+SETTLED = """() => {
+    const [{ moved, numbers }, { part }] = [studio.view.placing, studio.store.job.values];
+    return !moved && String(numbers.xyz) === String(part.xyz_mm);
+}"""
 PART = """() => {
     const { machine } = studio.view;
     machine.group.updateMatrixWorld(true);
@@ -133,6 +138,23 @@ def test_the_part_follows_a_hand_and_is_put_back_by_undo(opened):
     until(page, lambda: not page.evaluate("() => studio.view.placing.moved"))
     page.locator("#undo").click()
     until(page, lambda: part_of(page) == was)
+    # The robot by its handle: the part stays where it is seen, and is elsewhere in the base.
+    until(page, lambda: page.evaluate(SETTLED))
+    page.get_by_role("button", name="Robot", exact=True).click()
+    seen = page.evaluate(HANDLE.replace("placing.handle.position", SEEN))
+    x, y = page.evaluate(HANDLE)
+    page.mouse.move(x, y)
+    until(page, lambda: page.evaluate("() => studio.view.placing.gizmo.axis") == "XYZ")
+    page.mouse.down()
+    page.mouse.move(x - 20, y + 10, steps=4)
+    dragged = page.evaluate("() => studio.view.placing.offsets()")
+    page.mouse.up()
+    until(page, lambda: part_of(page) != was)
+    moved = [dragged[f"base_{axis}_mm"] for axis in "xyz"]
+    assert part_of(page)["xyz_mm"] == pytest.approx(np.subtract(was["xyz_mm"], moved), abs=1e-3)
+    until(page, lambda: page.evaluate(SETTLED))
+    again = page.evaluate(HANDLE.replace("placing.handle.position", SEEN))
+    assert again == pytest.approx(seen, abs=0.1)
     page.keyboard.press("Escape")
     until(page, lambda: not page.evaluate("() => studio.view.placing.open"))
     assert page.evaluate("() => studio.view.placing.lost.visible") is False

@@ -271,7 +271,8 @@
  * @property {"feasible" | "speed" | "collision" | "unreachable"} status
  * @property {string} stage
  * @property {number | null} value
- * @property {number | null} about
+ * @property {number | null} bound
+ * @property {number | null} estimate
  * @property {string | null} reason
  * @property {number[]} part  16, how the part moves in the robot's base
  * @property {number[]} rest  16, how all else but the robot does

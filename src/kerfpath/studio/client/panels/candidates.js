@@ -198,8 +198,9 @@ export function candidates(store, connection, placing, moved) {
    * @param {boolean} disabled
    */
   function entry(tried, disabled) {
-    const { number, offsets, value, about, status, reason } = tried;
+    const { number, offsets, value, bound, estimate, status, reason } = tried;
     const unit = GOALS[store.layout?.goal ?? "speed"].value;
+    const most = store.layout?.goal === "motion" ? "at least" : "at most";
     const own = (store.layout?.best ?? []).find(isOwn)?.value ?? null;
     const gain = value !== null && own !== null && !isOwn(tried) ? `, ${change(value, own)}` : "";
     const words =
@@ -207,9 +208,11 @@ export function candidates(store, connection, placing, moved) {
         ? `${digits(value, 3)} ${unit}${gain}`
         : status !== "feasible"
           ? { unreachable: "out of reach", collision: "collides", speed: "no path" }[status]
-          : about !== null
-            ? `about ${digits(about, 3)} ${unit}`
-            : "within reach";
+          : bound !== null
+            ? `${most} ${digits(bound, 3)} ${unit}`
+            : estimate !== null
+              ? `about ${digits(estimate, 3)} ${unit}`
+              : "within reach";
     return el(
       "button",
       {
@@ -229,7 +232,7 @@ export function candidates(store, connection, placing, moved) {
    */
   function taking(tried, live) {
     const take = () => {
-      placing.awaits = connection.send({ type: "take", number: tried.number });
+      placing.sent(connection.send({ type: "take", number: tried.number }));
     };
     const disabled = !live || tried.status !== "feasible";
     return [

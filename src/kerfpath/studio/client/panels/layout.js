@@ -121,7 +121,7 @@ export function layoutSheet(store, connection, view) {
   function commit() {
     const offsets = placing.offsets();
     if (Object.keys(offsets).length)
-      placing.awaits = connection.send({ type: "place", scene: store.scene?.revision, offsets });
+      placing.sent(connection.send({ type: "place", scene: store.scene?.revision, offsets }));
     moved();
   }
 

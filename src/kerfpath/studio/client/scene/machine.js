@@ -33,7 +33,7 @@ const COLOURS = {
 const MOST_EDGES = 60000;
 
 /**
- * What moves a body: a joint, the part with what holds it, or nothing but the robot's base.
+ * What moves a body: a joint, the part with what holds it, or nothing. A floor goes with the base.
  * @param {Body} body
  * @param {string[]} standing  names of the fixtures that do not go with the part
  * @returns {number | "carried" | "standing"}
@@ -41,7 +41,7 @@ const MOST_EDGES = 60000;
 const carrier = ({ kind, name, frame }, standing) =>
   kind === "part" || (kind === "fixture" && !standing.includes(name))
     ? "carried"
-    : kind === "fixture" || kind === "floor"
+    : kind === "fixture"
       ? "standing"
       : frame;
 
@@ -60,7 +60,7 @@ export class Machine {
     this.frames = [];
     /** @type {Group[]} */
     this.ghostFrames = [];
-    /** Part and fixtures, and the bodies that do not go with the part: both stand in the base. */
+    /** The part with its fixtures, and the fixtures that do not go with it; both in the base. */
     this.carried = new Group();
     this.standing = new Group();
     /** The part where the job has it, seen while it is shown elsewhere. */
@@ -157,7 +157,7 @@ export class Machine {
         left.raycast = () => {}; // nobody points at it
         this.left.add(left);
       }
-      if (typeof by === "number")
+      if (typeof by === "number" && kind !== "floor")
         for (const [order, material] of [this.veil, this.ghostMaterial].entries()) {
           const part = new Mesh(faces, material);
           part.renderOrder = 10 + order;

@@ -57,8 +57,9 @@ export class Placing {
     this.part = new Matrix4();
     this.base = new Matrix4();
     this.mount = 0; // deg, of the head
-    /** Whether what is shown is on its way into the job. */
+    /** Whether what is shown is on its way into the job, and whether it has not been sent. */
     this.awaits = false;
+    this.fresh = false;
     this.middle = new Vector3();
     /** @type {{xyz: number[], rpy: number[]} | null} what the job said of the part in the scene */
     this.numbers = null;
@@ -91,6 +92,7 @@ export class Placing {
       const { matrix: at } = this.handle;
       if (this.what === "robot") this.base.copy(at);
       else this.part.copy(at).multiply(new Matrix4().setPosition(this.middle.clone().negate()));
+      this.fresh = true;
       this.apply();
       this.tell(false);
     });
@@ -182,6 +184,7 @@ export class Placing {
     if (!this.numbers) return;
     const from = poseOf(this.numbers.xyz, this.numbers.rpy).invert();
     this.part.copy(this.base).multiply(poseOf(xyz, rpy)).multiply(from);
+    this.fresh = true;
     this.apply();
   }
 
@@ -194,6 +197,7 @@ export class Placing {
   moveRobot(xyz, yaw, mount) {
     this.base.copy(poseOf(xyz, [0, 0, yaw]));
     this.mount = mount;
+    this.fresh = true;
     this.apply();
   }
 
@@ -205,22 +209,38 @@ export class Placing {
     this.base.copy(matrix(rest)).invert();
     this.part.copy(this.base).multiply(matrix(part));
     this.mount = offsets.mount_deg ?? 0;
+    this.fresh = true;
     this.apply();
+  }
+
+  /**
+   * What is shown has been asked for.
+   * @param {boolean} awaits  whether it can be waited for
+   */
+  sent(awaits) {
+    this.awaits = awaits;
+    this.fresh = false;
   }
 
   /** Have all where the job has it. */
   reset() {
-    this.part.identity();
-    this.base.identity();
-    this.mount = 0;
+    this.clear();
     this.apply();
   }
 
-  /** A new scene: what was moved is there now, seen from the robot's base. */
+  clear() {
+    this.part.identity();
+    this.base.identity();
+    this.mount = 0;
+    this.fresh = false;
+  }
+
+  /** A new scene: what was sent is there now, seen from the robot's base; what is fresh is kept. */
   landed() {
     const { stage, store } = this.view;
     const away = this.base.clone().invert();
-    if (!away.equals(new Matrix4())) stage.move(away);
+    const still = away.equals(new Matrix4());
+    if (!this.fresh && !still) stage.move(away);
     const there = matrix(store.scene?.T_part ?? []);
     const motion = there.clone().multiply(this.there.invert());
     this.there = there;
@@ -228,12 +248,8 @@ export class Placing {
     const { xyz_mm, rpy_deg } = store.job?.values?.part ?? {};
     this.numbers = xyz_mm && rpy_deg ? { xyz: xyz_mm, rpy: rpy_deg } : null;
     this.reach = null;
-    if (this.gizmo.dragging) this.part.multiply(motion.invert());
-    else {
-      this.part.identity();
-      this.base.identity();
-      this.mount = 0;
-    }
+    if (this.fresh && still) this.part.multiply(motion.invert());
+    else this.clear();
     this.lay();
     this.draw();
   }
