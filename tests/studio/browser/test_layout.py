@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from jobs import DEMO
-from studio.browser.test_page import serious, until
+from studio.browser.test_page import ready, serious, until
 from studio.browser.test_studio import JOB, REVISION, Server, settled
 
 GRID = JOB.replace("[plan]", '[plan]\nmethod = "exact"')
@@ -193,3 +193,50 @@ def test_the_fastest_speed_follows_and_the_best_place_is_found_and_taken(opened)
     settled(page, page.evaluate(REVISION) - 1)
     until(page, lambda: before in sheet.locator("dd").nth(1).inner_text(), seconds=120)
     until(page, lambda: re.search(r"\d m/min", sheet.locator("dd").first.inner_text()), seconds=120)
+
+
+def test_what_the_search_has_tried_is_said_in_words(page, studio, first, messages):
+    (reach,), (layout,) = messages["reach"], messages["layout"]
+
+    def react(message):
+        if message["type"] == "reach":
+            far = message["offsets"].get("x_mm", 0) > 500
+            contours = [
+                each | {"out": list(range(10)) if far else []} for each in reach["contours"]
+            ]
+            studio.say(reach | {"number": message["number"], "contours": contours})
+
+    studio.react = react
+    studio.open(*first, layout)
+    ready(page)
+    page.get_by_role("button", name="Layout").click()
+    rows = page.locator(".tries button .name")
+    said = ["5.14 m/min, +6.5 %", "4.83 m/min", "at most 5.14 m/min", "about 4.75 m/min"]
+    until(page, lambda: rows.all_inner_texts() == [*said, "out of reach"])
+    sheet = page.locator("#sheet")
+    take = sheet.get_by_role("button", name="Take it")
+    rows.last.click()
+    until(page, lambda: "Out of reach: 20 of" in sheet.inner_text())
+    assert take.is_disabled()
+    assert "no pose at node 16" in sheet.inner_text()
+    rows.first.click()
+    until(page, lambda: "are within reach" in sheet.inner_text())
+    assert page.get_by_label("Part x, mm").input_value() == "1260"
+    assert serious(page) == []
+    take.click()
+    assert studio.sent[-1] == {"type": "take", "number": 3}
+    sheet.get_by_role("button", name="Back to the job's place").click()
+    assert page.get_by_label("Part x, mm").input_value() == "1200"
+    sheet.get_by_role("button", name="Look again").click()
+    asked = next(m for m in reversed(studio.sent) if m["type"] == "layout")
+    spans = {"x_mm": [-200, 200], "y_mm": [-200, 200], "yaw_deg": [-30, 30]}
+    assert asked == {
+        "type": "layout", "goal": "speed", "ranges": spans, "evaluations": 64, "grid": True,
+    }  # fmt: skip
+    studio.say(layout | {"state": "running"})
+    sheet.get_by_role("button", name="Stop").first.click()
+    assert studio.sent[-1]["type"] == "cancel"
+    job = next(m for m in first if m["type"] == "job")
+    studio.say(job | {"revision": 2})
+    until(page, lambda: "Of the job before its last change" in sheet.inner_text())
+    assert page.locator(".tries button:disabled").count() == 5

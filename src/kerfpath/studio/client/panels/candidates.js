@@ -39,6 +39,8 @@ export function candidates(store, connection, placing, moved) {
   /** @type {number | null} the one that is shown */
   let shown = null;
   let filled = false;
+  /** @type {unknown[]} what the list was drawn of: it is drawn again only where that changes */
+  let drawnBefore = [];
   const goal = el(
     "select",
     { "aria-label": "What is best" },
@@ -95,7 +97,7 @@ export function candidates(store, connection, placing, moved) {
     list,
     actions,
   );
-  return { element, draw };
+  return { element, draw, forget: () => (shown = null) };
 
   function running() {
     return store.layout?.state === "running" && !store.stale(store.layout);
@@ -170,6 +172,9 @@ export function candidates(store, connection, placing, moved) {
     const stale = layout !== null && store.stale(layout);
     if (stale || !placing.moved) shown = null;
     say(stale);
+    const drawn = [layout, shown, stale, live];
+    if (drawn.every((each, i) => each === drawnBefore[i])) return;
+    drawnBefore = drawn;
     const tries = layout?.best ?? [];
     const focused = /** @type {HTMLElement | null} */ (document.activeElement)?.dataset?.number;
     list.classList.toggle("stale-set", stale);

@@ -80,7 +80,11 @@ export function layoutSheet(store, connection, view) {
     xyz[0].input.focus();
   });
   byId("sheet").addEventListener("close", leave);
-  placing.on((done) => (done ? commit() : moved()));
+  placing.on((done) => {
+    search.forget();
+    if (done) commit();
+    else moved();
+  });
   store.on(["job"], () => {
     if (!placing.open || store.job?.revision === revision) return;
     revision = store.job?.revision ?? 0;
@@ -145,6 +149,7 @@ export function layoutSheet(store, connection, view) {
   }
 
   function putPart() {
+    search.forget();
     placing.put(
       xyz.map(({ input }) => Number(input.value)),
       rpy.map(({ input }) => Number(input.value)),
@@ -153,6 +158,7 @@ export function layoutSheet(store, connection, view) {
   }
 
   function putRobot() {
+    search.forget();
     placing.moveRobot(
       base.map(({ input }) => Number(input.value)),
       Number(yaw.input.value),
@@ -237,6 +243,10 @@ export function layoutSheet(store, connection, view) {
               : "once all is planned";
     const now = row(state, here && !out && !placing.moved ? known?.now : null);
     now.append(gain);
+    const offer = looking ? "stop" : idle && !here && !out && looked === key ? "look" : "";
+    const drawn = [selected, now.textContent, was, offer].join();
+    if (speed.dataset.drawn === drawn) return;
+    speed.dataset.drawn = drawn;
     speed.replaceChildren(
       el("p", { class: "quiet small" }, `Of ${selected}, constant along it.`),
       el(
@@ -247,10 +257,10 @@ export function layoutSheet(store, connection, view) {
         el("dt", {}, "before"),
         row("–", was),
       ),
-      ...(looking
+      ...(offer === "stop"
         ? [el("button", { class: "text", onclick: () => stop() }, "Stop looking")]
-        : idle && !here && !out && looked === key
-          ? [el("button", { class: "text", onclick: () => find(key) }, "Look for it")]
+        : offer
+          ? [el("button", { class: "text", onclick: () => find(key) }, "Find the fastest")]
           : []),
     );
   }
