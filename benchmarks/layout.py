@@ -17,8 +17,8 @@ from kerfpath.job import Goal, Job, warm_up
 from kerfpath.search import SearchProblem, find_least_interval
 from kerfpath.study import Layout, digest, layout
 from kerfpath.study._evaluator import SampledContour
-from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, middle_of
-from kerfpath.study.placing._place import move_job, numbers_of
+from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, nodes_of
+from kerfpath.study.placing._place import middle_of, move_job, numbers_of
 from kerfpath.study.placing._search import HALF
 from kerfpath.study.placing._value import PlacementValue
 
@@ -198,7 +198,7 @@ def _job(folder: Path, *, quick: bool) -> Path:
 
 def _bounds(found: Layout, contours: Sequence[SampledContour], placements: int) -> list[Figure]:
     """Return how far bounds are above exact speeds, and the share of time that they take."""
-    middle, rng = middle_of(found.job, contours), np.random.default_rng(5)
+    middle, rng = middle_of(found.job, nodes_of(contours)), np.random.default_rng(5)
     over: dict[str, list[float]] = {}
     share: dict[str, list[float]] = {}
     _timed(found.job, contours[0], np.arange(len(contours[0].nodes)))  # what is loaded once
