@@ -200,7 +200,7 @@ async def _socket(socket: WebSocket) -> None:
             else:
                 await session.hear(ask, page)
     finally:
-        session.hub.close(page)
+        session.leave(page)
         for look in looking:
             look.cancel()
         sending.cancel()

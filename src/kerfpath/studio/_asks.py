@@ -27,7 +27,9 @@ __all__ = [
     "Relax",
     "Rename",
     "Save",
+    "ShadeOf",
     "Take",
+    "TechniqueOf",
     "Text",
     "TextOf",
     "parse",
@@ -136,6 +138,22 @@ class ReasonOf(_Strict):
     node: Index
     gamma: float
     posture: Annotated[int, Field(ge=0, lt=64)]
+
+
+class ShadeOf(_Strict):
+    """What the map of a contour is shaded by; null: nothing, stop looking for it."""
+
+    type: Literal["shade"]
+    contour: Words
+    by: Words | None
+
+
+class TechniqueOf(_Strict):
+    """The course of another technique along a contour; null: of none, stop looking for it."""
+
+    type: Literal["technique"]
+    contour: Words
+    method: Literal["paper", "known"] | None
 
 
 class Relax(_Strict):
@@ -247,6 +265,8 @@ Ask = (
     | Save
     | OfContour
     | ReasonOf
+    | ShadeOf
+    | TechniqueOf
     | Relax
     | Cut
     | Leave

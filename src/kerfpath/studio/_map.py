@@ -14,10 +14,11 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.job import CutResult, Job
 from kerfpath.losses import Loss, Reason
 from kerfpath.robots import posture_name
+from kerfpath.studio._map_messages import ShadeName
 from kerfpath.studio._messages import CodeLayer, CourseEntry, MapMessage, PoseMessage
 from kerfpath.studio._numbers import flat
 
-__all__ = ["map_id", "map_message", "pose_message"]
+__all__ = ["map_id", "map_message", "pose_message", "with_collisions"]
 
 KINDS = {
     Loss.ADMITTED: "admitted",
@@ -43,8 +44,22 @@ def map_id(graph: LayeredGraph) -> str:
     return digest.hexdigest()[:16]
 
 
+def with_collisions(cut: CutResult, graph: LayeredGraph) -> LayeredGraph:
+    """Return the graph with what collides lost, where the job asks for a map of its cell."""
+    from kerfpath.report import add_clearance
+
+    known = cut.clearance
+    fits = known is not None and len(known.clear) == len(graph.q)
+    return add_clearance(graph, known) if fits and known is not None else graph
+
+
 def map_message(
-    cuts: Sequence[CutResult], nodes: Contour, graph: LayeredGraph, *, revision: int
+    cuts: Sequence[CutResult],
+    nodes: Contour,
+    graph: LayeredGraph,
+    *,
+    shades: Sequence[ShadeName],
+    revision: int,
 ) -> MapMessage:
     """Return the map of a contour with the course of its plans, as the report draws it.
 
@@ -55,14 +70,15 @@ def map_message(
     nodes : Contour
     graph : LayeredGraph
         Of the whole of it.
+    shades : sequence of ShadeName
+        What it can be shaded by.
     revision : int
         Of the job.
     """
-    from kerfpath.report import add_clearance, hidden_postures, reason_colours, shown_postures
+    from kerfpath.report import hidden_postures, reason_colours, shown_postures
 
-    name, clearance, first = map_id(graph), cuts[0].clearance, float(nodes.s[0])
-    if clearance is not None and len(clearance.clear) == len(graph.q):
-        graph = add_clearance(graph, clearance)
+    name, first = map_id(graph), float(nodes.s[0])
+    graph = with_collisions(cuts[0], graph)
     codes = graph.reason_by_gamma
     return MapMessage(
         revision=revision,
@@ -83,6 +99,7 @@ def map_message(
             for mu in shown_postures(graph)
         ],
         hidden=hidden_postures(graph),
+        shades=list(shades),
         course=[
             CourseEntry(
                 name=cut.plan.name,
@@ -127,6 +144,7 @@ def pose_message(
     )
     q = solved[0, 0, posture] if reach[0, 0, posture] else None
     admitted = KINDS.get(why.loss) == "admitted"
+    reason = _turns(graph, why, node, sample, posture) if admitted else _in_numbers(job, why, q)
     return PoseMessage(
         contour=contour,
         node=node,
@@ -134,8 +152,21 @@ def pose_message(
         posture=posture,
         q=None if q is None else flat(q),
         admitted=admitted,
-        reason=_in_numbers(job, why, q),
+        reason=reason,
     )
+
+
+def _turns(graph: LayeredGraph, why: Reason, node: int, sample: int, posture: int) -> str:
+    """Say where the joints may be that are admitted on several turns at a place of the map."""
+    layer = slice(*graph.start[node : node + 2])
+    here = (graph.sample[layer] == sample) & (graph.posture[layer] == posture)
+    variant = graph.variant[layer][here]
+    q = graph.q[layer][here][variant == variant.min(initial=len(graph.tilt))]
+    if len(q) < 2:
+        return str(why)
+    places = [sorted({f"{x:.0f}" for x in column}, key=float) for column in np.degrees(q).T]
+    several = [f"joint {i + 1} at {' or '.join(at)} deg" for i, at in enumerate(places) if at[1:]]
+    return f"{why}{', ' if ': ' in why else ': '}on {len(q)} turns, {', '.join(several)}"
 
 
 def _in_numbers(job: Job, why: Reason, q: Array | None) -> str:

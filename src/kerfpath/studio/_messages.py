@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from kerfpath.studio._clearance_messages import ClearanceMessage
+from kerfpath.studio._map_messages import ShadeMessage, ShadeName, TechniqueMessage
 from kerfpath.studio._numbers import Message, Numbers
 from kerfpath.studio._part_messages import FaceEntry, LoopEntry, PartMessage
 from kerfpath.studio._program_messages import FileEntry, FindingEntry, ProgramTextMessage
@@ -46,6 +47,8 @@ __all__ = [
     "SampleEntry",
     "SceneMessage",
     "Segment",
+    "ShadeMessage",
+    "TechniqueMessage",
 ]
 
 
@@ -348,6 +351,7 @@ class MapMessage(Message):
     colours: list[str]
     layers: list[CodeLayer]
     hidden: list[str]
+    shades: list[ShadeName]
     course: list[CourseEntry]
 
 

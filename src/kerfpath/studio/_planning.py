@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from functools import partial
 from threading import Event
@@ -10,7 +9,7 @@ from typing import NamedTuple
 
 from kerfpath.cad import Part
 from kerfpath.contour import Contour
-from kerfpath.errors import InputError, KerfpathError
+from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import (
     CutResult,
@@ -45,13 +44,12 @@ from kerfpath.studio._messages import (
 from kerfpath.studio._numbers import Message
 from kerfpath.studio._run import Run, drafts_of
 from kerfpath.studio._scene import Meshes, scene_of, scene_of_robot, tables_of
-from kerfpath.studio._work import Newest, Stop
+from kerfpath.studio._work import Newest, Stop, said_of
 
 __all__ = ["Outcome", "Planning"]
 
 PATIENCE = 0.3
 """s: where a draft shows what a change does, a run begins once nothing has changed for so long."""
-log = logging.getLogger("kerfpath.studio")
 
 
 class Outcome(NamedTuple):
@@ -80,6 +78,8 @@ class Planning:
         Those of the scene.
     cuts : dict of str to tuple of CutResult
         What came of each contour, by its name.
+    revisions : dict of str to int
+        Of the job that these came of, or of one before it.
     result : Outcome or None
         What the job that was planned last comes to.
     layouts : Layouts
@@ -107,6 +107,7 @@ class Planning:
         self.meshes = self._shown = Meshes()
         self.prepared: PreparedJob | None = None
         self.cuts: dict[str, tuple[CutResult, ...]] = {}
+        self.revisions: dict[str, int] = {}
         self.result: Outcome | None = None
 
     def take(self, job: Job, revision: int, first: str | None) -> None:
@@ -253,7 +254,7 @@ class Planning:
             self._say(ProgressMessage(busy=True, label="compiling the kernels, first run only"))
             warm_up()
         run = Run(self._bench, prepared, revision, self._say, stop)
-        tried = run.contours(first, partial(self._took, motion_key(job)))
+        tried = run.contours(first, partial(self._took, motion_key(job), revision))
         self._look_ahead(prepared, revision, run)
         self._settle(run.ordered(tried), revision, settled=False)
         assert self.result is not None
@@ -294,11 +295,12 @@ class Planning:
             self._refused(all_of(found), revision)
         self._looked = setup
 
-    def _took(self, key: str, contour: str, cuts: tuple[CutResult, ...]) -> None:
+    def _took(self, key: str, revision: int, contour: str, cuts: tuple[CutResult, ...]) -> None:
         """Keep what came of a contour."""
         if self._before[0] != key:
             self._before = key, {}
         self.cuts[contour] = cuts
+        self.revisions[contour] = revision  # once they are there: never newer than they are
         made = cuts[0].plan
         if len(cuts) == 1 and made is not None:
             self._before[1][contour] = made
@@ -346,12 +348,7 @@ class Planning:
 
     def _failed(self, error: BaseException) -> None:
         """Say what went wrong in a thread."""
-        if isinstance(error, KerfpathError):
-            message = str(error)
-        else:
-            log.error("the studio's planning failed", exc_info=error)
-            message = f"a fault in kerfpath, {type(error).__name__}: {error}; the terminal has more"
-        self._say(ErrorMessage(message=message))
+        self._say(ErrorMessage(message=said_of(error)))
         self._say(ProgressMessage(busy=False))
 
 

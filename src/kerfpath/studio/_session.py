@@ -40,7 +40,9 @@ from kerfpath.studio._asks import (
     Relax,
     Rename,
     Save,
+    ShadeOf,
     Take,
+    TechniqueOf,
     Text,
     TextOf,
 )
@@ -49,7 +51,7 @@ from kerfpath.studio._exports import WAIT, File, in_language, program_text
 from kerfpath.studio._hub import Hub, Page
 from kerfpath.studio._job_entry import faults_of, job_message
 from kerfpath.studio._kept import Kept
-from kerfpath.studio._map import map_message, pose_message
+from kerfpath.studio._looks import Looks
 from kerfpath.studio._messages import (
     ContourName,
     ErrorMessage,
@@ -62,6 +64,7 @@ from kerfpath.studio._newer import Newer
 from kerfpath.studio._numbers import Message
 from kerfpath.studio._planning import Outcome, Planning
 from kerfpath.studio._scene import tables_of
+from kerfpath.studio._work import said_of
 
 __all__ = ["Session"]
 
@@ -82,6 +85,7 @@ class Session:
         self.hub = Hub()
         self.kept = Kept()
         self._planning = Planning(self._from_thread, self._prepared_there, self._refused_there)
+        self._looks = Looks(self._planning, self._to_page, self._look_failed)
         self._newer = Newer()
         self._job: Job | None = None
         self._faults: list[Fault] = []
@@ -103,7 +107,13 @@ class Session:
                 self._changed.clear()
                 await self._read()
         finally:
+            self._looks.close()
             self._planning.close()
+
+    def leave(self, page: Page) -> None:
+        """Forget a page that is closed."""
+        self.hub.close(page)
+        self._looks.leave(page)
 
     @property
     def meshes(self) -> dict[str, bytes]:
@@ -190,9 +200,14 @@ class Session:
             case OfContour(type="fastest"):
                 self._planning.fastest(ask.contour, self.document.revision)
             case OfContour():
-                page.say(await asyncio.to_thread(self._map, ask.contour))
+                revision = self.document.revision
+                page.say(await asyncio.to_thread(self._looks.map, ask.contour, revision))
             case ReasonOf():
-                page.say(await asyncio.to_thread(self._pose, ask))
+                page.say(await asyncio.to_thread(self._looks.pose, ask))
+            case ShadeOf():
+                self._looks.shade(page, ask, self.document.revision)
+            case TechniqueOf():
+                self._looks.technique(page, ask)
             case Relax():
                 self._relax(ask)
             case Cut():
@@ -265,23 +280,6 @@ class Session:
                 self._replace(self.kept.text(ask.id))
         self.hub.say(self.kept.message())
 
-    def _map(self, contour: str) -> Message:
-        _, cuts, nodes, graph = self._planning.whole(contour)
-        return map_message(cuts, nodes, graph, revision=self.document.revision)
-
-    def _pose(self, ask: ReasonOf) -> Message:
-        prepared, _, nodes, graph = self._planning.whole(ask.contour)
-        K, _, postures = graph.reason.shape
-        if not (ask.node < K and ask.posture < postures):
-            raise InputError(
-                f"reason: expected a node below {K} and a posture below {postures}, got "
-                f"{ask.node} and {ask.posture}"
-            )
-        return pose_message(
-            ask.contour, prepared.job, nodes, graph,
-            node=ask.node, gamma=ask.gamma, posture=ask.posture,
-        )  # fmt: skip
-
     async def _read(self) -> None:
         """Read the job as it is now, and have it planned."""
         document = self.document
@@ -308,6 +306,12 @@ class Session:
                 self.document, self._job, self._contours, self._faults, interval=self._interval
             )
         )
+
+    def _to_page(self, page: Page, message: Message) -> None:
+        self._soon(page.say, message)
+
+    def _look_failed(self, page: Page, kind: str, error: BaseException) -> None:
+        self._to_page(page, ErrorMessage(message=said_of(error), about=kind))
 
     def _from_thread(self, message: Message) -> None:
         """Take a message from any thread."""

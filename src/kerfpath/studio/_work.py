@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from threading import Event, Lock
 from time import monotonic
 
+from kerfpath.errors import KerfpathError
 from kerfpath.progress import stopped_by
 
-__all__ = ["Newest", "Seldom", "Stop", "Superseded"]
+__all__ = ["Newest", "Seldom", "Stop", "Superseded", "said_of"]
+
+log = logging.getLogger("kerfpath.studio")
 
 
 class Superseded(Exception):  # it says what has happened, and is no error
@@ -120,3 +124,11 @@ class Seldom:
             return False
         self._last = now
         return True
+
+
+def said_of(error: BaseException) -> str:
+    """Return what work raised in one line; what is a fault of kerfpath goes to the log, too."""
+    if isinstance(error, KerfpathError):
+        return str(error)
+    log.error("the studio's work failed", exc_info=error)
+    return f"a fault in kerfpath, {type(error).__name__}: {error}; the terminal has more"

@@ -313,7 +313,40 @@
  * @property {string[]} colours
  * @property {{posture: number, name: string, codes: string}[]} layers
  * @property {string[]} hidden
+ * @property {{by: string, words: string, unit: string}[]} shades
  * @property {{name: string, s: number[], gamma: number[], posture: number[]}[]} course
+ */
+
+/**
+ * @typedef {object} ShadeMessage
+ * @property {"shade"} type
+ * @property {number} revision
+ * @property {string} contour
+ * @property {string} graph
+ * @property {string} by
+ * @property {string} words
+ * @property {string} unit
+ * @property {number} low
+ * @property {number} high
+ * @property {boolean} beyond
+ * @property {{posture: number, values: string, nearest: string | null}[]} layers
+ * @property {string[][]} pairs
+ */
+
+/**
+ * @typedef {object} TechniqueMessage
+ * @property {"technique"} type
+ * @property {number} revision
+ * @property {string} contour
+ * @property {"paper" | "known"} method
+ * @property {number[]} s
+ * @property {number[]} gamma
+ * @property {number[]} posture
+ * @property {number | null} cost
+ * @property {(number | null)[]} peak_velocity
+ * @property {(number | null)[]} peak_acceleration
+ * @property {string} statement
+ * @property {string[]} notes
  */
 
 /**
@@ -366,7 +399,7 @@
 /**
  * @typedef {JobMessage | PartMessage | ClearanceMessage | SceneMessage | ProgressMessage | PlanMessage | NoPathMessage
  *   | ProgramMessage | OutcomeMessage | MapMessage | PoseMessage | FastestMessage
- *   | ProgramTextMessage | KeptMessage | FrontMessage
+ *   | ShadeMessage | TechniqueMessage | ProgramTextMessage | KeptMessage | FrontMessage
  *   | CandidateMessage | ReachMessage | LayoutMessage | ErrorMessage} ServerMessage
  */
 
