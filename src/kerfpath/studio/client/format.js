@@ -65,3 +65,15 @@ export function change(now, before) {
  * @param {string} word
  */
 export const counted = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;
+
+/**
+ * Units of the trade by those of the server, and what a value is in them.
+ * @type {Record<string, {unit: string, of: (value: number) => number}>}
+ */
+export const UNITS = {
+  rad: { unit: "deg", of: deg },
+  m: { unit: "mm", of: (value) => 1e3 * value },
+  "m/s": { unit: "m/min", of: (value) => 60 * value },
+  share: { unit: "% limit", of: (value) => 100 * value },
+  "m^3": { unit: "m\u00b3", of: (value) => value },
+};

@@ -8,12 +8,14 @@
 /**
  * @typedef {"connection" | "job" | "part" | "pointed" | "clearance" | "scene" | "plan" | "program" | "outcome" | "progress" | "map"
  *   | "pose" | "fastest" | "program_text" | "error" | "selected" | "kept" | "compare" | "front"
- *   | "candidate" | "reach" | "layout"} Topic
+ *   | "candidate" | "shade" | "technique" | "reach" | "layout"} Topic
  */
 
 /** @typedef {import("./messages.js").KeptEntry} KeptEntry */
 /** @typedef {{entry: KeptEntry, plans: Map<string, PlanMessage[]>}} Against */
 /** @typedef {{name: string, s: number[], gamma: number[], posture: number[]}} Course */
+
+const MOST_SHADES = 12; // some 100 kB each
 
 /** The state of the page. One message changes it, then those who listen to its topic are called. */
 export class Store {
@@ -54,6 +56,10 @@ export class Store {
     this.clearances = new Map();
     /** @type {Map<string, MapMessage>} */
     this.maps = new Map();
+    /** @type {Map<string, import("./messages.js").ShadeMessage>} by contour and quantity */
+    this.shades = new Map();
+    /** @type {Map<string, import("./messages.js").TechniqueMessage>} by contour and method */
+    this.techniques = new Map();
     /** @type {string | null} the loop whose contour is chosen once there is one */
     this.awaited = null;
     /** @type {KeptEntry[]} jobs that are kept to be compared */
@@ -164,6 +170,8 @@ export class Store {
         break;
       case "scene":
         this.scene = message;
+        this.shades.clear(); // robot or cell may be others
+        this.techniques.clear();
         this.dropMissing();
         break;
       case "plan":
@@ -177,6 +185,14 @@ export class Store {
         break;
       case "map":
         this.maps.set(message.contour, message);
+        break;
+      case "shade":
+        this.shades.delete(`${message.contour} ${message.by}`);
+        this.shades.set(`${message.contour} ${message.by}`, message);
+        if (this.shades.size > MOST_SHADES) this.shades.delete([...this.shades.keys()][0]);
+        break;
+      case "technique":
+        this.techniques.set(`${message.contour} ${message.method}`, message);
         break;
       case "program":
         this.program = message;

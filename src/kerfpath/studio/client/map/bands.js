@@ -43,15 +43,7 @@ export class Bands {
    * @returns {Place}
    */
   place({ offsetX: x, offsetY: y }) {
-    const { grid } = this.chart;
-    const { left, top, width, height } = this.chart.frame();
-    const within = (/** @type {number} */ at) => Math.min(1, Math.max(0, at));
-    const first = grid?.message.s[0] ?? 0;
-    return {
-      ...{ x, y },
-      s: first + within((x - left) / width) * (grid?.length ?? 0),
-      gamma: 180 - 360 * within((y - top) / height),
-    };
+    return { x, y, s: this.chart.sAt(x), gamma: this.chart.gammaAt(y) };
   }
 
   /**
@@ -60,14 +52,19 @@ export class Bands {
    * @param {Frame} frame
    */
   boxes(pin, frame) {
-    const { grid } = this.chart;
+    const { grid, window } = this.chart;
     const first = grid?.message.s[0] ?? 0;
     const [from, to] = [pin.start, pin.end].map((mm) => this.chart.x(first + mm / 1e3, frame));
     // As far as the cells of its nodes, and no narrower than can be seen.
-    const beside = Math.max(2, frame.width / Math.max(1, (grid?.nodes ?? 2) - 1) / 2);
-    const x = Math.max(frame.left, from - beside);
-    const width = Math.min(frame.left + frame.width, to + beside) - x;
-    const y = (/** @type {number} */ angle) => frame.top + (0.5 - angle / 360) * frame.height;
+    const shown = (window.to - window.from) * Math.max(1, (grid?.nodes ?? 2) - 1);
+    const beside = Math.max(2, frame.width / shown / 2);
+    const [begin, end] = [
+      this.chart.x(first, frame),
+      this.chart.x(first + (grid?.length ?? 0), frame),
+    ];
+    const x = Math.max(begin, from - beside);
+    const width = Math.min(end, to + beside) - x;
+    const y = (/** @type {number} */ angle) => this.chart.up(angle, frame);
     return intervals(pin).map(([low, high]) => ({
       ...{ x, y: y(high), width, height: Math.max(2, y(low) - y(high)) },
       ...{ low, high },
@@ -105,7 +102,7 @@ export class Bands {
   begin(event) {
     this.took = false;
     const { grid, canvas } = this.chart;
-    if (event.button !== 0 || !grid?.layers.length || !this.pins.writable) return;
+    if (event.button !== 0 || event.shiftKey || !grid?.layers.length || !this.pins.writable) return;
     const frame = this.chart.frame();
     const [x, y] = [event.offsetX - frame.left, event.offsetY - frame.top];
     if (x < -NEAR || y < -NEAR || x > frame.width + NEAR || y > frame.height + NEAR) return;

@@ -1,13 +1,15 @@
 /** The drawing of a map on its canvas: cells, axes, courses, cursors. */
 
 import { fitCanvas, textSize, themeColour } from "../dom.js";
-import { fixed } from "../format.js";
+import { deg, fixed } from "../format.js";
 import { wrapped } from "./grid.js";
 import { inks, pixels } from "./paint.js";
+import { WHOLE } from "./window.js";
 
 /** @typedef {import("../messages.js").PlanMessage} PlanMessage */
 /** @typedef {import("../store.js").Course} Course */
 /** @typedef {import("./grid.js").Grid} Grid */
+/** @typedef {import("./shade.js").Shade} Shade */
 /** @typedef {(context: CanvasRenderingContext2D, frame: Frame) => void} Under */
 /** @typedef {{left: number, top: number, width: number, height: number, em: number}} Frame CSS px */
 
@@ -15,6 +17,7 @@ import { inks, pixels } from "./paint.js";
  * @typedef {object} Drawn
  * @property {PlanMessage[]} plans
  * @property {Course[]} before  drawn dashed
+ * @property {Course | null} technique  drawn dotted
  * @property {boolean} stale
  * @property {number | null} broken  m, where no path goes on
  * @property {{s: number, gamma: number} | null} now
@@ -22,7 +25,8 @@ import { inks, pixels } from "./paint.js";
  * @property {Under} under  draws what is below the courses
  */
 
-const STEPS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000]; // mm
+const TURNS = [1, 2, 5, 10, 15, 30, 45, 90]; // deg
+const STEPS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000]; // mm
 
 export class Chart {
   /** @param {HTMLCanvasElement} canvas */
@@ -31,6 +35,9 @@ export class Chart {
     /** @type {Grid | null} */
     this.grid = null;
     this.layer = 0;
+    /** @type {Shade | null} */
+    this.shade = null;
+    this.window = WHOLE;
     /** @type {HTMLCanvasElement} the cells alone, painted when they change */
     this.back = document.createElement("canvas");
     this.painted = "";
@@ -43,7 +50,7 @@ export class Chart {
 
   inks() {
     const { message } = /** @type {Grid} */ (this.grid);
-    return inks(message, this.dark(), themeColour("--free"));
+    return inks(message, this.dark(), themeColour("--free"), this.shade !== null);
   }
 
   /**
@@ -62,7 +69,7 @@ export class Chart {
   }
 
   /** @param {Drawn} drawn */
-  draw({ plans, before, stale, broken, now, hover, under }) {
+  draw({ plans, before, technique, stale, broken, now, hover, under }) {
     const { width, height, ratio } = fitCanvas(this.canvas);
     const context = this.canvas.getContext("2d");
     if (!context || !width || !height) return;
@@ -82,6 +89,13 @@ export class Chart {
     context.setLineDash([5 * scale, 4 * scale]);
     for (const plan of before)
       this.stroke(context, plan, frame, themeColour("--quiet"), 1.6 * scale);
+    if (technique) {
+      context.lineCap = "round";
+      context.setLineDash([0.1, 4.5 * scale]);
+      this.stroke(context, technique, frame, themeColour("--course-halo"), 4.6 * scale);
+      this.stroke(context, technique, frame, themeColour("--other"), 2.8 * scale);
+      context.lineCap = "butt";
+    }
     context.setLineDash([]);
     context.globalAlpha = stale ? 0.55 : 1;
     for (const plan of plans) this.course(context, plan, frame, "--course", 2.2 * scale);
@@ -100,11 +114,15 @@ export class Chart {
   cells(ratio, frame) {
     const grid = /** @type {Grid} */ (this.grid);
     const [w, h] = [Math.round(frame.width * ratio), Math.round(frame.height * ratio)];
-    const key = [grid.message.graph, grid.message.contour, this.layer, w, h, this.dark()].join(" ");
-    if (key === this.painted) return;
-    this.painted = key;
+    const { graph, contour } = grid.message;
+    const shaded = this.shade ? `${this.shade.message.by} ${this.shade.number}` : "";
+    const { from, to, top, bottom } = this.window;
+    const key = [graph, contour, this.layer, w, h, this.dark(), shaded, from, to, top, bottom];
+    if (key.join(" ") === this.painted) return;
+    this.painted = key.join(" ");
     Object.assign(this.back, { width: w, height: h });
-    const image = pixels(grid, this.layer, this.inks(), w, h, Math.round(8 * ratio));
+    const size = { width: w, height: h, period: Math.round(8 * ratio) };
+    const image = pixels(grid, this.layer, this.inks(), size, this.window, this.shade);
     this.back.getContext("2d")?.putImageData(image, 0, 0);
   }
 
@@ -114,7 +132,42 @@ export class Chart {
    */
   x(s, frame) {
     const { message, length } = /** @type {Grid} */ (this.grid);
-    return frame.left + ((s - message.s[0]) / length) * frame.width;
+    const { from, to } = this.window;
+    return frame.left + (((s - message.s[0]) / length - from) / (to - from)) * frame.width;
+  }
+
+  /**
+   * Return the path length at a place, no farther than the window shows.
+   * @param {number} x  px
+   * @returns {number} m
+   */
+  sAt(x) {
+    const { left, width } = this.frame();
+    const { from, to } = this.window;
+    const share = from + Math.min(1, Math.max(0, (x - left) / width)) * (to - from);
+    return (this.grid?.message.s[0] ?? 0) + share * (this.grid?.length ?? 0);
+  }
+
+  /**
+   * Return the rotation at a place, no farther than the window shows.
+   * @param {number} y  px
+   * @returns {number} deg
+   */
+  gammaAt(y) {
+    const { top: edge, height } = this.frame();
+    const { top, bottom } = this.window;
+    const share = top + Math.min(1, Math.max(0, (y - edge) / height)) * (bottom - top);
+    return 180 - 360 * share;
+  }
+
+  /**
+   * Return the height of an angle from -180 to 180 deg.
+   * @param {number} angle  deg
+   * @param {Frame} frame
+   */
+  up(angle, frame) {
+    const { top, bottom } = this.window;
+    return frame.top + ((0.5 - angle / 360 - top) / (bottom - top)) * frame.height;
   }
 
   /**
@@ -122,7 +175,7 @@ export class Chart {
    * @param {Frame} frame
    */
   y(gamma, frame) {
-    return frame.top + (0.5 - wrapped(gamma) / (2 * Math.PI)) * frame.height;
+    return this.up(deg(wrapped(gamma)), frame);
   }
 
   /**
@@ -139,11 +192,14 @@ export class Chart {
     context.strokeRect(left - 0.5, top - 0.5, width + 1, height + 1);
     context.textAlign = "right";
     context.textBaseline = "middle";
-    for (const gamma of [-180, -90, 0, 90, 180]) {
-      const y = top + (0.5 - gamma / 360) * height;
+    const { from, to, top: high, bottom: low } = this.window;
+    const turn = TURNS.find((each) => (360 * (low - high)) / each <= height / (1.5 * em)) ?? 90;
+    for (let gamma = -180; gamma <= 180; gamma += turn) {
+      const y = this.up(gamma, frame);
+      if (y < top - 0.5 || y > top + height + 0.5) continue;
       context.fillRect(left - 4, Math.round(y), 4, 1);
-      const edge = gamma === 180 ? 0.3 * em : gamma === -180 ? -0.3 * em : 0;
-      context.fillText(fixed(gamma, 0), left - 0.5 * em, y + edge);
+      const inside = Math.min(Math.max(y, top + 0.3 * em), top + height - 0.3 * em);
+      context.fillText(fixed(gamma, 0), left - 0.5 * em, inside);
     }
     context.save();
     context.translate(0.55 * em, top + height / 2);
@@ -153,12 +209,12 @@ export class Chart {
     context.restore();
     context.textBaseline = "top";
     const mm = length * 1e3;
-    const step = STEPS.find((each) => mm / each <= width / (4 * em)) ?? 2e4;
-    for (let at = 0; at <= mm + 1e-9; at += step) {
-      const x = this.x(message.s[0] + at / 1e3, frame);
+    const step = STEPS.find((each) => ((to - from) * mm) / each <= width / (4 * em)) ?? 2e4;
+    for (let k = Math.ceil((from * mm) / step - 1e-9); k * step <= to * mm + 1e-9; k++) {
+      const x = this.x(message.s[0] + (k * step) / 1e3, frame);
       context.fillRect(Math.round(x), top + height, 1, 4);
-      context.textAlign = at === 0 ? "left" : x > left + width - em ? "right" : "center";
-      context.fillText(fixed(at, 0), x, top + height + 0.4 * em);
+      context.textAlign = x < left + em ? "left" : x > left + width - em ? "right" : "center";
+      context.fillText(fixed(k * step, step < 1 ? 1 : 0), x, top + height + 0.4 * em);
     }
     context.textAlign = "center";
     context.fillText("path length, mm", left + width / 2, top + height + 1.4 * em);
@@ -196,10 +252,10 @@ export class Chart {
       context.beginPath();
       for (let k = 0; k + 1 < plan.s.length; k++) {
         if ((plan.posture[k] === posture) !== here) continue;
-        const [from, to] = [this.y(plan.gamma[k], frame), this.y(plan.gamma[k + 1], frame)];
-        if (Math.abs(from - to) > frame.height / 2) continue; // over the edge of the map
-        context.moveTo(this.x(plan.s[k], frame), from);
-        context.lineTo(this.x(plan.s[k + 1], frame), to);
+        const [from, to] = [wrapped(plan.gamma[k]), wrapped(plan.gamma[k + 1])];
+        if (Math.abs(from - to) > Math.PI) continue; // over the edge of the map
+        context.moveTo(this.x(plan.s[k], frame), this.y(from, frame));
+        context.lineTo(this.x(plan.s[k + 1], frame), this.y(to, frame));
       }
       context.stroke();
     }

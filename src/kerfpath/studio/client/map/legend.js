@@ -59,6 +59,8 @@ function swatch(message, ink) {
     ...message,
     ...{ nodes: 1, s: [0], gamma: [0], layers: [{ posture: 0, name: "", codes: "AA==" }] },
   });
-  canvas.getContext("2d")?.putImageData(pixels(one, 0, [ink], SWATCH, SWATCH, 12), 0, 0);
+  canvas
+    .getContext("2d")
+    ?.putImageData(pixels(one, 0, [ink], { width: SWATCH, height: SWATCH, period: 12 }), 0, 0);
   return canvas;
 }

@@ -1,9 +1,17 @@
 /** The cells of a map as pixels: a colour and a pattern for each reason, in either theme. */
 
+import { alongScale } from "../scene/scale.js";
+import { WHOLE } from "./window.js";
+
 /** @typedef {import("./grid.js").Grid} Grid */
 /** @typedef {[number, number, number]} Rgb */
 /** @typedef {"none" | "rising" | "falling" | "dots" | "cross" | "level"} Pattern */
-/** @typedef {{base: Rgb, mark: Rgb, pattern: Pattern}} Ink */
+/** @typedef {{base: Rgb, mark: Rgb, pattern: Pattern, free: boolean}} Ink */
+
+/** Codes of a shade: too near to something, and none; those below are along its scale. */
+export const [TOO_NEAR, NO_SHADE] = [254, 255];
+/** The code of the end of the scale. */
+export const MOST = 253;
 
 /**
  * @param {string} hex  #rrggbb
@@ -45,22 +53,35 @@ function patternOf(kind, words) {
  * Return how each code of a map is painted.
  * @param {import("../messages.js").MapMessage} map
  * @param {boolean} dark
- * @param {string} free  #rrggbb
+ * @param {string} open  #rrggbb, of what is admitted
+ * @param {boolean} shaded  what is lost steps back
  * @returns {Ink[]}
  */
-export function inks(map, dark, free) {
+export function inks(map, dark, open, shaded) {
   return map.reasons.map((words, code) => {
     const pattern = patternOf(map.kinds[code], words);
-    if (words === "admitted") return { base: rgb(free), mark: rgb(free), pattern };
+    const free = map.kinds[code] === "admitted";
+    if (words === "admitted") return { base: rgb(open), mark: rgb(open), pattern, free };
     const colour = rgb(map.colours[code]);
     const light = 0.3 * colour[0] + 0.59 * colour[1] + 0.11 * colour[2];
-    const base = dark
+    const full = dark
       ? mix(colour, [14, 16, 18], light > 140 ? 0.42 : 0.18)
       : mix(colour, [255, 255, 255], 0.12);
+    const base = shaded ? mix(full, dark ? [23, 26, 29] : [255, 255, 255], 0.72) : full;
     const mark = mix(base, light > 120 ? [0, 0, 0] : [255, 255, 255], light > 120 ? 0.2 : 0.24);
-    return { base, mark, pattern };
+    return { base, mark, pattern, free };
   });
 }
+
+const packed = (/** @type {Rgb} */ [r, g, b]) => (255 << 24) | (b << 16) | (g << 8) | r;
+
+const NEAR_MARK = packed([255, 255, 255]);
+
+/** @returns {number[]} the colours of the codes of a shade, as pixels */
+const shadeInks = () =>
+  Array.from({ length: MOST + 1 }, (_, code) =>
+    packed(rgb(`#${alongScale(code / MOST).getHexString()}`)),
+  );
 
 /**
  * Whether a pixel is on the lines of a pattern.
@@ -92,26 +113,35 @@ function marked(pattern, x, y, period) {
  * @param {Grid} grid
  * @param {number} layer
  * @param {Ink[]} ink
- * @param {number} width  device px
- * @param {number} height  device px
- * @param {number} period  of the patterns, device px
+ * @param {{width: number, height: number, period: number}} size  device px; the period of patterns
+ * @param {import("./window.js").Window} [window]  the part that is seen
+ * @param {import("./shade.js").Shade | null} [shade]  of the admitted
  * @returns {ImageData}
  */
-export function pixels(grid, layer, ink, width, height, period) {
+export function pixels(grid, layer, ink, { width, height, period }, window = WHOLE, shade = null) {
   const image = new ImageData(width, height);
   const out = new Uint32Array(image.data.buffer);
-  const packed = (/** @type {Rgb} */ [r, g, b]) => (255 << 24) | (b << 16) | (g << 8) | r;
   const [bases, marks] = [ink.map(({ base }) => packed(base)), ink.map(({ mark }) => packed(mark))];
   const first = grid.message.s[0];
+  const { from, to, top, bottom } = window;
   const column = new Int32Array(width);
-  for (let x = 0; x < width; x++)
-    column[x] = grid.nodeAt(first + ((x + 0.5) / width) * grid.length) * grid.samples;
-  const { codes } = grid.layers[layer];
+  for (let x = 0; x < width; x++) {
+    const share = from + ((x + 0.5) / width) * (to - from);
+    column[x] = grid.nodeAt(first + share * grid.length) * grid.samples;
+  }
+  const { codes, posture } = grid.layers[layer];
+  const shades = shade?.of(posture);
+  const ramp = shade ? shadeInks() : [];
   for (let y = 0; y < height; y++) {
-    const sample = grid.sampleAt(Math.PI - ((y + 0.5) / height) * 2 * Math.PI);
+    const share = top + ((y + 0.5) / height) * (bottom - top);
+    const sample = grid.sampleAt(Math.PI - share * 2 * Math.PI);
     for (let x = 0; x < width; x++) {
       const code = codes[column[x] + sample];
-      out[y * width + x] = marked(ink[code].pattern, x, y, period) ? marks[code] : bases[code];
+      const value = shades && ink[code].free ? shades[column[x] + sample] : NO_SHADE;
+      if (value < TOO_NEAR) out[y * width + x] = ramp[value];
+      else if (value === TOO_NEAR)
+        out[y * width + x] = marked("cross", x, y, period) ? NEAR_MARK : ramp[0];
+      else out[y * width + x] = marked(ink[code].pattern, x, y, period) ? marks[code] : bases[code];
     }
   }
   return image;

@@ -1,42 +1,43 @@
 /** The map: what became of every rotation along the path, the course through it, and its ghosts. */
 
 import { byId, el } from "../dom.js";
-import { deg, degrees, fixed } from "../format.js";
+import { deg } from "../format.js";
 import { Bands, courseAt } from "./bands.js";
 import { Chart } from "./chart.js";
-import { turnedAbout } from "../inverse.js";
-import { Grid, wrapped } from "./grid.js";
+import { Choices } from "./choices.js";
+import { Gestures } from "./gestures.js";
+import { Grid } from "./grid.js";
+import { Hover } from "./hover.js";
 import { legend } from "./legend.js";
 import { Pins } from "./pins.js";
 
 /** @typedef {import("../store.js").Store} Store */
 /** @typedef {import("../player.js").Player} Player */
-/** @typedef {{node: number, sample: number}} Cell */
-/** @typedef {(q: ArrayLike<number> | null, admitted: boolean) => void} Haunt */
-
-const ASK_AFTER = 140; // ms at rest, before the server is asked for more than the map says
+/** @typedef {import("./hover.js").Cell} Cell */
 
 export class MapView {
   /**
    * @param {Store} store
    * @param {Player} player
    * @param {{send: (message: any) => boolean}} connection
-   * @param {Haunt} haunt
+   * @param {import("./hover.js").Haunt} haunt
    */
   constructor(store, player, connection, haunt) {
     this.store = store;
     this.player = player;
     this.connection = connection;
-    this.haunt = haunt;
     this.canvas = byId("map-canvas", HTMLCanvasElement);
     this.chart = new Chart(this.canvas);
     this.pins = new Pins(store, connection);
+    const again = () => this.invalidate();
     this.bands = new Bands(this.chart, this.pins, () => {
-      if (this.bands.busy) this.leave();
+      if (this.bands.busy) this.hover.leave();
       this.describe();
       this.invalidate();
     });
-    this.tip = byId("map-tip");
+    this.gestures = new Gestures(this.chart, again);
+    this.choices = new Choices(store, connection, () => this.load());
+    this.hover = new Hover(store, this.chart, this.choices, connection, haunt, again);
     this.said = byId("map-state");
     this.legend = byId("legend");
     this.tabs = byId("postures");
@@ -45,37 +46,34 @@ export class MapView {
     this.layer = 0;
     this.picked = false; // by hand; else the layer follows the course
     this.asked = "";
-    /** @type {Cell | null} */
-    this.hover = null;
-    this.timer = 0;
     this.waiting = false;
     this.bind();
     this.load();
   }
 
   bind() {
-    const { store, player, canvas } = this;
+    const { store, player, canvas, hover } = this;
     store.on(["selected"], () => {
       this.picked = false;
-      this.leave();
+      hover.leave();
       this.load();
     });
     store.on(["map", "plan", "scene", "job", "connection", "progress", "compare"], () =>
       this.load(),
     );
-    store.on(["pose"], (pose) => this.answered(pose));
+    store.on(["shade", "technique"], () => this.load());
     player.on(() => this.invalidate());
     new ResizeObserver(() => this.invalidate()).observe(canvas);
     canvas.addEventListener("pointermove", (event) => {
-      const cell = this.cellAt(event.offsetX, event.offsetY);
-      if (cell && !this.bands.busy) this.enter(cell);
-      else this.leave();
+      const cell = hover.at(event.offsetX, event.offsetY);
+      if (cell && !this.bands.busy && !this.gestures.drag) hover.enter(cell);
+      else hover.leave();
     });
-    canvas.addEventListener("pointerleave", () => this.leave());
-    canvas.addEventListener("blur", () => this.leave());
+    canvas.addEventListener("pointerleave", () => hover.leave());
+    canvas.addEventListener("blur", () => hover.leave());
     canvas.addEventListener("click", (event) => {
-      const cell = this.cellAt(event.offsetX, event.offsetY);
-      if (cell && !this.bands.took) this.go(cell);
+      const cell = hover.at(event.offsetX, event.offsetY);
+      if (cell && !this.bands.took && !event.shiftKey) this.go(cell);
     });
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
@@ -107,8 +105,17 @@ export class MapView {
       const wanted = this.grid.layerOf(plans[0]?.posture[0] ?? -1);
       if (wanted >= 0) this.layer = wanted;
     }
+    this.choices.load(this.grid);
+    this.hand();
     this.describe();
     this.invalidate();
+  }
+
+  /** Hand the chart what it shows. */
+  hand() {
+    const { chart, grid, layer, choices } = this;
+    Object.assign(chart, { grid, layer, shade: choices.shade });
+    this.gestures.recall();
   }
 
   /** Draw the tabs, the legend and what stands in for a map. */
@@ -147,8 +154,9 @@ export class MapView {
     );
     byId("map-said").textContent = grid?.layers.length === 1 ? grid.layers[0].name : "";
     if (!grid || !grid.layers.length) return this.legend.replaceChildren(...this.bands.listed());
-    Object.assign(this.chart, { grid, layer: this.layer });
+    this.hand();
     this.legend.replaceChildren(
+      ...this.choices.legend(grid),
       ...legend(grid, this.layer, this.chart.inks(), {
         course: store.plans.has(grid.message.contour),
         before: store.besideOf(grid.message.contour),
@@ -175,8 +183,8 @@ export class MapView {
   }
 
   draw() {
-    const { store, chart, grid, layer } = this;
-    Object.assign(chart, { grid, layer });
+    const { store, chart } = this;
+    this.hand();
     const name = store.selected ?? "";
     const plans = store.plans.get(name) ?? [];
     const { moment } = this.player;
@@ -186,156 +194,13 @@ export class MapView {
     chart.draw({
       plans,
       before: store.beside(name),
+      technique: this.choices.course,
       stale: plans.some((each) => store.stale(each)),
       broken: store.nopaths.get(name)?.s ?? null,
       now: plan ? { s: plan.s[k], gamma: plan.gamma[k] } : null,
-      hover: this.hover,
+      hover: this.hover.cell,
       under: (context, frame) => this.bands.draw(context, frame),
     });
-  }
-
-  /**
-   * Return the cell at a place of the canvas, or null.
-   * @param {number} x
-   * @param {number} y
-   * @returns {Cell | null}
-   */
-  cellAt(x, y) {
-    const { grid } = this;
-    if (!grid || !grid.layers.length) return null;
-    const { left, top, width, height } = this.chart.frame();
-    const [across, down] = [(x - left) / width, (y - top) / height];
-    if (across < 0 || across > 1 || down < 0 || down > 1) return null;
-    return {
-      node: grid.nodeAt(grid.message.s[0] + across * grid.length),
-      sample: grid.sampleAt(Math.PI * (1 - 2 * down)),
-    };
-  }
-
-  /**
-   * Say what became of a pose, and show it as a ghost.
-   * @param {Cell} cell
-   */
-  enter(cell) {
-    const grid = /** @type {Grid} */ (this.grid);
-    this.hover = cell;
-    const code = grid.code(this.layer, cell.node, cell.sample);
-    const admitted = grid.message.kinds[code] === "admitted";
-    const q = this.turned(cell);
-    this.haunt(q, admitted);
-    this.say(
-      admitted ? "free" : `lost: ${grid.message.reasons[code]}`,
-      this.numbers(grid.message.reasons[code], q),
-    );
-    this.invalidate();
-    clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => {
-      const { posture } = grid.layers[this.layer];
-      const gamma = grid.message.gamma[cell.sample];
-      const { contour } = grid.message;
-      this.connection.send({ type: "reason", contour, node: cell.node, gamma, posture });
-    }, ASK_AFTER);
-  }
-
-  /**
-   * Return the joints of a pose by turning the plan's at its node about the beam; null where the
-   * plan is in another posture or the robot cannot follow: then the server's answer shows it.
-   * @param {Cell} cell
-   */
-  turned({ node, sample }) {
-    const { scene, plans } = this.store;
-    const grid = /** @type {Grid} */ (this.grid);
-    const { s, gamma, contour } = grid.message;
-    const { posture } = grid.layers[this.layer];
-    for (const plan of scene ? (plans.get(contour) ?? []) : []) {
-      const k = plan.s.findIndex((each) => Math.abs(each - s[node]) < 1e-7);
-      if (k < 0 || plan.posture[k] !== posture || !scene) continue;
-      const n = scene.robot.joints.length;
-      const angle = wrapped(gamma[sample] - plan.gamma[k]);
-      return turnedAbout(scene.robot, plan.q.slice(k * n, (k + 1) * n), angle);
-    }
-    return null;
-  }
-
-  /**
-   * Return what a reason is in numbers, as far as the joints say it.
-   * @param {string} words
-   * @param {ArrayLike<number> | null} q
-   */
-  numbers(words, q) {
-    const joints = this.store.scene?.robot.joints;
-    if (!q || !joints) return "";
-    const named = /^joint (\d+) (low|high)$/.exec(words);
-    if (named) {
-      const i = Number(named[1]) - 1;
-      const [{ lower, upper }, at] = [joints[i], q[i]];
-      const limit = named[2] === "low" ? lower : upper;
-      return limit === null
-        ? ""
-        : `joint ${i + 1} at ${degrees(at)}, its limit is ${degrees(limit)}`;
-    }
-    let [nearest, room] = [-1, Infinity];
-    joints.forEach(({ lower, upper, endless }, i) => {
-      if (endless || lower === null || upper === null) return;
-      const left = Math.min(q[i] - lower, upper - q[i]);
-      if (left >= 0 && left < room) [nearest, room] = [i, left];
-    });
-    return nearest < 0 ? "" : `nearest limit: joint ${nearest + 1}, ${degrees(room)} away`;
-  }
-
-  /**
-   * Write the tip beside the hovered cell.
-   * @param {string} head
-   * @param {string} numbers
-   */
-  say(head, numbers) {
-    const { hover, grid, tip } = this;
-    if (!hover || !grid) return;
-    const frame = this.chart.frame();
-    const s = grid.message.s[hover.node];
-    const gamma = grid.message.gamma[hover.sample];
-    tip.replaceChildren(
-      el("b", {}, head[0].toUpperCase() + head.slice(1)),
-      ...(numbers ? [el("span", {}, numbers), el("br")] : []),
-      el(
-        "span",
-        { class: "quiet" },
-        `${fixed((s - grid.message.s[0]) * 1e3)} mm, gamma ${fixed(deg(gamma), 0)} deg`,
-      ),
-    );
-    tip.hidden = false;
-    const [x, y] = [this.chart.x(s, frame), this.chart.y(gamma, frame)];
-    const left =
-      x + 16 + tip.offsetWidth > this.canvas.clientWidth ? x - 16 - tip.offsetWidth : x + 16;
-    const top = Math.min(
-      Math.max(4, y - tip.offsetHeight / 2),
-      this.canvas.clientHeight - tip.offsetHeight - 4,
-    );
-    tip.style.transform = `translate(${Math.max(0, left)}px, ${top}px)`;
-  }
-
-  /** @param {import("../messages.js").PoseMessage} pose */
-  answered(pose) {
-    const { hover, grid } = this;
-    if (!hover || !grid || pose.contour !== grid.message.contour || pose.node !== hover.node)
-      return;
-    if (
-      grid.sampleAt(pose.gamma) !== hover.sample ||
-      pose.posture !== grid.layers[this.layer].posture
-    )
-      return;
-    this.haunt(pose.q, pose.admitted);
-    const [head, rest] = pose.reason.split(/: (.*)/s);
-    const numbers = rest ?? this.numbers(head, pose.q);
-    this.say(pose.admitted ? "free" : `lost: ${head}`, numbers);
-  }
-
-  leave() {
-    clearTimeout(this.timer);
-    if (this.hover) this.haunt(null, true);
-    this.hover = null;
-    this.tip.hidden = true;
-    this.invalidate();
   }
 
   /**
@@ -357,23 +222,43 @@ export class MapView {
 
   /** @param {KeyboardEvent} event */
   key(event) {
-    const { grid } = this;
-    if (!grid || !grid.layers.length || event.ctrlKey || event.metaKey || event.altKey) return;
+    const { grid, hover, gestures } = this;
+    if (!grid || !grid.layers.length) return;
+    const plain = !event.ctrlKey && !event.metaKey && !event.altKey;
+    if ((plain && this.pinned(event)) || gestures.key(event, this.middle())) {
+      event.preventDefault();
+      event.stopPropagation();
+      return;
+    }
+    if (!plain) return;
     const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
     const move = moves[/** @type {keyof typeof moves} */ (event.key)];
-    if (this.pinned(event)) return;
-    if (event.key === "Escape") this.leave();
-    if (event.key === "Enter" && this.hover) this.go(this.hover);
+    if (event.key === "Escape") hover.leave();
+    if (event.key === "Enter" && hover.cell) this.go(hover.cell);
     if (!move) return;
     const plan = this.store.plans.get(grid.message.contour)?.[0];
-    const from = this.hover ?? { node: 0, sample: grid.sampleAt(plan?.gamma[0] ?? 0) };
+    const from = hover.cell ?? { node: 0, sample: grid.sampleAt(plan?.gamma[0] ?? 0) };
     const stride = event.shiftKey ? 10 : 1;
-    this.enter({
-      node: Math.min(Math.max(from.node + move[0] * stride, 0), grid.nodes - 1),
-      sample: (from.sample + move[1] * stride + 10 * grid.samples) % grid.samples,
-    });
+    const node = Math.min(Math.max(from.node + move[0] * stride, 0), grid.nodes - 1);
+    const sample = (from.sample + move[1] * stride + 10 * grid.samples) % grid.samples;
+    const { s, gamma } = grid.message;
+    gestures.show((s[node] - s[0]) / grid.length, 0.5 - deg(gamma[sample]) / 360);
+    hover.enter({ node, sample });
     event.preventDefault();
     event.stopPropagation();
+  }
+
+  /** Return the place that keys zoom about: the cursor, else the middle of what is seen. */
+  middle() {
+    const { cell } = this.hover;
+    const { message } = /** @type {Grid} */ (this.grid);
+    if (!cell) return { x: 0.5, y: 0.5 };
+    const frame = this.chart.frame();
+    const [offsetX, offsetY] = [
+      this.chart.x(message.s[cell.node], frame),
+      this.chart.y(message.gamma[cell.sample], frame),
+    ];
+    return this.gestures.share({ offsetX, offsetY });
   }
 
   /**
@@ -382,13 +267,11 @@ export class MapView {
    */
   pinned(event) {
     const { message } = /** @type {Grid} */ (this.grid);
-    const node = this.hover?.node ?? 0;
+    const { cell } = this.hover;
+    const node = cell?.node ?? 0;
     const course = courseAt(this.store.plans.get(message.contour) ?? [], message.s[node]);
-    const here = this.hover ? deg(message.gamma[this.hover.sample]) : null;
-    if (!this.bands.key(event, node, course ?? here)) return false;
-    event.preventDefault();
-    event.stopPropagation();
-    return true;
+    const here = cell ? deg(message.gamma[cell.sample]) : null;
+    return this.bands.key(event, node, course ?? here);
   }
 
   /** Take the colours of the theme. */

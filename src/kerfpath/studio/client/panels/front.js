@@ -1,7 +1,7 @@
 /** The Pareto set of the chosen contour: which trade-offs there are, each to be seen and taken. */
 
 import { byId, el } from "../dom.js";
-import { deg, digits } from "../format.js";
+import { UNITS, digits } from "../format.js";
 import { SCALE_GRADIENT } from "../scene/scale.js";
 import { Scatter } from "../scatter.js";
 
@@ -10,15 +10,6 @@ import { Scatter } from "../scatter.js";
 
 const USUAL = ["displacement", "velocity", "range"];
 const MOST = 5; // criteria of one set
-
-/** @type {Record<string, {unit: string, of: (value: number) => number}>} */
-const UNITS = {
-  rad: { unit: "deg", of: deg },
-  m: { unit: "mm", of: (value) => 1e3 * value },
-  "m/s": { unit: "m/min", of: (value) => 60 * value },
-  share: { unit: "% limit", of: (value) => 100 * value },
-  "m^3": { unit: "m\u00b3", of: (value) => value },
-};
 
 /**
  * @param {Store} store

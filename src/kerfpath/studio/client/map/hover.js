@@ -1,0 +1,187 @@
+/** The cursor of the map: what became of a pose, in numbers, and its ghost. */
+
+import { byId, el } from "../dom.js";
+import { deg, degrees, fixed } from "../format.js";
+import { turnedAbout } from "../inverse.js";
+import { wrapped } from "./grid.js";
+
+/** @typedef {import("./chart.js").Chart} Chart */
+/** @typedef {import("./choices.js").Choices} Choices */
+/** @typedef {import("../store.js").Store} Store */
+/** @typedef {{node: number, sample: number}} Cell */
+/** @typedef {(q: ArrayLike<number> | null, admitted: boolean) => void} Haunt */
+
+const ASK_AFTER = 140; // ms at rest, before the server is asked for more than the map says
+
+export class Hover {
+  /**
+   * @param {Store} store
+   * @param {Chart} chart
+   * @param {Choices} choices
+   * @param {{send: (message: any) => boolean}} connection
+   * @param {Haunt} haunt
+   * @param {() => void} changed
+   */
+  constructor(store, chart, choices, connection, haunt, changed) {
+    this.store = store;
+    this.chart = chart;
+    this.choices = choices;
+    this.connection = connection;
+    this.haunt = haunt;
+    this.changed = changed;
+    this.tip = byId("map-tip");
+    /** @type {Cell | null} */
+    this.cell = null;
+    this.timer = 0;
+    store.on(["pose"], (pose) => this.answered(pose));
+  }
+
+  /** The grid that is hovered. */
+  get grid() {
+    return /** @type {import("./grid.js").Grid} */ (this.chart.grid);
+  }
+
+  /**
+   * Return the cell at a place of the canvas, or null.
+   * @param {number} x
+   * @param {number} y
+   * @returns {Cell | null}
+   */
+  at(x, y) {
+    const { chart, grid } = this;
+    if (!chart.grid?.layers.length) return null;
+    const { left, top, width, height } = chart.frame();
+    if (x < left || x > left + width || y < top || y > top + height) return null;
+    const gamma = (chart.gammaAt(y) / 180) * Math.PI;
+    return { node: grid.nodeAt(chart.sAt(x)), sample: grid.sampleAt(gamma) };
+  }
+
+  /**
+   * Say what became of a pose, and show it as a ghost.
+   * @param {Cell} cell
+   */
+  enter(cell) {
+    const { grid, chart } = this;
+    this.cell = cell;
+    const code = grid.code(chart.layer, cell.node, cell.sample);
+    const admitted = grid.message.kinds[code] === "admitted";
+    const q = this.turned(cell);
+    this.haunt(q, admitted);
+    this.say(
+      admitted ? "free" : `lost: ${grid.message.reasons[code]}`,
+      this.numbers(grid.message.reasons[code], q),
+    );
+    this.changed();
+    clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => {
+      const { posture } = grid.layers[chart.layer];
+      const gamma = grid.message.gamma[cell.sample];
+      const { contour } = grid.message;
+      this.connection.send({ type: "reason", contour, node: cell.node, gamma, posture });
+    }, ASK_AFTER);
+  }
+
+  /**
+   * Return the joints of a pose by turning the plan's at its node about the beam; null where the
+   * plan is in another posture or the robot cannot follow: then the server's answer shows it.
+   * @param {Cell} cell
+   */
+  turned({ node, sample }) {
+    const { scene, plans } = this.store;
+    const { s, gamma, contour } = this.grid.message;
+    const { posture } = this.grid.layers[this.chart.layer];
+    for (const plan of scene ? (plans.get(contour) ?? []) : []) {
+      const k = plan.s.findIndex((each) => Math.abs(each - s[node]) < 1e-7);
+      if (k < 0 || plan.posture[k] !== posture || !scene) continue;
+      const n = scene.robot.joints.length;
+      const angle = wrapped(gamma[sample] - plan.gamma[k]);
+      return turnedAbout(scene.robot, plan.q.slice(k * n, (k + 1) * n), angle);
+    }
+    return null;
+  }
+
+  /**
+   * Return what a reason is in numbers, as far as the joints say it.
+   * @param {string} words
+   * @param {ArrayLike<number> | null} q
+   */
+  numbers(words, q) {
+    const joints = this.store.scene?.robot.joints;
+    if (!q || !joints) return "";
+    const named = /^joint (\d+) (low|high)$/.exec(words);
+    if (named) {
+      const i = Number(named[1]) - 1;
+      const [{ lower, upper }, at] = [joints[i], q[i]];
+      const limit = named[2] === "low" ? lower : upper;
+      return limit === null
+        ? ""
+        : `joint ${i + 1} at ${degrees(at)}, its limit is ${degrees(limit)}`;
+    }
+    let [nearest, room] = [-1, Infinity];
+    joints.forEach(({ lower, upper, endless }, i) => {
+      if (endless || lower === null || upper === null) return;
+      const left = Math.min(q[i] - lower, upper - q[i]);
+      if (left >= 0 && left < room) [nearest, room] = [i, left];
+    });
+    return nearest < 0 ? "" : `nearest limit: joint ${nearest + 1}, ${degrees(room)} away`;
+  }
+
+  /**
+   * Write the tip beside the cursor.
+   * @param {string} head
+   * @param {string} numbers
+   */
+  say(head, numbers) {
+    const { cell, chart, tip, grid } = this;
+    if (!cell || !chart.grid) return;
+    const frame = chart.frame();
+    const s = grid.message.s[cell.node];
+    const gamma = grid.message.gamma[cell.sample];
+    const place = cell.node * grid.samples + cell.sample;
+    const [{ posture }, { shade }] = [grid.layers[chart.layer], this.choices];
+    const shaded = shade?.said(posture, place) ?? "";
+    if (head === "free" && shade?.tooNear(posture, place)) head = "nearer than it must be";
+    tip.replaceChildren(
+      el("b", {}, head[0].toUpperCase() + head.slice(1)),
+      ...[shaded, numbers].flatMap((each) => (each ? [el("span", {}, each), el("br")] : [])),
+      el(
+        "span",
+        { class: "quiet" },
+        `${fixed((s - grid.message.s[0]) * 1e3)} mm, gamma ${fixed(deg(gamma), 0)} deg`,
+      ),
+    );
+    tip.hidden = false;
+    const { clientWidth, clientHeight } = chart.canvas;
+    const [x, y] = [chart.x(s, frame), chart.y(gamma, frame)];
+    const left = x + 16 + tip.offsetWidth > clientWidth ? x - 16 - tip.offsetWidth : x + 16;
+    const top = Math.min(
+      Math.max(4, y - tip.offsetHeight / 2),
+      clientHeight - tip.offsetHeight - 4,
+    );
+    tip.style.transform = `translate(${Math.max(0, left)}px, ${top}px)`;
+  }
+
+  /** @param {import("../messages.js").PoseMessage} pose */
+  answered(pose) {
+    const { cell, chart, grid } = this;
+    if (!cell || !chart.grid || pose.contour !== grid.message.contour || pose.node !== cell.node)
+      return;
+    if (
+      grid.sampleAt(pose.gamma) !== cell.sample ||
+      pose.posture !== grid.layers[chart.layer].posture
+    )
+      return;
+    this.haunt(pose.q, pose.admitted);
+    const [head, rest] = pose.reason.split(/: (.*)/s);
+    const numbers = rest ?? this.numbers(head, pose.q);
+    this.say(pose.admitted ? "free" : `lost: ${head}`, numbers);
+  }
+
+  leave() {
+    clearTimeout(this.timer);
+    if (this.cell) this.haunt(null, true);
+    this.cell = null;
+    this.tip.hidden = true;
+    this.changed();
+  }
+}

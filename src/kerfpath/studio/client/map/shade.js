@@ -1,0 +1,91 @@
+/** A quantity over a map that its admitted poses are shaded by, and its scale. */
+
+import { el } from "../dom.js";
+import { UNITS, digits, fixed } from "../format.js";
+import { SCALE_GRADIENT } from "../scene/scale.js";
+import { bytes } from "./grid.js";
+import { MOST, NO_SHADE, TOO_NEAR } from "./paint.js";
+
+/** @typedef {import("../messages.js").ShadeMessage} ShadeMessage */
+
+let made = 0;
+
+export class Shade {
+  /** @param {ShadeMessage} message */
+  constructor(message) {
+    this.message = message;
+    this.number = ++made;
+    /** @type {Map<number, {values: Uint8Array, nearest: Uint8Array | null}>} by posture */
+    this.layers = new Map(
+      message.layers.map(({ posture, values, nearest }) => [
+        posture,
+        { values: bytes(values), nearest: nearest === null ? null : bytes(nearest) },
+      ]),
+    );
+  }
+
+  /**
+   * Return the codes of a posture, all gamma of a node in a row.
+   * @param {number} posture
+   */
+  of(posture) {
+    return this.layers.get(posture)?.values;
+  }
+
+  /**
+   * Say what it is at a place of the map; "" where it has no value.
+   * @param {number} posture
+   * @param {number} place  of all gamma of all nodes
+   */
+  said(posture, place) {
+    const layer = this.layers.get(posture);
+    const code = layer?.values[place] ?? NO_SHADE;
+    if (!layer || code === NO_SHADE) return "";
+    const names = this.message.pairs[layer.nearest?.[place] ?? NO_SHADE] ?? [];
+    const pair = names.length ? `, ${names.join(" \u2013 ")}` : "";
+    if (code === TOO_NEAR) return names.join(" \u2013 ");
+    const { low, high, words, beyond, unit } = this.message;
+    if (!unit) return `${words}: ${fixed(low + ((high - low) * code) / MOST, 0)}`;
+    const value = this.shown(low + ((high - low) * code) / MOST);
+    // What is told up to a distance is a lower bound.
+    const from = beyond ? "at least " : "";
+    return `${words}: ${from}${value}${code < MOST ? pair : ""}`;
+  }
+
+  /** @param {number} value */
+  shown(value) {
+    const { unit, of } = UNITS[this.message.unit] ?? { unit: this.message.unit, of: Number };
+    return `${digits(of(value), 2)} ${unit}`.trim();
+  }
+
+  /**
+   * Whether something comes too near at a place.
+   * @param {number} posture
+   * @param {number} place
+   */
+  tooNear(posture, place) {
+    return this.of(posture)?.[place] === TOO_NEAR;
+  }
+
+  /** Whether something comes too near anywhere. */
+  get closed() {
+    return [...this.layers.values()].some(({ values }) => values.includes(TOO_NEAR));
+  }
+
+  /**
+   * Return the scale.
+   * @returns {Node[]}
+   */
+  legend() {
+    const { words, low, high, beyond } = this.message;
+    const strip = el("i", { class: "ramp" });
+    strip.style.background = SCALE_GRADIENT;
+    const [first, last] = [low, high].map((each) => this.shown(each));
+    const begin = first.split(" ")[0];
+    return [
+      el("p", {}, beyond ? `${words} beyond what is kept` : words),
+      el("p", { class: "scale" }, begin, strip, beyond ? `\u2265 ${last}` : last),
+      ...(this.closed ? [el("p", { class: "quiet" }, "crossed: nearer than allowed")] : []),
+    ];
+  }
+}
