@@ -3,6 +3,7 @@
 import ctypes
 import os
 import signal
+import sys
 import time
 
 from kerfpath.errors import InputError
@@ -14,6 +15,10 @@ def doubled(number):
 
 def whose():
     return os.getpid()
+
+
+def knows(module):
+    return module in sys.modules
 
 
 def crash():

@@ -15,6 +15,7 @@ from apart_calls import (
     doubled,
     err,
     hang,
+    knows,
     leave,
     refuse,
     swell,
@@ -92,6 +93,18 @@ def test_a_process_that_has_left_is_replaced(monkeypatch):
     monkeypatch.undo()
     assert call_apart(doubled, 21, size=0) == 42
     assert module._worker.process is not idle
+
+
+@pytest.mark.parametrize(("wanted", "there"), [("colorsys", True), ("no.such.module", False)])
+def test_a_process_that_stands_by_imports_what_it_will_be_asked_for(wanted, there):
+    if module._worker is not None:
+        module._worker.end()
+        module._worker = None
+    assert not call_apart(knows, "colorsys", size=0)
+    module._worker.end()
+    module._worker = None
+    module.stand_by(wanted)
+    assert call_apart(knows, wanted, size=0) == there
 
 
 INTERRUPTED = """

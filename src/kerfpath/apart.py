@@ -17,6 +17,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from importlib import import_module
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -42,7 +43,8 @@ IDLE = 10.0
 _T = TypeVar("_T")
 _LEAVES = "leaves"
 _START = (
-    "import sys; sys.path[:] = {path!r}; from kerfpath.apart import _serve; _serve({fd}, {idle})"
+    "import sys; sys.path[:] = {path!r}; from kerfpath.apart import _serve; "
+    "_serve({fd}, {idle}, {module!r})"
 )
 
 
@@ -81,10 +83,13 @@ def call_apart(function: Callable[..., _T], *arguments: object, size: int) -> _T
     raise value
 
 
-def stand_by() -> None:
-    """Have the process started, which takes a second, while this one does something else."""
+def stand_by(module: str | None = None) -> None:
+    """Have the process started, which takes a second, while this one does something else.
+
+    A new one imports `module`, that of a function that it will be asked for, without being asked.
+    """
     with _lock:
-        _ready()
+        _ready(module)
 
 
 def _answer(request: bytes, seconds: int) -> tuple[str, Any]:
@@ -125,14 +130,16 @@ def _too_slow(seconds: int) -> InputError:
 class _Worker:
     """The process, and this end of the line to it."""
 
-    def __init__(self) -> None:
+    def __init__(self, module: str | None) -> None:
         self.ours, theirs = Pipe()
+        number = theirs.fileno()
+        start = _START.format(path=sys.path, fd=number, idle=IDLE, module=module)
         self.process = subprocess.Popen(
-            [sys.executable, "-c", _START.format(path=sys.path, fd=theirs.fileno(), idle=IDLE)],
+            [sys.executable, "-c", start],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            pass_fds=[theirs.fileno()],
+            pass_fds=[number],
         )
         theirs.close()
 
@@ -146,14 +153,14 @@ _worker: _Worker | None = None
 _lock = threading.Lock()
 
 
-def _ready() -> _Worker:
-    """Return the process, a new one where there is none."""
+def _ready(module: str | None = None) -> _Worker:
+    """Return the process, a new one where there is none, which imports a module first."""
     global _worker
     if _worker is not None and _worker.process.poll() is not None:
         _worker.end()
         _worker = None
     if _worker is None:
-        _worker = _Worker()
+        _worker = _Worker(module)
     return _worker
 
 
@@ -175,9 +182,12 @@ def _forget() -> None:
 os.register_at_fork(after_in_child=_forget)
 
 
-def _serve(fd: int, idle: float) -> None:
+def _serve(fd: int, idle: float, module: str | None) -> None:
     """Do what is asked over a line, until it is closed or nothing comes for `idle` seconds."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if module is not None:
+        with suppress(ImportError):  # whoever asks for what is in it is told
+            import_module(module)
     line = Connection(fd)
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
         while line.poll(idle):

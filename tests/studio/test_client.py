@@ -6,8 +6,12 @@ import shutil
 import subprocess
 
 import pytest
+from starlette.testclient import TestClient
 
 from conftest import ROOT
+from kerfpath.studio._app import application
+from kerfpath.studio._document import Document
+from studio.talk import HOST
 
 CLIENT = ROOT / "src" / "kerfpath" / "studio" / "client"
 BROWSER = ROOT / "tests" / "studio" / "browser"
@@ -52,6 +56,18 @@ def test_the_page_loads_nothing_but_its_own_files_and_has_all_of_them():
     loaded += [path.removeprefix("./") for path in re.findall(r'": "(\./[^"]+\.js)"', html)]
     assert loaded
     assert all((CLIENT.parent / path).is_file() for path in loaded)
+
+
+def test_the_page_asks_for_all_of_its_modules_at_once_and_after_its_import_map():
+    app = application(Document(CLIENT / "index.html"), hosts=[HOST])
+    client = TestClient(app, base_url=f"http://{HOST}")  # not at work: the page does not wait
+    text = client.get("/").text
+    loaded = re.findall(r'<link rel="modulepreload" href="client/([^"]+)">', text)
+    modules = {str(file.relative_to(CLIENT)) for file in CLIENT.rglob("*.js")} - {"early.js"}
+    assert sorted(loaded) == sorted(modules)
+    # A module that is asked for before it would have no import map.
+    assert text.index("importmap") < text.index("modulepreload") < text.index("</head>")
+    assert all(client.get(f"/client/{name}").status_code == 200 for name in loaded)
 
 
 def test_every_icon_that_is_used_is_on_the_sheet():

@@ -6,28 +6,37 @@ import asyncio
 from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from pydantic import ValidationError
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.requests import Request
-from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kerfpath.errors import KerfpathError
 from kerfpath.studio._asks import OfContour, PointOf, ReasonOf, TextOf, parse
 from kerfpath.studio._document import Document
-from kerfpath.studio._exports import File, zipped
+from kerfpath.studio._files import File
 from kerfpath.studio._guard import Guard
 from kerfpath.studio._hub import Page
 from kerfpath.studio._messages import ErrorMessage
-from kerfpath.studio._session import Session
+
+if TYPE_CHECKING:
+    from kerfpath.studio._session import Session
 
 __all__ = ["LONGEST", "application"]
 
 CLIENT = Path(__file__).parent / "client"
+MODULES = sorted(
+    file.relative_to(CLIENT).as_posix()
+    for file in CLIENT.rglob("*.js")
+    if file.name != "early.js"  # no module
+)
+"""The modules of the page."""
 KINDS = {
     ".html": "text/html; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -64,11 +73,11 @@ def application(document: Document, *, hosts: Iterable[str], token: str | None =
     token : str, optional
         That whoever asks must bring.
     """
-    session = Session(document)
+    worker = _Worker(document)
 
     @asynccontextmanager
     async def at_work(app: Starlette) -> AsyncIterator[None]:
-        work = asyncio.create_task(session.work())
+        work = asyncio.create_task(worker.work())
         try:
             yield
         finally:
@@ -89,12 +98,47 @@ def application(document: Document, *, hosts: Iterable[str], token: str | None =
         middleware=[Middleware(Guard, hosts=tuple(hosts), token=token)],
         lifespan=at_work,
     )
-    app.state.session = session
+    app.state.worker = worker
     return app
 
 
+class _Worker:
+    """The session of a document, once it is imported: that takes a second, and the page loads."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._session: Session | None = None
+        self._lock = asyncio.Lock()
+
+    async def session(self) -> Session:
+        """Return it once it is there."""
+        async with self._lock:
+            if self._session is None:
+                self._session = await asyncio.to_thread(_session_of, self._document)
+        return self._session
+
+    async def work(self) -> None:
+        """Work on the document."""
+        await (await self.session()).work()
+
+
+def _session_of(document: Document) -> Session:
+    from kerfpath.studio._session import Session
+
+    return Session(document)
+
+
+async def _session(app: Starlette) -> Session:
+    worker: _Worker = app.state.worker
+    return await worker.session()
+
+
 async def _index(request: Request) -> Response:
-    return _own_file("index.html")
+    html = (CLIENT / "index.html").read_text()
+    # All modules at once: each would else be asked for only when one that needs it has come.
+    links = "".join(f'<link rel="modulepreload" href="client/{quote(each)}">\n' for each in MODULES)
+    page = html.replace("</head>", f"{links}</head>")
+    return HTMLResponse(page, headers={"cache-control": "no-cache"})
 
 
 async def _client(request: Request) -> Response:
@@ -114,7 +158,7 @@ def _own_file(name: str) -> Response:
 
 
 async def _mesh(request: Request) -> Response:
-    session: Session = request.app.state.session
+    session = await _session(request.app)
     data = session.meshes.get(request.path_params["name"])
     if data is None:
         return PlainTextResponse("there is no such mesh\n", status_code=404)
@@ -123,7 +167,7 @@ async def _mesh(request: Request) -> Response:
 
 
 async def _kept(request: Request) -> Response:
-    session: Session = request.app.state.session
+    session = await _session(request.app)
     try:
         text = session.kept.plans(request.path_params["number"])
     except KerfpathError as error:
@@ -132,7 +176,7 @@ async def _kept(request: Request) -> Response:
 
 
 async def _export(request: Request) -> Response:
-    session: Session = request.app.state.session
+    session = await _session(request.app)
     name, language = request.path_params["name"], request.query_params.get("language")
     if name == "job":
         document = session.document
@@ -146,6 +190,8 @@ async def _export(request: Request) -> Response:
         return PlainTextResponse("there is nothing of this name\n", status_code=404)
     try:
         if name == "program":
+            from kerfpath.studio._exports import zipped
+
             result, texts = await session.program(language)
             return _download(zipped(result.job.program.name, texts))
         texts = await session.files()
@@ -156,7 +202,7 @@ async def _export(request: Request) -> Response:
 
 
 async def _report(request: Request) -> Response:
-    session: Session = request.app.state.session
+    session = await _session(request.app)
     try:
         texts = await session.files()
     except KerfpathError as error:
@@ -174,8 +220,8 @@ def _download(file: File) -> Response:
 
 
 async def _socket(socket: WebSocket) -> None:
-    session: Session = socket.app.state.session
     await socket.accept()
+    session = await _session(socket.app)
     page = session.hub.open()
     sending, looking = asyncio.create_task(_send(socket, page)), set[asyncio.Task[None]]()
     try:

@@ -6,7 +6,7 @@ import io
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -20,21 +20,14 @@ from kerfpath.job import (
     script_refusal,
 )
 from kerfpath.post import Line, ProgramIssue, TimedLine, languages
+from kerfpath.studio._files import File
 from kerfpath.studio._messages import Export, FileEntry, FindingEntry, ProgramTextMessage
 from kerfpath.studio._numbers import flat
 
-__all__ = ["WAIT", "File", "exports_of", "in_language", "program_text", "zipped"]
+__all__ = ["WAIT", "exports_of", "in_language", "program_text", "zipped"]
 
 
 WAIT = "what is proved of the plans is still to come"
-
-
-class File(NamedTuple):
-    """A file to take along: its name, what it is, and its content."""
-
-    name: str
-    kind: str
-    content: bytes
 
 
 def exports_of(result: JobResult, *, settled: bool) -> list[Export]:

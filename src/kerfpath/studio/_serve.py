@@ -21,6 +21,8 @@ HERE = ("127.0.0.1", "localhost", "::1")
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 """Names of this machine for itself, in addresses."""
 
+READER = "kerfpath.cad._step"
+"""What the process that reads drawings imports at once: most drawings are STEP files."""
 EVERYWHERE = ("0.0.0.0", "::")
 """Addresses at which every one of this machine is listened at."""
 WITHOUT_PORT = 80
@@ -48,7 +50,7 @@ def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[st
     InputError
         The job cannot be read; the port is in use or the address is not of this machine.
     """
-    stand_by()  # the process that reads drawings starts while this one imports
+    stand_by(READER)  # it starts while this one imports
     document = Document(path)
     with _listener(host, port) as listener:
         number = listener.getsockname()[1]

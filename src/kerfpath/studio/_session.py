@@ -47,7 +47,8 @@ from kerfpath.studio._asks import (
     TextOf,
 )
 from kerfpath.studio._document import Change, Document
-from kerfpath.studio._exports import WAIT, File, in_language, program_text
+from kerfpath.studio._exports import WAIT, in_language, program_text
+from kerfpath.studio._files import File
 from kerfpath.studio._hub import Hub, Page
 from kerfpath.studio._job_entry import faults_of, job_message
 from kerfpath.studio._kept import Kept

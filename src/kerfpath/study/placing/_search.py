@@ -13,7 +13,6 @@ from itertools import repeat
 
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution
-from scipy.stats import qmc
 
 from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
@@ -136,6 +135,8 @@ class PlacementSearch:
         low, high = np.array(list(self.ranges.values())).T
         size = 2 ** int(np.ceil(np.log2(PER_VARIABLE * len(low))))
         size = max(5, min(max(size, 8), evaluations // 2))
+        from scipy.stats import qmc  # a quarter of a second to load, and the studio has no layouts
+
         drawn = qmc.Sobol(len(low), rng=seed).random_base2(int(np.ceil(np.log2(size))))[:size]
         points = low + drawn * (high - low)
         if (low <= 0).all() and (high >= 0).all():
