@@ -421,7 +421,7 @@ def test_robots_lists_the_library_and_shows_sources():
 
 
 def test_help_teaches():
-    for command in ("demo", "plan", "speed", "post", "audit", "contours", "robots"):
+    for command in ("demo", "plan", "speed", "post", "audit", "script", "contours", "robots"):
         result = run(command, "--help")
         assert result.returncode == 0
         assert f"Example: kerfpath {command}" in result.stdout
@@ -499,6 +499,26 @@ def test_a_program_with_a_folder_of_its_own_is_written_audited_and_removed(folde
     assert result.returncode == 1
     assert "a_very_long_pro.pjx, of an earlier run" in result.stdout.replace("\n", " ")
     assert not main_file.parent.exists()
+
+
+def test_a_job_is_written_as_a_script_that_finds_its_drawing(folder, tmp_path):
+    printed = run("script", "small.toml", cwd=folder)
+    assert printed.returncode == 0, printed.stderr
+    assert "cad.read(HERE / 'b_pillar.step'" in printed.stdout
+    compile(printed.stdout, "small.py", "exec")
+    (tmp_path / "deep").mkdir()
+    result = run("script", "small.toml", "-o", tmp_path / "deep" / "small.py", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    text = (tmp_path / "deep" / "small.py").read_text()
+    (named,) = re.findall(r"cad\.read\(HERE / '([^']+)'", text)
+    assert (tmp_path / "deep" / named).samefile(folder / "b_pillar.step")
+    beside = text.replace(named, "b_pillar.step")
+    assert [x for x in beside.splitlines() if "Put it beside" not in x] == [
+        x for x in printed.stdout.splitlines() if "Put it beside" not in x
+    ]
+    (folder / "ordered.toml").write_text(SMALL + "\n[sequence]\nhome_deg = [0, 0, 0, 0, 90, 0]\n")
+    assert_refused(run("script", "ordered.toml", cwd=folder), "no lines for [sequence]", "run_job")
+    assert_refused(run("script", "small.toml", "-o", "no/where.py", cwd=folder), "cannot write")
 
 
 def test_help_keeps_the_names_of_tables():

@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -81,12 +82,14 @@ if faults:
 """
 
 
-def python_script(prepared: PreparedJob) -> str:
+def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
     """Return a script that plans the contours of a job as its run does, and writes its program.
 
     Parameters
     ----------
     prepared : PreparedJob
+    folder : Path, optional
+        That the script is put into; default: that of the job.
 
     Raises
     ------
@@ -97,7 +100,7 @@ def python_script(prepared: PreparedJob) -> str:
     if refusal := script_refusal(job, prepared.contours):
         said = f"{job.path}: as Python: {refusal}; run the job itself with kerfpath.job.run_job"
         raise InputError(said)
-    drawing = os.path.relpath(job.part_file, job.path.parent)
+    drawing = os.path.relpath(job.part_file.absolute(), folder or job.path.absolute().parent)
     lines = [_robot(job), f"T_flange_tip = {_array(job.tool)}", ""]
     lines += [f"T_base_part = {_array(job.placement)}", "", _part(job, drawing), ""]
     lines += ["# How every plan is asked for.", _options(job.options)]
