@@ -4,6 +4,7 @@ import json
 import runpy
 import shutil
 
+import numpy as np
 import pytest
 
 from jobs import CONTOURS, DEMO, HEAD, SMALL, WHOLE
@@ -36,6 +37,30 @@ pierce_time_s = 0.2
 )
 """Leads, a kerf, joints, corners, weights and margins."""
 
+CELLED = (
+    QUICK
+    + """
+[cell]
+near_miss_mm = 5
+stand_off_mm = 2
+[cell.head]
+body_radius_mm = 35
+nozzle_radii_mm = [2, 15]
+[[cell.fixture]]
+name = "post"
+size_mm = [60, 60, 900]
+xyz_mm = [900, 300, 450]
+rpy_deg = [0, 0, 30]
+[[cell.pair]]
+between = ["post", "head"]
+near_miss_mm = 8
+[[cell.pair]]
+between = ["post", "arm"]
+allowed = "it bends"
+"""
+)
+"""Two contours that are clear of a post, by pairs of their own."""
+
 
 def scripted(folder, text):
     """The job of a text beside the part of the demo, and its script there."""
@@ -48,7 +73,7 @@ def scripted(folder, text):
     return job, script
 
 
-@pytest.mark.parametrize("text", [QUICK, FEATURES], ids=["plain", "features"])
+@pytest.mark.parametrize("text", [QUICK, FEATURES, CELLED], ids=["plain", "features", "cell"])
 def test_the_script_comes_to_the_plans_and_the_program_of_the_job(tmp_path, text):
     job, script = scripted(tmp_path, text)
     made = runpy.run_path(str(script))
@@ -80,6 +105,30 @@ def test_names_cannot_become_code(tmp_path):
     assert name in [spec.name for spec in job.contours]
     made = runpy.run_path(str(script))
     assert [plan.name for plan in made["plans"]] == [spec.name for spec in job.contours]
+
+
+def test_a_cell_is_that_of_the_job(tmp_path):
+    job, script = scripted(tmp_path, CELLED)
+    made, meant = runpy.run_path(str(script))["cell"], prepare(job).cell
+    assert made.names == meant.names
+    assert made.pair_names == meant.pair_names
+    assert made.unjudged == meant.unjudged
+    assert made.required.tolist() == meant.required.tolist()
+    q = np.array([[0.1, -0.2, 0.3, 0.4, 1.0, 0.6], [-0.6, 0.3, -0.2, 1.0, -1.1, 0]])
+    assert made.distances(q) == pytest.approx(meant.distances(q), abs=1e-12)
+
+
+def test_solids_from_files_are_refused(tmp_path):
+    fixture = """
+[cell]
+near_miss_mm = 5
+[[cell.fixture]]
+name = "rest"
+file = "b_pillar.step"
+xyz_mm = [3000, 0, 0]
+"""
+    with pytest.raises(InputError, match=r"solids from files in \[cell\]"):
+        scripted(tmp_path, QUICK + fixture)
 
 
 def test_what_a_script_has_no_lines_for_is_refused(tmp_path):

@@ -173,7 +173,7 @@ def script(
     """Write a job as a Python script that does the same by the public functions.
 
     The script reads the drawing, plans each contour with the options of the job, audits, and writes
-    the program. It belongs beside the drawing. What it has no lines for is refused, as a cell.
+    the program. It belongs beside the drawing. What it has no lines for is refused, as an order.
 
     Example: kerfpath script door.toml -o door.py
     """

@@ -14,6 +14,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job.as_run import keeps_between_nodes, turning_speed
 from kerfpath.job.format import ContourSpec, CutRequest, Job, PreparedJob
+from kerfpath.job.output._script_cell import cell_lines, has_files
 from kerfpath.operations import Side
 from kerfpath.options import PlanOptions
 from kerfpath.robots import robot as robot_of
@@ -25,6 +26,8 @@ ANGLES = frozenset(("gamma_step", "cone", "angle", "lower", "upper", "velocity",
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 CLASSES = ("Band", "Certify", "Comfort", "PlanOptions", "Tilt")
 """What options are made of."""
+OF_CELL = ("CuttingHead", "Mesh", "box", "cell_of", "link_capsules", "thicken", "weld")
+"""What cells are made of."""
 SAY = "print"
 """By which the script, and no module of this package, says how far it is."""
 WIDTH = 99
@@ -42,7 +45,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath import {used}
-{execution}from kerfpath.post import build_program, language, post, write_files
+{cell}{execution}from kerfpath.post import build_program, language, post, write_files
 
 HERE = Path(__file__).parent
 MM = 1e-3  # m
@@ -56,9 +59,9 @@ plans, faults = [], []
 def cut(nodes, path, speed):
     """Plan a contour and audit the plan against its path; speed None: the nodes have times."""
     made = plan(
-        nodes, arm, tool=T_flange_tip, placement=T_base_part, speed=speed, options=options
+        nodes, arm, tool=T_flange_tip, placement=T_base_part, speed=speed, options=options{cell}
     )
-{keep}    found = audit(made, reference=path, path_tolerance={path!r}, axis_tolerance={axis!r})
+{keep}    found = audit(made, reference=path, path_tolerance={path!r}, axis_tolerance={axis!r}{cell})
     faults.extend(f"{{made.name}}: {{issue}}" for issue in found if issue.level == "error")
     plans.append(made)
     {say}(f"{{made.name}}: cost {{made.cost:.6g}}, {{made.proof.statement}}")
@@ -104,12 +107,14 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
     lines = [_robot(job), f"T_flange_tip = {_array(job.tool)}", ""]
     lines += [f"T_base_part = {_array(job.placement)}", "", _part(job, drawing), ""]
     lines += ["# How every plan is asked for.", _options(job.options)]
-    tolerances = job.tolerances
+    if prepared.cell is not None:
+        lines += ["", *cell_lines(job, prepared.cell)]
+    within, cell = job.tolerances, "" if prepared.cell is None else ", cell=cell"
     keeps = keeps_between_nodes(job)
     keep = KEEP.format(turning=_value(turning_speed(job)), say=SAY) if keeps else ""
     if job.program.language != "none":
         lines += _program(job)
-    lines.append(CUT.format(path=tolerances.path, axis=tolerances.axis, say=SAY, keep=keep))
+    lines.append(CUT.format(path=within.path, axis=within.axis, say=SAY, keep=keep, cell=cell))
     for request in prepared.contours:
         lines += [*_contour(request), ""]
     lines.append(REFUSE)
@@ -119,14 +124,16 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
     classes = [name for name in CLASSES if f"{name}(" in text]
     used = ", ".join([*classes, "audit", "cad", "operations", "plan", "robot"])
     execution = "from kerfpath.execution import keep_limits\n" if keeps else ""
+    of_cell = ", ".join(name for name in OF_CELL if f"{name}(" in text)
+    cell = f"from kerfpath.cell import {of_cell}\n" if prepared.cell is not None else ""
     names = {"job": _plain(job.path.name), "drawing": _plain(drawing)}
-    return HEAD.format(**names, used=used, execution=execution) + text
+    return HEAD.format(**names, used=used, execution=execution, cell=cell) + text
 
 
 def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
     """Return what a job asks for that a script has no few lines for; empty where there is none."""
     beyond = {
-        "[cell]": job.cell is not None,
+        "solids from files in [cell]": job.cell is not None and has_files(job.cell),
         "[sequence]": job.sequence is not None,
         "[robot] without model": "model" not in job.source["robot"],
         'start = "best" or direction = "best"': any(len(r.candidates) > 1 for r in requests),
