@@ -2,6 +2,7 @@
 
 import { el } from "../dom.js";
 import { percent } from "../format.js";
+import { SCALE_GRADIENT } from "../scene/scale.js";
 import { Grid } from "./grid.js";
 import { pixels } from "./paint.js";
 
@@ -12,7 +13,8 @@ const SWATCH = 28; // px, drawn at half that size
  * @param {Grid} grid
  * @param {number} layer
  * @param {import("./paint.js").Ink[]} ink
- * @param {{course: boolean, before: string | null}} lines  before: whose course is dashed
+ * @param {{course: boolean, before: string | null, shaded: boolean}} lines
+ *   before: whose course is dashed; shaded: what is free has the colours of a scale
  * @returns {Node[]}
  */
 export function legend(grid, layer, ink, lines) {
@@ -26,7 +28,7 @@ export function legend(grid, layer, ink, lines) {
     return el(
       "li",
       {},
-      swatch(message, ink[code]),
+      lines.shaded && ink[code].free ? ramp() : swatch(message, ink[code]),
       el("span", {}, code === 0 ? "free" : message.reasons[code]),
       el("b", {}, share < 0.005 ? "< 1 %" : percent(share)),
     );
@@ -47,6 +49,12 @@ export function legend(grid, layer, ink, lines) {
       ? [el("details", {}, el("summary", {}, "Postures not shown"), ...hidden)]
       : []),
   ];
+}
+
+function ramp() {
+  const made = el("i", { class: "swatch" });
+  made.style.background = SCALE_GRADIENT;
+  return made;
 }
 
 /**

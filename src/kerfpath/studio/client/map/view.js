@@ -160,6 +160,7 @@ export class MapView {
       ...legend(grid, this.layer, this.chart.inks(), {
         course: store.plans.has(grid.message.contour),
         before: store.besideOf(grid.message.contour),
+        shaded: this.choices.shade !== null,
       }),
       ...this.bands.listed(),
     );
