@@ -153,6 +153,16 @@ def test_the_course_of_a_technique_is_what_plan_finds_by_it(winding, method):
     assert found["notes"] == []
 
 
+def test_what_a_technique_knows_nothing_of_is_left_out(tmp_path):
+    text = QUICK.replace("[plan]", '[plan]\nbetween_nodes = "guaranteed"')
+    with serving(write_job(tmp_path, text)) as client, talking(client) as page:
+        page.until("plan", contour="hole 10")
+        page.say("technique", contour="hole 10", method="known")
+        found = page.until("technique")
+    assert found["cost"] > 0
+    assert "limits between the nodes" in found["notes"][0]
+
+
 def test_what_a_technique_does_not_look_at_is_said(celled):
     page, *_ = celled
     page.say("technique", contour="slot", method="known")

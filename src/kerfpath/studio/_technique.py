@@ -61,6 +61,7 @@ def _without(
     asked = replace(
         options, method=method, refine=False, refine_parts=1, certify=None,
         closure="free", rotation=None, feed="constant", interruptions="none", least_piece=None,
+        between_nodes="reported",
         comfort=None if comfort is None else replace(comfort, clearance=None),
     )  # fmt: skip
     kept = {
@@ -68,6 +69,7 @@ def _without(
         "limits on how far endless joints turn": options.rotation is None,
         "a reduced feed": options.feed == "constant",
         "interruptions": options.interruptions == "none",
+        "limits between the nodes": options.between_nodes != "guaranteed",
         "collisions in the cell": prepared.cell is None,
     }
     left = [words for words, none in kept.items() if not none]

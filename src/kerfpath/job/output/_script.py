@@ -61,7 +61,9 @@ def cut(nodes, path, speed):
     made = plan(
         nodes, arm, tool=T_flange_tip, placement=T_base_part, speed=speed, options=options{cell}
     )
-{keep}    found = audit(made, reference=path, path_tolerance={path!r}, axis_tolerance={axis!r}{cell})
+{keep}    found = audit(
+        made, reference=path, path_tolerance={path!r}, axis_tolerance={axis!r}{cell}
+    )
     faults.extend(f"{{made.name}}: {{issue}}" for issue in found if issue.level == "error")
     plans.append(made)
     {say}(f"{{made.name}}: cost {{made.cost:.6g}}, {{made.proof.statement}}")
