@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from kerfpath.cad import Part
 from kerfpath.contour import Contour
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, KerfpathError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import (
     CutResult,
