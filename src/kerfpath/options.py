@@ -133,9 +133,9 @@ class PlanOptions:
         keeps the nodes of its contour.
     between_nodes : {"reported", "kept", "guaranteed"}
         The limits hold at the nodes, and what the program needs between them is "reported"; where
-        that is more, the nodes are held to less, until the limits are "kept" at every instant, as
-        far as they can be; or the audit fails unless that is proved, "guaranteed". A job does so;
-        see `kerfpath.execution.keep_limits` for a plan.
+        that is more, the nodes are held to less if the limits can be "kept" so at every instant;
+        or the audit fails unless that is proved, "guaranteed". A job does so; see
+        `kerfpath.execution.keep_limits` for a plan.
     interruptions : {"none", "fewest"}
         Whether a contour that cannot be cut in one go is cut in pieces, see `plan_in_pieces`.
     least_piece : float m, optional

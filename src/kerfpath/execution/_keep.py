@@ -94,6 +94,8 @@ def keep_limits(
         if max(run.velocity_bound, run.acceleration_bound) <= 1:
             said = "it keeps the limits between the nodes, too"
             return Kept(plan=made, done=True, rounds=count, run=run, statement=said)
+        if count == ROUNDS:
+            break
         worst = max(run.peak_velocity.share, run.peak_acceleration.share)
         if np.isinf(worst) or np.isinf(run.acceleration_bound):
             why = "nothing can be proved there for this arm"

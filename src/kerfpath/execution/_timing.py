@@ -99,12 +99,9 @@ def timing_of(run: Executed, robot: Robot, *, eta_v: float = 1.0, eta_a: float =
     first, second = run.velocity_share * velocity, run.acceleration_share * acceleration
     if np.isnan(second).any():
         raise InputError("timing_of: expected a run whose joints are in reach")
-    velocity, acceleration = eta_v * velocity, eta_a * acceleration
     steps = np.diff(run.time)
-    most = _most(first, second, velocity, acceleration)
-    x = _forward(
-        _backward(most, steps, first, second, acceleration), steps, first, second, acceleration
-    )
+    room, lean, most = _rows(first, second, eta_v * velocity, eta_a * acceleration)
+    x = _forward(_backward(most, steps, room, lean), steps, room, lean)
     rate = np.sqrt(x)
     pace = np.maximum((rate[1:] + rate[:-1]) / 2, 1e-9)
     points = run.course.poses(run.time)[:, :3, 3]
@@ -119,57 +116,48 @@ def timing_of(run: Executed, robot: Robot, *, eta_v: float = 1.0, eta_a: float =
     )
 
 
-def _most(first: Array, second: Array, velocity: Array, acceleration: Array) -> Array:
-    """Return the largest x (m,) at each sample by itself, the programmed pace at most."""
-    with np.errstate(divide="ignore"):
-        most = np.minimum(1.0, ((velocity / np.abs(first)) ** 2).min(axis=1))
-    return np.array(
-        [
-            min(x, _largest(*_lines(f, s, acceleration)))
-            for x, f, s in zip(most, first, second, strict=True)
-        ]
-    )
+def _rows(
+    first: Array, second: Array, velocity: Array, acceleration: Array
+) -> tuple[Array, Array, Array]:
+    """Return room and lean (m, n), |u + lean x| <= room, and the largest x (m,) by themselves.
 
-
-def _lines(first: Array, second: Array, acceleration: Array) -> tuple[Array, Array, float]:
-    """Return bounds of u by x at a sample: low and high (j, 2) of c0 + c1 x, and the largest x.
-
-    |q' u + q'' x| <= a, of the joints that move; of one that does not, q'' x <= a.
+    A joint that does not move bounds x alone. Of two joints a u is left for both where
+    |lean_1 - lean_2| x <= room_1 + room_2.
     """
     moves = np.abs(first) > 1e-12
-    with np.errstate(divide="ignore"):
-        alone = (acceleration / np.abs(second))[~moves].min(initial=np.inf)
-    f, s, a = np.abs(first[moves]), (second * np.sign(first))[moves], acceleration[moves]
-    return np.c_[-a / f, -s / f], np.c_[a / f, -s / f], float(alone)
-
-
-def _largest(low: Array, high: Array, alone: float) -> float:
-    """Return the largest x for which there is a u; each pair of bounds asks for low <= high."""
-    gap = high[None, :, 0] - low[:, None, 0]
-    slope = low[:, None, 1] - high[None, :, 1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return float(min(np.where(slope > 0, gap / slope, np.inf).min(initial=np.inf), alone))
+        room = np.where(moves, acceleration / np.abs(first), np.inf)
+        lean = np.where(moves, second / first, 0.0)
+        alone = np.where(moves, np.inf, acceleration / np.abs(second)).min(axis=1)
+        most = np.minimum(alone, ((velocity / np.abs(first)) ** 2).min(axis=1))
+        both = room[:, :, None] + room[:, None]
+        pair = both / np.abs(lean[:, :, None] - lean[:, None])
+    return room, lean, np.minimum(np.minimum(most, pair.min(axis=(1, 2))), 1.0)
 
 
-def _backward(most: Array, steps: Array, first: Array, second: Array, acceleration: Array) -> Array:
-    """Return the largest x (m,) from which the end is reached at rest."""
+def _backward(most: Array, steps: Array, room: Array, lean: Array) -> Array:
+    """Return the largest x (m,) from which the end is reached at rest.
+
+    A step leads from x to x + 2 step u, which is neither below zero nor above what the next sample
+    is left from.
+    """
     reach = most.copy()
     reach[-1] = 0.0
+    rate = 1 / (2 * steps[:, None])
+    with np.errstate(divide="ignore"):
+        rests = np.where(lean[:-1] > rate, room[:-1] / (lean[:-1] - rate), np.inf).min(axis=1)
+        slope = np.where(lean[:-1] < rate, 1 / (rate - lean[:-1]), np.inf)
     for i in range(len(steps) - 1, -1, -1):
-        low, high, alone = _lines(first[i], second[i], acceleration)
-        # x + 2 u step stays between rest and what the next sample is left from.
-        low = np.vstack([low, [0.0, -0.5 / steps[i]]])
-        high = np.vstack([high, [0.5 * reach[i + 1] / steps[i], -0.5 / steps[i]]])
-        reach[i] = max(min(reach[i], _largest(low, high, alone)), 0.0)
+        left = ((reach[i + 1] * rate[i] + room[i]) * slope[i]).min()
+        reach[i] = min(reach[i], rests[i], left)
     return reach
 
 
-def _forward(reach: Array, steps: Array, first: Array, second: Array, acceleration: Array) -> Array:
+def _forward(reach: Array, steps: Array, room: Array, lean: Array) -> Array:
     """Return the largest x (m,) that is come to from rest."""
     x = reach.copy()
     x[0] = 0.0
     for i, step in enumerate(steps):
-        _, high, _ = _lines(first[i], second[i], acceleration)
-        u = (high[:, 0] + high[:, 1] * x[i]).min(initial=np.inf)
+        u = (room[i] - lean[i] * x[i]).min()
         x[i + 1] = min(reach[i + 1], max(x[i] + 2 * step * u, 0.0))
     return x
