@@ -130,6 +130,24 @@ def test_limits_are_read_and_may_be_given(tmp_path):
     np.testing.assert_array_equal(r.speed_limits(), [[5.0] * 6, [7.0] * 6])
 
 
+def test_accelerations_of_every_joint_are_read_the_smaller_of_both_ways(tmp_path):
+    both = LIMIT.replace("/>", ' acceleration="9" deceleration="8" jerk="100"/>')
+    path = described(tmp_path, robot("staubli_tx60"), inside=both)
+    r = Robot.from_urdf(path)
+    np.testing.assert_array_equal(r.acceleration, [8.0] * 6)
+    assert r.acceleration_source == "URDF arm.urdf"
+    given = Robot.from_urdf(path, acceleration=[7] * 6)
+    np.testing.assert_array_equal(given.acceleration, [7.0] * 6)
+    assert given.acceleration_source == "given by the user"
+    # Of five joints they are no limits of an arm of six.
+    path.write_text(path.read_text().replace(' acceleration="9" deceleration="8"', "", 1))
+    assert Robot.from_urdf(path).acceleration is None
+    still = path.read_text().replace('acceleration="9"', 'acceleration="0"', 1)
+    path.write_text(still)
+    with pytest.raises(InputError, match="the acceleration limit 0 rad/s"):
+        Robot.from_urdf(path)
+
+
 @pytest.mark.parametrize(
     ("limit", "message"),
     [

@@ -115,6 +115,9 @@ def build_robot(
     left_out = ", ".join(description.left_out)
     outside = [f"Links on joints outside the chain are left out: {left_out}."] if left_out else []
     low, high = _ranges(description, lower, upper, endless)
+    source = "given by the user"
+    if acceleration is None and (acceleration := _acceleration(description)) is not None:
+        source = f"URDF {Path(description.path).name}"
     found = kind(
         id=description.name,
         manufacturer=manufacturer,
@@ -129,7 +132,7 @@ def build_robot(
         upper=high,
         velocity=_velocity(description) if velocity is None else np.asarray(velocity),
         acceleration=None if acceleration is None else np.asarray(acceleration),
-        acceleration_source="" if acceleration is None else "given by the user",
+        acceleration_source="" if acceleration is None else source,
         endless=continuous if endless is None else np.asarray(endless),
         chain=description.chain,
         bodies=description.bodies,
@@ -166,6 +169,18 @@ def _ranges(
         low if lower is None else np.asarray(lower),
         high if upper is None else np.asarray(upper),
     )
+
+
+def _acceleration(description: Description) -> Array | None:
+    """Return the accelerations (n,) that are written, as URDF 1.2 can; None unless all are."""
+    found = [joint.acceleration for joint in description.joints]
+    for joint in description.joints:
+        if joint.acceleration is not None and joint.acceleration <= 0:
+            what = (
+                f"has the acceleration limit {joint.acceleration:g} rad/s^2, so that it cannot move"
+            )
+            raise _lacks(description, joint.name, what, "acceleration=")
+    return None if None in found else np.array(found, dtype=float)
 
 
 def _velocity(description: Description) -> Array:

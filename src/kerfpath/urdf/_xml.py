@@ -39,6 +39,8 @@ class Joint:
         Unit axis in the joint's own frame.
     lower, upper : float rad or None
     velocity : float rad/s or None
+    acceleration : float rad/s^2 or None
+        The smaller of those for speeding up and for slowing down, as far as they are written.
     mimics : str
         The joint that it follows, or nothing.
     """
@@ -52,6 +54,7 @@ class Joint:
     lower: float | None
     upper: float | None
     velocity: float | None
+    acceleration: float | None
     mimics: str
 
     __repr__ = short_repr
@@ -169,7 +172,8 @@ def _joint(element: ElementTree.Element, snap: float, path: Path) -> Joint:
         if not np.abs(axis).max() > NO_AXIS:
             raise InputError(f"{where}: its axis is nearly 0 0 0, which is no direction")
     limit, mimic = child(element, "limit", where), child(element, "mimic", where)
-    written: dict[str, float | None] = dict.fromkeys(("lower", "upper", "velocity"))
+    names = ("lower", "upper", "velocity", "acceleration", "deceleration")
+    written: dict[str, float | None] = dict.fromkeys(names)
     if limit is not None:
         for key in written:
             if limit.get(key) is not None:
@@ -181,6 +185,7 @@ def _joint(element: ElementTree.Element, snap: float, path: Path) -> Joint:
                 "lower": written["lower"] or 0.0,
                 "upper": written["upper"] or 0.0,
             }
+    rates = [written.pop(key) for key in ("acceleration", "deceleration")]
     return Joint(
         name=name,
         kind=kind,
@@ -189,6 +194,7 @@ def _joint(element: ElementTree.Element, snap: float, path: Path) -> Joint:
         origin=pose_of(element, where, snap),
         axis=freeze(np.asarray(axis / np.linalg.norm(axis))),
         mimics="" if mimic is None else mimic.get("joint", "another"),
+        acceleration=min((rate for rate in rates if rate is not None), default=None),
         **written,
     )
 
