@@ -3,14 +3,17 @@ PYTHON ?= python3
 BIN := .venv/bin
 DEMO_OUT ?= demo-out
 
-.PHONY: demo test check bench figures lock clean
+.PHONY: demo test test-slow check bench figures lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/kerfpath demo --out $(DEMO_OUT)
 	@echo 'To see it cut and to change it, in the browser: $(BIN)/kerfpath studio'
 
 test: .venv/dev.stamp
-	$(BIN)/pytest -n auto --dist worksteal
+	$(BIN)/pytest -n auto --dist worksteal -m "not slow"
+
+test-slow: .venv/dev.stamp
+	$(BIN)/pytest -n auto --dist worksteal -m slow
 
 check: .venv/dev.stamp
 	$(BIN)/ruff check

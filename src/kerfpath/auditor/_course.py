@@ -104,11 +104,14 @@ def rates_along(
     task = _Task(robot, pieces, T_base_part, T_flange_tip)
     middle, half = (pieces.begin + pieces.end) / 2, (pieces.end - pieces.begin) / 2
     k = np.arange(len(middle))
-    posture = task.posture(k, middle, q)
+    posture = np.zeros(len(k), dtype=np.int64)
     velocity, acceleration = np.zeros((2, len(middle), robot.joints))
     for depth in range(deepest + 1):
         # Rounding leaves no gap between the halves.
-        fast, sharp = task.rates(k, middle, half * (1 + 1e-12), posture[k])
+        joints, none = task.joints(k, middle, half * (1 + 1e-12))
+        if depth == 0:
+            posture = _nearest(joints, none, q)
+        fast, sharp = _rates(joints, none, posture[k])
         done = ((fast <= enough[0]) & (sharp <= enough[1])).all(axis=1) | (depth == deepest)
         np.maximum.at(velocity, k[done], fast[done])
         np.maximum.at(acceleration, k[done], sharp[done])
@@ -128,29 +131,11 @@ class _Task:
         self._robot, self._pieces = robot, pieces
         self._before, self._after = fixed_poses(robot, T_base_part[None], T_flange_tip)
 
-    def posture(self, k: Ints, t: Array, q: Array) -> Ints:
-        """Return the posture (S,) nearest to joints q (S, n) at instants t (S,) of pieces k."""
-        joints, none = self._joints(k, t, np.zeros(len(t)))
-        off = np.zeros((8, len(k)))
-        for joint, own in zip(joints, q.T, strict=True):
-            angle = np.broadcast_to(joint.at.middle(), none.shape).reshape(8, -1)
-            apart = np.abs((angle - own + np.pi) % (2 * np.pi) - np.pi)
-            off = np.maximum(off, np.where(np.isnan(apart), np.inf, apart))
-        return np.asarray(np.argmin(off, axis=0))
+    def joints(self, k: Ints, t: Array, half: Array) -> tuple[list[Jet], Bools]:
+        """Return the joints over spans t +- half of pieces k (S,), and where there are none.
 
-    def rates(self, k: Ints, t: Array, half: Array, posture: Ints) -> tuple[Array, Array]:
-        """Return bounds (S, n) on velocity and acceleration over spans t +- half of pieces k."""
-        joints, none = self._joints(k, t, half)
-        rows = np.arange(len(k))
-        found = np.empty((2, len(k), len(joints)))
-        absent = none.reshape(8, -1)[posture, rows]
-        for i, joint in enumerate(joints):
-            for kind, held in enumerate((joint.rate, joint.bend)):
-                size = np.broadcast_to(held.magnitude(), none.shape).reshape(8, -1)[posture, rows]
-                found[kind, :, i] = np.where(np.isnan(size) | absent, np.inf, size)
-        return found[0], found[1]
-
-    def _joints(self, k: Ints, t: Array, half: Array) -> tuple[list[Jet], Bools]:
+        As `joints_of`.
+        """
         parts = []
         for i in range(0, len(k), AT_ONCE):
             rows = slice(i, i + AT_ONCE)
@@ -185,6 +170,28 @@ class _Task:
                 column = [each.plus(before[i, 3]) for i, each in enumerate(column)]
             columns.append((column[0], column[1], column[2]))
         return Pose(x=columns[0], y=columns[1], z=columns[2], point=columns[3])
+
+
+def _nearest(joints: list[Jet], none: Bools, q: Array) -> Ints:
+    """Return the posture (S,) nearest to joints q (S, n) in the middle of spans."""
+    off = np.zeros((8, len(q)))
+    for joint, own in zip(joints, q.T, strict=True):
+        angle = np.broadcast_to(joint.at.middle(), none.shape).reshape(8, -1)
+        apart = np.abs((angle - own + np.pi) % (2 * np.pi) - np.pi)
+        off = np.maximum(off, np.where(np.isnan(apart), np.inf, apart))
+    return np.asarray(np.argmin(off, axis=0))
+
+
+def _rates(joints: list[Jet], none: Bools, posture: Ints) -> tuple[Array, Array]:
+    """Return bounds (S, n) on velocity and acceleration over spans, each in its posture (S,)."""
+    rows = np.arange(len(posture))
+    found = np.empty((2, len(posture), len(joints)))
+    absent = none.reshape(8, -1)[posture, rows]
+    for i, joint in enumerate(joints):
+        for kind, held in enumerate((joint.rate, joint.bend)):
+            size = np.broadcast_to(held.magnitude(), none.shape).reshape(8, -1)[posture, rows]
+            found[kind, :, i] = np.where(np.isnan(size) | absent, np.inf, size)
+    return found[0], found[1]
 
 
 def _polynomial(coefficients: Array, time: Jet) -> Jet:

@@ -14,6 +14,7 @@ from kerfpath.errors import InputError
 from kerfpath.execution import (
     AT_SPEED,
     Executed,
+    Kept,
     Peak,
     Timing,
     deviation_of,
@@ -56,13 +57,15 @@ class AsRun:
     __repr__ = short_repr
 
 
-def as_run(job: Job, plan: Plan, path: Contour, why: str = "") -> AsRun:
+def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsRun:
     """Return a plan as its program has it run; without checks where it does not run straight.
 
     They hold at every instant where the arm is one whose rates can be bounded, else at samples.
     Where a joint needs more than its full limit between the nodes a controller slows down: that is
-    a warning, or an error where the job asks for a guarantee, and `why` it could not be given.
+    a warning, or an error where the job asks for a guarantee. `kept` is what came of keeping them.
     """
+    if kept is not None and kept.run is not None:
+        return run_judged(job, kept.run, plan, path, "" if kept.done else kept.statement)
     unknown = _not_modelled(job)
     if not unknown:
         try:
@@ -71,7 +74,7 @@ def as_run(job: Job, plan: Plan, path: Contour, why: str = "") -> AsRun:
             unknown = str(fault)
     if unknown:
         return AsRun(checks=checks_of_unknown(job, unknown))
-    return AsRun() if run is None else run_judged(job, run, plan, path, why)
+    return AsRun() if run is None else run_judged(job, run, plan, path)
 
 
 def checks_of_unknown(job: Job, why: str) -> tuple[Check, ...]:
@@ -145,18 +148,14 @@ def _node(run: Executed, plan: Plan, time: float) -> int:
     return int(np.argmin(np.linalg.norm(plan.T_part_tip[:, :3, 3] - there, axis=1)))
 
 
-def kept_between_nodes(job: Job, plan: Plan) -> tuple[Plan, str]:
-    """Return the plan held to less at its nodes where it needs more between them.
-
-    Second: why the limits cannot be kept so, and what would help; empty where they are.
-    """
+def kept_between_nodes(job: Job, plan: Plan) -> Kept | None:
+    """Return a plan held to less at its nodes where it needs more between; None: not asked for."""
     if not keeps_between_nodes(job):
-        return plan, ""
+        return None
     try:
-        kept = keep_limits(plan, _program(job), turning_speed=turning_speed(job))
-    except InputError as fault:  # said when it is written
-        return plan, str(fault)
-    return kept.plan, "" if kept.done else kept.statement
+        return keep_limits(plan, _program(job), turning_speed=turning_speed(job))
+    except InputError:  # said when it is written
+        return None
 
 
 def keeps_between_nodes(job: Job) -> bool:

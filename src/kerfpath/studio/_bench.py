@@ -17,8 +17,8 @@ from kerfpath.studio._scene import tables_of
 
 __all__ = ["Bench", "Kept"]
 
-MOST_VERTICES = 3_000_000
-"""Vertices of the graphs that are kept beyond those of the last two runs: some 200 MB."""
+MOST_VERTICES = 1_000_000
+"""Vertices of the graphs that each store keeps beyond those of the last two runs: some 70 MB."""
 _T = TypeVar("_T")
 
 

@@ -2,9 +2,13 @@
 
 import json
 
+import pytest
+
 from kerfpath.job.format.tables._cut import CornersTable, LeadTable, MicroJointsTable
 from kerfpath.job.format.tables._sequence import SequenceTable
 from studio.browser.test_page import ready, sent, serious, until
+
+pytestmark = pytest.mark.slow
 
 
 def slower(plan):

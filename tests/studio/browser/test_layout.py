@@ -12,6 +12,8 @@ from jobs import DEMO
 from studio.browser.test_page import ready, serious, until
 from studio.browser.test_studio import JOB, REVISION, Server, settled
 
+pytestmark = pytest.mark.slow
+
 GRID = JOB.replace("[plan]", '[plan]\nmethod = "exact"')
 TEXT = "() => studio.store.job.text"
 REACH = "() => studio.view.placing.reach?.contours[0].out.length ?? null"

@@ -4,6 +4,8 @@ import pytest
 
 from studio.browser.test_page import ready, sent, serious, until
 
+pytestmark = pytest.mark.slow
+
 PLACE = """(name) => {
     const { store, view: { stage, canvas } } = studio;
     const { points } = store.part.loops.find((loop) => loop.name === name);

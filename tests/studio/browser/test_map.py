@@ -7,6 +7,8 @@ import pytest
 
 from studio.browser.test_page import MODULE, ready, serious, until
 
+pytestmark = pytest.mark.slow
+
 SEEN = "() => ({ ...studio.map.chart.window })"
 WHOLE = {"from": 0, "to": 1, "top": 0, "bottom": 1}
 DRAWN = """() => new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)))"""

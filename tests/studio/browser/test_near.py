@@ -1,6 +1,10 @@
 """Contours by clearance: the nearest pair is lit, and its distance stands beside the tip."""
 
+import pytest
+
 from studio.browser.test_page import ready, serious, until
+
+pytestmark = pytest.mark.slow
 
 
 def test_the_nearest_pair_is_said_and_lit_where_the_robot_is(page, studio, first):

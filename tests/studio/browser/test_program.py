@@ -4,6 +4,8 @@ import pytest
 
 from studio.browser.test_page import ready, sent, serious, until
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def text(first):

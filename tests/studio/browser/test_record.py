@@ -3,7 +3,11 @@
 import struct
 from pathlib import Path
 
+import pytest
+
 from studio.browser.test_page import ready, until
+
+pytestmark = pytest.mark.slow
 
 
 def test_a_picture_is_as_large_as_the_view_and_shows_it(page, studio, first):

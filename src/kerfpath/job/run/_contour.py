@@ -154,11 +154,12 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
         candidate = Candidate.at(whole.request.task.speed, path, made.contour)
     if job.options.refine_parts > 1:
         made = _divided(made, candidate.path, job.options.refine_parts)
-    made, why = (made, "") if whole.picked else kept_between_nodes(job, made)
+    kept = None if whole.picked else kept_between_nodes(job, made)
+    made = made if kept is None else kept.plan
     checks = job.tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
     checks += whole.request.drawing_checks(candidate, made.contour, job.tolerances.path)
     cut = replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))
-    return replace(cut, as_run=as_run(job, made, candidate.path, why))
+    return replace(cut, as_run=as_run(job, made, candidate.path, kept))
 
 
 def _divided(made: Plan, path: Contour, parts: int) -> Plan:
