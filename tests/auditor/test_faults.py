@@ -182,6 +182,7 @@ def test_no_fault_proves_more_than_a_motion_costs(honest, kind):
         assert proved is None or proved <= honest.cost
 
 
+@pytest.mark.slow
 def test_stages_that_are_missing_or_in_another_order(honest):
     certificate, bound = honest.proof.certificate, honest.proof.bound
     stages = certificate.stages
@@ -198,6 +199,7 @@ def test_stages_that_are_missing_or_in_another_order(honest):
     assert bound <= twice <= honest.cost
 
 
+@pytest.mark.slow
 def test_a_bound_or_a_gap_that_is_not_what_is_proved(honest):
     certificate = honest.proof.certificate
     proved = certified_bound(certificate, honest)

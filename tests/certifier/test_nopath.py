@@ -116,6 +116,7 @@ def increments(q, arm, *, first=False):
     return np.where(arm.endless, dq - 2 * np.pi * np.rint(dq / (2 * np.pi)), dq)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("ceiling_at_work")
 @pytest.mark.parametrize("wild", [0.0, 0.01, 0.1])
 def test_no_motion_is_ruled_out_by_limits_that_it_keeps(arm, tool, placement, wild):

@@ -207,6 +207,7 @@ def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder, fastest
     assert "a path exists up to" in (folder / "fast-plan" / "report.html").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "share"),
     [

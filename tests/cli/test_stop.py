@@ -60,6 +60,7 @@ def life(job):
     return time.perf_counter() - start
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
 def test_ctrl_c_at_any_moment_ends_a_plan_with_one_line(job, life):
     rng = np.random.default_rng(71)

@@ -191,6 +191,7 @@ def few(circle, arm, tool, placement):
     return few | {"method": "exact"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "criteria",
     [("displacement", "range_3"), ("displacement", "range_6"), ("displacement_4", "range_6")],
@@ -204,6 +205,7 @@ def test_the_front_of_a_small_task_is_that_of_all_paths(few, criteria):
     np.testing.assert_allclose(made.values, front, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_of_the_range_of_all_joints_nearly_all_is_found(few):
     criteria = ("displacement_1", "range")
     front = np.array(front_of_all_paths(few, criteria))

@@ -149,6 +149,7 @@ def test_off_the_grid_it_is_faster_and_the_motion_keeps_the_limits(circle, arm, 
     assert found.limit == "acceleration"
 
 
+@pytest.mark.slow
 def test_off_the_grid_a_plan_is_found_up_to_the_fastest_speed(circle, arm, tool, placement):
     nodes = circle.resample(count=41)
     cell = {"tool": tool, "placement": placement, "gamma_step": np.radians(5), "refine": True}

@@ -87,6 +87,7 @@ def test_the_front_is_that_of_the_planner_itself(job, studied):
     assert studied.front.failures == own.failures
 
 
+@pytest.mark.slow
 def test_a_study_that_is_killed_goes_on_and_comes_to_the_same(job, studied, tmp_path):
     store = tmp_path / "s"
     script = tmp_path / "script.py"
@@ -124,6 +125,7 @@ def _done(store):
     return log.stat().st_size // 4096 if log.exists() else 0
 
 
+@pytest.mark.slow
 def test_a_cluster_comes_to_the_same_though_a_worker_is_killed(
     job, studied, scheduler, workers, tmp_path
 ):

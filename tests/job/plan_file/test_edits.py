@@ -28,6 +28,7 @@ def made(folder):
     return lru_cache(partial(_plan_jobs.planned, folder))
 
 
+@pytest.mark.slow
 def test_no_harmful_edit_of_a_plan_passes(made):
     tally = plan_edits.Tally()
     for job, plan in map(made, _plan_jobs.JOBS):

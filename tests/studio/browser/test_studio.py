@@ -275,6 +275,7 @@ def test_two_pages_see_the_same_and_a_new_server_finds_the_work(opened, servers,
     assert page.locator("#saved").inner_text().startswith("changed")
 
 
+@pytest.mark.slow
 def test_a_rectangle_on_the_map_pins_the_course_until_it_is_undone(opened):
     page = opened
     before, at = page.evaluate(COURSE), page.evaluate(PLACES)
