@@ -105,8 +105,11 @@ def test_the_part_is_moved_by_numbers_and_what_is_out_of_reach_is_said(opened):
         page.get_by_label(label).focus()
         page.keyboard.press("Control+a")
         page.keyboard.type(keys)
+        before = part_of(page)
         page.keyboard.press("Enter")
-        page.wait_for_timeout(300)
+        until(page, lambda now=before: part_of(page) != now)
+        # The next move counts from the scene of this one.
+        until(page, lambda: not page.evaluate("() => studio.view.placing.moved"))
     until(page, lambda: part_of(page)["rpy_deg"] == pytest.approx([12, -7, 80], abs=2e-4))
     assert part_of(page)["xyz_mm"] == pytest.approx(was["xyz_mm"], abs=2e-3)
 
@@ -231,18 +234,19 @@ def test_what_the_search_has_tried_is_said_in_words(page, studio, first, message
     assert page.get_by_label("Part x, mm").input_value() == "1260"
     assert serious(page) == []
     take.click()
-    assert studio.sent[-1] == {"type": "take", "number": 3}
+    until(page, lambda: studio.sent[-1] == {"type": "take", "number": 3})
     sheet.get_by_role("button", name="Back to the job's place").click()
     assert page.get_by_label("Part x, mm").input_value() == "1200"
     sheet.get_by_role("button", name="Look again").click()
-    asked = next(m for m in reversed(studio.sent) if m["type"] == "layout")
+    until(page, lambda: studio.sent[-1]["type"] == "layout")
+    asked = studio.sent[-1]
     spans = {"x_mm": [-200, 200], "y_mm": [-200, 200], "yaw_deg": [-30, 30]}
     assert asked == {
         "type": "layout", "goal": "speed", "ranges": spans, "evaluations": 64, "grid": True,
     }  # fmt: skip
     studio.say(layout | {"state": "running"})
     sheet.get_by_role("button", name="Stop").first.click()
-    assert studio.sent[-1]["type"] == "cancel"
+    until(page, lambda: studio.sent[-1]["type"] == "cancel")
     job = next(m for m in first if m["type"] == "job")
     studio.say(job | {"revision": 2})
     until(page, lambda: "Of the job before its last change" in sheet.inner_text())

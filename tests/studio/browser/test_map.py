@@ -80,7 +80,7 @@ def test_the_admitted_are_shaded_with_a_scale_and_their_values_are_said(mapped, 
     page.locator("#map-shade").select_option("wrist")
     until(page, lambda: page.evaluate("() => studio.map.chart.shade !== null"))
     page.evaluate(DRAWN)
-    assert [m["by"] for m in studio.sent if m["type"] == "shade"] == ["wrist"]
+    assert shades_asked(studio) == ["wrist"]
     legend = page.locator("#legend .shades").inner_text()
     assert "wrist singularity" in legend
     assert "90 deg" in legend
@@ -106,7 +106,11 @@ def test_the_admitted_are_shaded_with_a_scale_and_their_values_are_said(mapped, 
     page.locator("#map-shade").select_option("")
     until(page, lambda: page.evaluate("() => studio.map.chart.shade === null"))
     assert page.locator("#legend .shades").count() == 0
-    assert [m["by"] for m in studio.sent if m["type"] == "shade"] == ["wrist", None]
+    until(page, lambda: shades_asked(studio) == ["wrist", None])
+
+
+def shades_asked(studio):
+    return [m["by"] for m in studio.sent if m["type"] == "shade"]
 
 
 def test_what_comes_too_near_is_crossed_and_said(mapped, studio, messages):
@@ -224,6 +228,7 @@ def test_a_pin_is_drawn_where_the_pointer_is_on_a_zoomed_map(mapped, studio):
     page.mouse.move(x + 10, y + 10)
     page.mouse.move(x + 40, y + 30)
     page.mouse.up()
+    until(page, lambda: any(m["type"] == "edit" for m in studio.sent))
     (edit,) = (m for m in studio.sent if m["type"] == "edit")
     ((start, end, low, high),) = edit["value"]
     frame, s = page.evaluate("() => [studio.map.chart.frame(), studio.map.grid.message.s]")
@@ -282,5 +287,5 @@ def test_the_course_of_another_technique_is_dotted_with_what_it_comes_to(mapped,
     assert "collisions in the cell" in legend.inner_text()
     page.locator("#map-technique").select_option("")
     until(page, lambda: page.evaluate("() => studio.map.choices.course === null"))
-    asked = [m["method"] for m in studio.sent if m["type"] == "technique"]
-    assert asked == ["known", "paper", None]
+    wanted = ["known", "paper", None]
+    until(page, lambda: [m["method"] for m in studio.sent if m["type"] == "technique"] == wanted)
