@@ -14,6 +14,7 @@ from kerfpath.auditor._course import ENCLOSED as ENCLOSED
 from kerfpath.auditor._course import CoursePieces as CoursePieces
 from kerfpath.auditor._course import rates_along as rates_along
 from kerfpath.auditor._room import retract_checks as retract_checks
+from kerfpath.auditor._rounding import MOST_ROUNDED as MOST_ROUNDED
 from kerfpath.auditor._rounding import Rounding as Rounding
 from kerfpath.auditor._rounding import rounding_of as rounding_of
 from kerfpath.auditor._table import Check as Check

@@ -78,6 +78,11 @@ class Executed:
         return self._peak(self.acceleration_share)
 
     @property
+    def most(self) -> float:
+        """The largest share of a limit of either kind."""
+        return max(self.peak_velocity.share, self.peak_acceleration.share)
+
+    @property
     def missed(self) -> float:
         """The largest distance, m, by which the tip passes a target."""
         poses = self.course.poses(self.course.time)

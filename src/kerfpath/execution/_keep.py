@@ -96,7 +96,7 @@ def keep_limits(
             return Kept(plan=made, done=True, rounds=count, run=run, statement=said)
         if count == ROUNDS:
             break
-        worst = max(run.peak_velocity.share, run.peak_acceleration.share)
+        worst = run.most
         if np.isinf(worst) or np.isinf(run.acceleration_bound):
             why = "nothing can be proved there for this arm"
             break

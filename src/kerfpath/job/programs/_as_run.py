@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from kerfpath.auditor import Check, Rounding
+from kerfpath.auditor import MOST_ROUNDED, Check, Rounding
 from kerfpath.contour import Contour
-from kerfpath.execution import Executed, from_stop_to_stop, run_along
+from kerfpath.execution import from_stop_to_stop, run_along
 from kerfpath.job.as_run import checks_of_unknown, run_judged
 from kerfpath.job.format import Job
 from kerfpath.job.programs._read import ReadCut
@@ -19,8 +19,6 @@ __all__ = ["check_run"]
 
 SHORTEST = 1e-9
 """s: no move is shorter."""
-MOST_ROUNDED = 0.05
-"""Share of a limit that the digits of a text may explain at most."""
 
 
 def check_run(
@@ -44,7 +42,7 @@ def check_run(
     ]  # fmt: skip
     if not runs:
         return [*checks_of_unknown(job, "the robot stops at every node")]
-    run = max(runs, key=_needs)
+    run = max(runs, key=lambda each: each.most)
     dq, dt = np.diff(made.q, axis=0), np.diff(made.time)
     velocity, acceleration = job.robot.speed_limits()
     allowed = (
@@ -58,10 +56,6 @@ def check_run(
         replace(sharp, limit=sharp.limit + more[1]),
         *others,
     ]
-
-
-def _needs(run: Executed) -> float:
-    return max(run.peak_velocity.share, run.peak_acceleration.share)
 
 
 def _moves(cut: ReadCut) -> list[LinearMove]:
