@@ -64,7 +64,7 @@ class Layouts:
         """Take the job of the scene that is said now, from which offsets count."""
         self._stands = revision, prepared
 
-    def reach(self, ask: ReachOf, revision: int, answer: Say) -> None:
+    def reach(self, ask: ReachOf, answer: Say) -> None:
         """Have an answer what is in reach, unless that of another place is asked for before.
 
         Raises
@@ -72,7 +72,7 @@ class Layouts:
         InputError
             There is no scene yet.
         """
-        _, prepared = self._there()
+        revision, prepared = self._there()
 
         def work(stop: Stop) -> None:
             at = placement_of(prepared)

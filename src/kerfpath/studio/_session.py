@@ -223,9 +223,7 @@ class Session:
             case PointOf():
                 page.say(await asyncio.to_thread(self._planning.candidate, ask))
             case ReachOf():
-                self._planning.layouts.reach(
-                    ask, self.document.revision, lambda said: self._soon(page.say, said)
-                )
+                self._planning.layouts.reach(ask, lambda said: self._soon(page.say, said))
             case Place():
                 self._change(self._planning.layouts.placed(ask))
             case LayoutOf():

@@ -143,7 +143,7 @@ export function layoutSheet(store, connection, view) {
     if (!answer || answer.number !== asked) return;
     waiting = 0;
     if (!placing.open) return;
-    placing.take(answer);
+    if (answer.revision === store.scene?.revision) placing.take(answer);
     draw();
     if (again) ask();
   }
