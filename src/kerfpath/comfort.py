@@ -282,8 +282,9 @@ def jacobian(robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> Ar
     quarter turn ahead and one behind is its derivative, exactly and for every family.
     """
     q = floats(q, "q", (None, robot.joints), copy=False)
-    if robot.external is not None:
-        raise InputError(f"jacobian: with a {robot.external.kind} ask for that of robot.held(x)")
+    if robot.externals:
+        name = robot.externals[0].name
+        raise InputError(f"jacobian: with {name} ask for that of robot.held(x)")
     T_flange_tip = np.eye(4) if tool is None else as_pose(tool, "tool")
     turned = robot.forward(q)[:, :3, :3] @ T_flange_tip[:3, :3]
     J = np.empty((len(q), 6, robot.joints))

@@ -15,9 +15,9 @@ from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
 from kerfpath.errors import InputError
 from kerfpath.kernels.turns import JointLimits, count_admissible, fill_admissible
 from kerfpath.losses import Loss, Reason
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, base_in_part
 
-__all__ = ["LayeredGraph", "build", "gamma_grid"]
+__all__ = ["LayeredGraph", "build", "external_grid", "gamma_grid"]
 
 _WHOLE_STEPS = 1e-9
 """How far 2 pi / step may be from a whole number, relative, and still count as one."""
@@ -37,8 +37,6 @@ class LayeredGraph:
         The samples of gamma, ascending.
     tilt : (V, 2) rad
         Lead and lean of each variant of a layer; without a tolerance all nominal.
-    external : (V,) m or rad
-        Value of the robot's external axis in each variant; empty where it has none.
     sample, posture, variant : (N,) int
         Index into `gamma`, posture mu, and variant of each vertex.
     turn : (N, n) int
@@ -56,7 +54,6 @@ class LayeredGraph:
     start: Ints
     gamma: Array
     tilt: Array
-    external: Array
     sample: NDArray[np.int32]
     variant: NDArray[np.int32]
     posture: NDArray[np.int8]
@@ -180,6 +177,7 @@ def build(
     gamma: Array,
     tilt: Array | None = None,
     postures: Sequence[int] | None = None,
+    external: Array | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
     """Return the vertices of every node: all variants, gamma, postures and turns (Eq. 10).
@@ -189,7 +187,7 @@ def build(
     frames : (K, 4, 4) or (K, T, 4, 4)
         Task frames H_k in the robot base, m; or those of each tilt.
     robot : Robot
-        Kinematics and joint limits. Every sample of its external axis is a variant of each tilt.
+        Kinematics and joint limits.
     T_flange_tip : (4, 4)
         Tool: tip frame in the flange.
     gamma : (m,) rad
@@ -198,6 +196,9 @@ def build(
         Lead and lean of the tilts, see `kerfpath.tilt`; default: one, the nominal axis.
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
+    external : (K, X, E) rad or m, optional
+        Values of the robot's E external axes, each a variant of each tilt; default: all of a grid
+        in their steps.
     progress : callable, optional
         Called with the number of nodes done since the last call.
 
@@ -215,21 +216,26 @@ def build(
         gamma = freeze(np.zeros(1))
     tilt = freeze(np.zeros((1, 2))) if tilt is None else tilt
     frames = frames.reshape(len(frames), len(tilt), 4, 4)
-    external, part_in_base = _stands(robot)
-    tilt = freeze(np.repeat(tilt, len(part_in_base), axis=0))
+    if external is None:
+        external = np.broadcast_to(grid := external_grid(robot), (len(frames), *grid.shape))
+    places = external.shape[1]
+    tilt = freeze(np.repeat(tilt, places, axis=0))
     samples = len(tilt) * len(gamma)
     reason = np.empty((len(frames), samples, robot.postures), np.uint8)
 
     def layers_of(first: int, last: int) -> _NodeRun:
         """Solve nodes first..last-1 and keep what the limits admit."""
-        H = frames[first:last, :, None]
-        H = np.ascontiguousarray(part_in_base @ H if robot.external else H).reshape(-1, 4, 4)
+        H, x = frames[first:last, :, None], external[first:last]
+        if robot.externals:
+            H = np.linalg.inv(base_in_part(robot.externals, x))[:, None] @ H
+        H = np.ascontiguousarray(H).reshape(-1, 4, 4)
         q, reach = arm.inverse_nodes(H, gamma, T_flange_tip)
         q = q.reshape(last - first, samples, *q.shape[2:])
         piece = _admitted(q, reach.reshape(q.shape[:3]), wanted, limits, reason[first:last])
-        if robot.external:
-            at = np.tile(external, len(tilt) // len(external))[piece.sample // len(gamma)]
-            still = np.zeros(len(at), np.int8)
+        if robot.externals:
+            node = np.repeat(np.arange(len(x)), piece.sizes)
+            at = x[node, piece.sample // len(gamma) % places]
+            still = np.zeros(at.shape, np.int8)
             piece = piece._replace(
                 q=np.column_stack([piece.q, at]), turn=np.column_stack([piece.turn, still])
             )
@@ -250,7 +256,6 @@ def build(
         start=freeze(np.concatenate([[0], np.cumsum(np.concatenate(sizes))])),
         gamma=gamma,
         tilt=tilt,
-        external=freeze(np.tile(external, len(tilt) // max(1, len(external)))),
         sample=freeze(origin % len(gamma)),
         variant=freeze(origin // len(gamma)),
         posture=freeze(_end_to_end(posture)),
@@ -260,16 +265,28 @@ def build(
     )
 
 
-def _stands(robot: Robot) -> tuple[Array, Array]:
-    """Return the samples (E,) of the external axis, and the part against the base at each.
+def external_grid(robot: Robot) -> Array:
+    """Return every combination (X, E) of the samples of a robot's external axes, rad or m.
 
-    The poses are (E, 4, 4) m; a robot without such an axis has no sample and stands at one place.
+    Raises
+    ------
+    InputError
+        One of them has no step.
     """
-    if robot.external is None:
-        return np.zeros(0), np.eye(4)[None]
-    limits = robot.joint_limits()
-    samples = robot.external.samples(float(limits.lower[-1]), float(limits.upper[-1]))
-    return samples, np.asarray(np.linalg.inv(robot.external.poses(samples)), dtype=float)
+    if not robot.externals:
+        return np.zeros((1, 0))
+    limits, arm = robot.joint_limits(), robot.family.joints
+    samples = [
+        axis.samples(float(lower), float(upper), endless=bool(endless))
+        for axis, lower, upper, endless in zip(
+            robot.externals,
+            limits.lower[arm:],
+            limits.upper[arm:],
+            robot.endless[arm:],
+            strict=True,
+        )
+    ]
+    return np.stack(np.meshgrid(*samples, indexing="ij"), axis=-1).reshape(-1, len(samples))
 
 
 def _end_to_end(parts: list[NDArray[Any]]) -> NDArray[Any]:

@@ -118,7 +118,7 @@ def test_no_step_costs_less_than_its_cells_say(made, metric, tilted):
     gamma = -np.pi + 2 * np.pi / (BASE * 2.0**cells.level) * (cells.index + 0.5) + t
     about = cells.center + (cells.slope + cells.bend * t[:, None] / 2) * t[:, None]
     curves = JointCurves(one.robot, one.frames[cells.node], one.T_flange_tip, cells.posture)
-    q = curves.at(gamma, about)
+    q = curves.at(gamma[:, None], about)
     good = np.isfinite(q).all(axis=1) & np.isfinite(result.level[:, 0])
     # Rounding of the kinematics in floats.
     assert (np.abs(q - about) <= cells.spread + 1e-9)[good].all()

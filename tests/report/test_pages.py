@@ -439,7 +439,6 @@ def test_fine_maps_stay_small(section: ContourSection) -> None:
         start=np.zeros(K + 1, int),
         gamma=np.linspace(-np.pi, np.pi, m + 1)[1:],
         tilt=np.zeros((1, 2)),
-        external=np.zeros(0),
         sample=np.zeros(0, int),
         variant=np.zeros(0, int),
         posture=np.zeros(0, int),

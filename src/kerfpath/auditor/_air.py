@@ -51,8 +51,9 @@ def transfer_checks(
     list of Check
         Their node is the corner that a motion starts from.
     """
-    if robot.external is not None:
-        raise InputError(f"air move: it is not known yet how a {robot.external.kind} moves in it")
+    if robot.externals:
+        name = robot.externals[0].name
+        raise InputError(f"air move: it is not known yet how {name} moves in it")
     corners = floats(q, "q", (None, robot.joints))
     duration = np.diff(floats(time, "time", (len(corners),)))
     needed = _least_times(robot, np.abs(np.diff(corners, axis=0)), eta_v, eta_a)

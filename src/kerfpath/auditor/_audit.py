@@ -107,8 +107,9 @@ def checks(
         raise InputError(f"parts: expected a whole number >= 1, got {parts!r}")
     path_tolerance = scalar(path_tolerance, "path_tolerance", unit="m", above=0.0)
     axis_tolerance = scalar(axis_tolerance, "axis_tolerance", unit="rad", above=0.0)
-    if cell is not None and plan.robot.external is not None:
-        raise InputError(f"cell: it does not know how a {plan.robot.external.kind} moves in it")
+    if cell is not None and plan.robot.externals:
+        name = plan.robot.externals[0].name
+        raise InputError(f"cell: it does not know how {name} moves in it")
     chain = chain_of(plan.robot)
     motion = motion_of(plan, chain, interpolation, parts)
     path = plan.contour if reference is None else reference
@@ -215,13 +216,15 @@ def _positions(
     limits = plan.robot.joint_limits()
     left = np.zeros(plan.q.shape) if rounding is None else rounding.q
     left = np.maximum(left[:-1], left[1:])
-    bound, axis = ~plan.robot.endless, plan.robot.external
-    rows, own = [], slice(plan.robot.family.joints)
-    if axis is not None:
-        x, bound[-1] = motion.q[..., -1], False
-        over = np.maximum(limits.lower[-1] - x, x - limits.upper[-1]).max(axis=1)
-        title = f"excess over the limits of the {axis.kind}"
-        rows.append(_worst("external-limits", title, over, LIMIT_SLACK, axis.unit))
+    arm, bound = plan.robot.family.joints, ~plan.robot.endless
+    rows, own = [], slice(arm)
+    for i, axis in enumerate(plan.robot.externals, arm):
+        if bound[i]:
+            x = motion.q[..., i]
+            over = np.maximum(limits.lower[i] - x, x - limits.upper[i]).max(axis=1)
+            title = f"excess over the limits of {axis.name}"
+            rows.append(_worst("external-limits", title, over, LIMIT_SLACK, axis.unit))
+    bound[arm:] = False
     if bound.any():
         n = len(bound)
         beyond = np.maximum(limits.lower - reached.low[:, :n], reached.high[:, :n] - limits.upper)
@@ -274,33 +277,31 @@ def _rates(plan: Plan, reached: BetweenNodes, rounding: Rounding | None) -> list
     fine = reached.speed / dt[:, None] / velocity
     left = None if rounding is None else rounding.of_velocity(dq, dt) / velocity
     rows = [
-        _per_joint("velocity", "joint velocity from node to node", speed, eta_v, left),
-        _per_joint("velocity-between", "joint velocity between the nodes", fine, 1.0, left),
+        _per_joint(plan, "velocity", "joint velocity from node to node", speed, eta_v, left),
+        _per_joint(plan, "velocity-between", "joint velocity between the nodes", fine, 1.0, left),
     ]
     if len(dq) > 1:
         change = np.diff(dq / dt[:, None], axis=0) / ((dt[1:] + dt[:-1]) / 2)[:, None]
         share = np.abs(change) / acceleration
         left = None if rounding is None else rounding.of_acceleration(dq, dt) / acceleration
         rows.append(
-            _per_joint("acceleration", "joint acceleration at the nodes", share, eta_a, left, 1)
+            _per_joint(plan, "acceleration", "joint acceleration at the nodes", share, eta_a, left)
         )
     return rows
 
 
 def _per_joint(
-    code: str, title: str, share: Array, limit: float, left: Array | None, first: int = 0
+    plan: Plan, code: str, title: str, share: Array, limit: float, left: Array | None
 ) -> Check:
-    """Check shares (rows, joints) of a limit, wider by what is `left` to digits at each.
-
-    Row 0 belongs to node `first`.
-    """
+    """Check shares (rows, joints) of a limit, wider by what is `left` to digits at each."""
+    first = len(plan.q) - 1 - len(share)  # accelerations begin at node 1
     wider = np.zeros(share.shape) if left is None else np.minimum(left, MOST_ROUNDED)
     over = np.where(np.isnan(share), np.inf, share - wider)
     row, joint = (int(i) for i in np.unravel_index(np.argmax(over), over.shape))
     digits = f"; {wider[row, joint] * 100:.2g} % of it for digits" if left is not None else ""
     return Check(
         code=code,
-        title=f"{title} (highest: joint {joint + 1}{digits})",
+        title=f"{title} (highest: {plan.robot.joint_names[joint]}{digits})",
         value=float(share[row, joint]),
         limit=limit * (1 + SHARE_SLACK) + float(wider[row, joint]),
         unit="share",

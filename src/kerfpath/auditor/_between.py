@@ -146,19 +146,23 @@ class _StraightMoves:
         self._turn = np.einsum("kij,kj->ki", R[:-1], local)
         self._step = np.diff(self._poses[:, :3, 3], axis=0)
         dq = joint_increments(plan)
-        self._x = dq[:, self._n] if dq.shape[1] > self._n else np.zeros(len(dq))
+        self._x = dq[:, self._n :]
         rate, reach = np.sqrt((self._step**2).sum(1) + (self._turn**2).sum(1)), _reaches(chain)
-        turned = np.abs(self._x) * _turns(chain)
-        far = float(np.abs(self._poses[:, :3, 3]).max()) + 1.0
-        self._size = rate + np.abs(self._x) * (far if chain.external is not None else 0.0)
+        rotary = np.array([axis.kind == "rotary" for axis in chain.externals], dtype=float)
+        spun, slid = np.abs(self._x) @ rotary, np.abs(self._x) @ (1 - rotary)
+        self._turned = spun * float(np.sqrt((reach**2 + 1.0).sum()))  # of the Jacobian
+        far = _farthest(chain, self._poses[:, :3, 3], plan.q[:, self._n :])
+        self._size = rate + slid + spun * far
         # What the twist changes by per interval: the axis that it is measured about turns with it.
         still = self._n == 6
         own = 0.0 if still else (self._turn**2).sum(1)
-        self._change = own + np.abs(self._x) * rate * (1.0 + reach[0]) + turned * self._size
+        self._change = own + spun * rate * (1.0 + reach[0]) + self._turned * self._size
+        if len(chain.externals) > 1:  # the one carries the other's axis along
+            self._change = self._change + 2 * spun * (slid + spun * far)
         self._lipschitz = _lipschitz(reach) * (1.0 if still else 2.0)
         limits, (velocity, _) = plan.robot.joint_limits(), plan.robot.speed_limits()
         bound, couplings = ~plan.robot.endless, plan.robot.couplings
-        bound[self._n :] = False  # an external axis runs evenly
+        bound[self._n :] = False  # external axes run evenly
         self.rows = np.vstack([np.eye(dq.shape[1]), *(c.row[None] for c in couplings)])
         self._low = np.append(np.where(bound, limits.lower, -np.inf), [c.lower for c in couplings])
         self._high = np.append(np.where(bound, limits.upper, np.inf), [c.upper for c in couplings])
@@ -168,15 +172,7 @@ class _StraightMoves:
         """Return joint speeds (S, n) per interval at samples, and least singular values (S,)."""
         T, J = self._chain.jacobian(q)
         V = np.concatenate([self._step[k], self._turn[k]], axis=1)
-        axis = self._chain.external
-        if axis is not None:
-            column = np.zeros((len(q), 6))
-            if axis.kind == "rail":
-                column[:, :3] = axis.axis
-            else:
-                column[:, :3] = -np.cross(axis.axis, T[:, :3, 3] - axis.point)
-                column[:, 3:] = -axis.axis
-            V = V - column * self._x[k, None]
+        V = V - (self._chain.twists(q, T[:, :3, 3]) @ self._x[k, :, None])[..., 0]
         if self._n < 6:
             z = T[:, :3, 2]
             J = J.copy()
@@ -186,16 +182,13 @@ class _StraightMoves:
         least = s[:, -1]
         inverse = np.where(s > 1e-12, 1 / np.maximum(s, 1e-12), 0.0)
         v = np.einsum("bji,bj,bkj,bk->bi", Vt, inverse, U, V)
-        if axis is not None:
-            v = np.concatenate([v, self._x[k, None]], axis=1)
-        return v, least
+        return np.concatenate([v, self._x[k]], axis=1), least
 
     def settled(self, steps: _Steps) -> Bools:
         """Say of which steps what they hide is known not to matter."""
         L, own = self._lipschitz, slice(self._n)
         s, size = np.maximum(steps.s0, steps.s1), self._size[steps.k]
-        turned = np.abs(self._x[steps.k]) * steps.h * _turns(self._chain)
-        s = s - turned
+        s = s - self._turned[steps.k] * steps.h
         root = s**2 - 4 * L * size * steps.h
         known = (s > 0) & (root >= 0)
         r = np.where(known, (s - np.sqrt(np.maximum(root, 0.0))) / (2 * L), np.inf)
@@ -262,9 +255,12 @@ def _lipschitz(reach: Array) -> float:
     return float(np.sqrt((reach[outer] ** 2 + inner).sum()))
 
 
-def _turns(chain: JointChain) -> float:
-    """Return by how much a positioner changes the Jacobian at most per radian; a rail does not."""
-    axis = chain.external
-    if axis is None or axis.kind == "rail":
-        return 0.0
-    return float(np.sqrt((_reaches(chain) ** 2 + 1.0).sum()))
+def _farthest(chain: JointChain, tips: Array, x: Array) -> float:
+    """Return how fast (m) the tip is at most for each m or radian of an external axis.
+
+    tips : (K, 3) m; x : (K, E), values of the axes at the nodes.
+    """
+    linear = [axis.kind == "linear" for axis in chain.externals]
+    travel = float(np.abs(x[:, linear]).max(axis=0).sum()) if any(linear) else 0.0
+    points = sum(float(np.linalg.norm(axis.point)) for axis in chain.externals)
+    return float(np.linalg.norm(tips, axis=1).max()) + 1.0 + travel + 2 * points

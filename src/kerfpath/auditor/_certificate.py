@@ -129,7 +129,7 @@ def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
     for known, what in (
         (settings.objective == "sum", f"the objective {settings.objective!r}"),
         (settings.tilt is None and not plan.tilt.any(), "a tilt of the tool axis"),
-        (robot.external is None, "an external axis"),
+        (not robot.externals, "an external axis"),
         (robot.family.free_rotation, "a robot without free rotation"),
         (plan.feed is None and dt - tau.min() <= EVEN * dt, "a feed that is not constant"),
     ):

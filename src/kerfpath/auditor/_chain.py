@@ -29,14 +29,14 @@ class JointChain:
         Unit axis of each joint in its own frame.
     tip : (4, 4)
         Tip in the frame of the last joint, m.
-    external : ExternalAxis, optional
-        What carries the first joint, or the part against it; its values are the last of q.
+    externals : tuple of ExternalAxis
+        What carries the first joint, and the part against it; their values are the last of q.
     """
 
     origins: Array
     axes: Array
     tip: Array
-    external: ExternalAxis | None = None
+    externals: tuple[ExternalAxis, ...] = ()
 
     __repr__ = short_repr
 
@@ -51,7 +51,7 @@ class JointChain:
     def jacobian(self, q: Array) -> tuple[Array, Array]:
         """Return tip poses (B, 4, 4) and geometric Jacobians (B, 6, n): linear over angular.
 
-        Of the arm's own joints, without an external axis.
+        Of the arm's own joints, without the external axes.
         """
         *joints, tip = self._frames(q)
         position = tip[:, :3, 3]
@@ -62,17 +62,54 @@ class JointChain:
             J[:, 3:, i] = axis
         return tip, J
 
+    def twists(self, q: Array, tip: Array) -> Array:
+        """Return what each external axis moves the tip by (B, 6, E), at tips (B, 3) m of q (B, n).
+
+        Linear over angular, against the part, per m or rad.
+        """
+        steps = self._steps_to_base(q)
+        columns = np.zeros((len(q), 6, len(self.externals)))
+        for T, i in zip(steps, self._order(), strict=False):
+            axis = self.externals[i]
+            sign = -1.0 if axis.carries == "part" else 1.0
+            direction = sign * T[:, :3, :3] @ axis.axis
+            if axis.kind == "linear":
+                columns[:, :3, i] = direction
+            else:
+                point = T[:, :3, :3] @ axis.point + T[:, :3, 3]
+                columns[:, :3, i] = np.cross(direction, tip - point)
+                columns[:, 3:, i] = direction
+        return columns
+
+    def _order(self) -> list[int]:
+        """Return the external axes on the way from the part to the robot's base."""
+        numbers = range(len(self.externals))
+        part = [i for i in numbers if self.externals[i].carries == "part"]
+        return part[::-1] + [i for i in numbers if self.externals[i].carries == "robot"]
+
+    def _steps_to_base(self, q: Array) -> list[Array]:
+        """Return where the part is left for the robot's base, (B, 4, 4) before each axis; the base.
+
+        An axis that carries the part is passed backwards: seen from it, all else moves.
+        """
+        T, n = np.tile(np.eye(4), (len(q), 1, 1)), len(self.axes)
+        steps = [T]
+        for i in self._order():
+            axis = self.externals[i]
+            x = q[:, n + i] * (-1.0 if axis.carries == "part" else 1.0)
+            moved = np.tile(np.eye(4), (len(q), 1, 1))
+            if axis.kind == "linear":
+                moved[:, :3, 3] = np.outer(x, axis.axis)
+            else:
+                moved[:, :3, :3] = turn = Rotation.from_rotvec(np.outer(x, axis.axis)).as_matrix()
+                moved[:, :3, 3] = axis.point - turn @ axis.point
+            T = T @ moved
+            steps.append(T)
+        return steps
+
     def _frames(self, q: Array) -> list[Array]:
         """Return the poses of every joint frame, turned, and of the tip; (B, 4, 4) each."""
-        T = np.tile(np.eye(4), (len(q), 1, 1))
-        if self.external is not None and self.external.kind == "rail":
-            T[:, :3, 3] = np.outer(q[:, -1], self.external.axis)
-        elif self.external is not None:
-            # The part turns one way, so that seen from it the base turns the other way.
-            back = Rotation.from_rotvec(np.outer(q[:, -1], -self.external.axis)).as_matrix()
-            T[:, :3, :3] = back
-            T[:, :3, 3] = self.external.point - back @ self.external.point
-        frames = []
+        frames, T = [], self._steps_to_base(q)[-1]
         for i, (origin, axis) in enumerate(zip(self.origins, self.axes, strict=True)):
             turn = np.zeros((len(q), 4, 4))
             turn[:, :3, :3] = Rotation.from_rotvec(q[:, i, None] * axis).as_matrix()
@@ -90,7 +127,7 @@ def chain_of(robot: Robot) -> JointChain:
     if robot.chain is not None:
         given = robot.chain
         return JointChain(
-            origins=given.origins, axes=given.axes, tip=given.end, external=robot.external
+            origins=given.origins, axes=given.axes, tip=given.end, externals=robot.externals
         )
     origins, axes, end = _MODELS[robot.kinematics](robot.geometry)
     for i, axis in enumerate(axes):
@@ -102,7 +139,7 @@ def chain_of(robot: Robot) -> JointChain:
         origins=origins,
         axes=robot.sign[:, None] * axes,
         tip=end @ robot.T_end_flange,
-        external=robot.external,
+        externals=robot.externals,
     )
 
 

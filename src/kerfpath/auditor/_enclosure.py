@@ -158,10 +158,10 @@ def require_closed_form(robot: Robot) -> None:
             f"robot {robot.id!r}: its solutions are enclosed for the families "
             f"{', '.join(POSTURES_OF)} only, it is of {robot.kinematics!r}"
         )
-    if robot.external is not None:
+    if robot.externals:
         raise InputError(
             f"robot {robot.id!r}: its solutions are enclosed without an external axis only, it "
-            f"has a {robot.external.kind}; hold it with robot.held(x)"
+            f"has {robot.externals[0].name}; hold it with robot.held(x)"
         )
 
 

@@ -158,7 +158,7 @@ def _certified(
 def _why_not(plan: Plan) -> str:
     """Say why nothing can be proved of a plan; "" where it can."""
     robot, asked = plan.robot, plan.settings
-    if robot.external is not None:
+    if robot.externals:
         return "the joints of an external axis are not enclosed"
     if not robot.encloses:
         return f"the joints of a robot of the kind {robot.kinematics!r} are not enclosed"

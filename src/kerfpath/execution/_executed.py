@@ -168,7 +168,7 @@ def run_along(
     InputError
         As `executed`.
     """
-    if robot.external is not None:
+    if robot.externals:
         raise InputError("executed: expected a robot without an external axis")
     T_tip_flange = np.linalg.inv(T_flange_tip)
     course = ToolCourse.of(moves[0].T_part_tip, moves[1:], turning_speed)

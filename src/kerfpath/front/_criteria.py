@@ -315,7 +315,7 @@ def _named(name: str, robot: Robot) -> Criterion:
     kind, _, number = str(name).rpartition("_")
     if kind in JOINT_CRITERIA and number in map(str, range(1, robot.joints + 1)):
         joint, each = int(number) - 1, JOINT_CRITERIA[kind]
-        unit = robot.external.unit if robot.external and joint == robot.joints - 1 else "rad"
+        unit = robot.units[joint]
         return replace(
             each, name=name, words=f"{each.words}, joint {number}", unit=unit, joint=joint
         )

@@ -182,7 +182,7 @@ def _rules(job: Job) -> Rules:
 
 def _not_modelled(job: Job) -> str:
     """Return why the motion of the job's programs is not known between the nodes; else empty."""
-    if job.robot.external is not None:
+    if job.robot.externals:
         return "the motion of a program with an external axis is not modelled"
     if job.program.language == "none":
         return "there is no program; name a language in [program]"

@@ -198,8 +198,9 @@ class ClearSearch:
 
 def _require_same_cell(task: PlanningTask, cell: Cell) -> None:
     """Raise InputError where the cell was built for another tool or another place of the part."""
-    if task.robot.external is not None:
-        raise InputError(f"cell: it does not know how a {task.robot.external.kind} moves in it")
+    if task.robot.externals:
+        name = task.robot.externals[0].name
+        raise InputError(f"cell: it does not know how {name} moves in it")
     for name, here, there in (
         ("tool", task.T_flange_tip, cell.T_flange_tip),
         ("placement", task.T_base_part, cell.T_base_part),

@@ -20,7 +20,7 @@ from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
 from kerfpath.search import ContinuousPath, Effort, find_shortest
 
-__all__ = ["clear_motion", "grid_reason", "plan_continuous"]
+__all__ = ["claimed", "clear_motion", "grid_reason", "plan_continuous"]
 
 FIRST_STEP = 5e-3
 """rad: first change of gamma of a refinement that begins from a path between the samples."""
@@ -56,7 +56,7 @@ def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[st
     begin("search")
     found = clear_motion(task, finder, begin)
     if found is not None:
-        return _claimed(found, finder)
+        return claimed(found, finder)
     why = "begun from the grid: the search between its samples found no motion"
     try:
         made = _from_grid(task, finder, begin, why)
@@ -68,7 +68,8 @@ def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[st
     return shaken(made, finder) if made.feed is None else made
 
 
-def _claimed(found: Refinement, finder: ClearSearch) -> Plan:
+def claimed(found: Refinement, finder: ClearSearch) -> Plan:
+    """Return the plan of a motion, and what is claimed of it."""
     claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
 
@@ -105,7 +106,7 @@ def _from_more_samples(
     found = clear_motion(fine, there, begin)
     why = "begun from a finer grid: the search between its samples found no motion"
     try:
-        made = _from_grid(fine, there, begin, why) if found is None else _claimed(found, there)
+        made = _from_grid(fine, there, begin, why) if found is None else claimed(found, there)
     except NoFeasiblePath:
         return None
     return replace(made, settings=task.settings)

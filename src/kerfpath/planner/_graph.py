@@ -9,7 +9,7 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, as_pose, scalar
+from kerfpath._arrays import Array, Bools, as_pose, floats, scalar
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
@@ -22,6 +22,7 @@ from kerfpath.tilt import tilt_frames
 from kerfpath.windows import nodes_of, samples_inside, with_window_ends
 
 __all__ = [
+    "course_of",
     "layered_graph",
     "longest_step",
     "node_interval",
@@ -45,12 +46,15 @@ def layered_graph(
     placement: ArrayLike,
     options: PlanOptions | None = None,
     nodes: ArrayLike | None = None,
+    external: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
     **keywords: Unpack[GraphKeywords],
 ) -> LayeredGraph:
     """Return the layered graph that `plan` searches; arguments as there.
 
-    With `nodes` (M,) int it has their layers alone, the very ones of the whole graph.
+    With `nodes` (M,) int it has their layers alone, the very ones of the whole graph; `external`
+    (K, E) or (K, X, E) rad or m has the values of the external axes at every node, one or more of
+    each, else it has a grid of them.
     """
     asked = with_keywords(options, keywords, GraphKeywords)
     require_windows_fit(contour, robot, asked)
@@ -58,8 +62,10 @@ def layered_graph(
     samples = None if asked.tilt is None else asked.tilt.samples()
     if samples is not None and samples.any():
         H = tilt_frames(H[:, None], contour.along[:, None], samples)
+    course = None if external is None else course_of(external, contour, robot)
     if nodes is not None:
         H, s = H[np.asarray(nodes)], s[np.asarray(nodes)]
+        course = None if course is None else course[np.asarray(nodes)]
     T_flange_tip = as_pose(tool, "tool")
     H = np.ascontiguousarray(as_pose(placement, "placement") @ H)
     graph = build(
@@ -69,11 +75,36 @@ def layered_graph(
         gamma=with_window_ends(gamma_grid(asked.gamma_step), asked.gamma_windows),
         tilt=samples,
         postures=asked.postures,
+        external=course,
         progress=progress,
     )
     if nodes is not None:
         asked = replace(asked, retract=None)  # its first and last layer need not be the ends
     return within_margins(graph, robot, asked, T_flange_tip, s)
+
+
+def course_of(external: ArrayLike, contour: Contour, robot: Robot) -> Array:
+    """Return values of the external axes at every node, (K, E) or (K, X, E), as (K, X, E), checked.
+
+    Raises
+    ------
+    InputError
+        Another number of nodes or axes; a value out of the range of its axis.
+    """
+    arm, limits = robot.family.joints, robot.joint_limits()
+    x = np.asarray(external, dtype=float)
+    x = x[:, None] if x.ndim == 2 else x
+    x = floats(x, "external", (len(contour), None, len(robot.externals)), copy=False)
+    low, high = limits.lower[arm:], limits.upper[arm:]
+    out = ((x < low) | (x > high)) & ~robot.endless[arm:]
+    if out.any():
+        node, place, i = np.argwhere(out)[0]
+        axis = robot.externals[i]
+        raise InputError(
+            f"external: {axis.name} is at {x[node, place, i]:.6g} {axis.unit} at node {node}, "
+            f"outside its range {low[i]:g} to {high[i]:g} {axis.unit}"
+        )
+    return x
 
 
 def within_margins(

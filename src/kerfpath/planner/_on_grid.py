@@ -102,7 +102,7 @@ def _from_quickest(
     # they may take minutes to begin: the long steps between its samples leave the arm nearly every
     # edge, and the exact search for the fastest path on the grid keeps each as a state.
     priced = asked.comfort is not None and asked.comfort.prices_clearance
-    if asked.closure == "periodic" or priced or task.robot.external is not None:
+    if asked.closure == "periodic" or priced or task.robot.externals:
         raise _judged(broken, task, begin) from None
     judged, best = None, None
     begin("search for the quickest motion")

@@ -16,6 +16,7 @@ from kerfpath.planner._certified import with_bound
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._continuous import plan_continuous
 from kerfpath.planner._on_grid import plan_on_grid
+from kerfpath.planner._over_courses import plan_over_courses
 from kerfpath.planner._task import task_of
 from kerfpath.planner._words import with_windows_said
 from kerfpath.plans import Plan
@@ -34,6 +35,7 @@ def plan(
     options: PlanOptions | None = None,
     cell: Cell | None = None,
     graph: LayeredGraph | None = None,
+    external: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
     phase: Callable[[str], None] | None = None,
     **keywords: Unpack[PlanKeywords],
@@ -94,6 +96,9 @@ def plan(
         the best of all clear paths.
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `layered_graph`.
+    external : (K, E) rad or m, optional
+        Values of the robot's external axes at every node, from which they are refined; default:
+        method "continuous" looks for a smooth course, the others take all of a grid in their steps.
     progress : callable, optional
         Called with the number of nodes whose poses have been solved since the last call. Of very
         many nodes every few are solved first, and all only where these do not lead to a plan.
@@ -118,12 +123,15 @@ def plan(
         placement=placement,
         speed=speed,
         graph=graph,
+        external=external,
         progress=progress,
     )
     finder = ClearSearch(task, cell)
     begin = phase or (lambda what: None)
     try:
-        if asked.method == "continuous":
+        if asked.method == "continuous" and robot.externals and graph is None and external is None:
+            made = plan_over_courses(task, finder, begin)
+        elif asked.method == "continuous":
             made = plan_continuous(task, finder, begin)
         else:
             made = plan_on_grid(task, finder, begin, refine=asked.refine)

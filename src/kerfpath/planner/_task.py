@@ -19,6 +19,7 @@ from kerfpath.kernels.metric import increments, wrap
 from kerfpath.losses import Loss
 from kerfpath.options import PlanOptions
 from kerfpath.planner._graph import (
+    course_of,
     layered_graph,
     node_interval,
     require_no_empty_layer,
@@ -82,6 +83,8 @@ class PlanningTask:
         With the weights that are used.
     dt : float s
         Time from node to node at the speed asked for.
+    external : (K, E) rad or m, optional
+        Course of the external axes; None: a grid of their values at every node.
     layers : callable
         Builds the layers of some nodes (M,) of a task, or of all where it is given None: then no
         layer is empty, or it raises NoFeasiblePath.
@@ -94,6 +97,7 @@ class PlanningTask:
     settings: PlanOptions
     dt: float
     layers: Callable[[PlanningTask, Ints | None], Layered]
+    external: Array | None = None
 
     __repr__ = short_repr
 
@@ -137,6 +141,10 @@ class PlanningTask:
     def sampled(self, step: float) -> PlanningTask:
         """Return the task with gamma sampled in other steps, rad; its graph is not built yet."""
         return replace(self, settings=replace(self.settings, gamma_step=step), layers=_layers)
+
+    def along(self, external: Array) -> PlanningTask:
+        """Return the task with another course (K, E) of the external axes, not built."""
+        return replace(self, external=external, layers=_layers)
 
     def at_nodes(self, nodes: Ints) -> Layered:
         """Return the layers of some nodes (M,), ascending; those of all are not built for it."""
@@ -217,7 +225,9 @@ class PlanningTask:
     def part(self, first: int, last: int, name: str) -> PlanningTask:
         """Return the task of nodes first to last alone."""
         part = self.contour.part(first, last, self.settings.frames)
-        return replace(self.on(self.built.part(first, last)), contour=replace(part, name=name))
+        x = None if self.external is None else self.external[first : last + 1]
+        part = replace(part, name=name)
+        return replace(self.on(self.built.part(first, last)), contour=part, external=x)
 
 
 def task_of(
@@ -229,6 +239,7 @@ def task_of(
     placement: ArrayLike,
     speed: float | None = None,
     graph: LayeredGraph | None = None,
+    external: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> PlanningTask:
     """Return the task that the arguments of `kerfpath.plan` pose; errors as there.
@@ -251,6 +262,7 @@ def task_of(
         settings=options,
         dt=dt,
         layers=partial(_layers, graph=graph, progress=progress),
+        external=None if external is None else course_of(external, contour, robot)[:, 0],
     )
 
 
@@ -270,6 +282,7 @@ def _layers(
             placement=task.T_base_part,
             options=replace(options, comfort=None, retract=None, floor=None),
             nodes=nodes,
+            external=task.external,
             progress=progress,
         )
     elif nodes is not None:

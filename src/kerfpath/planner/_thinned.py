@@ -82,7 +82,7 @@ def thinned(task: PlanningTask) -> ThinTask | None:
     graph of all nodes is not built for it.
     """
     last = len(task.contour) - 1
-    if last < MANY or task.settings.tilt is not None or task.robot.external is not None:
+    if last < MANY or task.settings.tilt is not None or task.robot.externals:
         return None
     even = [every for every in EVERY if last % every == 0]
     if task.settings.closure == "periodic" and not even:

@@ -112,9 +112,8 @@ def build_program(
     if not plans:
         raise InputError("build_program: expected at least one plan, got none")
     first = plans[0]
-    for axis in (plan.robot.external for plan in plans):
-        if axis is not None:
-            raise InputError(f"program: no language writes the {axis.kind} of a plan yet")
+    for axis in (axis for plan in plans for axis in plan.robot.externals):
+        raise InputError(f"program: no language writes {axis.name} of a plan yet")
     for plan in plans[1:]:
         _require_same_cell(first, plan)
     process = _Process(

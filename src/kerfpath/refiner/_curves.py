@@ -1,20 +1,23 @@
-"""The joints as functions of gamma at every node, posture and turns fixed."""
+"""The joints as functions of what is free at every node, posture and turns fixed."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, base_in_part
 
 __all__ = ["JointCurves"]
 
 DERIVATIVE_STEP = 1e-5
-"""rad: the central difference is good to 1e-10 of the curvature, rounding to 1e-11."""
+"""rad or m: the central difference is good to 1e-10 of the curvature, rounding to 1e-11."""
 
 
 class JointCurves:
-    """q_k(gamma) of every node in one posture: the true kinematics, not a model of it.
+    """q_k of every node in one posture: the true kinematics, not a model of it.
+
+    What is free at a node are gamma, rad, and the values of the E external axes, rad or m, in this
+    order: F = 1 + E numbers.
 
     Parameters
     ----------
@@ -29,21 +32,21 @@ class JointCurves:
 
     def __init__(self, robot: Robot, H: Array, T_flange_tip: Array, posture: Ints) -> None:
         self._robot = robot.alone()
-        self._external = robot.external
+        self._externals = robot.externals
         self._H = H
         self._T_tip_flange = np.linalg.inv(T_flange_tip)
         self._posture = posture
 
-    def at(self, gamma: Array, near: Array) -> Array:
-        """Return the joints (K, n) rad at `gamma` (K,), each on the turn nearest to `near` (K, n).
+    def at(self, free: Array, near: Array) -> Array:
+        """Return the joints (K, n) at `free` (K, F), each on the turn nearest to `near` (K, n).
 
-        NaN at the nodes that are out of reach. An external axis stays where it is in `near`.
+        NaN at the nodes that are out of reach.
         """
-        H = self._H
-        if self._external is not None:
-            H = np.linalg.inv(self._external.poses(near[:, -1])) @ H
-            return np.column_stack([self._of_arm(H, gamma, near[:, :-1]), near[:, -1]])
-        return self._of_arm(H, gamma, near)
+        H, x = self._H, free[:, 1:]
+        if self._externals:
+            H = np.linalg.inv(base_in_part(self._externals, x)) @ H
+        arm = self._of_arm(H, free[:, 0], np.ascontiguousarray(near[:, : self._robot.joints]))
+        return np.concatenate([arm, x], axis=1)
 
     def _of_arm(self, H: Array, gamma: Array, near: Array) -> Array:
         K = len(gamma)
@@ -53,7 +56,10 @@ class JointCurves:
         spin[:, 0, 1] = -spin[:, 1, 0]
         return self._robot.follow(H @ spin @ self._T_tip_flange, near, self._posture)
 
-    def slope(self, gamma: Array, q: Array) -> Array:
-        """Return dq/dgamma (K, n) where the joints are `q`; NaN at the edge of reach."""
-        ahead, behind = (self.at(gamma + h, q) for h in (DERIVATIVE_STEP, -DERIVATIVE_STEP))
-        return np.asarray((ahead - behind) / (2 * DERIVATIVE_STEP))
+    def slope(self, free: Array, q: Array) -> Array:
+        """Return dq/dfree (K, n, F) where the joints are `q`; NaN at the edge of reach."""
+        slopes = []
+        for step in DERIVATIVE_STEP * np.eye(free.shape[1]):
+            ahead, behind = self.at(free + step, q), self.at(free - step, q)
+            slopes.append((ahead - behind) / (2 * DERIVATIVE_STEP))
+        return np.stack(slopes, axis=2)

@@ -44,8 +44,9 @@ class MotionState:
 
     Parameters
     ----------
-    gamma : (K,) rad
-    q : (K, 6) rad
+    free : (K, F) rad or m
+        Gamma, and the values of the external axes.
+    q : (K, n) rad
         Joints, not wrapped.
     cost : float
     excess : float
@@ -56,7 +57,7 @@ class MotionState:
         By how much a joint or a coupling is out of its range; negative inside.
     """
 
-    gamma: Array
+    free: Array
     q: Array
     cost: float
     excess: float
@@ -89,7 +90,7 @@ class _Step(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Descent:
-    """What is minimised over gamma, and what holds it.
+    """What is minimised over what is free, and what holds it.
 
     Parameters
     ----------
@@ -101,13 +102,13 @@ class Descent:
     weight : (6,) 1/rad
     metric : str
     objective : {"sum", "max"}
-    radius : float rad
-        Largest change of gamma in the first iteration, and that a descent has to have tried before
-        it counts as converged.
+    radius : float rad or m
+        Largest change in the first iteration, and that a descent has to have tried before it counts
+        as converged.
     first : float rad, optional
         Largest change in the first iteration where that is less.
-    gamma_low, gamma_high : (K,) rad, optional
-        Where gamma is kept.
+    low, high : (K, F) rad or m
+        Where what is free is kept; infinite where that is anywhere.
     node_cost : (K,), optional
         What each node costs, taken as fixed; what it comes to once gamma has moved is found after.
     cap : float
@@ -124,28 +125,28 @@ class Descent:
     metric: Metric
     objective: ObjectiveKind
     radius: float
+    low: Array
+    high: Array
     first: float | None = None
-    gamma_low: Array | float = -np.inf
-    gamma_high: Array | float = np.inf
     node_cost: Array | None = None
     cap: float = np.inf
     most: int = MOST_PROGRAMS
 
     __repr__ = short_repr
 
-    def stand(self, gamma: Array, near: Array) -> MotionState:
-        """Return where `gamma` brings the joints; infinite where it is out of reach."""
-        q = self.curves.at(gamma, near)
+    def stand(self, free: Array, near: Array) -> MotionState:
+        """Return where `free` brings the joints; infinite where it is out of reach."""
+        q = self.curves.at(free, near)
         if not np.isfinite(q).all():
             return MotionState(
-                gamma=gamma, q=q, cost=np.inf, excess=np.inf, lost=np.inf, outside=np.inf
+                free=free, q=q, cost=np.inf, excess=np.inf, lost=np.inf, outside=np.inf
             )
         excess = self.rates.excess(np.diff(q, axis=0))
         if self.cap < np.inf:
             longest = path_cost(np.diff(q, axis=0), self.weight, self.metric, "max")
             excess = max(excess, longest / self.cap - 1)
         return MotionState(
-            gamma=gamma,
+            free=free,
             q=q,
             cost=self.cost(q),
             excess=excess,
@@ -199,8 +200,8 @@ class Descent:
         found, programs = self._run(at, self.objective)
         if self.objective == "max":
             tie = replace(self, objective="sum", cap=found.cost)
-            smooth, more = tie._run(tie.stand(found.gamma, found.q), "sum")
-            found, programs = self.stand(smooth.gamma, smooth.q), programs + more
+            smooth, more = tie._run(tie.stand(found.free, found.q), "sum")
+            found, programs = self.stand(smooth.free, smooth.q), programs + more
         return found, programs
 
     def _run(
@@ -238,36 +239,36 @@ class Descent:
             if programs == 1:
                 promised = at.value(target) - self._modelled(model, delta, target)
             longest = float(np.abs(delta).max())
-            there = self.stand(at.gamma + delta, at.q)
+            there = self.stand(at.free + delta, at.q)
             soft = target in ("excess", "lost")
             if there.admitted or (soft and there.outside <= max(at.outside, 0)):
                 return _Step(there, promised, longest, programs)
             if there.outside == np.inf:
                 break
             model = self._model(there, radius)
-            model = replace(model, q=there.q - model.slope * delta[:, None])
+            model = replace(model, q=there.q - _moved(model, delta))
         return _Step(None, promised, longest, programs)
 
     def _modelled(self, model: LinearModel, delta: Array, target: Target) -> float:
-        q = model.q + model.slope * delta[:, None]
+        q = model.q + _moved(model, delta)
         dq = np.diff(q, axis=0)
         if target == "excess":
             return self.rates.excess(dq)
         return self.cost(q) + (PRICE * self.rates.lost(dq) if target == "lost" else 0.0)
 
     def _model(self, at: MotionState, radius: float) -> LinearModel:
-        slope = self.curves.slope(at.gamma, at.q)
+        slope = self.curves.slope(at.free, at.q)
         # At the edge of reach a node stays where it is.
-        movable = np.asarray(np.isfinite(slope).all(axis=1))
+        movable = np.asarray(np.isfinite(slope).all(axis=(1, 2)))
         endless = self.limits.endless
         # A range may be a single point.
         room = np.minimum(MARGIN, (self.limits.upper - self.limits.lower) / 2)
         return LinearModel(
             q=at.q,
-            slope=np.where(movable[:, None], slope, 0.0),
-            radius=np.where(movable, radius, 0.0),
-            least=np.clip((self.gamma_low - at.gamma) / radius, -1.0, 0.0),
-            most=np.clip((self.gamma_high - at.gamma) / radius, 0.0, 1.0),
+            slope=np.where(movable[:, None, None], slope, 0.0),
+            radius=np.repeat(np.where(movable, radius, 0.0)[:, None], at.free.shape[1], axis=1),
+            least=np.clip((self.low - at.free) / radius, -1.0, 0.0),
+            most=np.clip((self.high - at.free) / radius, 0.0, 1.0),
             lower=np.where(endless, -np.inf, self.limits.lower + room),
             upper=np.where(endless, np.inf, self.limits.upper - room),
             rotation=self.rotation - MARGIN,
@@ -286,3 +287,8 @@ class Descent:
         over = np.maximum(limits.row_lower - value, value - limits.row_upper)
         turned = np.abs(q - q[0]) - self.rotation
         return float(max(beyond.max(), over.max(initial=-np.inf), turned.max()))
+
+
+def _moved(model: LinearModel, delta: Array) -> Array:
+    """Return by how much the joints (K, n) move by the linear model where `delta` (K, F) does."""
+    return np.asarray((model.slope @ delta[..., None])[..., 0])

@@ -1,6 +1,7 @@
-"""The convex program of one step: limits and ranges linear in the change of gamma, costs convex.
+"""The convex program of one step: limits and ranges linear in what is free, costs convex.
 
-With q_k(gamma_k + delta_k) = q_k + J_k delta_k the limits (5) and (6) and the ranges of the joints
+Free at a node are gamma and its external axes, F numbers f_k. With
+q_k(f_k + delta_k) = q_k + J_k delta_k the limits (5) and (6) and the ranges of the joints
 are linear in delta, and the distances of (14) and (15) are convex: a linear program for the
 Manhattan and Chebychev metrics, a second-order cone program for the Euclidean one. The unknowns are
 x = delta / radius, so that all lie in [-1, 1].
@@ -35,15 +36,15 @@ MARGIN = 1e-8
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinearModel:
-    """The joints as linear functions of the change of gamma, and what they are held to.
+    """The joints as linear functions of the change of what is free, and what they are held to.
 
     Parameters
     ----------
-    q, slope : (K, n) rad, rad/rad
-        Joints at no change, not wrapped, and their derivatives by gamma.
-    radius : (K,) rad
-        Largest change of gamma at each node.
-    least, most : (K,)
+    q, slope : (K, n) rad, (K, n, F)
+        Joints at no change, not wrapped, and their derivatives by what is free.
+    radius : (K, F) rad or m
+        Largest change of it at each node.
+    least, most : (K, F)
         Share of it that the change is held to, from -1 to 1.
     lower, upper : (n,) rad
         Ranges of the joints; infinite where there is none.
@@ -76,9 +77,9 @@ class LinearModel:
 
 
 def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None:
-    """Return the best change of gamma (K,) rad by the linear model; None where there is none."""
-    K = len(model.q)
-    rows = ConstraintRows(K)
+    """Return the best change (K, F) by the linear model; None where there is none."""
+    free = model.radius.shape
+    rows = ConstraintRows(size := model.radius.size)
     dq, D = np.diff(model.q, axis=0), _increments(model)
     beyond = None
     if target in ("excess", "lost"):
@@ -86,18 +87,25 @@ def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None
     _limits(rows, dq, D, rates, beyond)
     _ranges(rows, model)
     for sign, bound in ((1.0, model.most), (-1.0, -model.least)):
-        rows.hold(sign * sparse.eye_array(K, format="csr"), bound)
-    cost = np.zeros(K) if target == "excess" else _cost(rows, dq, D, model, minimax=target == "max")
+        rows.hold(sign * sparse.eye_array(size, format="csr"), bound.ravel())
+    if target == "excess":
+        cost = np.zeros(size)
+    else:
+        cost = _cost(rows, dq, D, model, minimax=target == "max")
     if beyond is not None:
         price = (1.0 if target == "excess" else PRICE) * beyond.sum(axis=0)
         cost = np.pad(cost, (0, rows.variables - len(cost)))
         cost[: len(price)] += price
     equal = None
     if rates.periodic:
-        ends = [0, K - 1]
-        equal = _matrix(model.radius[ends] * (1, -1), np.zeros(2, np.int64), np.array(ends), (1, K))
+        each, last = np.arange(free[1]), size - free[1]
+        values = np.concatenate([model.radius[0], -model.radius[-1]])
+        columns = np.concatenate([each, last + each])
+        equal = _matrix(values, np.tile(each, 2), columns, (free[1], size))
     x = rows.solve(cost, equal)
-    return None if x is None else np.clip(x[:K], model.least, model.most) * model.radius
+    if x is None:
+        return None
+    return np.clip(x[:size].reshape(free), model.least, model.most) * model.radius
 
 
 def _matrix(values: Array, row: Ints, column: Ints, shape: tuple[int, int]) -> Sparse:
@@ -116,12 +124,18 @@ def _less(rows: Sparse, one: Sparse) -> Sparse:
 
 
 def _increments(model: LinearModel) -> Sparse:
-    """Slopes ((K-1) n, K) of the increments, edge after edge."""
-    K, n = model.q.shape
-    slope, row = model.slope * model.radius[:, None], np.arange((K - 1) * n)
-    values = np.concatenate([slope[1:].ravel(), -slope[:-1].ravel()])
-    column = np.concatenate([row // n + 1, row // n])
-    return _matrix(values, np.tile(row, 2), column, (len(row), K))
+    """Slopes ((K-1) n, K F) of the increments, edge after edge."""
+    n, slopes = model.q.shape[1], _slopes(model)
+    return slopes[n:] - slopes[:-n]
+
+
+def _slopes(model: LinearModel) -> Sparse:
+    """Slopes (K n, K F) of the joints by the unknowns, node after node."""
+    K, n, F = model.slope.shape
+    values = (model.slope * model.radius[:, None]).ravel()
+    row = np.repeat(np.arange(K * n), F)
+    column = (row // n) * F + np.tile(np.arange(F), K * n)
+    return _matrix(values, row, column, (K * n, K * F))
 
 
 def _limits(
@@ -159,9 +173,7 @@ def _limits(
 def _ranges(rows: ConstraintRows, model: LinearModel) -> None:
     """Hold the ranges of joints and of couplings."""
     K, n = model.q.shape
-    slope = model.slope * model.radius[:, None]
-    node = np.repeat(np.arange(K), n)
-    one = _matrix(slope.ravel(), np.arange(K * n), node, (K * n, K))
+    one = _slopes(model)
     rows.at_most(model.q.ravel(), one, np.tile(model.upper, K))
     rows.at_most(-model.q.ravel(), -one, np.tile(-model.lower, K))
     if np.isfinite(model.rotation).any():
@@ -170,7 +182,7 @@ def _ranges(rows: ConstraintRows, model: LinearModel) -> None:
             turned = sign * (model.q - model.q[0]).ravel()
             rows.at_most(turned, sign * away, np.tile(model.rotation, K))
     for row, lower, upper in zip(model.rows, model.row_lower, model.row_upper, strict=True):
-        both = _scaled(slope @ row, sparse.eye_array(K, format="csr"))
+        both = sparse.kron(sparse.eye_array(K), row[None], format="csr") @ one
         rows.at_most(model.q @ row, both, upper)
         rows.at_most(-(model.q @ row), -both, -lower)
 

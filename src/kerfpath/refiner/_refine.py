@@ -1,4 +1,4 @@
-"""refine(): a plan off the grid, gamma continuous; tilts, postures and turns as they are."""
+"""refine(): a plan off the grid, gamma and external axes continuous; tilts and postures kept."""
 
 from __future__ import annotations
 
@@ -140,9 +140,11 @@ def refine(
     if comfort is not None and comfort.prices_clearance:
         return _unrefined(plan, "what clearance costs is known on the grid only")
     descent, start = _descent(asked, kept)
-    low, high = within or (-np.inf, np.inf)
-    low, high = np.maximum(low, descent.gamma_low), np.minimum(high, descent.gamma_high)
-    descent = replace(descent, first=first, gamma_low=low, gamma_high=high)
+    low, high = descent.low.copy(), descent.high.copy()
+    if within is not None:
+        low[:, 0] = np.maximum(low[:, 0], within[0])
+        high[:, 0] = np.minimum(high[:, 0], within[1])
+    descent = replace(descent, first=first, low=low, high=high)
     descent = descent if most is None else replace(descent, most=most)
     begun, before = descent.admitted(start)
     if not begun.admitted:
@@ -245,7 +247,8 @@ def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, Motio
     """Return the task of refining a plan, and where it stands."""
     settings, comfort = plan.settings, plan.settings.comfort
     low, high = room_at_ends(plan)
-    gamma, windows = plan.gamma, settings.gamma_windows
+    gamma, windows, q = plan.gamma, settings.gamma_windows, plan.unwrapped
+    x = q[:, plan.robot.family.joints :]
     if windows:
         inside = nearest_inside(windows, plan.contour.s, gamma)
         gamma = np.full(len(gamma), np.nan) if inside is None else inside
@@ -268,10 +271,10 @@ def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, Motio
         objective=settings.objective,
         node_cost=plan.node_cost,
         radius=FIRST_STEPS * settings.gamma_step,
-        gamma_low=low,
-        gamma_high=high,
+        low=np.column_stack([low, np.full(x.shape, -np.inf)]),
+        high=np.column_stack([high, np.full(x.shape, np.inf)]),
     )
-    return descent, descent.stand(gamma, plan.unwrapped)
+    return descent, descent.stand(np.column_stack([gamma, x]), q)
 
 
 def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
@@ -281,7 +284,7 @@ def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
     """
     q, turn = on_turns(plan.robot, found.q)
     proof = plan.proof.without_bound()
-    moved = replace(plan, q=q, gamma=wrap(found.gamma), turn=turn, proof=proof)
+    moved = replace(plan, q=q, gamma=wrap(found.free[:, 0]), turn=turn, proof=proof)
     s, dq = plan.settings, np.diff(found.q, axis=0)
     return replace(moved, cost=path_cost(dq, s.weights, s.metric, s.objective, moved.node_cost))
 
@@ -317,6 +320,8 @@ def _divide_plan(plan: Plan, nodes: Contour) -> Plan | str:
         return "the times of a reduced feed hold at its own nodes, not between them"
     gamma = CubicSpline(coarse, np.unwrap(plan.gamma + twist))(index)
     near = np.stack([np.interp(index, coarse, q) for q in plan.unwrapped.T], axis=1)
+    arm = plan.robot.family.joints
+    near[:, arm:] = CubicSpline(coarse, plan.unwrapped[:, arm:])(index)
     return replace(
         plan,
         contour=nodes,

@@ -32,7 +32,8 @@ def room_at_ends(plan: Plan) -> tuple[Array, Array]:
             H = np.broadcast_to(frames[end], (len(AWAY), 4, 4))
             curves = JointCurves(plan.robot, H, plan.T_flange_tip, posture)
             near = np.broadcast_to(q[end], (len(AWAY), n))
-            there = curves.at(plan.gamma[end] + sign * AWAY, near)
+            gamma = plan.gamma[end] + sign * AWAY
+            there = curves.at(np.column_stack([gamma, near[:, plan.robot.family.joints :]]), near)
             reached = np.asarray(np.isfinite(there).all(axis=1))
             there = np.where(reached[:, None], there, near)
             tool = plan.T_flange_tip

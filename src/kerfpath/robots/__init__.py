@@ -10,6 +10,8 @@ from kerfpath.robots._coupling import Coupling as Coupling
 from kerfpath.robots._enclosure import Enclosure as Enclosure
 from kerfpath.robots._external import ExternalAxis as ExternalAxis
 from kerfpath.robots._external import Travel as Travel
+from kerfpath.robots._external import base_in_part as base_in_part
+from kerfpath.robots._external import carried as carried
 from kerfpath.robots._families import FAMILIES as FAMILIES
 from kerfpath.robots._families import Family as Family
 from kerfpath.robots._families import posture_name as posture_name

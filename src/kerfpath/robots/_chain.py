@@ -25,9 +25,9 @@ def chain_of(robot: Robot) -> KinematicChain:
         The robot has no description, and its family no model that says where its joints are; or it
         has an external axis.
     """
-    if robot.external is not None:
+    if robot.externals:
         raise InputError(
-            f"robot {robot.id!r}: a cell does not know how a {robot.external.kind} moves in it"
+            f"robot {robot.id!r}: a cell does not know how {robot.externals[0].name} moves in it"
         )
     return model_chain(robot) if robot.chain is None else robot.chain
 

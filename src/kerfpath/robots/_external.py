@@ -1,9 +1,10 @@
-"""One more joint, of the robot's base or of the part: a rail or a positioner."""
+"""External axes: rails under the robot, tables under the part; up to three, one on the other."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, TypedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, NotRequired, TypedDict
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,39 +13,44 @@ from kerfpath._arrays import Array, floats, freeze, scalar
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
-__all__ = ["ExternalAxis", "Travel"]
+__all__ = ["MOST_EXTERNAL", "ExternalAxis", "Travel", "base_in_part", "carried"]
+
+MOST_EXTERNAL = 3
+"""External axes that a robot may have."""
 
 
 class Travel(TypedDict):
-    """Range, limits and grid of an external axis: rad; m for a rail."""
+    """Range and limits of an external axis: rad, rad/s, rad/s^2; m, m/s, m/s^2 of a linear one."""
 
     lower: float
     upper: float
     velocity: float
     acceleration: float
-    step: float
+    endless: NotRequired[bool]
+    step: NotRequired[float | None]
+    name: NotRequired[str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ExternalAxis:
-    """A joint that moves the whole robot against the part; its value is the last column of q.
+    """A joint that moves the robot's base or the part; its value is one of the last columns of q.
 
-    Known to the search, the refinement and the audit; jobs, cells, reports and programs have none.
-
-    Where it stands at x: a rail has taken the robot's base x metres along `axis`; a positioner has
-    turned the part by x about `axis` through `point`. All frames and poses stay those of base and
-    part at x = 0: what matters is how the one moves against the other. Its limits are the last of
-    the robot's `lower`, `upper`, `velocity` and `acceleration`.
+    It is described where every external axis is at zero. Of axes that carry the same thing the
+    first one named carries the others: a tilt comes before the table that it tilts. Its limits are
+    among the last of the robot's `lower`, `upper`, `velocity`, `acceleration` and `endless`.
 
     Parameters
     ----------
-    kind : {"rail", "positioner"}
+    name : str
+        What messages, reports and programs call it.
+    kind : {"linear", "rotary"}
+    carries : {"robot", "part"}
     axis : (3,)
-        Direction in the robot base, any length but zero.
+        Direction in the robot base, any length but zero; a rotary axis turns right-handed about it.
     point : (3,) m
-        Where a positioner's axis passes, in the robot base.
-    step : float m or rad
-        Largest step of its samples.
+        Where the axis of a rotary one passes, in the robot base.
+    step : float m or rad, optional
+        Largest step of its samples where the exact search takes it on a grid.
 
     Raises
     ------
@@ -52,30 +58,47 @@ class ExternalAxis:
         A direction of length zero, a step that is not positive.
     """
 
-    kind: Literal["rail", "positioner"]
+    name: str
+    kind: Literal["linear", "rotary"]
+    carries: Literal["robot", "part"]
     axis: Array
-    point: Array
-    step: float
+    point: Array = field(default_factory=lambda: np.zeros(3))
+    step: float | None = None
 
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        axis = floats(self.axis, f"{self.kind} axis", (3,))
+        axis = floats(self.axis, f"{self.name} axis", (3,))
         if not axis.any():
-            raise InputError(f"{self.kind} axis: expected a direction, got {axis.tolist()}")
-        step = scalar(self.step, f"{self.kind} step", unit=self.unit, above=0.0)
+            raise InputError(f"{self.name} axis: expected a direction, got {axis.tolist()}")
         _set = object.__setattr__
         _set(self, "axis", freeze(axis / np.linalg.norm(axis)))
-        _set(self, "point", floats(self.point, f"{self.kind} point", (3,)))
-        _set(self, "step", step)
+        _set(self, "point", floats(self.point, f"{self.name} point", (3,)))
+        if self.step is not None:
+            step = scalar(self.step, f"{self.name} step", unit=self.unit, above=0.0)
+            _set(self, "step", step)
 
     @property
     def unit(self) -> Literal["m", "rad"]:
         """Unit of its values."""
-        return "m" if self.kind == "rail" else "rad"
+        return "m" if self.kind == "linear" else "rad"
 
-    def samples(self, lower: float, upper: float) -> Array:
-        """Return its samples (E,), both ends of the range among them, at most a step apart."""
+    def samples(self, lower: float, upper: float, *, endless: bool) -> Array:
+        """Return its samples (E,), at most a step apart, both ends of the range among them.
+
+        Raises
+        ------
+        InputError
+            It has no step.
+        """
+        if self.step is None:
+            raise InputError(
+                f"{self.name}: the exact search takes its values on a grid and needs their step; "
+                'give step=, or choose method "continuous"'
+            )
+        if endless:
+            parts = int(np.ceil(2 * np.pi / self.step * (1 - 1e-9)))
+            return freeze(-np.pi + 2 * np.pi / parts * np.arange(1, parts + 1, dtype=float))
         parts = int(np.ceil((upper - lower) / self.step * (1 - 1e-9)))
         return freeze(np.linspace(lower, upper, parts + 1))
 
@@ -83,26 +106,37 @@ class ExternalAxis:
         """Raise InputError where the ends of its range are reversed; they may be the same."""
         if not lower <= upper:
             raise InputError(
-                f"{self.kind}: its limits are reversed, lower {lower:g} {self.unit} is above upper "
+                f"{self.name}: its limits are reversed, lower {lower:g} {self.unit} is above upper "
                 f"{upper:g} {self.unit}"
             )
 
-    def no_inverse(self) -> InputError:
-        """Return the error for a pose to be solved: why it is not, and what to ask instead."""
-        return InputError(
-            f"inverse: with a {self.kind} a pose has solutions without end; ask "
-            f"robot.held(x).inverse(T), x in {self.unit}"
-        )
-
-    def poses(self, x: Array) -> Array:
-        """Return where the robot's base stands against the part, (..., 4, 4) m, at x (...,)."""
+    def motion(self, x: Array) -> Array:
+        """Return how far it has moved what it carries, (..., 4, 4) m, at values x (...,)."""
         x = np.asarray(x, dtype=float)
         T = np.zeros((*x.shape, 4, 4))
         T[..., range(4), range(4)] = 1.0
-        if self.kind == "rail":
+        if self.kind == "linear":
             T[..., :3, 3] = x[..., None] * self.axis
             return T
-        turn = Rotation.from_rotvec(-x.reshape(-1, 1) * self.axis).as_matrix()
+        turn = Rotation.from_rotvec(x.reshape(-1, 1) * self.axis).as_matrix()
         T[..., :3, :3] = turn.reshape(*x.shape, 3, 3)
         T[..., :3, 3] = self.point - T[..., :3, :3] @ self.point
         return T
+
+
+def carried(axes: Sequence[ExternalAxis], x: Array, what: Literal["robot", "part"]) -> Array:
+    """Return where the axes at x (..., E) have taken robot or part from zero, (..., 4, 4) m."""
+    x = np.asarray(x, dtype=float)
+    T = np.broadcast_to(np.eye(4), (*x.shape[:-1], 4, 4))
+    for i, axis in enumerate(axes):
+        if axis.carries == what:
+            T = T @ axis.motion(x[..., i])
+    return T
+
+
+def base_in_part(axes: Sequence[ExternalAxis], x: Array) -> Array:
+    """Return where the robot's base stands against the part, (..., 4, 4) m, at x (..., E).
+
+    In the robot base at zero: what matters is how the one moves against the other.
+    """
+    return np.asarray(np.linalg.inv(carried(axes, x, "part")) @ carried(axes, x, "robot"))

@@ -15,7 +15,7 @@ from kerfpath.kernels.enclosure import Curves
 from kerfpath.losses import Loss, Reason
 from kerfpath.robots._coupling import AXIS_3, Coupling
 from kerfpath.robots._enclosure import Enclosure, ball_frames, require_cells
-from kerfpath.robots._external import ExternalAxis
+from kerfpath.robots._external import MOST_EXTERNAL, ExternalAxis, base_in_part
 from kerfpath.robots._families import FAMILIES, Family
 from kerfpath.robots._solutions import Solutions, all_solutions, solutions_within
 from kerfpath.urdf import KinematicChain, LinkBody
@@ -43,7 +43,7 @@ class Manipulator:
     axis_3: str = ""
     chain: KinematicChain | None = None
     bodies: tuple[LinkBody, ...] = ()
-    external: ExternalAxis | None = None
+    externals: tuple[ExternalAxis, ...] = ()
     manufacturer: str = ""
     model: str = ""
     payload: float | None = None
@@ -80,6 +80,7 @@ class Manipulator:
         for name in ("T_base_foot", "T_end_flange"):
             _set(self, name, as_pose(getattr(self, name), name))
         _set(self, "endless", bools(_for_each(self.endless, n), "endless", (n,)))
+        self._require_few_axes()
         for coupling in self.couplings:
             floats(coupling.row, "coupling row", (n,))
         for name in ("lower", "upper"):
@@ -97,8 +98,19 @@ class Manipulator:
 
     @property
     def joints(self) -> int:
-        """Number of joints, n, with the external axis."""
-        return self.family.joints + (self.external is not None)
+        """Number of joints, n, with the external axes."""
+        return self.family.joints + len(self.externals)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each joint: rad, m of a linear external axis."""
+        return ("rad",) * self.family.joints + tuple(axis.unit for axis in self.externals)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """What messages call each joint: "joint 1" and so on, an external axis by its name."""
+        arm = tuple(f"joint {i + 1}" for i in range(self.family.joints))
+        return arm + tuple(axis.name for axis in self.externals)
 
     @property
     def postures(self) -> int:
@@ -108,7 +120,7 @@ class Manipulator:
     def forward(self, q: ArrayLike) -> Array:
         """Return the flange poses (..., 4, 4) in the robot base of joint vectors q (..., n) rad.
 
-        The base is that at zero of an external axis, and the part's place at zero, too.
+        The base is that at zero of the external axes, and the part's place at zero, too.
         """
         q = np.asarray(q, dtype=float)
         rows = floats(q.reshape(-1, q.shape[-1]) if q.ndim else q, "q", (None, self.joints))
@@ -117,8 +129,8 @@ class Manipulator:
         self.family.forward_all(self.arm(), np.ascontiguousarray(rows[:, :n]), T)
         if self._placed:
             T = self.T_base_foot @ T @ self.T_end_flange
-        if self.external is not None:
-            T = self.external.poses(rows[:, n]) @ T
+        if self.externals:
+            T = base_in_part(self.externals, rows[:, n:]) @ T
         return freeze(T.reshape(*q.shape[:-1], 4, 4))
 
     def inverse(self, T: ArrayLike, *, within_limits: bool = True) -> Solutions:
@@ -226,7 +238,7 @@ class Manipulator:
     @property
     def encloses(self) -> bool:
         """Whether `enclose` proves where its joints are: a closed form, no external axis."""
-        return self.family.enclose_all is not None and self.external is None
+        return self.family.enclose_all is not None and not self.externals
 
     def enclose(
         self, frames: Array, node: Ints, gamma: Array, half: Array, T_flange_tip: Array
@@ -323,8 +335,7 @@ class Manipulator:
 
     def bounds(self) -> tuple[Reason, ...]:
         """Return the reasons for poses beyond a limit: low and high of each joint and coupling."""
-        names = [f"joint {i + 1}" for i in range(self.family.joints)]
-        names += [c.name for c in self.couplings]
+        names = [*self.joint_names[: self.family.joints], *(c.name for c in self.couplings)]
         return tuple(Reason(end, name) for name in names for end in (Loss.LOW, Loss.HIGH))
 
     def reasons(self) -> tuple[Reason, ...]:
@@ -355,8 +366,8 @@ class Manipulator:
         if self.lower is None or self.upper is None:
             return
         n = self.family.joints
-        if self.external is not None:
-            self.external.require_range(float(self.lower[n]), float(self.upper[n]))
+        for axis, lower, upper in zip(self.externals, self.lower[n:], self.upper[n:], strict=True):
+            axis.require_range(float(lower), float(upper))
         reversed_ = np.flatnonzero(~(self.lower[:n] < self.upper[:n]))
         if reversed_.size:
             i = int(reversed_[0])
@@ -366,9 +377,25 @@ class Manipulator:
                 f"{np.degrees(self.upper[i]):g} deg"
             )
 
+    def _require_few_axes(self) -> None:
+        """Raise InputError for too many external axes, or two of one name."""
+        names = [axis.name for axis in self.externals]
+        if len(names) > MOST_EXTERNAL:
+            raise InputError(
+                f"robot {self.id!r}: expected at most {MOST_EXTERNAL} external axes, got "
+                f"{len(names)}: {', '.join(names)}"
+            )
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"robot {self.id!r}: two of its external axes are named {name!r}")
+
     def _require_alone(self) -> None:
-        if self.external is not None:
-            raise self.external.no_inverse()
+        if self.externals:
+            names = ", ".join(axis.name for axis in self.externals)
+            raise InputError(
+                f"inverse: with {names} a pose has solutions without end; ask "
+                "robot.held(x).inverse(T), x the values of the external axes"
+            )
 
     def _lacks(self, what: str, keys: str, hint: str = "") -> InputError:
         why = f" ({self.limits_missing})" if self.limits_missing else ""

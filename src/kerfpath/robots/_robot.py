@@ -1,19 +1,19 @@
-"""A robot: an arm as the library or a description has it, alone or with an external axis."""
+"""A robot: an arm as the library or a description has it, alone or with external axes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, Unpack
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, floats
 from kerfpath.errors import InputError
 from kerfpath.robots._described import build_robot, read_description
-from kerfpath.robots._external import ExternalAxis, Travel
+from kerfpath.robots._external import ExternalAxis, Travel, base_in_part
 from kerfpath.robots._library import read_robot
 from kerfpath.robots._manipulator import Manipulator
 
@@ -60,8 +60,8 @@ class Robot(Manipulator):
         The joint frames of the description that the robot comes from: the audit's kinematics.
     bodies : tuple of Body
         Collision bodies of that description.
-    external : ExternalAxis, optional
-        Rail or positioner: one more joint, the last of q and of the limits. See `on_rail`.
+    externals : tuple of ExternalAxis
+        Rails and positioners: joints more, the last of q and of the limits. See `on_rail`.
 
     Raises
     ------
@@ -140,49 +140,65 @@ class Robot(Manipulator):
     def on_rail(self, direction: ArrayLike, **travel: Unpack[Travel]) -> Robot:
         """Return this robot with its base on a rail along `direction` (3,).
 
-        Keywords lower, upper, velocity, acceleration, step (m, m/s, m/s^2); see `ExternalAxis`.
+        Keywords lower, upper, velocity, acceleration (m, m/s, m/s^2), step, name ("rail").
         """
-        return self._with_axis("rail", direction, np.zeros(3), travel)
+        axis = ExternalAxis(
+            name=travel.get("name", "rail"),
+            kind="linear",
+            carries="robot",
+            axis=direction,  # type: ignore[arg-type]  # cast by __post_init__
+            step=travel.get("step"),
+        )
+        return self.with_external(axis, **travel)
 
     def with_positioner(self, axis: ArrayLike, point: ArrayLike, **travel: Unpack[Travel]) -> Robot:
         """Return this robot with a part that turns about `axis` (3,) through `point` (3,) m.
 
-        Keywords as in `on_rail`, in rad, rad/s, rad/s^2; see `ExternalAxis`.
+        Keywords lower, upper, velocity, acceleration (rad, rad/s, rad/s^2), endless, step, name
+        ("positioner"). Of a turn-tilt positioner the tilt comes first.
         """
-        return self._with_axis("positioner", axis, point, travel)
+        turned = ExternalAxis(
+            name=travel.get("name", "positioner"),
+            kind="rotary",
+            carries="part",
+            axis=axis,  # type: ignore[arg-type]  # cast by __post_init__
+            point=point,  # type: ignore[arg-type]  # cast by __post_init__
+            step=travel.get("step"),
+        )
+        return self.with_external(turned, **travel)
 
-    def _with_axis(
-        self, kind: Literal["rail", "positioner"], axis: ArrayLike, point: ArrayLike, travel: Travel
-    ) -> Robot:
-        if self.external is not None:
-            raise InputError(
-                f"robot {self.id!r}: it has an external axis already; only one is known"
-            )
+    def with_external(self, axis: ExternalAxis, **travel: Unpack[Travel]) -> Robot:
+        """Return this robot with one more external axis, carried by those of its side before it.
+
+        Raises
+        ------
+        InputError
+            Limits of the arm that are not known; more than three such axes, or two of one name; an
+            endless axis that is linear.
+        """
+        endless = travel.get("endless", False)
+        if endless and axis.kind == "linear":
+            raise InputError(f"{axis.name}: a linear axis cannot be endless")
         limits, (velocity, acceleration) = self.joint_limits(), self.speed_limits()
         return replace(
             self,
-            external=ExternalAxis(
-                kind=kind,
-                axis=axis,  # type: ignore[arg-type]  # cast by __post_init__
-                point=point,  # type: ignore[arg-type]  # cast by __post_init__
-                step=travel["step"],
-            ),
+            externals=(*self.externals, axis),
             lower=np.append(limits.lower, travel["lower"]),
             upper=np.append(limits.upper, travel["upper"]),
             velocity=np.append(velocity, travel["velocity"]),
             acceleration=np.append(acceleration, travel["acceleration"]),
-            endless=np.append(self.endless, False),
+            endless=np.append(self.endless, endless),
             couplings=tuple(replace(c, row=np.append(c.row, 0.0)) for c in self.couplings),
         )
 
     def alone(self) -> Robot:
-        """Return the arm without its external axis, standing where it does at zero."""
-        if self.external is None:
+        """Return the arm without its external axes, standing where it does at zero."""
+        if not self.externals:
             return self
         n = self.family.joints
         return replace(
             self,
-            external=None,
+            externals=(),
             lower=_first(self.lower, n),
             upper=_first(self.upper, n),
             velocity=_first(self.velocity, n),
@@ -191,17 +207,23 @@ class Robot(Manipulator):
             couplings=tuple(replace(c, row=c.row[:n]) for c in self.couplings),
         )
 
-    def held(self, x: float) -> Robot:
-        """Return the arm alone, standing where its external axis takes it at x (rad; m for a rail).
+    def held(self, x: ArrayLike) -> Robot:
+        """Return the arm alone, standing against the part as with its external axes at x (E,).
+
+        Parameters
+        ----------
+        x : (E,) rad; m of a linear axis
+            One number will do where there is one axis.
 
         Raises
         ------
         InputError
-            It has no external axis.
+            It has no external axis, or another number of them.
         """
-        if self.external is None:
+        if not self.externals:
             raise InputError(f"robot {self.id!r}: it has no external axis to be held")
-        T, chain = self.external.poses(np.asarray(x)), self.chain
+        at = floats(np.atleast_1d(np.asarray(x, dtype=float)), "held", (len(self.externals),))
+        T, chain = base_in_part(self.externals, at), self.chain
         if chain is not None:
             origins = np.concatenate([T @ chain.origins[:1], chain.origins[1:]])
             chain = replace(chain, origins=origins)

@@ -139,9 +139,6 @@ def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:
     """Return what a run asks for, in words."""
     each = run.weights * robot.speed_limits()[0]
     relative = each / np.exp(np.log(each).mean())
-    units = ["rad"] * robot.joints
-    if robot.external is not None:
-        units[-1] = robot.external.unit
     rows = [
         ("minimise", f"{run.objective} of {run.metric} distances"),
         ("rotation", "continuous" if run.continuous else "on its grid"),
@@ -150,7 +147,7 @@ def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:
     ]
     for joint, (low, high) in enumerate(run.window):
         if np.isfinite(high - low):
-            factor, unit = (1e3, "mm") if units[joint] == "m" else (180 / np.pi, "deg")
+            factor, unit = (1e3, "mm") if robot.units[joint] == "m" else (180 / np.pi, "deg")
             span = f"{low * factor:.1f} to {high * factor:.1f} {unit}"
             rows.append((f"window of joint {joint + 1}", span))
     if run.clearance:

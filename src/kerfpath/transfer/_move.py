@@ -114,8 +114,9 @@ def transfer_move(
     InputError
         Limits that are not known, joints beyond them, an external axis.
     """
-    if robot.external is not None:
-        raise InputError(f"air move: it is not known yet how a {robot.external.kind} moves in it")
+    if robot.externals:
+        name = robot.externals[0].name
+        raise InputError(f"air move: it is not known yet how {name} moves in it")
     n = robot.joints
     ends = np.array([floats(q0, "q0", (n,)), floats(q1, "q1", (n,))])
     velocity, acceleration = robot.speed_limits()

@@ -349,7 +349,6 @@ def test_the_map_tells_collisions_and_what_is_to_spare():
         start=np.array([0, 3, 4]),
         gamma=np.array([0.0, 1.0, 2.0]),
         tilt=np.zeros((1, 2)),
-        external=np.zeros(0),
         sample=np.array([0, 1, 2, 1], np.int32),
         variant=np.zeros(4, np.int32),
         posture=np.zeros(4, np.int8),

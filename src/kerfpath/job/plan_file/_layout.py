@@ -46,21 +46,20 @@ class RobotData(TypedDict):
 
 
 class ExternalData(TypedDict):
-    """A rail, in m, or a positioner, in rad."""
+    """An external axis and its limits, in its unit, per s and s^2."""
 
-    kind: Literal["rail", "positioner"]
+    name: str
+    kind: Literal["linear", "rotary"]
+    carries: Literal["robot", "part"]
+    unit: Literal["m", "rad"]
     axis: Row
     point_m: Row
-    step_m: NotRequired[float | None]
-    lower_m: NotRequired[float | None]
-    upper_m: NotRequired[float | None]
-    velocity_m_s: NotRequired[float | None]
-    acceleration_m_s2: NotRequired[float | None]
-    step_rad: NotRequired[float | None]
-    lower_rad: NotRequired[float | None]
-    upper_rad: NotRequired[float | None]
-    velocity_rad_s: NotRequired[float | None]
-    acceleration_rad_s2: NotRequired[float | None]
+    step: float | None
+    lower: float
+    upper: float
+    velocity: float
+    acceleration: float
+    endless: bool
 
 
 class CouplingData(TypedDict):
@@ -93,17 +92,14 @@ class NearestData(TypedDict):
 
 
 class CriteriaData(TypedDict):
-    """The criteria of a plan, joint by joint; those of an external axis apart."""
+    """The criteria of a plan, joint by joint; those of external axes apart."""
 
     displacement_rad: Row
-    external_displacement_m: NotRequired[float | None]
-    external_displacement_rad: NotRequired[float | None]
+    external_displacement: NotRequired[Row]
     largest_increment_rad: Row
-    external_largest_increment_m: NotRequired[float | None]
-    external_largest_increment_rad: NotRequired[float | None]
+    external_largest_increment: NotRequired[Row]
     range_rad: Row
-    external_range_m: NotRequired[float | None]
-    external_range_rad: NotRequired[float | None]
+    external_range: NotRequired[Row]
     peak_velocity_share: Row
     peak_acceleration_share: Row
     nearest: dict[str, NearestData]
@@ -151,8 +147,7 @@ class NodesData(TypedDict):
     speed_share: Row
     x: Rows | None
     q_rad: Rows
-    external_q_m: NotRequired[Row | None]
-    external_q_rad: NotRequired[Row | None]
+    external_q: NotRequired[Rows]
     gamma_rad: Row
     lead_lean_rad: Rows | None
     posture: list[int]
@@ -195,8 +190,7 @@ class PlanData(OptionData):
     feasible: bool
     picked: NotRequired[bool]
     closed: bool
-    external_weights_per_m: NotRequired[float | None]
-    external_weights_per_rad: NotRequired[float | None]
+    external_weights_per: NotRequired[Row]
     dt: float
     cost: float
     optimal: bool
@@ -275,7 +269,7 @@ class PlanDocument(TypedDict):
     kerfpath: str
     job: dict[str, Any]
     robot: RobotData
-    external_axis: ExternalData | None
+    external_axes: list[ExternalData]
     T_flange_tip: Rows
     T_base_part: Rows
     limits: LimitsData

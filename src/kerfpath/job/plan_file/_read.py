@@ -14,7 +14,7 @@ from kerfpath._repr import short_repr
 from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError
 from kerfpath.job.plan_file._certificate import read_certificate
-from kerfpath.job.plan_file._external import add_external, joints
+from kerfpath.job.plan_file._external import add_externals, joints
 from kerfpath.job.plan_file._layout import PlanData, PlanDocument
 from kerfpath.job.plan_file._schema import read_document
 from kerfpath.job.plan_file._sequence import read_moves
@@ -98,7 +98,7 @@ def read_plan_file(path: str | Path) -> PlanFile:
     data = read_document(path)
     try:
         arm = _read_robot(data["robot"], data["limits"])
-        robot = add_external(data["external_axis"], arm)
+        robot = add_externals(data["external_axes"], arm)
         entries = planned_entries(data)
         return PlanFile(
             path=path,

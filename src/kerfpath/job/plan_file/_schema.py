@@ -25,7 +25,7 @@ from kerfpath.job.plan_file._layout import BrokenData, ContourData, PlanData, Pl
 
 __all__ = ["SCHEMA", "read_document"]
 
-SCHEMA = 8
+SCHEMA = 9
 """Version of the layout of plan.json; it grows when a reader of the old one would go wrong."""
 LARGEST = 1e12
 """No number of a plan is larger, in SI: not even the sum of all it counts."""

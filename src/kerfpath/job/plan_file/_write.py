@@ -17,7 +17,7 @@ from kerfpath.cell import Cell, caveats
 from kerfpath.comfort import MEASURES
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.plan_file._certificate import certificate_entry
-from kerfpath.job.plan_file._external import by_unit, external_entry
+from kerfpath.job.plan_file._external import apart, external_entries
 from kerfpath.job.plan_file._layout import (
     BrokenData,
     ContourData,
@@ -76,7 +76,7 @@ def plan_document(
         "kerfpath": __version__,
         "job": dict(job),
         "robot": _robot_entry(robot),
-        "external_axis": external_entry(robot),
+        "external_axes": external_entries(robot),
         "T_flange_tip": tool.tolist(),
         "T_base_part": placement.tolist(),
         "limits": _limits_entry(robot),
@@ -109,7 +109,7 @@ def plan_entry(
         **({"picked": True} if picked else {}),
         "closed": plan.contour.closed,
         **settings.to_data(),
-        **by_unit("weights_per", settings.weights, plan.robot),
+        **apart("weights_per", settings.weights, plan.robot),
         "dt": plan.dt,
         "cost": plan.cost,
         "optimal": proof.optimal,
@@ -119,9 +119,9 @@ def plan_entry(
         "gap": proof.gap,
         **({} if shown is None else {"certificate": certificate_entry(shown)}),
         "criteria": {
-            **by_unit("displacement", criteria.displacement, plan.robot),
-            **by_unit("largest_increment", criteria.largest_increment, plan.robot),
-            **by_unit("range", criteria.range, plan.robot),
+            **apart("displacement", criteria.displacement, plan.robot),
+            **apart("largest_increment", criteria.largest_increment, plan.robot),
+            **apart("range", criteria.range, plan.robot),
             "peak_velocity_share": criteria.peak_velocity.tolist(),
             "peak_acceleration_share": criteria.peak_acceleration.tolist(),
             "nearest": {
@@ -144,14 +144,14 @@ def plan_entry(
             "kind": list(plan.contour.kinds),
             "speed_share": plan.contour.speed_share.tolist(),
             "x": None if plan.contour.x is None else plan.contour.x.tolist(),
-            **by_unit("q", plan.q, plan.robot),
+            **apart("q", plan.q, plan.robot),
             "gamma_rad": plan.gamma.tolist(),
             "lead_lean_rad": plan.tilt.tolist() if plan.tilt.any() else None,
             "posture": plan.posture.tolist(),
             "turn": plan.turn.tolist(),
         },
     }
-    return cast(PlanData, entry)  # keys of an external axis have its unit in their name
+    return cast(PlanData, entry)
 
 
 def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None) -> BrokenData:

@@ -1,0 +1,268 @@
+"""Courses of the external axes: smooth, from a search over coarse samples of all that is free.
+
+Rails and tables are slow beside the arm, and a grid of their values would quantise what they may
+accelerate. So a few nodes are taken, at each of them every place of a coarse grid of the axes, of
+gamma and of the postures, and the best way through these within the velocity limits is found by
+dynamic programming. The course of the axes is then the smoothest curve that stays near it; gamma is
+planned anew along it, and both together are refined by the true kinematics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import lsq_linear
+
+from kerfpath._arrays import Array, Ints
+from kerfpath._repr import short_repr
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.kernels.courses import CoarseLayer, Nearby, best_steps
+from kerfpath.kernels.metric import increments, wrap
+from kerfpath.planner._graph import layered_graph
+from kerfpath.planner._task import PlanningTask
+from kerfpath.robots import Robot
+
+__all__ = ["courses"]
+
+FEW_NODES, NODES = 9, 41
+"""Nodes at which the axes are sampled: as many as leave them time for a step, within these."""
+STEP = {"linear": 0.15, "rotary": np.radians(12)}
+"""m and rad: steps of the axes, where there are not too many places."""
+MOST_PLACES = 1500
+GAMMA_STEP = {1: np.radians(12), 2: np.radians(20), 3: np.radians(24)}
+"""rad, by the number of axes."""
+FARTHEST = 2
+"""Steps of the grid that an axis moves at most from one of these nodes to the next."""
+TURN = np.radians(40)
+"""rad that gamma turns by at most."""
+
+
+class _Style(NamedTuple):
+    """What a course is to be good for: prices of speed squared, and of the axes' own moves."""
+
+    square: float
+    axes: float
+
+
+STYLES = (_Style(1.0, 1.0), _Style(8.0, 1.0), _Style(1.0, 8.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Coarse:
+    """The coarse samples of a task.
+
+    Parameters
+    ----------
+    nodes : (M,) int
+        The nodes that have samples.
+    places : (X, E) rad or m
+        The grid of the axes.
+    counts : tuple of int
+        Values of each axis in it.
+    graph : LayeredGraph
+        All samples within limits and margins; its variants are the places.
+    """
+
+    nodes: Ints
+    places: Array
+    counts: tuple[int, ...]
+    graph: LayeredGraph
+
+    __repr__ = short_repr
+
+
+def courses(task: PlanningTask) -> Iterator[Array]:
+    """Yield courses (K, E) rad or m of a task's external axes, that which promises most first.
+
+    Raises
+    ------
+    NoFeasiblePath
+        There is no way through the samples; says from which of the nodes on.
+    """
+    coarse, robot = _sampled(task), task.robot
+    known: list[Array] = []
+    for style in STYLES:
+        path = _best_way(coarse, task, style)
+        course = _smooth(coarse, robot, path, len(task.contour))
+        if not any(np.allclose(course, other, atol=1e-3) for other in known):
+            known.append(course)
+            yield course
+
+
+def _sampled(task: PlanningTask) -> _Coarse:
+    robot, options, K = task.robot, task.settings, len(task.contour)
+    arm, limits = robot.family.joints, robot.joint_limits()
+    bounds = list(zip(robot.externals, limits.lower[arm:], limits.upper[arm:], strict=True))
+    endless = robot.endless[arm:]
+    wanted = [
+        (2 * np.pi if turns else upper - lower) / STEP[axis.kind]
+        for (axis, lower, upper), turns in zip(bounds, endless, strict=True)
+    ]
+    moving = max(1, sum(count > 0 for count in wanted))
+    share = min(1.0, (MOST_PLACES / np.prod(np.add(wanted, 1))) ** (1 / moving))
+    counts = tuple(int(np.ceil((count + 1) * share)) if count else 1 for count in wanted)
+    grids = [
+        np.linspace(-np.pi, np.pi, count, endpoint=False)
+        if turns
+        else np.linspace(lower, upper, count)
+        if count > 1
+        else np.array([(lower + upper) / 2])
+        for (_, lower, upper), turns, count in zip(bounds, endless, counts, strict=True)
+    ]
+    slowest = max(
+        STEP[axis.kind] / share / speed
+        for axis, speed in zip(robot.externals, robot.speed_limits()[0][arm:], strict=True)
+    )
+    many = int(np.clip(task.dt * (K - 1) / slowest, min(K, FEW_NODES), min(K, NODES)))
+    nodes = np.unique(np.round(np.linspace(0, K - 1, many)).astype(np.int64))
+    places = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1).reshape(-1, len(grids))
+    hard = options.comfort.hard if options.comfort is not None else None
+    graph = layered_graph(
+        task.contour,
+        robot,
+        tool=task.T_flange_tip,
+        placement=task.T_base_part,
+        options=replace(
+            options, gamma_step=GAMMA_STEP[len(grids)], tilt=None, comfort=hard, retract=None
+        ),
+        nodes=nodes,
+        external=np.broadcast_to(places, (K, *places.shape)),
+    )
+    return _Coarse(nodes=nodes, places=places, counts=counts, graph=graph)
+
+
+def _best_way(coarse: _Coarse, task: PlanningTask, style: _Style) -> Ints:
+    """Return the place (M,) of each sampled node on the best way."""
+    robot, graph, count = task.robot, coarse.graph, len(coarse.nodes)
+    before = _layer(coarse, robot, 0)
+    value = np.where(before.ok, 0.0, np.inf)
+    back = np.full((count, *value.shape), -1, np.int64)
+    for k in range(1, count):
+        here, reached = _layer(coarse, robot, k), np.empty(value.shape)
+        parts = int(coarse.nodes[k] - coarse.nodes[k - 1])
+        best_steps(before, value, here, _nearby(coarse, task, parts, style), reached, back[k])
+        if not np.isfinite(reached).any():
+            raise NoFeasiblePath(
+                _stuck(coarse, robot, k),
+                node=int(coarse.nodes[k - 1]),
+                proved=False,
+                counts=graph.counts(k),
+            )
+        before, value = here, reached
+    if not np.isfinite(value).any():
+        raise NoFeasiblePath(
+            _stuck(coarse, robot, 0), node=-1, proved=False, counts=graph.counts(0)
+        )
+    at = int(np.argmin(value))
+    path = [at]
+    for k in range(count - 1, 0, -1):
+        at = int(back[k].flat[at])
+        path.append(at)
+    return np.unravel_index(path[::-1], value.shape)[0].astype(np.int64)
+
+
+def _layer(coarse: _Coarse, robot: Robot, k: int) -> CoarseLayer:
+    """Return the arm's joints at every sample of a node, one turn of each."""
+    graph = coarse.graph
+    own = slice(graph.start[k], graph.start[k + 1])
+    shape = len(coarse.places), len(graph.gamma), robot.postures
+    q, ok = np.zeros((*shape, robot.family.joints)), np.zeros(shape, np.bool_)
+    at = graph.variant[own], graph.sample[own], graph.posture[own]
+    q[at], ok[at] = graph.q[own, : robot.family.joints], True
+    return CoarseLayer(q=q, ok=ok)
+
+
+def _nearby(coarse: _Coarse, task: PlanningTask, parts: int, style: _Style) -> Nearby:
+    """Return where steps to each place may come from in the time of some intervals."""
+    robot, options = task.robot, task.settings
+    arm, counts = robot.family.joints, coarse.counts
+    velocity = options.eta_v * robot.speed_limits()[0]
+    reach = [range(-FARTHEST, FARTHEST + 1) if n > 1 else range(1) for n in counts]
+    moves = np.stack(np.meshgrid(*reach, indexing="ij"), axis=-1).reshape(-1, len(counts))
+    cells = np.stack(np.unravel_index(np.arange(len(coarse.places)), counts), axis=-1)
+    there = cells[:, None] + moves
+    endless = robot.endless[arm:]
+    there = np.where(endless, there % counts, there)
+    inside = ((there >= 0) & (there < counts)).all(axis=2)
+    index = np.ravel_multi_index(np.moveaxis(there, 2, 0), counts, mode="clip")
+    span = velocity * task.dt * parts
+    weight = span * (1 / velocity if options.weights is None else options.weights)
+    steps = _steps(coarse, robot) / span[arm:]
+    share, square = np.abs(moves) * steps, style.square * parts
+    cost = style.axes * (weight[arm:] * share).sum(axis=1) + square * (share**2).sum(axis=1)
+    # Between the middles of two cells it is a step more than between their edges.
+    cost = np.where((share - steps <= 1).all(axis=1), cost, np.inf)
+    limits = robot.joint_limits()
+    wide = limits.upper - limits.lower > 2 * np.pi
+    samples = len(coarse.graph.gamma)
+    return Nearby(
+        place=np.where(inside, index, -1),
+        cost=cost,
+        turns=min((samples - 1) // 2, int(np.ceil(TURN * samples / (2 * np.pi)))),
+        span=span[:arm],
+        wraps=(robot.endless | wide)[:arm],
+        weight=weight[:arm],
+        square=square,
+    )
+
+
+def _steps(coarse: _Coarse, robot: Robot) -> Array:
+    """Return the step (E,) of each axis in the grid, rad or m."""
+    arm, limits = robot.family.joints, robot.joint_limits()
+    counts = np.array(coarse.counts)
+    span = np.where(robot.endless[arm:], 2 * np.pi, (limits.upper - limits.lower)[arm:])
+    between = np.where(robot.endless[arm:], counts, np.maximum(counts - 1, 1))
+    return np.asarray(span / between)
+
+
+def _smooth(coarse: _Coarse, robot: Robot, path: Ints, K: int) -> Array:
+    """Return the smoothest course (K, E) that stays within half a step of the places of a way."""
+    arm, limits = robot.family.joints, robot.joint_limits()
+    endless, steps = robot.endless[arm:], _steps(coarse, robot)
+    x = coarse.places[path]
+    x = np.vstack([x[:1], x[:1] + np.cumsum(increments(x, endless), axis=0)])
+    course = np.empty((K, x.shape[1]))
+    for i in range(x.shape[1]):
+        low, high = x[:, i] - steps[i] / 2, x[:, i] + steps[i] / 2
+        if not endless[i]:
+            low = np.maximum(low, limits.lower[arm + i])
+            high = np.minimum(high, limits.upper[arm + i])
+        eased = _eased(low, high, coarse.nodes)
+        course[:, i] = CubicSpline(coarse.nodes, eased)(np.arange(K)) if len(x) > 1 else eased[0]
+        if not endless[i]:
+            course[:, i] = np.clip(course[:, i], limits.lower[arm + i], limits.upper[arm + i])
+    return np.where(endless, wrap(course), course)
+
+
+def _eased(low: Array, high: Array, nodes: Ints) -> Array:
+    """Return the values (M,) between low and high whose speed changes least, over uneven nodes."""
+    if len(nodes) < 3 or (high - low).max() <= 0:
+        return (low + high) / 2
+    h = np.diff(nodes).astype(float)
+    change, rows = np.zeros((len(h) - 1, len(nodes))), np.arange(len(h) - 1)
+    change[rows, rows] = 1 / h[:-1]
+    change[rows, rows + 1] = -1 / h[:-1] - 1 / h[1:]
+    change[rows, rows + 2] = 1 / h[1:]
+    room = np.maximum(high - low, 1e-9)
+    found = lsq_linear(change, np.zeros(len(change)), bounds=(low, low + room))
+    return np.asarray(np.clip(found.x, low, high))
+
+
+def _stuck(coarse: _Coarse, robot: Robot, k: int) -> str:
+    """Say where the way through the samples ends, and why that may be."""
+    names = ", ".join(axis.name for axis in robot.externals)
+    graph = coarse.graph
+    if graph.start[k + 1] == graph.start[k]:
+        where = f"node {coarse.nodes[k]} is out of reach at every sampled value of {names}"
+        loss = graph.main_loss(k)
+        return f"{where}; most are lost by {loss}" if loss else where
+    return (
+        f"no motion of the arm and {names} was found from node {coarse.nodes[k - 1]} to node "
+        f"{coarse.nodes[k]} within the velocity limits; the values of {names} were sampled, which "
+        "proves nothing of those between"
+    )
