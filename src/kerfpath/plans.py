@@ -306,6 +306,11 @@ class Plan:
         return freeze(metric.increments(self.q, self.robot.endless))
 
     @property
+    def external(self) -> Array | None:
+        """Values (K, E) of the external axes, rad or m; None where the robot has none."""
+        return freeze(self.q[:, self.robot.family.joints :]) if self.robot.externals else None
+
+    @property
     def unwrapped(self) -> Array:
         """The joints (K, n) rad with endless joints turned on, not wrapped."""
         return np.vstack([self.q[:1], self.q[:1] + np.cumsum(self.increments, axis=0)])

@@ -13,6 +13,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanOptions
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._continuous import clear_motion, grid_reason
+from kerfpath.planner._courses import along_a_course
 from kerfpath.planner._task import task_of
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot
@@ -53,6 +54,7 @@ def best_motion(
     task = task_of(
         contour, robot, options, tool=tool, placement=placement, speed=speed, graph=graph
     )
+    task = along_a_course(task)
     finder, begin = ClearSearch(task, cell), phase or (lambda what: None)
     why = grid_reason(task)
     begin("search")

@@ -14,20 +14,23 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.optimize import lsq_linear
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
+from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.courses import CoarseLayer, Nearby, best_steps
 from kerfpath.kernels.metric import increments, wrap
+from kerfpath.options import PlanOptions
 from kerfpath.planner._graph import layered_graph
-from kerfpath.planner._task import PlanningTask
+from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.robots import Robot
 
-__all__ = ["courses"]
+__all__ = ["along_a_course", "coarse_places", "courses", "external_course"]
 
 FEW_NODES, NODES = 9, 41
 """Nodes at which the axes are sampled: as many as leave them time for a step, within these."""
@@ -42,6 +45,10 @@ TURN = np.radians(40)
 """rad that gamma turns by at most."""
 
 
+SLOW, SLOWLY = 1e-6, 1e6
+"""m/s and s from node to node: so slow that no limit binds."""
+
+
 class _Style(NamedTuple):
     """What a course is to be good for: prices of speed squared, and of the axes' own moves."""
 
@@ -49,6 +56,8 @@ class _Style(NamedTuple):
     axes: float
 
 
+GENTLE = _Style(1e6, 1.0)
+"""Where no speed is asked for: the least speeds alone."""
 STYLES = (_Style(1.0, 1.0), _Style(8.0, 1.0), _Style(1.0, 8.0))
 
 
@@ -76,7 +85,55 @@ class _Coarse:
     __repr__ = short_repr
 
 
-def courses(task: PlanningTask) -> Iterator[Array]:
+def coarse_places(robot: Robot) -> Array:
+    """Return a coarse grid (X, E) of the values of a robot's external axes, rad or m."""
+    return _grid(robot)[0]
+
+
+def external_course(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    speed: float | None = None,
+    options: PlanOptions | None = None,
+) -> Array:
+    """Return the course (K, E) rad or m of the external axes that promises most.
+
+    Arguments as in `kerfpath.plan`; without a speed the gentlest one.
+
+    Raises
+    ------
+    NoFeasiblePath
+        There is no way through the samples of the axes; says from which node on.
+    """
+    free = speed is None and contour.time is None
+    asked = options or PlanOptions()
+    task = task_of(
+        contour, robot, asked, tool=tool, placement=placement, speed=SLOW if free else speed
+    )
+    return next(courses(task, (GENTLE,) if free else STYLES))
+
+
+def along_a_course(task: PlanningTask, *, at_any_speed: bool = False) -> PlanningTask:
+    """Return the task along the course that promises most, where its robot has external axes.
+
+    A task that has a course or a graph is returned as it is, as is one that takes a grid of them.
+
+    Raises
+    ------
+    NoFeasiblePath
+        As `external_course`.
+    """
+    if not task.robot.externals or task.placed or task.settings.method != "continuous":
+        return task
+    if at_any_speed:
+        return task.along(next(courses(replace(task, dt=SLOWLY), (GENTLE,))))
+    return task.along(next(courses(task)))
+
+
+def courses(task: PlanningTask, styles: tuple[_Style, ...] = STYLES) -> Iterator[Array]:
     """Yield courses (K, E) rad or m of a task's external axes, that which promises most first.
 
     Raises
@@ -86,7 +143,7 @@ def courses(task: PlanningTask) -> Iterator[Array]:
     """
     coarse, robot = _sampled(task), task.robot
     known: list[Array] = []
-    for style in STYLES:
+    for style in styles:
         path = _best_way(coarse, task, style)
         course = _smooth(coarse, robot, path, len(task.contour))
         if not any(np.allclose(course, other, atol=1e-3) for other in known):
@@ -96,6 +153,31 @@ def courses(task: PlanningTask) -> Iterator[Array]:
 
 def _sampled(task: PlanningTask) -> _Coarse:
     robot, options, K = task.robot, task.settings, len(task.contour)
+    places, counts = _grid(robot)
+    arm = robot.family.joints
+    slowest = max(
+        step / speed
+        for step, speed in zip(_steps(robot, counts), robot.speed_limits()[0][arm:], strict=True)
+    )
+    many = int(np.clip(task.dt * (K - 1) / slowest, min(K, FEW_NODES), min(K, NODES)))
+    nodes = np.unique(np.round(np.linspace(0, K - 1, many)).astype(np.int64))
+    hard = options.comfort.hard if options.comfort is not None else None
+    graph = layered_graph(
+        task.contour,
+        robot,
+        tool=task.T_flange_tip,
+        placement=task.T_base_part,
+        options=replace(
+            options, gamma_step=GAMMA_STEP[len(counts)], tilt=None, comfort=hard, retract=None
+        ),
+        nodes=nodes,
+        external=np.broadcast_to(places, (K, *places.shape)),
+    )
+    return _Coarse(nodes=nodes, places=places, counts=counts, graph=graph)
+
+
+def _grid(robot: Robot) -> tuple[Array, tuple[int, ...]]:
+    """Return a grid (X, E) of the external axes, rad or m, and how many values each has in it."""
     arm, limits = robot.family.joints, robot.joint_limits()
     bounds = list(zip(robot.externals, limits.lower[arm:], limits.upper[arm:], strict=True))
     endless = robot.endless[arm:]
@@ -114,26 +196,8 @@ def _sampled(task: PlanningTask) -> _Coarse:
         else np.array([(lower + upper) / 2])
         for (_, lower, upper), turns, count in zip(bounds, endless, counts, strict=True)
     ]
-    slowest = max(
-        STEP[axis.kind] / share / speed
-        for axis, speed in zip(robot.externals, robot.speed_limits()[0][arm:], strict=True)
-    )
-    many = int(np.clip(task.dt * (K - 1) / slowest, min(K, FEW_NODES), min(K, NODES)))
-    nodes = np.unique(np.round(np.linspace(0, K - 1, many)).astype(np.int64))
     places = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1).reshape(-1, len(grids))
-    hard = options.comfort.hard if options.comfort is not None else None
-    graph = layered_graph(
-        task.contour,
-        robot,
-        tool=task.T_flange_tip,
-        placement=task.T_base_part,
-        options=replace(
-            options, gamma_step=GAMMA_STEP[len(grids)], tilt=None, comfort=hard, retract=None
-        ),
-        nodes=nodes,
-        external=np.broadcast_to(places, (K, *places.shape)),
-    )
-    return _Coarse(nodes=nodes, places=places, counts=counts, graph=graph)
+    return places, counts
 
 
 def _best_way(coarse: _Coarse, task: PlanningTask, style: _Style) -> Ints:
@@ -192,7 +256,7 @@ def _nearby(coarse: _Coarse, task: PlanningTask, parts: int, style: _Style) -> N
     index = np.ravel_multi_index(np.moveaxis(there, 2, 0), counts, mode="clip")
     span = velocity * task.dt * parts
     weight = span * (1 / velocity if options.weights is None else options.weights)
-    steps = _steps(coarse, robot) / span[arm:]
+    steps = _steps(robot, coarse.counts) / span[arm:]
     share, square = np.abs(moves) * steps, style.square * parts
     cost = style.axes * (weight[arm:] * share).sum(axis=1) + square * (share**2).sum(axis=1)
     # Between the middles of two cells it is a step more than between their edges.
@@ -211,10 +275,10 @@ def _nearby(coarse: _Coarse, task: PlanningTask, parts: int, style: _Style) -> N
     )
 
 
-def _steps(coarse: _Coarse, robot: Robot) -> Array:
+def _steps(robot: Robot, counted: tuple[int, ...]) -> Array:
     """Return the step (E,) of each axis in the grid, rad or m."""
     arm, limits = robot.family.joints, robot.joint_limits()
-    counts = np.array(coarse.counts)
+    counts = np.array(counted)
     span = np.where(robot.endless[arm:], 2 * np.pi, (limits.upper - limits.lower)[arm:])
     between = np.where(robot.endless[arm:], counts, np.maximum(counts - 1, 1))
     return np.asarray(span / between)
@@ -223,7 +287,7 @@ def _steps(coarse: _Coarse, robot: Robot) -> Array:
 def _smooth(coarse: _Coarse, robot: Robot, path: Ints, K: int) -> Array:
     """Return the smoothest course (K, E) that stays within half a step of the places of a way."""
     arm, limits = robot.family.joints, robot.joint_limits()
-    endless, steps = robot.endless[arm:], _steps(coarse, robot)
+    endless, steps = robot.endless[arm:], _steps(robot, coarse.counts)
     x = coarse.places[path]
     x = np.vstack([x[:1], x[:1] + np.cumsum(increments(x, endless), axis=0)])
     course = np.empty((K, x.shape[1]))

@@ -18,6 +18,7 @@ from kerfpath.limits import Limits
 from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._closed import binding_nodes, impossible_share
+from kerfpath.planner._courses import along_a_course
 from kerfpath.planner._graph import longest_step, node_interval, require_even
 from kerfpath.planner._quickest import QuickMotion, quick_motions
 from kerfpath.planner._task import PlanningTask, task_of
@@ -84,6 +85,7 @@ def fastest_speed(
     options: PlanOptions | None = None,
     cell: Cell | None = None,
     graph: LayeredGraph | None = None,
+    external: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
     ceiling: bool = False,
     enough: float | None = None,
@@ -97,10 +99,10 @@ def fastest_speed(
     the acceleration: `refine` moves gamma off it, from the fastest path and from others, to what is
     faster still (the best found, which is not proved to be the best there is), where that is clear
     and keeps the margins of `comfort`, which may have no costs here. `plan` finds a motion at the
-    speed returned, too (without an external axis). With `ceiling` it is also proved, as far as a
-    limited amount of work does, above which speed there is no motion at all, on the grid or off it,
-    see `FastestSpeed.ceiling`. Off the grid a speed that is `enough`, m/s, may be returned although
-    there are faster ones.
+    speed returned, too. External axes begin from the gentlest course, or from `external`. With
+    `ceiling` it is also proved, as far as a limited amount of work does, above which speed there is
+    no motion at all, on the grid or off it, see `FastestSpeed.ceiling`. Off the grid a speed that
+    is `enough`, m/s, may be returned although there are faster ones.
 
     Raises
     ------
@@ -124,8 +126,10 @@ def fastest_speed(
         placement=placement,
         speed=1.0,
         graph=graph,
+        external=external,
         progress=progress,
-    ).whole()
+    )
+    task = along_a_course(task, at_any_speed=True).whole()
     found, nodes = _fastest(task, ClearSearch(task, cell), enough)
     if not ceiling:
         return found

@@ -98,11 +98,12 @@ def _from_quickest(
         None was found; says of what that is proved, and what the quickest one found would take.
     """
     asked = task.settings
-    # The quickest motions know neither a closure nor what clearance costs. With an external axis
-    # they may take minutes to begin: the long steps between its samples leave the arm nearly every
-    # edge, and the exact search for the fastest path on the grid keeps each as a state.
+    # The quickest motions know neither a closure nor what clearance costs. On a grid of external
+    # axes they may take minutes to begin: the long steps between its samples leave the arm nearly
+    # every edge, and the exact search for the fastest path on the grid keeps each as a state.
     priced = asked.comfort is not None and asked.comfort.prices_clearance
-    if asked.closure == "periodic" or priced or task.robot.externals:
+    on_a_grid = task.robot.externals and task.external is None
+    if asked.closure == "periodic" or priced or on_a_grid:
         raise _judged(broken, task, begin) from None
     judged, best = None, None
     begin("search for the quickest motion")

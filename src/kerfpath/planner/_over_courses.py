@@ -65,6 +65,7 @@ def plan_over_courses(
 
 def _unproved(task: PlanningTask, broken: NoFeasiblePath) -> NoFeasiblePath:
     names = ", ".join(axis.name for axis in task.robot.externals)
-    return broken.with_message(
+    said = (
         f"{broken}; along the courses of {names} that promised most, which proves nothing of others"
     )
+    return NoFeasiblePath(said, proved=False, node=broken.node, counts=broken.counts)

@@ -17,6 +17,7 @@ from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
 from kerfpath.planner._certified import with_bound
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._continuous import clear_motion, grid_reason
+from kerfpath.planner._courses import along_a_course
 from kerfpath.planner._refined import refine_plan
 from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.plans import Plan, Proof
@@ -89,7 +90,8 @@ def plan_in_pieces(
         speed=speed,
         graph=graph,
         progress=progress,
-    ).whole()
+    )
+    task = along_a_course(task).whole()
     finder = ClearSearch(task, cell)
     begin = phase or (lambda what: None)
     begin("search for pieces")

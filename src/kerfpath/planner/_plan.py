@@ -129,7 +129,7 @@ def plan(
     finder = ClearSearch(task, cell)
     begin = phase or (lambda what: None)
     try:
-        if asked.method == "continuous" and robot.externals and graph is None and external is None:
+        if asked.method == "continuous" and robot.externals and not task.placed:
             made = plan_over_courses(task, finder, begin)
         elif asked.method == "continuous":
             made = plan_continuous(task, finder, begin)

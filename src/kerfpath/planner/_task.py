@@ -85,6 +85,8 @@ class PlanningTask:
         Time from node to node at the speed asked for.
     external : (K, E) rad or m, optional
         Course of the external axes; None: a grid of their values at every node.
+    placed : bool
+        The course, or the graph, was given with the task.
     layers : callable
         Builds the layers of some nodes (M,) of a task, or of all where it is given None: then no
         layer is empty, or it raises NoFeasiblePath.
@@ -98,6 +100,7 @@ class PlanningTask:
     dt: float
     layers: Callable[[PlanningTask, Ints | None], Layered]
     external: Array | None = None
+    placed: bool = False
 
     __repr__ = short_repr
 
@@ -144,7 +147,7 @@ class PlanningTask:
 
     def along(self, external: Array) -> PlanningTask:
         """Return the task with another course (K, E) of the external axes, not built."""
-        return replace(self, external=external, layers=_layers)
+        return replace(self, external=external, placed=True, layers=_layers)
 
     def at_nodes(self, nodes: Ints) -> Layered:
         """Return the layers of some nodes (M,), ascending; those of all are not built for it."""
@@ -263,6 +266,7 @@ def task_of(
         dt=dt,
         layers=partial(_layers, graph=graph, progress=progress),
         external=None if external is None else course_of(external, contour, robot)[:, 0],
+        placed=graph is not None or external is not None,
     )
 
 

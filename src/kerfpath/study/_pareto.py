@@ -206,8 +206,6 @@ def problem_of_job(
     nodes = task.sample(drawn)
     asked = task.asked(job.options)
     options = replace(asked, feed="constant", refine=False, certify=None)
-    home = None if job.sequence is None else job.sequence.home_deg
-    home_rad = None if home is None else np.radians(home)
     return ParetoProblem(
         contour=nodes,
         robot=job.robot,
@@ -215,10 +213,10 @@ def problem_of_job(
         placement=job.placement,
         speed=task.speed if nodes.time is None else None,
         options=options,
-        criteria=criteria_named(criteria, job.robot, options=options, cell=cell, home=home_rad),
+        criteria=criteria_named(criteria, job.robot, options=options, cell=cell, home=job.home),
         graph=job.graph(nodes, asked),
         cell=cell,
-        home=home_rad,
+        home=job.home,
         audit=lambda made: _faults(job, drawn, made, cell),
     )
 

@@ -17,6 +17,8 @@ from kerfpath.job.format._program import Tolerances as Tolerances
 from kerfpath.job.format._program import program_options as program_options
 from kerfpath.job.format._program import tolerances_of as tolerances_of
 from kerfpath.job.format._read import Job as Job
+from kerfpath.job.format._read import home_of as home_of
+from kerfpath.job.format._read import places_of as places_of
 from kerfpath.job.format._read import read_job as read_job
 from kerfpath.job.format._refusals import all_of as all_of
 from kerfpath.job.format._refusals import refusal_at as refusal_at
@@ -25,6 +27,7 @@ from kerfpath.job.format._sampling import closer_nodes as closer_nodes
 from kerfpath.job.format.tables import VARIABLES as VARIABLES
 from kerfpath.job.format.tables import AuditTable as AuditTable
 from kerfpath.job.format.tables import ContourTable as ContourTable
+from kerfpath.job.format.tables import ExternalTable as ExternalTable
 from kerfpath.job.format.tables import Goal as Goal
 from kerfpath.job.format.tables import JobFile as JobFile
 from kerfpath.job.format.tables import LayoutTable as LayoutTable

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from kerfpath._arrays import Array, Ints
+from kerfpath._arrays import Array, Ints, freeze
 from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.comfort import Comfort
@@ -32,16 +32,17 @@ from kerfpath.job.format._refusals import all_of, error_at, refusal, refusal_at
 from kerfpath.job.format.tables import (
     LIMITS_MARGIN,
     CellTable,
+    ExternalTable,
     JobFile,
     LayoutTable,
     SequenceTable,
 )
 from kerfpath.job.format.tables._plan import said_in_keys
 from kerfpath.options import OptionConflict, PlanOptions
-from kerfpath.planner import layered_graph
+from kerfpath.planner import coarse_places, external_course, layered_graph
 from kerfpath.robots import Robot
 
-__all__ = ["Job", "read_job"]
+__all__ = ["Job", "home_of", "places_of", "read_job"]
 
 MOST_TEXT = 10_000_000
 """Characters of a job file: many thousand contours."""
@@ -70,6 +71,8 @@ class Job:
         How every contour is to be planned.
     cell : CellTable or None
         What stands around, as the file says it; without one, collisions are not checked.
+    home : (n,) rad, optional
+        Joints that the program begins and ends at, external axes last (linear: m).
     sequence : SequenceTable or None
         How the order and the moves between contours are chosen; without one, neither is.
     layout : LayoutTable
@@ -92,6 +95,7 @@ class Job:
     contours: tuple[ContourSpec, ...]
     options: PlanOptions
     cell: CellTable | None
+    home: Array | None
     sequence: SequenceTable | None
     layout: LayoutTable
     tolerances: Tolerances
@@ -130,19 +134,27 @@ class Job:
         options: PlanOptions | None = None,
         *,
         only: Ints | None = None,
+        external: Array | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> LayeredGraph:
         """Return the layered graph of a contour's nodes, by these options or the job's own.
 
-        With `only` (M,) it has the layers of these nodes alone.
+        With `only` (M,) it has the layers of these nodes alone. External axes are at `external`
+        (K, E) or (K, X, E), or take the gentlest course.
         """
+        chosen = options or self.options
+        if self.robot.externals and external is None and chosen.method == "continuous":
+            external = external_course(
+                nodes, self.robot, tool=self.tool, placement=self.placement, options=chosen
+            )
         return layered_graph(
             nodes,
             self.robot,
             tool=self.tool,
             placement=self.placement,
-            options=options or self.options,
+            options=chosen,
             nodes=only,
+            external=external,
             progress=progress,
         )
 
@@ -232,6 +244,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         contours=tuple(task_of(table) for table in file.contour),
         options=options,
         cell=file.cell,
+        home=home_of(file.sequence, file.robot.external),
         sequence=file.sequence,
         layout=file.layout,
         tolerances=tolerances_of(file.audit),
@@ -239,6 +252,21 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         source=source,
         text=text,
     )
+
+
+def places_of(job: Job, nodes: Contour) -> Array | None:
+    """Return a coarse grid (K, X, E) of a job's external axes at every node; None: it has none."""
+    if not job.robot.externals:
+        return None
+    places = coarse_places(job.robot)
+    return np.broadcast_to(places, (len(nodes), *places.shape))
+
+
+def home_of(sequence: SequenceTable | None, external: Sequence[ExternalTable]) -> Array | None:
+    """Return the joints (n,) at home, external axes last; None where a job has no home."""
+    if sequence is None or sequence.home_deg is None:
+        return None
+    return freeze(np.append(np.radians(sequence.home_deg), [table.home for table in external]))
 
 
 def _comfort(file: JobFile, robot: Robot) -> Comfort | None:

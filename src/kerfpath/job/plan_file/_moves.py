@@ -37,7 +37,7 @@ def check_moves(
     sequence, robot = prepared.job.sequence, prepared.job.robot
     if sequence is None:
         return [count("moves", "moves that the job does not ask for", len(moves))] if moves else []
-    homes = 2 if sequence.home_deg is not None else 0
+    homes = 2 if prepared.job.home is not None else 0
     wanted = len(plans) - 1 + homes
     rows = [count("moves", "moves too many or too few", abs(len(moves) - wanted))]
     odd = [m for m in moves if m.q.shape[1] != robot.joints or len(m.q) < 2]
@@ -110,11 +110,10 @@ def _approach(prepared: PreparedJob, plan: Plan, end: End) -> Array:
 
 def _ends(prepared: PreparedJob, ways: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
     """Return where each move begins and ends, (n,) rad each."""
-    assert prepared.job.sequence is not None
-    home = prepared.job.sequence.home_deg
+    home = prepared.job.home
     starts, ends = [way[0][-1] for way in ways], [way[1][-1] for way in ways]
     if home is not None:
-        starts, ends = [*starts, np.radians(home)], [np.radians(home), *ends]
+        starts, ends = [*starts, home], [home, *ends]
         return list(zip(ends, starts, strict=True))
     return list(zip(ends[:-1], starts[1:], strict=True))
 
@@ -125,9 +124,8 @@ def _fits(prepared: PreparedJob, move: TransferMove, ends: tuple[Array, Array]) 
     Home is the same with endless joints turned on by whole turns, as the last move may have them.
     """
     first, last = np.abs(move.q[0] - ends[0]), np.abs(move.q[-1] - ends[1])
-    assert prepared.job.sequence is not None
-    home = prepared.job.sequence.home_deg
-    if home is not None and np.array_equal(ends[1], np.radians(home)):
+    home = prepared.job.home
+    if home is not None and np.array_equal(ends[1], home):
         whole = 2 * np.pi * np.round(last / (2 * np.pi))
         last = np.where(prepared.job.robot.endless, np.abs(last - whole), last)
     off = max(float(first.max()), float(last.max()))

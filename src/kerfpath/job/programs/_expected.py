@@ -187,8 +187,8 @@ def _moves(
     ]
     backs = [back_off(plan, "end", job.program.retract) for plan in plans]
     ways = [[back, *way] for back, way in zip(backs, corners[1:], strict=False)]
-    if job.sequence.home_deg is not None:
-        there = np.radians(job.sequence.home_deg)
+    if job.home is not None:
+        there = job.home
         # At the end an endless joint is at home on whichever turn the motion has brought it to.
         end = home[-1] if len(home) else backs[-1]
         turns = np.round((end - there) / (2 * np.pi)) * job.robot.endless

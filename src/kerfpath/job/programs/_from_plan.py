@@ -14,6 +14,7 @@ from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.job.format import (
     AuditTable,
     Drawing,
+    ExternalTable,
     Job,
     LayoutTable,
     PreparedJob,
@@ -21,6 +22,7 @@ from kerfpath.job.format import (
     ProgramTable,
     SequenceTable,
     Tolerances,
+    home_of,
     prepare,
     program_options,
     read_job,
@@ -164,6 +166,8 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
     sequence = None
     if file.job.get("sequence") is not None:
         sequence = table_of(file, "sequence", SequenceTable, lambda table: table)
+    axes = file.job["robot"].get("external", ())
+    external = [ExternalTable.model_validate(axis) for axis in axes]
     return Job(
         path=file.path,
         robot=first.robot,
@@ -173,9 +177,8 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
         contours=(),
         options=replace(first.settings, refine_parts=1, interruptions="none", least_piece=None),
         cell=None,
-        sequence=None
-        if sequence is None
-        else table_of(file, "sequence", SequenceTable, lambda table: table),
+        home=home_of(sequence, external),
+        sequence=sequence,
         layout=LayoutTable(),
         tolerances=table_of(file, "audit", AuditTable, tolerances_of),
         program=options,

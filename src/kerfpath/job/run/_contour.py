@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from kerfpath._arrays import Array
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.front import Subproblem, plan_run
@@ -59,7 +60,12 @@ def cut_candidate(
         progress(f"{name}: {what}", 0, 0)
 
     progress(name, 0, total)
-    graph = graph_of(job, candidate.nodes, solved)
+    courses = bool(job.robot.externals) and options.method == "continuous"
+    try:
+        graph = graph_of(job, candidate.nodes, solved)
+    except NoFeasiblePath as closed:  # no course of the external axes: shown where they are at zero
+        graph = job.graph(candidate.nodes, external=_at_rest(job, candidate))
+        return (CutResult(request=request, candidate=candidate, graph=graph, broken=closed),)
     clearance = None
     if cell is not None and job.cell is not None and job.cell.map:
         begin("map of the cell")
@@ -72,7 +78,8 @@ def cut_candidate(
     def planned(by: Callable[..., _T]) -> _T:
         return by(
             candidate.nodes, job.robot, tool=job.tool, placement=job.placement,
-            speed=candidate.speed, options=job.options, cell=kept, graph=graph, phase=begin,
+            speed=candidate.speed, options=job.options, cell=kept, phase=begin,
+            graph=None if courses else graph,
         )  # fmt: skip
 
     def follow(run: Subproblem) -> Plan:
@@ -94,6 +101,13 @@ def cut_candidate(
     return tuple(_audited(prepared, whole, made) for made in plans)
 
 
+def _at_rest(job: Job, candidate: Candidate) -> Array:
+    """Return where the external axes are nearest to zero, at every node (K, E) rad or m."""
+    limits, arm = job.robot.joint_limits(), job.robot.family.joints
+    rest = np.clip(0.0, limits.lower[arm:], limits.upper[arm:])
+    return np.broadcast_to(rest, (len(candidate.nodes), len(rest)))
+
+
 def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> CutResult | None:
     """Return a contour's first candidate cut in one posture; None where its audit fails.
 
@@ -107,7 +121,7 @@ def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> 
     graph = job.graph(candidate.nodes)
     made = plan(
         candidate.nodes, job.robot, tool=job.tool, placement=job.placement, speed=candidate.speed,
-        options=job.options, cell=prepared.cell, graph=graph,
+        options=job.options, cell=prepared.cell, graph=None if job.robot.externals else graph,
     )  # fmt: skip
     cut = _audited(prepared, CutResult(request=request, candidate=candidate, graph=graph), made)
     return cut if cut.passed else None
@@ -156,6 +170,8 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
         made = _divided(made, candidate.path, job.options.refine_parts)
     kept = None if whole.picked else kept_between_nodes(job, made)
     made = made if kept is None else kept.plan
+    if made.external is not None and len(made.q) == len(candidate.nodes):
+        graph = job.graph(made.contour, external=made.external)
     checks = job.tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
     checks += whole.request.drawing_checks(candidate, made.contour, job.tolerances.path)
     cut = replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))

@@ -17,6 +17,7 @@ from kerfpath.job.format import (
     all_of,
     chord_error,
     closer_nodes,
+    places_of,
     refusal_at,
 )
 from kerfpath.plans import has_room
@@ -196,7 +197,8 @@ def _end_poses(job: Job, nodes: Contour) -> list[tuple[Array, Ints]]:
     """Return the admissible joints (B, n) rad of both ends, and their postures (B,)."""
     ends = np.array([0, len(nodes) - 1])
     fine = min(job.options.gamma_step, FINE)
-    graph = job.graph(nodes, replace(job.options, retract=None, gamma_step=fine), only=ends)
+    options = replace(job.options, retract=None, gamma_step=fine)
+    graph = job.graph(nodes, options, only=ends, external=places_of(job, nodes))
     cut = graph.start[1]
     posture = graph.posture.astype(np.int64)
     return [(graph.q[:cut], posture[:cut]), (graph.q[cut:], posture[cut:])]

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-import numpy as np
-
 from kerfpath.auditor import transfer_checks, worst_of
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.format import PreparedJob
@@ -52,7 +50,6 @@ def order_cuts(
         () if r.run is not None or owner.count(i) > 1 else r.options.postures
         for r, i in zip(requests, owner, strict=True)
     ]
-    home = job.sequence.home_deg
     try:
         part = order_candidates(
             units,
@@ -62,7 +59,7 @@ def order_cuts(
             progress=lambda unit, done, total: progress(
                 f"{requests[unit].task.name}: other postures", done, total
             ),
-            home=None if home is None else np.radians(home),
+            home=job.home,
             cell=prepared.cell,
             before=before,
             heat_spacing=job.sequence.heat_spacing_mm / 1000,

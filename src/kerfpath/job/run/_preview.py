@@ -9,7 +9,7 @@ import numpy as np
 from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.cell import Cell
-from kerfpath.job.format import Job, cell_of_job
+from kerfpath.job.format import Job, cell_of_job, places_of
 
 __all__ = ["ContourStart", "JobPreview", "check_job"]
 
@@ -72,7 +72,8 @@ def check_job(job: Job, part: Part | None = None) -> JobPreview:
     for task in job.tasks(part):
         nodes = task.sample(task.candidates(part)[0])
         first = nodes.part(0, 1, job.options.frames)
-        graph = job.graph(first, replace(job.options, comfort=None, retract=None, floor=None))
+        plain = replace(job.options, comfort=None, retract=None, floor=None)
+        graph = job.graph(first, plain, external=places_of(job, first))
         q = graph.q[: graph.start[1]]
         starts.append(_start(task.name, len(nodes), q, cell))
     return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts))

@@ -9,6 +9,7 @@ from kerfpath.job.format.tables._cell import CellTable as CellTable
 from kerfpath.job.format.tables._cell import FixtureTable as FixtureTable
 from kerfpath.job.format.tables._comfort import LIMITS_MARGIN as LIMITS_MARGIN
 from kerfpath.job.format.tables._contour import ContourTable as ContourTable
+from kerfpath.job.format.tables._external import ExternalTable as ExternalTable
 from kerfpath.job.format.tables._job import REPEATED as REPEATED
 from kerfpath.job.format.tables._job import TABLES as TABLES
 from kerfpath.job.format.tables._job import JobFile as JobFile

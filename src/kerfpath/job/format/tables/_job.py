@@ -18,6 +18,7 @@ from kerfpath.job.format.tables._cut import (
     PickTable,
     SmoothAxesTable,
 )
+from kerfpath.job.format.tables._external import ExternalTable
 from kerfpath.job.format.tables._layout import LayoutTable
 from kerfpath.job.format.tables._part import PartTable
 from kerfpath.job.format.tables._plan import PlanTable
@@ -58,10 +59,12 @@ class JobFile(Table):
     def _one_for_every_joint(self, info: ValidationInfo) -> JobFile:
         home = None if self.sequence is None else self.sequence.home_deg
         given = {("plan", "weights"): self.plan.weights, ("sequence", "home_deg"): home}
-        joints = self.robot.joints(folder_of(info))
+        arm, more = self.robot.joints(folder_of(info)), len(self.robot.external)
         for where, numbers in given.items():
+            joints = arm + more * (where[1] == "weights")
             if numbers is not None and len(numbers) != joints:
-                expected = f"{joints} numbers, one for every joint"
+                axes = f", {more} of them for external axes" if joints > arm else ""
+                expected = f"{joints} numbers, one for every joint{axes}"
                 raise fault(expected, f"{len(numbers)}", "give as many", where)
         return self
 
@@ -146,6 +149,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "cell": CellTable,
     "cell.head": HeadTable,
     "cell.fixture": FixtureTable,
+    "robot.external": ExternalTable,
     "cell.pair": PairTable,
     "sequence": SequenceTable,
     "comfort": ComfortTable,
@@ -154,5 +158,5 @@ TABLES: dict[str, type[BaseModel]] = {
     "program": ProgramTable,
 }
 """The model of each table of the file."""
-REPEATED = ("contour", "cell.fixture", "cell.pair")
+REPEATED = ("contour", "cell.fixture", "cell.pair", "robot.external")
 """Those that a file may have several of."""

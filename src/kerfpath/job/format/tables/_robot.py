@@ -28,7 +28,8 @@ from kerfpath.job.format._values import (
     key,
     one_of,
 )
-from kerfpath.job.format.tables._table import Table, given
+from kerfpath.job.format.tables._external import External
+from kerfpath.job.format.tables._table import Table, given, require_distinct
 from kerfpath.robots import FAMILIES, Robot, acceleration_ratios, robot, robot_ids, with_axis_3
 from kerfpath.urdf import read_urdf
 
@@ -137,6 +138,7 @@ class RobotTable(Table):
     acceleration_ratio: Annotated[
         Ratio | None, key("a ratio of acceleration to speed, by its name", '"iontec_20_to_70kg"')
     ] = None
+    external: External = ()
 
     @model_validator(mode="after")
     def _plannable(self, info: ValidationInfo) -> RobotTable:
@@ -242,6 +244,12 @@ class RobotTable(Table):
             )
 
     @model_validator(mode="after")
+    def _axes_differ(self) -> RobotTable:
+        names = [table.name for table in self.external]
+        require_distinct(names, "external axis", "external", ["name"] * len(names))
+        return self
+
+    @model_validator(mode="after")
     def _one_floor(self) -> RobotTable:
         if not self.floor and "floor_mm" in self.model_fields_set:
             raise fault("floor_mm only with a floor", "floor = false", "remove one", ("floor_mm",))
@@ -255,16 +263,18 @@ class RobotTable(Table):
         """Return the robot with this table's limits; `bodies`: those of its description, too."""
         changed = self._known(folder, bodies=bodies)
         changed = changed.with_limits(**self._limits(changed.joints))
-        if self.acceleration_ratio is None:
-            return changed
-        assert changed.velocity is not None
-        return replace(
-            changed,
-            acceleration=np.multiply(
-                acceleration_ratios()[self.acceleration_ratio], changed.velocity
-            ),
-            acceleration_source=f"assumed: ratio {self.acceleration_ratio} times the speeds",
-        )
+        if self.acceleration_ratio is not None:
+            assert changed.velocity is not None
+            changed = replace(
+                changed,
+                acceleration=np.multiply(
+                    acceleration_ratios()[self.acceleration_ratio], changed.velocity
+                ),
+                acceleration_source=f"assumed: ratio {self.acceleration_ratio} times the speeds",
+            )
+        for table in self.external:
+            changed = table.on(changed)
+        return changed
 
     def _known(self, folder: Path, *, bodies: bool = False) -> Robot:
         """Return the robot as the library or its lengths have it, or as described and limited."""
@@ -304,7 +314,7 @@ class RobotTable(Table):
         )
 
     def joints(self, folder: Path) -> int:
-        """Return how many joints the robot has."""
+        """Return how many joints the robot has without its external axes."""
         if self.urdf is not None:
             chain = self._chain(folder) | {"meshes": False, "snap": 0.0}
             return len(read_urdf(folder / self.urdf, **chain).joints)
