@@ -148,15 +148,15 @@ def test_nodes_that_do_not_divide_the_intervals_are_refused(planned, circle):
         refine(coarse, eta_a=0.0)
 
 
-def _random_model(rng, metric, *, cap=np.inf):
+def _random_model(rng, metric, *, cap=np.inf, free=1):
     K, n = 6, 3
     q = rng.normal(0, 0.2, (K, n)).cumsum(0)
     model = LinearModel(
         q=q,
-        slope=rng.normal(0, 1, (K, n)),
-        radius=np.full(K, 0.3),
-        least=np.full(K, -1.0),
-        most=np.full(K, 1.0),
+        slope=rng.normal(0, 1, (K, n, free)),
+        radius=np.full((K, free), 0.3),
+        least=np.full((K, free), -1.0),
+        most=np.full((K, free), 1.0),
         lower=q.min(0) - 0.05,
         upper=q.max(0) + 0.05,
         rotation=np.array([np.inf, np.abs(q[:, 1] - q[0, 1]).max() + 0.02, np.inf]),
@@ -179,8 +179,12 @@ def _random_model(rng, metric, *, cap=np.inf):
     return model, replace(rates, limits=Limits.of(velocity, acceleration))
 
 
+def _moved(model, delta):
+    return model.q + np.einsum("kif,kf->ki", model.slope, delta.reshape(model.radius.shape))
+
+
 def _distances(model, delta):
-    dq = np.diff(model.q + model.slope * delta[:, None], axis=0) * model.weight
+    dq = np.diff(_moved(model, delta), axis=0) * model.weight
     return {
         "manhattan": np.abs(dq).sum(1),
         "chebychev": np.abs(dq).max(1),
@@ -190,7 +194,7 @@ def _distances(model, delta):
 
 def _margins(model, rates, delta):
     """All that must not be negative, straight from the definitions."""
-    q = model.q + model.slope * delta[:, None]
+    q = _moved(model, delta)
     v = np.diff(q, axis=0) / rates.tau[:, None]
     a = [(v[k + 1] - v[k]) / ((rates.tau[k] + rates.tau[k + 1]) / 2) for k in range(len(v) - 1)]
     if rates.periodic:
@@ -204,26 +208,27 @@ def _margins(model, rates, delta):
         model.rotation[1] - np.abs(q - q[0])[:, 1],
         coupled - model.row_lower,
         model.row_upper - coupled,
-        model.radius - np.abs(delta),
+        (model.radius - np.abs(delta.reshape(model.radius.shape))).ravel(),
     ])  # fmt: skip
 
 
 @pytest.mark.parametrize("aim", ["sum", "max"])
 @pytest.mark.parametrize("metric", METRICS)
-def test_the_program_is_the_problem_that_it_claims_to_be(metric, aim):
+@pytest.mark.parametrize("free", [1, 2])
+def test_the_program_is_the_problem_that_it_claims_to_be(free, metric, aim):
     """Against a general solver over the definitions, which share no row with the program."""
     rng = np.random.default_rng(5)
-    for _ in range(8):
-        model, rates = _random_model(rng, metric)
+    for _ in range(8 if free == 1 else 3):
+        model, rates = _random_model(rng, metric, free=free)
         found = solve(model, rates, aim)
         assert found is not None
         assert _margins(model, rates, found).min() > -1e-7
         total = np.sum if aim == "sum" else np.max
         cost = total(_distances(model, found))
-        ends = {"type": "eq", "fun": lambda d: d[0] - d[-1]}
+        ends = {"type": "eq", "fun": lambda d, f=free: d[:f] - d[-f:]}
         held = [{"type": "ineq", "fun": lambda d, m=model, r=rates: _margins(m, r, d)}]
         for seed in range(4):
-            start = np.random.default_rng(seed).uniform(-0.1, 0.1, len(model.q))
+            start = np.random.default_rng(seed).uniform(-0.1, 0.1, model.radius.size)
             other = minimize(
                 lambda d, m=model, over=total: over(_distances(m, d)),
                 start if seed else np.zeros(len(start)),
@@ -234,7 +239,7 @@ def test_the_program_is_the_problem_that_it_claims_to_be(metric, aim):
             if _margins(model, rates, other.x).min() > -1e-9:
                 # A convex problem: no admissible point is better, up to the solver's tolerance.
                 assert cost <= other.fun + 1e-6
-        assert rates.periodic is False or abs(found[0] - found[-1]) < 1e-7
+        assert rates.periodic is False or np.abs(found[0] - found[-1]).max() < 1e-7
 
 
 def test_the_manhattan_program_is_a_linear_program():
@@ -244,20 +249,20 @@ def test_the_manhattan_program_is_a_linear_program():
         model, rates = _random_model(rng, "manhattan")
         rates = replace(rates, periodic=False)
         found = solve(model, rates, "sum")
-        K, n = model.q.shape
+        (K, n), slope = model.q.shape, model.slope[..., 0]
         D = np.zeros(((K - 1) * n, K))
         for k in range(K - 1):
             for i in range(n):
-                D[k * n + i, k], D[k * n + i, k + 1] = -model.slope[k, i], model.slope[k + 1, i]
+                D[k * n + i, k], D[k * n + i, k + 1] = -slope[k, i], slope[k + 1, i]
         dq = np.diff(model.q, axis=0).ravel()
         V = D / np.repeat(rates.tau, n)[:, None]
         v = dq / np.repeat(rates.tau, n)
         span = np.repeat((rates.tau[1:] + rates.tau[:-1]) / 2, n)
         A, a = (V[n:] - V[:-n]) / span[:, None], (v[n:] - v[:-n]) / span
-        Q = np.kron(np.eye(K), np.ones((n, 1))) * model.slope.ravel()[:, None]
-        C = np.diag(model.slope @ model.rows[0])
+        Q = np.kron(np.eye(K), np.ones((n, 1))) * slope.ravel()[:, None]
+        C = np.diag(slope @ model.rows[0])
         c = model.q @ model.rows[0]
-        R = np.diag(model.slope[:, 1]) - model.slope[0, 1] * np.eye(K)[[0] * K]
+        R = np.diag(slope[:, 1]) - slope[0, 1] * np.eye(K)[[0] * K]
         r = model.q[:, 1] - model.q[0, 1]
         velocity = rates.limits.velocity.bound
         acceleration = rates.limits.acceleration.bound
@@ -279,7 +284,7 @@ def test_the_manhattan_program_is_a_linear_program():
             np.append(np.zeros(K), np.ones(len(T))),
             np.vstack(rows),
             np.concatenate(right),
-            bounds=[(-r, r) for r in model.radius] + [(None, None)] * len(T),
+            bounds=[(-r, r) for r in model.radius.ravel()] + [(None, None)] * len(T),
         )
         assert _distances(model, found).sum() == pytest.approx(best.fun, abs=1e-6)
 
@@ -317,7 +322,7 @@ def test_the_largest_share_is_brought_down_where_limits_are_broken():
     tight = replace(rates, limits=halved)
     dq = np.diff(model.q, axis=0)
     found = solve(model, tight, "excess")
-    after = np.diff(model.q + model.slope * found[:, None], axis=0)
+    after = np.diff(_moved(model, found), axis=0)
     assert tight.excess(after) < tight.excess(dq)
 
 

@@ -13,7 +13,7 @@ from kerfpath._arrays import Array, floats, freeze, scalar
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
-__all__ = ["MOST_EXTERNAL", "ExternalAxis", "Travel", "base_in_part", "carried"]
+__all__ = ["ExternalAxis", "Travel", "base_in_part", "carried", "require_distinct_axes"]
 
 MOST_EXTERNAL = 3
 """External axes that a robot may have."""
@@ -122,6 +122,19 @@ class ExternalAxis:
         T[..., :3, :3] = turn.reshape(*x.shape, 3, 3)
         T[..., :3, 3] = self.point - T[..., :3, :3] @ self.point
         return T
+
+
+def require_distinct_axes(robot: str, axes: Sequence[ExternalAxis]) -> None:
+    """Raise InputError for too many external axes of a robot, or two of one name."""
+    names = [axis.name for axis in axes]
+    if len(names) > MOST_EXTERNAL:
+        raise InputError(
+            f"robot {robot!r}: expected at most {MOST_EXTERNAL} external axes, got "
+            f"{len(names)}: {', '.join(names)}"
+        )
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"robot {robot!r}: two of its external axes are named {name!r}")
 
 
 def carried(axes: Sequence[ExternalAxis], x: Array, what: Literal["robot", "part"]) -> Array:

@@ -15,7 +15,7 @@ from kerfpath.kernels.enclosure import Curves
 from kerfpath.losses import Loss, Reason
 from kerfpath.robots._coupling import AXIS_3, Coupling
 from kerfpath.robots._enclosure import Enclosure, ball_frames, require_cells
-from kerfpath.robots._external import MOST_EXTERNAL, ExternalAxis, base_in_part
+from kerfpath.robots._external import ExternalAxis, base_in_part, require_distinct_axes
 from kerfpath.robots._families import FAMILIES, Family
 from kerfpath.robots._solutions import Solutions, all_solutions, solutions_within
 from kerfpath.urdf import KinematicChain, LinkBody
@@ -80,7 +80,7 @@ class Manipulator:
         for name in ("T_base_foot", "T_end_flange"):
             _set(self, name, as_pose(getattr(self, name), name))
         _set(self, "endless", bools(_for_each(self.endless, n), "endless", (n,)))
-        self._require_few_axes()
+        require_distinct_axes(self.id, self.externals)
         for coupling in self.couplings:
             floats(coupling.row, "coupling row", (n,))
         for name in ("lower", "upper"):
@@ -376,18 +376,6 @@ class Manipulator:
                 f"{np.degrees(self.lower[i]):g} deg is not below upper "
                 f"{np.degrees(self.upper[i]):g} deg"
             )
-
-    def _require_few_axes(self) -> None:
-        """Raise InputError for too many external axes, or two of one name."""
-        names = [axis.name for axis in self.externals]
-        if len(names) > MOST_EXTERNAL:
-            raise InputError(
-                f"robot {self.id!r}: expected at most {MOST_EXTERNAL} external axes, got "
-                f"{len(names)}: {', '.join(names)}"
-            )
-        for name in names:
-            if names.count(name) > 1:
-                raise InputError(f"robot {self.id!r}: two of its external axes are named {name!r}")
 
     def _require_alone(self) -> None:
         if self.externals:

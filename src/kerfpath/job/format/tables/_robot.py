@@ -141,6 +141,12 @@ class RobotTable(Table):
     external: External = ()
 
     @model_validator(mode="after")
+    def _axes_differ(self) -> RobotTable:
+        names = [table.name for table in self.external]
+        require_distinct(names, "external axis", "external", ["name"] * len(names))
+        return self
+
+    @model_validator(mode="after")
     def _plannable(self, info: ValidationInfo) -> RobotTable:
         """Require every limit that planning needs, known or given: nothing is assumed silently."""
         self._require_one_source()
@@ -242,12 +248,6 @@ class RobotTable(Table):
                 "give acceleration_deg_s2 instead",
                 ("acceleration_ratio",),
             )
-
-    @model_validator(mode="after")
-    def _axes_differ(self) -> RobotTable:
-        names = [table.name for table in self.external]
-        require_distinct(names, "external axis", "external", ["name"] * len(names))
-        return self
 
     @model_validator(mode="after")
     def _one_floor(self) -> RobotTable:
