@@ -1,8 +1,8 @@
-"""Model small example drawings: a bent bracket, a bulged tube, and a flat blank.
+"""Model example drawings: a bent bracket, a bulged tube, a long beam, and a flat blank.
 
     python examples/model_drawings.py [FOLDER]
 
-Writes bracket.step, tube.step and blank.dxf beside their jobs in examples/parts; all lengths are in
+Writes bracket.step, tube.step, beam.step and blank.dxf beside their jobs in examples/parts; all lengths are in
 mm, as in the files.
 """
 
@@ -102,6 +102,22 @@ def tube() -> TopoDS_Shape:
     return shape
 
 
+def beam() -> TopoDS_Shape:
+    """Return a channel 4 m long, its web up: a slot along it, and a hole beyond each end of that."""
+    length, width, height, wall = 4000.0, 120.0, 60.0, 3.0
+    shape = BRepPrimAPI_MakeBox(length, width, height).Shape()
+    hollow = BRepPrimAPI_MakeBox(
+        gp_Pnt(-1, wall, -1), length + 2, width - 2 * wall, height + 1 - wall
+    )
+    shape = BRepAlgoAPI_Cut(shape, hollow.Shape()).Shape()
+    for x, diameter in ((60.0, 20.0), (200.0, 30.0), (length - 200, 30.0), (length - 60, 20.0)):
+        shape = drilled(shape, diameter, (x, width / 2, height - wall - 1), (0, 0, 1), 10.0)
+    slot = BRepPrimAPI_MakeBox(
+        gp_Pnt(200, width / 2 - 15, height - wall - 1), length - 400, 30.0, 10.0
+    )
+    return BRepAlgoAPI_Cut(shape, slot.Shape()).Shape()
+
+
 def drilled(
     shape: TopoDS_Shape,
     diameter: float,
@@ -165,6 +181,7 @@ def write(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     write_step(folder / "bracket.step", bracket())
     write_step(folder / "tube.step", tube())
+    write_step(folder / "beam.step", beam())
     write_blank(folder / "blank.dxf")
 
 

@@ -148,6 +148,8 @@ def clear_motion(
         paths = [path for effort in QUICK for path in search.paths(effort)]
     begin("refinement")
     starts.refine(paths)
+    if task.external is not None and starts.best is not None:
+        return starts.best  # the values are those of a course, which the refinement leaves
     if starts.above(search.value, ENOUGH):
         paths += search.paths(wide(task))
         starts.refine(paths)

@@ -104,6 +104,11 @@ class PlanningTask:
 
     __repr__ = short_repr
 
+    @property
+    def arm(self) -> int:
+        """Number of joints of the arm, without external axes."""
+        return self.robot.family.joints
+
     @cached_property
     def built(self) -> Layered:
         """The layers of all nodes; asking for them raises NoFeasiblePath where one is empty."""
@@ -255,8 +260,10 @@ def task_of(
         raise InputError(f"closure: contour {contour.name!r} is open and cannot be periodic")
     options = options.resolve(robot, dt)
     require_windows_fit(contour, robot, options)
+    x = None if external is None else course_of(external, contour, robot)[:, 0]
     if graph is not None:
         _require_fitting(graph, contour, robot, options)
+        x = _course_in(graph, robot)
     return PlanningTask(
         contour=contour,
         robot=robot,
@@ -265,9 +272,18 @@ def task_of(
         settings=options,
         dt=dt,
         layers=partial(_layers, graph=graph, progress=progress),
-        external=None if external is None else course_of(external, contour, robot)[:, 0],
+        external=x,
         placed=graph is not None or external is not None,
     )
+
+
+def _course_in(graph: LayeredGraph, robot: Robot) -> Array | None:
+    """Return the course (K, E) of the external axes along which a graph was built, if any."""
+    arm, sizes = robot.family.joints, np.diff(graph.start)
+    if not robot.externals or not sizes.all():
+        return None
+    x = graph.q[graph.start[:-1], arm:]
+    return x if np.array_equal(np.repeat(x, sizes, axis=0), graph.q[:, arm:]) else None
 
 
 def _layers(

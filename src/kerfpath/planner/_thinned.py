@@ -16,7 +16,7 @@ from kerfpath.plans import Plan, Proof, on_turns
 __all__ = ["ThinTask", "thinned"]
 
 MANY = 800
-"""Intervals from which on a task is thinned.
+"""Intervals from which on a task is thinned, for each that is free at a node.
 
 The closer the nodes, the less an increment may change by (6) against the samples of gamma: paths
 through these grow poor, and what they are refined to takes long and may end in another valley."""
@@ -45,7 +45,7 @@ class ThinTask:
     __repr__ = short_repr
 
     def lifted(self, made: Plan) -> Plan | None:
-        """Return the motion at all nodes, gamma a spline through that at some of them.
+        """Return the motion at all nodes, gamma and external axes splines through some of them.
 
         It need not keep the limits; beyond the last of some it goes on as it is. None where the
         posture changes on the way.
@@ -53,9 +53,11 @@ class ThinTask:
         task, at = self.whole, np.arange(len(self.whole.contour))
         if np.ptp(made.posture):
             return None
-        spline, end = CubicSpline(self.nodes, np.unwrap(made.gamma)), self.nodes[-1]
-        gamma = spline(np.minimum(at, end)) + spline(end, 1) * np.maximum(at - end, 0)
         q = np.stack([np.interp(at, self.nodes, joint) for joint in made.unwrapped.T], axis=1)
+        free = np.column_stack([np.unwrap(made.gamma), made.unwrapped[:, task.arm :]])
+        spline, end = CubicSpline(self.nodes, free), self.nodes[-1]
+        free = spline(np.minimum(at, end)) + spline(end, 1) * np.maximum(at - end, 0)[:, None]
+        gamma, q[:, task.arm :] = free[:, 0], free[:, 1:]
         claim = Proof(optimal=False, statement="found over continuous rotation")
         return Plan(
             contour=task.contour,
@@ -77,12 +79,14 @@ class ThinTask:
 def thinned(task: PlanningTask) -> ThinTask | None:
     """Return the task of every few nodes of one with very many; None of one with fewer.
 
-    None, too, where gamma is not all that varies: with a tilt, or an external axis; with a periodic
-    closure whose intervals do not come out even; and where one of the few nodes has no pose. The
-    graph of all nodes is not built for it.
+    None, too, with a tilt, or a grid of external axes; with a periodic closure whose intervals do
+    not come out even; and where one of the few nodes has no pose. The graph of all nodes is not
+    built for it.
     """
-    last = len(task.contour) - 1
-    if last < MANY or task.settings.tilt is not None or task.robot.externals:
+    last, axes = len(task.contour) - 1, len(task.robot.externals)
+    if last < MANY / (1 + axes) or task.settings.tilt is not None:
+        return None
+    if axes and task.external is None:
         return None
     even = [every for every in EVERY if last % every == 0]
     if task.settings.closure == "periodic" and not even:
@@ -101,4 +105,6 @@ def thinned(task: PlanningTask) -> ThinTask | None:
         name=whole.name,
     )
     few = replace(few, problem=replace(few.problem, dt=every * task.dt))
-    return ThinTask(task=replace(task.on(few), contour=contour), whole=task, nodes=nodes)
+    x = None if task.external is None else task.external[nodes]
+    thin = replace(task.on(few), contour=contour, external=x)
+    return ThinTask(task=thin, whole=task, nodes=nodes)
