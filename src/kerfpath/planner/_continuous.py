@@ -122,12 +122,17 @@ def _finer(task: PlanningTask) -> PlanningTask | None:
 
 
 def clear_motion(
-    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None] = lambda what: None
+    task: PlanningTask,
+    finder: ClearSearch,
+    begin: Callable[[str], None] = lambda what: None,
+    *,
+    thorough: bool = True,
 ) -> Refinement | None:
     """Return the best motion found that is clear; None where none is.
 
-    The values tell whether a wider search may find a better one; of very many nodes, the motion
-    along some of them does, and the graph of all is built only where that is not enough.
+    Unless `thorough`, what the first paths are refined to is enough. The values tell whether a
+    wider search may find a better one; of very many nodes, the motion along some of them does, and
+    the graph of all is built only where that is not enough.
 
     Raises
     ------
@@ -148,8 +153,8 @@ def clear_motion(
         paths = [path for effort in QUICK for path in search.paths(effort)]
     begin("refinement")
     starts.refine(paths)
-    if task.external is not None and starts.best is not None:
-        return starts.best  # the values are those of a course, which the refinement leaves
+    if not thorough:
+        return starts.best
     if starts.above(search.value, ENOUGH):
         paths += search.paths(wide(task))
         starts.refine(paths)

@@ -40,7 +40,7 @@ def plan_over_courses(
     for course in courses(task):
         few = task.along(course).sampled(max(task.settings.gamma_step, GAMMA_STEP))
         try:
-            found = clear_motion(few, finder.of(few), begin)
+            found = clear_motion(few, finder.of(few), begin, thorough=False)
         except NoFeasiblePath as broken:
             failed.append(broken)
             continue
