@@ -7,13 +7,14 @@ from scipy.spatial.transform import Rotation
 from kerfpath import InputError, robot
 from kerfpath.auditor import rates_along
 from kerfpath.execution import ToolCourse
-from kerfpath.post import CircularMove, LinearMove
+from kerfpath.post import CircularMove, Controller, LinearMove
 
 ARMS = ("abb_irb4600_60_205", "ur_ur10e")
 TOOL = np.eye(4)
+LAWS = ("slerp", "two-angle")
 
 
-def random_course(arm, seed, arcs):
+def random_course(arm, seed, arcs, law="slerp"):
     """Return a course of zones of all widths near a pose of the arm, and the joints there."""
     rng = np.random.default_rng(seed)
     q = np.radians([10.0, -60.0, 80.0, 20.0, 50.0, 30.0]) + rng.uniform(-0.2, 0.2, 6)
@@ -38,7 +39,7 @@ def random_course(arm, seed, arcs):
             moves.append(CircularMove(**said, T_part_via=via, q_via=q))
         else:
             moves.append(LinearMove(**said))
-    return ToolCourse.of(T[0], moves), q
+    return ToolCourse.of(T[0], moves, Controller(orientation=law)), q
 
 
 def middles(arm, course, q):
@@ -49,9 +50,10 @@ def middles(arm, course, q):
 @pytest.mark.parametrize("arcs", [False, True])
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", ARMS)
-def test_no_sample_is_above_the_bounds_and_some_are_near(name, seed, arcs):
+@pytest.mark.parametrize("law", LAWS)
+def test_no_sample_is_above_the_bounds_and_some_are_near(name, seed, arcs, law):
     arm = robot(name)
-    course, q = random_course(arm, seed, arcs)
+    course, q = random_course(arm, seed, arcs, law)
     borders, near = course.borders, middles(arm, course, q)
     bounds = rates_along(
         arm, course.pieces(), near, T_base_part=np.eye(4), T_flange_tip=TOOL,
@@ -75,8 +77,9 @@ def test_no_sample_is_above_the_bounds_and_some_are_near(name, seed, arcs):
 
 
 @pytest.mark.parametrize("arcs", [False, True])
-def test_pieces_are_the_course(arcs):
-    course, _ = random_course(robot(ARMS[0]), 5, arcs)
+@pytest.mark.parametrize("law", LAWS)
+def test_pieces_are_the_course(arcs, law):
+    course, _ = random_course(robot(ARMS[0]), 5, arcs, law)
     pieces, borders = course.pieces(), course.borders
     for share in (0.0, 0.3, 1.0):
         t = (pieces.begin + share * (pieces.end - pieces.begin))[:, None]
@@ -86,7 +89,11 @@ def test_pieces_are_the_course(arcs):
         turn = pieces.turn[:, 0] + pieces.turn[:, 1] * t + pieces.turn[:, 2] * t**2 / 2
         T = course.poses(borders[:-1] + share * np.diff(borders))
         np.testing.assert_allclose(T[:, :3, 3], point, rtol=0, atol=1e-13)
-        R = pieces.R @ Rotation.from_rotvec(turn).as_matrix()
+        assert pieces.two_angles == (law == "two-angle")
+        parts = [turn] if law == "slerp" else [turn * [1, 1, 0], turn * [0, 0, 1]]
+        R = pieces.R
+        for part in parts:
+            R = R @ Rotation.from_rotvec(part).as_matrix()
         np.testing.assert_allclose(T[:, :3, :3], R, rtol=0, atol=1e-13)
 
 

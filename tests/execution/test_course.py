@@ -6,7 +6,7 @@ from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
 from kerfpath.execution import ToolCourse
-from kerfpath.post import CircularMove, LinearMove
+from kerfpath.post import CircularMove, Controller, LinearMove
 
 SPEED = 0.1
 
@@ -49,11 +49,12 @@ def test_where_zones_meet_half_way_the_tip_follows_the_quadratic_spline_of_the_n
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("share", [0.2, 0.5, 1.0])
-def test_the_motion_is_smooth_through_every_zone(seed, share):
+@pytest.mark.parametrize("orientation", ["slerp", "two-angle"])
+def test_the_motion_is_smooth_through_every_zone(seed, share, orientation):
     T = random_way(seed)
     gaps = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1)
     zones = share * np.minimum(gaps[:-1], gaps[1:]) / 2
-    course = ToolCourse.of(T[0], moves_through(T, zones))
+    course = ToolCourse.of(T[0], moves_through(T, zones), Controller(orientation=orientation))
     d = 1e-6
     for border in course.borders[1:-1]:
         before, here, after = course.poses(border + np.array([-d, 0.0, d]))
@@ -96,7 +97,16 @@ def test_a_tool_that_turns_much_slows_the_move_down():
     T = poses_through([[0, 0, 0], [0.01, 0, 0]], [[0, 0, 0], [0, 0, 1.0]])
     moves = moves_through(T, [])
     assert ToolCourse.of(T[0], moves).time[-1] == pytest.approx(0.1)
-    assert ToolCourse.of(T[0], moves, turning=2.0).time[-1] == pytest.approx(0.5)
+    assert ToolCourse.of(T[0], moves, Controller(turning_speed=2.0)).time[-1] == pytest.approx(0.5)
+
+
+def test_of_two_angles_the_slower_one_counts():
+    T = poses_through([[0, 0, 0], [0.01, 0, 0]], np.zeros((2, 3)))
+    both = Rotation.from_rotvec([0.6, 0, 0]) * Rotation.from_rotvec([0, 0, 1.0])
+    T[1, :3, :3] = both.as_matrix()
+    moves = moves_through(T, [])
+    two = ToolCourse.of(T[0], moves, Controller(turning_speed=2.0, orientation="two-angle"))
+    assert two.time[-1] == pytest.approx(0.5)  # 1 rad about z, 0.6 rad of the axis
 
 
 def test_an_arc_is_followed_at_its_speed_and_left_along_its_tangent():
@@ -113,3 +123,55 @@ def test_an_arc_is_followed_at_its_speed_and_left_along_its_tangent():
     np.testing.assert_allclose(np.linalg.norm(course.poses(time)[:, :3, 3], axis=1), 1, rtol=1e-12)
     # The line goes on where the arc points to: nothing to round, and the target is met.
     assert course.poses(course.time[1:2])[0, :3, 3] == pytest.approx([0, 1, 0], abs=1e-12)
+
+
+def least_turn(a, b):
+    """The rotation that takes unit vector a to b and turns no more than that."""
+    v, c = np.cross(a, b), a @ b
+    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    return np.eye(3) + cross + cross @ cross / (1 + c)
+
+
+def two_angles(R0, R1, share):
+    """Where the law of two angles has the tool: its axis on the great circle, turned evenly."""
+    a, b = R0[:, 2], R1[:, 2]
+    angle = np.arccos(np.clip(a @ b, -1, 1))
+    on_circle = (np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
+    carried = least_turn(a, b) @ R0
+    about = Rotation.from_matrix(carried.T @ R1).as_rotvec()
+    assert np.abs(about[:2]).max() < 1e-12  # the axes agree
+    return least_turn(a, on_circle) @ R0 @ Rotation.from_rotvec(share * about).as_matrix()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_with_two_angles_the_axis_swings_in_a_plane_and_the_tool_turns_evenly_about_it(seed):
+    rng = np.random.default_rng(seed)
+    T = poses_through(rng.normal(size=(2, 3)), rng.uniform(-1, 1, size=(2, 3)))
+    course = ToolCourse.through(T, [None], "two-angle")
+    back = ToolCourse.through(T[::-1], [None], "two-angle")
+    for share in np.linspace(0, 1, 11):
+        R = course.poses(np.array([share]))[0, :3, :3]
+        np.testing.assert_allclose(R, two_angles(*T[:, :3, :3], share), rtol=0, atol=1e-12)
+        # There and back the tool goes the same way.
+        other = back.poses(np.array([1 - share]))[0, :3, :3]
+        np.testing.assert_allclose(R, other, rtol=0, atol=1e-12)
+
+
+def test_the_two_laws_are_one_where_the_axis_stands_still_or_the_tool_does_not_turn_about_it():
+    spin = poses_through(np.eye(3)[:2], [[0, 0, 0.2], [0, 0, 1.4]])
+    tilt = poses_through(np.eye(3)[:2], [[0, 0, 0], [0.7, -0.4, 0]])
+    time = np.linspace(0, 1, 11)
+    for T in (spin, tilt):
+        one, two = (
+            ToolCourse.through(T, [None], law).poses(time) for law in ("slerp", "two-angle")
+        )
+        np.testing.assert_allclose(one, two, rtol=0, atol=1e-12)
+
+
+def test_values_at_the_targets_are_blended_as_the_tip_is():
+    T = random_way(4)
+    gaps = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1)
+    course = ToolCourse.of(T[0], moves_through(T, np.full(6, 0.3 * gaps.min())))
+    time = np.linspace(0, course.time[-1], 301)
+    found = course.blended(T[:, :3, 3], time)
+    np.testing.assert_allclose(found, course.poses(time)[:, :3, 3], rtol=0, atol=1e-13)

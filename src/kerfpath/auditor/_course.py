@@ -38,7 +38,8 @@ class CoursePieces:
 
     At t s from the piece's own zero, in the part, the tip is at point + velocity t + acceleration
     t^2 / 2 + cos(rate t) x + sin(rate t) y, and its frame is `R` turned, in its own axes, by the
-    rotation vector turn[0] + turn[1] t + turn[2] t^2 / 2, of less than half a revolution.
+    rotation vector r = turn[0] + turn[1] t + turn[2] t^2 / 2, of less than half a revolution; with
+    two angles about z by r_z, and then by (r_x, r_y, 0) about an axis of `R`.
 
     Parameters
     ----------
@@ -51,6 +52,7 @@ class CoursePieces:
     x, y : (P, 3) m
         Of an arc; zero where there is none.
     rate : (P,) rad/s
+    two_angles : bool
     """
 
     begin: Array
@@ -61,6 +63,7 @@ class CoursePieces:
     x: Array
     y: Array
     rate: Array
+    two_angles: bool = False
 
     __repr__ = short_repr
 
@@ -149,7 +152,7 @@ class _Task:
         pieces, before, after = self._pieces, self._before[..., 0], self._after
         time = angle_from(t, half)
         turn = [_polynomial(pieces.turn[k, :, i], time) for i in range(3)]
-        E = _rotation(turn)
+        E = _swung(turn) if pieces.two_angles else _rotation(turn)
         c, s = time.times(exact(pieces.rate[k])).cos_sin()
         tip = [
             _polynomial(pieces.point[k, :, i], time)
@@ -198,6 +201,13 @@ def _polynomial(coefficients: Array, time: Jet) -> Jet:
     """Return c0 + c1 t + c2 t^2 / 2 of coefficients (S, 3)."""
     c0, c1, c2 = (exact(c) for c in coefficients.T)
     return (time.times(c1) + time.square().times(c2.scaled(0.5))).plus(c0)
+
+
+def _swung(r: list[Jet]) -> list[list[Jet]]:
+    """Return the rotation about z by r_z, and then by the rotation vector (r_x, r_y, 0)."""
+    c, s = r[2].cos_sin()
+    flat = constant(exact(np.zeros_like(r[2].half)), r[2])
+    return [[u * c + v * s, v * c - u * s, w] for u, v, w in _rotation([r[0], r[1], flat])]
 
 
 def _rotation(r: list[Jet]) -> list[list[Jet]]:

@@ -11,7 +11,14 @@ from scipy.spatial.transform import Rotation
 from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath._repr import short_repr
 from kerfpath.auditor import CoursePieces
-from kerfpath.post import CircularMove, LinearMove, circle_through
+from kerfpath.post import (
+    PLAIN,
+    CircularMove,
+    Controller,
+    LinearMove,
+    Orientation,
+    circle_through,
+)
 
 __all__ = ["ToolCourse"]
 
@@ -24,10 +31,10 @@ class ToolCourse:
     """The tool's pose over the time that the programmed speeds leave it.
 
     Between the zones the tip runs straight, or along an arc, at the programmed speed, and the tool
-    turns evenly about one axis. Within `half` s of a target it goes from one move over to the next
-    at constant acceleration, the tip and the rotation vector alike: along a parabola, tangent to
-    both, where both are straight. That is a model: makers of controllers publish the zones, not
-    what happens in them.
+    turns as `orientation` says. Within `half` s of a target it goes from one move over to the next
+    at constant acceleration, the tip and the angles alike: along a parabola, tangent to both, where
+    both are straight. That is a model: makers of controllers publish the zones, not what happens in
+    them.
 
     Parameters
     ----------
@@ -39,6 +46,8 @@ class ToolCourse:
         Before and after each target: half the time in its zone.
     centre, normal : (K-1, 3) m, 1
         Circle of each move, in the part; the normal is zero where the move is straight.
+    orientation : {"slerp", "two-angle"}
+        What the tool does between two targets, see `Controller`.
 
     Attributes
     ----------
@@ -53,6 +62,7 @@ class ToolCourse:
     half: Array
     centre: Array
     normal: Array
+    orientation: Orientation = "slerp"
     time: Array = field(init=False)
     sweep: Array = field(init=False)
     _along: Array = field(init=False, repr=False)
@@ -62,7 +72,7 @@ class ToolCourse:
 
     def __post_init__(self) -> None:
         R = self.T[:, :3, :3]
-        turn = Rotation.from_matrix(R[:-1].transpose(0, 2, 1) @ R[1:]).as_rotvec()
+        turn = _turns(R[:-1].transpose(0, 2, 1) @ R[1:], self.orientation)
         start, end = self.T[:-1, :3, 3] - self.centre, self.T[1:, :3, 3] - self.centre
         across = np.cross(self.normal, start)
         angle = np.arctan2((end * across).sum(1), (end * start).sum(1)) % (2 * np.pi)
@@ -70,13 +80,15 @@ class ToolCourse:
             "time": np.append(0.0, np.cumsum(self.duration)),
             "sweep": np.where(self._round, angle, 0.0),
             "_along": np.diff(self.T[:, :3, 3], axis=0) / self.duration[:, None],
-            "_rate": turn / self.duration[:, None],
+            "_rate": turn / self.duration[:, None],  # as seen where moves begin, and end
         }
         for name, value in values.items():
             object.__setattr__(self, name, freeze(value))
 
     @classmethod
-    def of(cls, start: Array, moves: Sequence[LinearMove], turning: float = np.inf) -> ToolCourse:
+    def of(
+        cls, start: Array, moves: Sequence[LinearMove], controller: Controller = PLAIN
+    ) -> ToolCourse:
         """Return the course of moves from a pose, (4, 4) m, to a stop.
 
         Parameters
@@ -84,15 +96,19 @@ class ToolCourse:
         start : (4, 4) m
             T_part_tip where the first move begins.
         moves : sequence of LinearMove
-        turning : float rad/s
-            How fast the tool may turn before the tip goes more slowly.
+        controller : Controller
+            Of "wrist" the course says where the tip is, not how the tool is turned.
         """
         T = np.array([start, *(move.T_part_tip for move in moves)])
         via = [move.T_part_via if isinstance(move, CircularMove) else None for move in moves]
-        even = cls.through(T, via)
+        law = "slerp" if controller.orientation == "wrist" else controller.orientation
+        even = cls.through(T, via, law)
         speed = np.array([move.speed for move in moves])
-        length, angle = even.lengths, np.linalg.norm(even._rate, axis=1)
-        duration = np.maximum(np.maximum(length / speed, angle / turning), SHORTEST)
+        length, turn = even.lengths, even._rate[0]
+        parts = [turn] if law == "slerp" else [turn[:, :2], turn[:, 2:]]
+        angle = np.max([np.linalg.norm(part, axis=1) for part in parts], axis=0)
+        duration = np.maximum(length / speed, angle / controller.turning_speed)
+        duration = np.maximum(duration, SHORTEST)
         zone = np.array([move.zone for move in moves[:-1]])
         fastest = length / duration
         half = zone / np.maximum(np.maximum(fastest[:-1], fastest[1:]), 1e-12)
@@ -101,7 +117,9 @@ class ToolCourse:
         return replace(even, duration=duration, half=half)
 
     @classmethod
-    def through(cls, T: Array, via: Sequence[Array | None]) -> ToolCourse:
+    def through(
+        cls, T: Array, via: Sequence[Array | None], orientation: Orientation = "slerp"
+    ) -> ToolCourse:
         """Return the course through poses, (K, 4, 4) m, without zones: each move takes a second.
 
         It leads along an arc through each of `via`, K-1 poses (4, 4) m, where that is not None.
@@ -114,8 +132,9 @@ class ToolCourse:
             if circle is not None:  # None: the three are on a line
                 centre[k], normal[k], _ = circle
         return cls(
-            T=T, duration=np.ones(len(via)), half=np.zeros(len(T)), centre=centre, normal=normal
-        )
+            T=T, duration=np.ones(len(via)), half=np.zeros(len(T)), centre=centre, normal=normal,
+            orientation=orientation,
+        )  # fmt: skip
 
     @property
     def lengths(self) -> Array:
@@ -135,27 +154,38 @@ class ToolCourse:
     def poses(self, time: Array) -> Array:
         """Return T_part_tip, (m, 4, 4) m, at times (m,) s from the start."""
         k, near, blend = self._at(time)
-        left, right = np.maximum(near - 1, 0), np.minimum(near, len(self.duration) - 1)
+        left, right = self._beside(near)
         away = time - self.time[near]
         end_left, end_right = self._velocity(left, ends=True), self._velocity(right, ends=False)
         T = np.tile(np.eye(4), (len(time), 1, 1))
         T[:, :3, 3] = self._points(k, time - self.time[k]) + blend[:, None] * (end_right - end_left)
-        rate = np.where((near == k)[:, None], self._rate[right], self._rate[left])
-        bend = self._rate[right] - self._rate[left]
-        turn = Rotation.from_rotvec(away[:, None] * rate + blend[:, None] * bend).as_matrix()
-        T[:, :3, :3] = self.T[near, :3, :3] @ turn
+        before, after = self._rate[1, left], self._rate[0, right]
+        rate = np.where((near == k)[:, None], after, before)
+        turn = away[:, None] * rate + blend[:, None] * (after - before)
+        T[:, :3, :3] = self.T[near, :3, :3] @ _turned(turn, self.orientation)
         return T
+
+    def blended(self, values: Array, time: Array) -> Array:
+        """Return values that go evenly from each target's (K, c) to the next's, (m, c), at times.
+
+        In zones they go over as straight moves do.
+        """
+        k, near, blend = self._at(time)
+        left, right = self._beside(near)
+        slope = np.diff(values, axis=0) / self.duration[:, None]
+        even = values[k] + (time - self.time[k])[:, None] * slope[k]
+        return np.asarray(even + blend[:, None] * (slope[right] - slope[left]))
 
     def pieces(self) -> CoursePieces:
         """Return the course as closed formulas of the time, one between each two borders."""
         borders = self.borders
         middle = (borders[1:] + borders[:-1]) / 2
         k, near, blend = self._at(middle)
-        left, right = np.maximum(near - 1, 0), np.minimum(near, len(self.duration) - 1)
+        left, right = self._beside(near)
         zero, half, after = self.time[near], self.half[near], near == k
         move = np.where(after, right, left)
         velocity = np.stack([self._velocity(left, ends=True), self._velocity(right, ends=False)])
-        rates = np.stack([self._rate[left], self._rate[right]])
+        rates = np.stack([self._rate[1, left], self._rate[0, right]])
         bends = np.where((blend > 0) & (half > 0), 1 / np.maximum(4 * half, 1e-12), 0.0)
 
         def parts(own: Array, change: Array) -> Array:
@@ -178,6 +208,7 @@ class ToolCourse:
             x=x,
             y=np.cross(self.normal[move], x),
             rate=np.where(arc, self.sweep[move] / self.duration[move], 0.0),
+            two_angles=self.orientation == "two-angle",
         )
 
     def _at(self, time: Array) -> tuple[Ints, Ints, Array]:
@@ -188,6 +219,10 @@ class ToolCourse:
         away, half = np.minimum(after, before), self.half[near]
         # What is added to the corner: of constant acceleration, and gone at the ends of the zone.
         return k, near, np.maximum(half - away, 0.0) ** 2 / np.maximum(4 * half, 1e-12)
+
+    def _beside(self, near: Ints) -> tuple[Ints, Ints]:
+        """Return the moves before and after targets."""
+        return np.maximum(near - 1, 0), np.minimum(near, len(self.duration) - 1)
 
     @property
     def _round(self) -> Bools:
@@ -205,3 +240,33 @@ class ToolCourse:
         x = self.T[k + 1 if ends else k, :3, 3] - self.centre[k]
         arc = (self.sweep / self.duration)[k, None] * np.cross(self.normal[k], x)
         return np.where(self._round[k, None], arc, self._along[k])
+
+
+def _turns(R: Array, orientation: Orientation) -> Array:
+    """Return by how much tools turn, (2, m, 3) rad, as seen where they begin and where they end.
+
+    Of rotations R (m, 3, 3) in the tool's own axes: rotation vectors. Of "two-angle" those by which
+    the axis z swings, whose own z is zero, with the turn about it in that place; R is the swing
+    after the turn.
+    """
+    if orientation == "slerp":
+        turn = Rotation.from_matrix(R).as_rotvec()
+        return np.stack([turn, turn])
+    x, y, z = R[:, :, 2].T
+    across = np.hypot(x, y)
+    share = np.divide(np.arctan2(across, z), across, out=np.ones_like(z), where=across > 0)
+    swing = np.stack([-y * share, x * share, np.zeros_like(z)], axis=1)
+    rest = np.swapaxes(Rotation.from_rotvec(swing).as_matrix(), 1, 2) @ R
+    about = np.arctan2(rest[:, 1, 0], rest[:, 0, 0])
+    c, s = np.cos(about), np.sin(about)
+    seen = np.stack([c * swing[:, 0] + s * swing[:, 1], c * swing[:, 1] - s * swing[:, 0]], axis=1)
+    return np.stack([np.c_[swing[:, :2], about], np.c_[seen, about]])
+
+
+def _turned(turn: Array, orientation: Orientation) -> Array:
+    """Return the rotations (m, 3, 3) that turns (m, 3) rad are, see `_turns`."""
+    if orientation == "slerp":
+        return np.asarray(Rotation.from_rotvec(turn).as_matrix())
+    swing, about = turn * [1.0, 1.0, 0.0], turn * [0.0, 0.0, 1.0]
+    both = Rotation.from_rotvec(swing) * Rotation.from_rotvec(about)
+    return np.asarray(both.as_matrix())

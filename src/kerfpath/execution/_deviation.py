@@ -35,8 +35,7 @@ def deviation_of(run: Executed, path: Contour) -> Deviation:
     path : Contour
         As drawn, in the part.
     """
-    T = run.course.poses(run.time)
-    tip, axis = T[:, :3, 3], T[:, :3, 2]
+    tip, axis = run.T[:, :3, 3], run.T[:, :3, 2]
     even = np.linspace(path.s[0], path.s[-1], SAMPLES * max(len(path), len(run.course.T)))
     at = np.unique(np.concatenate([path.s, even]))
     points = path.at(at)[0]

@@ -13,7 +13,8 @@ from kerfpath._repr import short_repr
 from kerfpath.auditor import ENCLOSED, rates_along
 from kerfpath.errors import InputError
 from kerfpath.execution._course import ToolCourse
-from kerfpath.post import JointMove, LinearMove, Program
+from kerfpath.execution._wrist import joints_with_wrist, require_wrist
+from kerfpath.post import PLAIN, Controller, JointMove, LinearMove, Program
 from kerfpath.robots import Robot
 
 __all__ = ["Executed", "Peak", "executed", "from_stop_to_stop", "run_along"]
@@ -47,23 +48,29 @@ class Executed:
         Where the joints were looked at, from the start of the run.
     q : (m, n) rad
         NaN where the posture of the targets does not reach.
+    T : (m, 4, 4) m
+        Poses of the tip there, in the part.
     velocity_share, acceleration_share : (m, n)
         Signed, of the full limit of each joint. Where one is above 1 in size, the robot cannot run
         at the programmed speed: a controller slows down.
     velocity_bound, acceleration_bound : float
         No joint uses more of a limit at any instant: proved, without a sample, and at most 2 % more
-        than what was seen, as far as a limit allows. Infinite where nothing is proved: for arms
-        other than OPW and UR, and next to a singularity.
+        than what was seen, as far as a limit allows. Infinite where nothing is proved: next to a
+        singularity, and where there are samples alone.
+    sampled : str
+        Why there are samples alone; empty where the bounds are proofs.
     """
 
     section: str
     course: ToolCourse
     time: Array
     q: Array
+    T: Array
     velocity_share: Array
     acceleration_share: Array
     velocity_bound: float
     acceleration_bound: float
+    sampled: str = ""
 
     __repr__ = short_repr
 
@@ -95,7 +102,7 @@ class Executed:
         return Peak(float(size[m, joint]), joint, float(self.time[m]))
 
 
-def executed(program: Program, *, turning_speed: float = np.inf) -> tuple[Executed, ...]:
+def executed(program: Program, *, controller: Controller = PLAIN) -> tuple[Executed, ...]:
     """Return every run of straight and circular moves of a program, as it is executed.
 
     The motion is that of `ToolCourse`, at the programmed speeds throughout: neither speeding up
@@ -106,13 +113,14 @@ def executed(program: Program, *, turning_speed: float = np.inf) -> tuple[Execut
     Parameters
     ----------
     program : Program
-    turning_speed : float rad/s
-        How fast the controller turns the tool at most in linear moves, see `post.Rules`.
+    controller : Controller
+        That of a language is `language(name).controller(settings)`.
 
     Raises
     ------
     InputError
-        A robot whose limits of velocity and acceleration are not known, or an external axis.
+        A robot whose limits of velocity and acceleration are not known, or an external axis; of
+        orientation "wrist" one without a wrist of three joints.
     """
     return tuple(
         run_along(
@@ -120,7 +128,7 @@ def executed(program: Program, *, turning_speed: float = np.inf) -> tuple[Execut
             program.robot,
             T_base_part=program.T_base_part,
             T_flange_tip=program.T_flange_tip,
-            turning_speed=turning_speed,
+            controller=controller,
             section=section.name,
         )
         for section in program.sections
@@ -149,7 +157,7 @@ def run_along(
     *,
     T_base_part: Array,
     T_flange_tip: Array,
-    turning_speed: float = np.inf,
+    controller: Controller = PLAIN,
     section: str = "",
 ) -> Executed:
     """Return the run of moves from the target of the first, where the robot stands, to a stop.
@@ -160,7 +168,7 @@ def run_along(
         Three or more, each with the joints at its target.
     robot : Robot
     T_base_part, T_flange_tip : (4, 4) m
-    turning_speed, section
+    controller, section
         As in `executed` and `Executed`.
 
     Raises
@@ -170,31 +178,37 @@ def run_along(
     """
     if robot.externals:
         raise InputError("executed: expected a robot without an external axis")
-    T_tip_flange = np.linalg.inv(T_flange_tip)
-    course = ToolCourse.of(moves[0].T_part_tip, moves[1:], turning_speed)
+    course = ToolCourse.of(moves[0].T_part_tip, moves[1:], controller)
     borders = course.borders
     long = np.diff(borders)
     time = (borders[:-1, None] + long[:, None] * np.array(WHERE)).ravel()
     step = np.repeat(STEP * long, len(WHERE))
     planned = np.array([move.q for move in moves])
-    near = np.stack([np.interp(time, course.time, joint) for joint in planned.T], axis=1)
+    wrist = controller.orientation == "wrist"
+    joints = _by_wrist if wrist else _by_pose
     before, q, after = (
-        robot.nearest(T_base_part @ course.poses(time + sign * step) @ T_tip_flange, near)
+        joints(robot, course, time + sign * step, planned, T_base_part, T_flange_tip)
         for sign in (-1, 0, 1)
     )
+    T = course.poses(time)
+    if wrist:
+        reached = ~np.isnan(q).any(axis=1)
+        T[reached] = np.linalg.inv(T_base_part) @ robot.forward(q[reached]) @ T_flange_tip
     velocity, acceleration = robot.speed_limits()
     run = Executed(
         section=section,
         course=course,
         time=time,
         q=q,
+        T=T,
         velocity_share=(after - before) / (2 * step[:, None]) / velocity,
         acceleration_share=(after - 2 * q + before) / step[:, None] ** 2 / acceleration,
         velocity_bound=np.inf,
         acceleration_bound=np.inf,
+        sampled=_sampled(robot, controller),
     )
     fast, sharp = run.peak_velocity.share, run.peak_acceleration.share
-    if robot.kinematics not in ENCLOSED or not np.isfinite(max(fast, sharp)):
+    if run.sampled or not np.isfinite(max(fast, sharp)):
         return run
     bounds = rates_along(
         robot,
@@ -210,6 +224,35 @@ def run_along(
         velocity_bound=float(shares[0].max()),
         acceleration_bound=float(shares[1].max()),
     )
+
+
+def _by_pose(
+    robot: Robot, course: ToolCourse, time: Array, planned: Array, T_base_part: Array,
+    T_flange_tip: Array,
+) -> Array:  # fmt: skip
+    """Return the joints (m, n) at times (m,), next to those planned at the targets (K, n)."""
+    near = np.stack([np.interp(time, course.time, joint) for joint in planned.T], axis=1)
+    return robot.nearest(T_base_part @ course.poses(time) @ np.linalg.inv(T_flange_tip), near)
+
+
+def _by_wrist(
+    robot: Robot, course: ToolCourse, time: Array, planned: Array, T_base_part: Array,
+    T_flange_tip: Array,
+) -> Array:  # fmt: skip
+    """Return the joints (m, n) at times (m,), the wrist going evenly from target to target."""
+    require_wrist(robot)
+    near = course.blended(planned, time)
+    tip = T_base_part @ course.poses(time)
+    return joints_with_wrist(robot, tip[:, :3, 3], near, T_flange_tip)
+
+
+def _sampled(robot: Robot, controller: Controller) -> str:
+    """Return why nothing is proved of a robot and a controller; empty where it is."""
+    if controller.orientation == "wrist":
+        return "where the controller moves the wrist by its joints nothing is proved"
+    if robot.kinematics not in ENCLOSED:
+        return f"nothing is proved for arms of the family {robot.kinematics}"
+    return ""
 
 
 def _enough(seen: float) -> float:

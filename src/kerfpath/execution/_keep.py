@@ -12,7 +12,7 @@ from kerfpath._repr import short_repr
 from kerfpath.execution._executed import Executed, Peak, executed
 from kerfpath.limits import meetings
 from kerfpath.plans import Plan
-from kerfpath.post import Program, build_program
+from kerfpath.post import PLAIN, Controller, Program, build_program
 from kerfpath.refiner import KeptShares, refine
 
 __all__ = ["Kept", "keep_limits", "longest_run"]
@@ -62,7 +62,7 @@ def keep_limits(
     plan: Plan,
     program: Callable[[Plan], Program] = _alone,
     *,
-    turning_speed: float = np.inf,
+    controller: Controller = PLAIN,
 ) -> Kept:
     """Return a plan whose program keeps every limit of velocity and acceleration at every instant.
 
@@ -75,7 +75,7 @@ def keep_limits(
     plan : Plan
     program : callable
         Returns the program of a plan; default: `build_program` with automatic zones.
-    turning_speed : float rad/s
+    controller : Controller
         As in `executed`.
 
     Raises
@@ -83,7 +83,7 @@ def keep_limits(
     InputError
         As `executed`.
     """
-    first = run = longest_run(program(plan), turning_speed)
+    first = run = longest_run(program(plan), controller)
     if first is None or run is None:
         return Kept(plan=plan, done=True, rounds=0, run=None, statement="it stops at every node")
     intervals, n = np.diff(plan.q, axis=0).shape
@@ -98,7 +98,7 @@ def keep_limits(
             break
         worst = run.most
         if np.isinf(worst) or np.isinf(run.acceleration_bound):
-            why = "nothing can be proved there for this arm"
+            why = run.sampled or "nothing can be proved there for this arm"
             break
         aim -= CLOSER if worst <= 1 else 0.0
         kept = _held(made, run, kept, aim)
@@ -107,14 +107,14 @@ def keep_limits(
             why = refined.statement.removeprefix("not refined: ")
             break
         made = refined.plan
-        run = longest_run(program(made), turning_speed) or run
+        run = longest_run(program(made), controller) or run
     said = _need(plan, first, why)
     return Kept(plan=plan, done=False, rounds=count, run=first, statement=said)
 
 
-def longest_run(program: Program, turning_speed: float = np.inf) -> Executed | None:
+def longest_run(program: Program, controller: Controller = PLAIN) -> Executed | None:
     """Return the run of a program of one plan with the most targets, its cut; None without one."""
-    runs = executed(program, turning_speed=turning_speed)
+    runs = executed(program, controller=controller)
     return max(runs, key=lambda each: len(each.course.T), default=None)
 
 

@@ -104,8 +104,7 @@ def timing_of(run: Executed, robot: Robot, *, eta_v: float = 1.0, eta_a: float =
     x = _forward(_backward(most, steps, room, lean), steps, room, lean)
     rate = np.sqrt(x)
     pace = np.maximum((rate[1:] + rate[:-1]) / 2, 1e-9)
-    points = run.course.poses(run.time)[:, :3, 3]
-    gone = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    gone = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(run.T[:, :3, 3], axis=0), axis=1)))
     whole = float(run.course.time[-1])
     return Timing(
         seconds=float((steps / pace).sum()),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._repr import short_repr
-from kerfpath.auditor import ENCLOSED, Check, Level
+from kerfpath.auditor import Check, Level
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.execution import (
@@ -24,16 +24,16 @@ from kerfpath.execution import (
 )
 from kerfpath.job.format import Job
 from kerfpath.plans import Plan
-from kerfpath.post import Program, Rules, language
+from kerfpath.post import Controller, Program, Rules, language
 
 __all__ = [
     "AsRun",
     "as_run",
     "checks_of_unknown",
+    "controller_of",
     "keeps_between_nodes",
     "kept_between_nodes",
     "run_judged",
-    "turning_speed",
 ]
 
 SLACK = 1e-3
@@ -69,7 +69,7 @@ def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsR
     unknown = _not_modelled(job)
     if not unknown:
         try:
-            run = longest_run(_program(job)(plan), turning_speed(job))
+            run = longest_run(_program(job)(plan), controller_of(job))
         except InputError as fault:  # said when it is written
             unknown = str(fault)
     if unknown:
@@ -88,12 +88,13 @@ def run_judged(job: Job, run: Executed, plan: Plan, path: Contour, why: str = ""
         _check("velocity", run.peak_velocity, run.velocity_bound, run, plan),
         _check("acceleration", run.peak_acceleration, run.acceleration_bound, run, plan),
     )
+    unproved = checks_of_unknown(job, run.sampled) if run.sampled else ()
     level: Level = "error" if job.options.between_nodes == "guaranteed" else "warning"
     if job.program.zone != "auto":
         why = f'{why}; write zone_mm = "auto" in [program]'.removeprefix("; ")
     advice = [f"{row.advice}; {why}".removesuffix("; ") for row in shares]
     kept = [replace(r, level=level, advice=a) for r, a in zip(shares, advice, strict=True)]
-    rows = (*kept, *_deviations(job, run, plan, path))
+    rows = (*kept, *unproved, *_deviations(job, run, plan, path))
     if np.isnan(run.acceleration_share).any():
         return AsRun(checks=rows)
     timing = timing_of(run, job.robot)
@@ -153,7 +154,7 @@ def kept_between_nodes(job: Job, plan: Plan) -> Kept | None:
     if not keeps_between_nodes(job):
         return None
     try:
-        return keep_limits(plan, _program(job), turning_speed=turning_speed(job))
+        return keep_limits(plan, _program(job), controller=controller_of(job))
     except InputError:  # said when it is written
         return None
 
@@ -170,9 +171,9 @@ def _program(job: Job) -> Callable[[Plan], Program]:
     return lambda plan: job.program.program([plan])
 
 
-def turning_speed(job: Job) -> float:
-    """Return how fast the job's controller turns the tool, rad/s."""
-    return _rules(job).turning_speed
+def controller_of(job: Job) -> Controller:
+    """Return the controller that a job is for, as its settings have it."""
+    return language(job.program.language).controller(job.program.settings)
 
 
 def _rules(job: Job) -> Rules:
@@ -209,7 +210,7 @@ def _unknown(why: str) -> Check:
 
 def _check(what: str, peak: Peak, bound: float, run: Executed, plan: Plan) -> Check:
     """Return a row about the largest share of one kind of limits."""
-    proved = plan.robot.kinematics in ENCLOSED
+    proved = not run.sampled
     return Check(
         code=f"{what}-as-run",
         title=f"joint {what} share as run, {'at every instant' if proved else 'sampled'}",

@@ -4,6 +4,9 @@ from kerfpath.post._arcs import circle_through as circle_through
 from kerfpath.post._arcs import with_arcs as with_arcs
 from kerfpath.post._build import build_program as build_program
 from kerfpath.post._compare import deviations as deviations
+from kerfpath.post._controller import PLAIN as PLAIN
+from kerfpath.post._controller import Controller as Controller
+from kerfpath.post._controller import Orientation as Orientation
 from kerfpath.post._differences import Difference as Difference
 from kerfpath.post._differences import differences as differences
 from kerfpath.post._differences import not_compared as not_compared

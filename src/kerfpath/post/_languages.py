@@ -12,6 +12,7 @@ from typing import Any
 from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
+from kerfpath.post._controller import Controller
 from kerfpath.post._formatter import Formatter
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import Program
@@ -110,6 +111,10 @@ class Language:
         settings = self.settings() if settings is None else settings
         lacks = {k: v for k, v in self.assumed.items() if getattr(settings, k, v) is None}
         return settings.model_copy(update=lacks) if lacks else settings
+
+    def controller(self, settings: LanguageSettings | None = None) -> Controller:
+        """Return the controller that settings describe, by default the language's defaults."""
+        return self.rules(self.completed(settings)).controller
 
     def refusal(self, robot: Robot) -> str:
         """Say why no program in this language can move a robot; empty where one can."""

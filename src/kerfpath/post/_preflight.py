@@ -289,12 +289,13 @@ def _check_motion(program: Program, section: Section, rules: Rules) -> Iterator[
             f"{section.name}, move {k + 1}",
         )
     speed = np.array([move.speed for move in moves[1:]])
-    if too_fast := int((on_path & (turn * speed > rules.turning_speed * lengths)).sum()):
+    most = rules.controller.turning_speed
+    if too_fast := int((on_path & (turn * speed > most * lengths)).sum()):
         yield ProgramIssue(
             "warning",
             "turning-speed",
             f"in {too_fast} moves of the path the tool turns faster than "
-            f"{np.degrees(rules.turning_speed):g} deg/s; the controller will slow the tip down",
+            f"{np.degrees(most):g} deg/s; the controller will slow the tip down",
             section.name,
         )
     near = np.minimum(np.append(lengths, np.inf), np.append(np.inf, lengths))

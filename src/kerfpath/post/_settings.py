@@ -9,11 +9,13 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from kerfpath._repr import short_repr
+from kerfpath.post._controller import PLAIN, Controller, Orientation
 from kerfpath.post._program import PARTNERS, Partner
 
 __all__ = [
     "LanguageSettings",
     "LinesPerFile",
+    "OrientationSetting",
     "PortSettings",
     "Rules",
     "handshakes",
@@ -35,6 +37,12 @@ def numbered(port: str, most: int, least: int = 1) -> Any:
 
 LinesPerFile = Annotated[
     int, setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000)
+]
+
+
+OrientationSetting = Annotated[
+    Orientation,
+    setting("how the tool turns between targets: slerp, two-angle or wrist", '"slerp"'),
 ]
 
 
@@ -108,8 +116,8 @@ class Rules:
         Speeds of the tip that can be said.
     speed_step : float m/s
         Speeds are written as multiples of this.
-    turning_speed : float rad/s
-        How fast the tool may turn in linear moves before the controller slows down.
+    controller : Controller
+        How the path is run.
     longest_lead : float s
         The longest lead time of a switch on the path.
     point_step, angle_step : float m, rad
@@ -123,7 +131,7 @@ class Rules:
     slowest: float = 1e-5
     fastest: float = np.inf
     speed_step: float = 0.0
-    turning_speed: float = np.inf
+    controller: Controller = PLAIN
     longest_lead: float = np.inf
     point_step: float = 0.0
     angle_step: float = 0.0

@@ -135,3 +135,36 @@ def test_a_program_is_judged_by_the_zones_of_its_text(tmp_path):
         "acceleration-as-run": "error",
         "speed-as-run": "warning",
     }
+
+
+WRIST = """
+[program.rapid]
+orientation = "wrist"
+"""
+
+
+def test_where_the_wrist_goes_by_its_joints_samples_are_said_to_be_samples(tmp_path):
+    plain, wrist = cuts_of(tmp_path, QUICK), cuts_of(tmp_path, QUICK + WRIST)
+    assert wrist.passed
+    for one, other in zip(plain.cuts, wrist.cuts, strict=True):
+        for old, row in zip(one.as_run.checks[:2], other.as_run.checks[:2], strict=True):
+            assert row.title == old.title.replace("at every instant", "sampled")
+            # Nodes are 1 mm apart, between which the laws of orientation are close.
+            assert row.value == pytest.approx(old.value, rel=0.02)
+    write_result(wrist, tmp_path / "out")
+    (program,) = (tmp_path / "out").glob("*.mod")
+    assert r"SingArea\Wrist;" in program.read_text()
+    audited = audit_program(program, tmp_path / "job.toml")
+    assert audited.passed
+    titles = [row.title for table in audited.tables.values() for row in table]
+    assert "joint acceleration share as run, sampled" in titles
+
+
+def test_samples_alone_are_no_guarantee(tmp_path):
+    text = QUICK.replace("[plan]", '[plan]\nbetween_nodes = "guaranteed"') + WRIST
+    result = cuts_of(tmp_path, text)
+    assert not result.passed
+    for cut in result.cuts:
+        (row,) = [row for row in cut.as_run.checks if not row.ok]
+        assert (row.code, row.level) == ("between-nodes", "error")
+        assert "moves the wrist by its joints nothing is proved" in row.issue().message

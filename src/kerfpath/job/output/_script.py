@@ -12,7 +12,7 @@ import numpy as np
 
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.job.as_run import keeps_between_nodes, turning_speed
+from kerfpath.job.as_run import keeps_between_nodes
 from kerfpath.job.format import ContourSpec, CutRequest, Job, PreparedJob
 from kerfpath.job.output._script_cell import cell_lines, has_files
 from kerfpath.operations import Side
@@ -70,7 +70,7 @@ def cut(nodes, path, speed):
 
 '''
 KEEP = """\
-    kept = keep_limits(made, lambda one: program([one]), turning_speed={turning})
+    kept = keep_limits(made, lambda one: program([one]), controller=controller)
     made = kept.plan
     if not kept.done:
         {say}(f"{{made.name}}: {{kept.statement}}")
@@ -113,7 +113,7 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
         lines += ["", *cell_lines(job, prepared.cell)]
     within, cell = job.tolerances, "" if prepared.cell is None else ", cell=cell"
     keeps = keeps_between_nodes(job)
-    keep = KEEP.format(turning=_value(turning_speed(job)), say=SAY) if keeps else ""
+    keep = KEEP.format(say=SAY) if keeps else ""
     if job.program.language != "none":
         lines += _program(job)
     lines.append(CUT.format(path=within.path, axis=within.axis, say=SAY, keep=keep, cell=cell))
@@ -286,8 +286,10 @@ def _program(job: Job) -> list[str]:
     said = {} if options.settings is None else options.settings.model_dump(exclude_defaults=True)
     settings = f"language({options.language!r}).settings({_arguments(said)})"
     made = _call("return build_program", named, "plans").replace("\n", "\n    ")
+    controller = f"controller = language({options.language!r}).controller(settings)"
     return [
         f"settings = {settings}",
+        *([controller] if keeps_between_nodes(job) else []),
         "",
         "",
         "def program(plans):",

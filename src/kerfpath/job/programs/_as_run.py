@@ -36,7 +36,7 @@ def check_run(
     runs = [
         run_along(
             part, job.robot, T_base_part=job.placement, T_flange_tip=job.tool,
-            turning_speed=chosen.rules(settings).turning_speed,
+            controller=chosen.controller(settings),
         )
         for part in from_stop_to_stop(_moves(cut))
     ]  # fmt: skip

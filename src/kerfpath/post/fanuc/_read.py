@@ -28,6 +28,7 @@ from kerfpath.post.fanuc._settings import UNITS, FanucSettings
 from kerfpath.post.fanuc._switching import time_before
 from kerfpath.post.fanuc._write import (
     ANGLES,
+    WRIST,
     abort_lines,
     selection_lines,
     switch_off_lines,
@@ -81,7 +82,7 @@ def _time_early(
 
 
 _NUMBER = r"(-?\d*\.\d+)"
-_END = r"(\d+)(cm/min|mm/sec) (?:(FINE)|CNT(\d+)|CR(\d+))"
+_END = rf"(\d+)(cm/min|mm/sec) (?:(FINE)|CNT(\d+)|CR(\d+))({WRIST})?"
 _TB = r"((?: TB +\d*\.\d\dsec,DO\[\d+\]=O(?:N|FF))*)"
 _SWITCH = re.compile(r" TB +(\d*\.\d\d)sec,DO\[(\d+)\]=(ON|OFF)")
 _MAIN = patterns(
@@ -215,9 +216,12 @@ class _Section(Listing):
 
     def path_end(
         self, speed: str, unit: str, fine: str | None, cnt: str | None, corner: str | None,
-        before: str,
+        wrist: str | None, before: str,
     ) -> tuple[float, float | None, str]:  # fmt: skip
         """Return speed (m/s), zone and what is switched, of the end of a line."""
+        if (wrist is not None) != (self.settings.orientation == "wrist"):
+            word = WRIST.strip()
+            raise self.fault(f"expected no {word}" if wrist else f"expected {word}")
         if corner is not None and self.settings.corner != "CR":
             raise self.fault(f"expected CNT{self.settings.cnt_percent} or FINE, got CR{corner}")
         if cnt is not None and self.settings.corner != "CNT":

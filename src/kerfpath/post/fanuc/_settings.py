@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import StringConstraints
 
-from kerfpath.post._settings import PortSettings, Rules, numbered, setting
+from kerfpath.post._controller import Controller
+from kerfpath.post._settings import OrientationSetting, PortSettings, Rules, numbered, setting
 
 __all__ = ["FanucSettings", "is_reserved", "rules", "unit"]
 
@@ -61,6 +62,7 @@ class FanucSettings(PortSettings, output=Output, input=Input):
     decimals: Annotated[
         int, setting("the decimals of mm and deg in positions, 3 to 6", "3", ge=3, le=6)
     ] = 4
+    orientation: OrientationSetting = "two-angle"
 
 
 def unit(settings: FanucSettings) -> float:
@@ -81,6 +83,7 @@ def rules(settings: FanucSettings) -> Rules:
         point_step=half_digit * 1e-3,
         angle_step=float(np.radians(half_digit)),
         zone_lengths=settings.corner == "CR",
+        controller=Controller(orientation=settings.orientation),
     )
 
 

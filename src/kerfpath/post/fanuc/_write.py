@@ -37,11 +37,13 @@ from kerfpath.post.fanuc._settings import FanucSettings, unit
 from kerfpath.post.fanuc._switching import split_switches
 
 __all__ = [
-    "ANGLES", "Fanuc", "abort_lines", "selection_lines", "switch_off_lines", "watch_lines",
+    "ANGLES", "WRIST", "Fanuc", "abort_lines", "selection_lines", "switch_off_lines", "watch_lines",
 ]  # fmt: skip
 
 ANGLES: Final = "xyz"
 """W turns about x, then P about y, then R about z, all axes fixed."""
+WRIST = " Wjnt"
+"""Option of path motions: the wrist goes evenly from joints to joints."""
 NEW_LINE = "\r\n"
 PADDING = "    "
 REMARK = 32
@@ -185,6 +187,7 @@ class Fanuc(CalledFormatter):
             end = f"CR{number(move.zone * 1e3, 0)}"
         timed = split_switches(move).timed
         before = "".join(f" TB {_seconds(s.lead_time)}sec,{self._set(s)}" for s in timed)
+        end += WRIST if settings.orientation == "wrist" else ""
         return f"{number(move.speed / unit(settings), 0)}{settings.speed_unit} {end}{before}"
 
     def _before(self, move: LinearMove) -> Iterator[str]:

@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, StringConstraints
 
-from kerfpath.post._settings import PortSettings, Rules, numbered, setting
+from kerfpath.post._controller import Controller
+from kerfpath.post._settings import OrientationSetting, PortSettings, Rules, numbered, setting
 
 __all__ = ["InformSettings", "is_reserved", "rules"]
 
@@ -61,6 +62,7 @@ class InformSettings(PortSettings, output=Output, input=Input):
     flip: Annotated[
         Literal["B", "R"], setting("the axis whose angle decides flip, B or R", '"R"')
     ] = "B"
+    orientation: OrientationSetting = "slerp"
     date: Annotated[
         Annotated[str, StringConstraints(pattern=r"^\d{4}/\d\d/\d\d \d\d:\d\d$")],
         setting("a date as YYYY/MM/DD HH:MM", '"2026/11/21 10:00"'),
@@ -78,6 +80,7 @@ def rules(settings: InformSettings) -> Rules:
         speed_step=SPEED_STEP,
         point_step=POINT_STEP,
         angle_step=float(np.radians(max(ANGLE_STEP_DEG, 0.5 / pulses.min()))),
+        controller=Controller(orientation=settings.orientation),
         zone_lengths=False,  # a position level says how the corner is rounded, not by how much
     )
 

@@ -6,7 +6,15 @@ from typing import Annotated
 
 import numpy as np
 
-from kerfpath.post._settings import LinesPerFile, PortSettings, Rules, numbered, setting
+from kerfpath.post._controller import Controller
+from kerfpath.post._settings import (
+    LinesPerFile,
+    OrientationSetting,
+    PortSettings,
+    Rules,
+    numbered,
+    setting,
+)
 
 __all__ = ["LONGEST_NAME", "KrlSettings", "is_reserved", "rules"]
 
@@ -62,6 +70,7 @@ class KrlSettings(PortSettings, output=Output, input=Input):
     turning_speed_deg_s: Annotated[
         float, setting("a speed from 1 to 1000, in deg/s ($VEL.ORI1)", "200.0", ge=1, le=1000)
     ] = 200.0
+    orientation: OrientationSetting = "two-angle"
 
 
 def rules(settings: KrlSettings) -> Rules:
@@ -73,7 +82,10 @@ def rules(settings: KrlSettings) -> Rules:
         speed_step=SPEED_STEP,
         point_step=POINT_STEP,
         angle_step=ANGLE_STEP,
-        turning_speed=float(np.radians(settings.turning_speed_deg_s)),
+        controller=Controller(
+            turning_speed=float(np.radians(settings.turning_speed_deg_s)),
+            orientation=settings.orientation,
+        ),
         longest_lead=LONGEST_LEAD,
     )
 

@@ -82,7 +82,7 @@ def opening_lines(settings: KrlSettings) -> list[str]:
         "BAS(#INITMOV,0)",
         "$ADVANCE=5",
         "$IPO_MODE=#BASE",
-        "$ORI_TYPE=#VAR",
+        f"$ORI_TYPE=#{'JOINT' if settings.orientation == 'wrist' else 'VAR'}",
         "$CIRC_TYPE=#BASE",
         f"$VEL.ORI1={turning_deg_s}",
         f"$VEL.ORI2={turning_deg_s}",

@@ -20,6 +20,7 @@ from kerfpath.post.rapid._settings import SWITCH_OFF, RapidSettings
 from kerfpath.post.rapid._write import (
     FIRST,
     FULL_AIR_SPEED,
+    WRIST,
     air_speed_data,
     ending_lines,
     linear_speed_data,
@@ -167,7 +168,8 @@ class _Reader(Aggregates):
         self.routine_name = name
         self.steps = self.routines[name] = []
         if name == "main":
-            self.required = [r"ConfL\Off;", f"{SWITCH_OFF};"]
+            wrist = [WRIST] if self.settings.orientation == "wrist" else []
+            self.required = [r"ConfL\Off;", *wrist, f"{SWITCH_OFF};"]
         if name != "main":
             self.homes[name] = self.file
         elif self.file != self.main:

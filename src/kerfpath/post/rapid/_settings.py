@@ -8,7 +8,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import StringConstraints
 
-from kerfpath.post._settings import PortSettings, Rules, setting
+from kerfpath.post._controller import Controller
+from kerfpath.post._settings import OrientationSetting, PortSettings, Rules, setting
 
 __all__ = ["SWITCH_OFF", "TURNING_SPEED", "RapidSettings", "is_reserved", "rules"]
 
@@ -60,6 +61,7 @@ class RapidSettings(PortSettings, output=Request, input=Input):
     tool_name: Annotated[Name, setting("a name for the tool", '"tLaser"')] = "tLaser"
     folder: Annotated[Folder, setting("a folder of the controller", '"HOME:"')] = "HOME:"
     work_object: Annotated[Name, setting("a name for the part's frame", '"wPart"')] = "wPart"
+    orientation: OrientationSetting = "slerp"
 
 
 def rules(settings: RapidSettings) -> Rules:
@@ -70,7 +72,7 @@ def rules(settings: RapidSettings) -> Rules:
         speed_step=SPEED_STEP,
         point_step=POINT_STEP,
         angle_step=ANGLE_STEP,
-        turning_speed=float(TURNING_SPEED),
+        controller=Controller(turning_speed=float(TURNING_SPEED), orientation=settings.orientation),
         longest_lead=LONGEST_LEAD,
     )
 

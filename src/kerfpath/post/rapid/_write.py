@@ -41,6 +41,7 @@ from kerfpath.post.rapid._settings import SWITCH_OFF, TURNING_SPEED, RapidSettin
 __all__ = [
     "FIRST",
     "FULL_AIR_SPEED",
+    "WRIST",
     "Rapid",
     "air_speed_data",
     "ending_lines",
@@ -53,6 +54,8 @@ _Key = TypeVar("_Key", bound=Hashable)
 
 FULL_AIR_SPEED = 1.0
 """Tip speed (m/s) that a joint move at its full share is given: RAPID knows no share."""
+WRIST = r"SingArea\Wrist;"
+"""Lets the wrist go evenly from joints to joints, instead of the tool from pose to pose."""
 NO_EXTERNAL_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 JOINT_TARGET = "[[" + ",".join(["%.6f"] * 6) + "]," + NO_EXTERNAL_AXES + "]"
 TARGET = "[[%.4f,%.4f,%.4f],[%.8f,%.8f,%.8f,%.8f],[%d,%d,%d,%d]," + NO_EXTERNAL_AXES + "]"
@@ -163,6 +166,8 @@ class Rapid(Formatter):
     def begin(self) -> Iterator[str]:
         """Yield the lines of the main routine before it calls those of the sections."""
         yield r"ConfL\Off;"
+        if self.settings.orientation == "wrist":
+            yield WRIST
         for s in self.trigger:
             self.output(s.signal)
         yield f"{SWITCH_OFF};"

@@ -17,6 +17,7 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.post._axes import offset_near
+from kerfpath.post._controller import Controller
 from kerfpath.post._divide import require_one_file
 from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._orientations import rotation_vectors
@@ -31,7 +32,7 @@ from kerfpath.post._program import (
     Wait,
     targets_of,
 )
-from kerfpath.post._settings import PortSettings, Rules, outputs, setting
+from kerfpath.post._settings import OrientationSetting, PortSettings, Rules, outputs, setting
 from kerfpath.post.urscript._switching import (
     LOCAL,
     distance_ahead,
@@ -64,6 +65,7 @@ class URScriptSettings(PortSettings, output=Output, input=Input):
     joint_acceleration_deg_s2: Annotated[
         float, setting("a number from 1 to 5000, in deg/s^2", "80", ge=1, le=5000)
     ] = 80.0
+    orientation: OrientationSetting = "slerp"
 
     @property
     def acceleration(self) -> float:
@@ -74,7 +76,11 @@ class URScriptSettings(PortSettings, output=Output, input=Input):
 def rules(settings: URScriptSettings) -> Rules:
     """Return what programs in URScript must keep to."""
     return Rules(
-        slowest=SPEED_STEP, speed_step=SPEED_STEP, point_step=POINT_STEP, angle_step=ANGLE_STEP
+        slowest=SPEED_STEP,
+        speed_step=SPEED_STEP,
+        point_step=POINT_STEP,
+        angle_step=ANGLE_STEP,
+        controller=Controller(orientation=settings.orientation),
     )
 
 

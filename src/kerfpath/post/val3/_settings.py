@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import StringConstraints
 
-from kerfpath.post._settings import PortSettings, Rules, setting
+from kerfpath.post._controller import Controller
+from kerfpath.post._settings import OrientationSetting, PortSettings, Rules, setting
 
 __all__ = ["LONGEST_NAME", "Val3Settings", "is_reserved", "rules"]
 
@@ -68,6 +69,7 @@ class Val3Settings(PortSettings, output=Output, input=Input):
         Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_:/.\-]{1,60}/$")],
         setting("the folder of projects, as the controller calls it", '"Disk://"'),
     ] = "Disk://"
+    orientation: OrientationSetting = "slerp"
     version: Annotated[
         Annotated[str, StringConstraints(pattern=r"^s[0-9]+(\.[0-9]+){0,3}$")],
         setting("the version of VAL 3 that projects are for", '"s7.3.1"'),
@@ -82,6 +84,7 @@ def rules(settings: Val3Settings) -> Rules:
         speed_step=SPEED_STEP,
         point_step=POINT_STEP,
         angle_step=ANGLE_STEP,
+        controller=Controller(orientation=settings.orientation),
     )
 
 
