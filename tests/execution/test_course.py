@@ -175,3 +175,15 @@ def test_values_at_the_targets_are_blended_as_the_tip_is():
     time = np.linspace(0, course.time[-1], 301)
     found = course.blended(T[:, :3, 3], time)
     np.testing.assert_allclose(found, course.poses(time)[:, :3, 3], rtol=0, atol=1e-13)
+
+
+def test_a_controller_with_a_measure_of_its_own_rounds_by_it():
+    T = poses_through([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0.2, 0.1, 0]], np.zeros((4, 3)))
+    moves = moves_through(T, [0.001, 0.001])
+    by_time = ToolCourse.of(T[0], moves, Controller(corner_time=0.05))
+    np.testing.assert_allclose(by_time.half, [0, 0.05, 0.05, 0], rtol=1e-12)
+    by_length = ToolCourse.of(T[0], moves, Controller(corner=0.02))
+    np.testing.assert_allclose(by_length.half, [0, 0.2, 0.2, 0], rtol=1e-12)
+    # More than there is room for: half way to the next corner.
+    wide = ToolCourse.of(T[0], moves, Controller(corner=1.0))
+    np.testing.assert_allclose(wide.half, [0, 0.5, 0.5, 0], rtol=1e-12)

@@ -5,7 +5,7 @@ import pytest
 
 from kerfpath import plan
 from kerfpath.execution import executed
-from kerfpath.post import build_program
+from kerfpath.post import Controller, build_program
 
 STEP = np.radians(10)
 
@@ -58,6 +58,15 @@ def test_with_zones_that_meet_the_motion_keeps_what_the_nodes_keep(made):
     assert auto.share < narrow[0] < narrow[1] < narrow[2]
     # In half the zone the same turn takes half the time.
     assert narrow[2] == pytest.approx(2 * narrow[1], rel=0.1)
+
+
+def test_between_zones_that_meet_rounding_is_not_taken_for_acceleration(made):
+    # As long as there is room: stretches of 1e-9 s and less are left between zones.
+    (run,) = executed(build_program([made]), controller=Controller(corner=1.0))
+    assert np.diff(run.course.borders).min() < 1e-6
+    at_nodes = made.criteria.peak_acceleration.max()
+    assert run.peak_acceleration.share == pytest.approx(at_nodes, rel=0.05)
+    assert run.acceleration_bound == pytest.approx(run.peak_acceleration.share, rel=0.03)
 
 
 def test_the_peak_says_the_joint_and_when(made):

@@ -97,7 +97,7 @@ class ToolCourse:
             T_part_tip where the first move begins.
         moves : sequence of LinearMove
         controller : Controller
-            Of "wrist" the course says where the tip is, not how the tool is turned.
+            Of orientation "wrist" the course says where the tip is, not how the tool is turned.
         """
         T = np.array([start, *(move.T_part_tip for move in moves)])
         via = [move.T_part_via if isinstance(move, CircularMove) else None for move in moves]
@@ -109,7 +109,7 @@ class ToolCourse:
         angle = np.max([np.linalg.norm(part, axis=1) for part in parts], axis=0)
         duration = np.maximum(length / speed, angle / controller.turning_speed)
         duration = np.maximum(duration, SHORTEST)
-        zone = np.array([move.zone for move in moves[:-1]])
+        zone = np.array([controller.zone(move.zone, move.speed) for move in moves[:-1]])
         fastest = length / duration
         half = zone / np.maximum(np.maximum(fastest[:-1], fastest[1:]), 1e-12)
         room = np.minimum(duration[:-1], duration[1:]) / 2

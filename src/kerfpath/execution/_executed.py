@@ -23,6 +23,8 @@ WHERE = (0.1, 0.5, 0.9)
 """Shares of each smooth stretch at which the joints are looked at."""
 TIGHT = 1.02
 """Bounds need not be nearer to what is seen."""
+RESOLVED = 2e-5
+"""s: between zones that all but meet, shorter stretches, differences of joints are rounding."""
 STEP = 0.05
 """Share of it by which they are looked at before and after, for their rates."""
 
@@ -59,6 +61,8 @@ class Executed:
         singularity, and where there are samples alone.
     sampled : str
         Why there are samples alone; empty where the bounds are proofs.
+    controller : Controller
+        By which it is run.
     """
 
     section: str
@@ -71,6 +75,7 @@ class Executed:
     velocity_bound: float
     acceleration_bound: float
     sampled: str = ""
+    controller: Controller = PLAIN
 
     __repr__ = short_repr
 
@@ -181,7 +186,9 @@ def run_along(
     course = ToolCourse.of(moves[0].T_part_tip, moves[1:], controller)
     borders = course.borders
     long = np.diff(borders)
-    time = (borders[:-1, None] + long[:, None] * np.array(WHERE)).ravel()
+    seen = long > min(RESOLVED, long.max() / 2)
+    begin, long = borders[:-1][seen], long[seen]
+    time = (begin[:, None] + long[:, None] * np.array(WHERE)).ravel()
     step = np.repeat(STEP * long, len(WHERE))
     planned = np.array([move.q for move in moves])
     wrist = controller.orientation == "wrist"
@@ -206,14 +213,16 @@ def run_along(
         velocity_bound=np.inf,
         acceleration_bound=np.inf,
         sampled=_sampled(robot, controller),
+        controller=controller,
     )
     fast, sharp = run.peak_velocity.share, run.peak_acceleration.share
     if run.sampled or not np.isfinite(max(fast, sharp)):
         return run
+    middles = (borders[1:] + borders[:-1]) / 2
     bounds = rates_along(
         robot,
         course.pieces(),
-        q[WHERE.index(0.5) :: len(WHERE)],
+        np.stack([np.interp(middles, time, joint) for joint in q.T], axis=1),
         T_base_part=T_base_part,
         T_flange_tip=T_flange_tip,
         enough=(_enough(fast) * velocity, _enough(sharp) * acceleration),

@@ -24,7 +24,7 @@ from kerfpath.execution import (
 )
 from kerfpath.job.format import Job
 from kerfpath.plans import Plan
-from kerfpath.post import Controller, Program, Rules, language
+from kerfpath.post import Controller, Program, language
 
 __all__ = [
     "AsRun",
@@ -88,9 +88,12 @@ def run_judged(job: Job, run: Executed, plan: Plan, path: Contour, why: str = ""
         _check("velocity", run.peak_velocity, run.velocity_bound, run, plan),
         _check("acceleration", run.peak_acceleration, run.acceleration_bound, run, plan),
     )
-    unproved = checks_of_unknown(job, run.sampled) if run.sampled else ()
+    controller = run.controller
+    doubts = "; ".join(each for each in (run.sampled, controller.assumed) if each)
+    unproved = checks_of_unknown(job, doubts) if doubts else ()
     level: Level = "error" if job.options.between_nodes == "guaranteed" else "warning"
-    if job.program.zone != "auto":
+    why = "; ".join(each for each in (why, controller.assumed) if each)
+    if job.program.zone != "auto" and not controller.rounds_by_itself:
         why = f'{why}; write zone_mm = "auto" in [program]'.removeprefix("; ")
     advice = [f"{row.advice}; {why}".removesuffix("; ") for row in shares]
     kept = [replace(r, level=level, advice=a) for r, a in zip(shares, advice, strict=True)]
@@ -129,7 +132,7 @@ def _deviations(job: Job, run: Executed, plan: Plan, path: Contour) -> Iterator[
         unit="m",
         node=_node(run, plan, off.tip_time),
         level="warning",
-        advice="lower zone_error_mm in [program], or sample the contour more finely",
+        advice=f"{_narrower(run.controller)}, or sample the contour more finely",
     )
     yield Check(
         code="axis-as-run",
@@ -141,6 +144,13 @@ def _deviations(job: Job, run: Executed, plan: Plan, path: Contour) -> Iterator[
         level="warning",
         advice="sample the contour more finely, or smooth its axes",
     )
+
+
+def _narrower(controller: Controller) -> str:
+    """Say what makes corners less round."""
+    if controller.rounds_by_itself:
+        return "let the controller round less, see the page of its language"
+    return "lower zone_error_mm in [program]"
 
 
 def _node(run: Executed, plan: Plan, time: float) -> int:
@@ -176,11 +186,6 @@ def controller_of(job: Job) -> Controller:
     return language(job.program.language).controller(job.program.settings)
 
 
-def _rules(job: Job) -> Rules:
-    chosen = language(job.program.language)
-    return chosen.rules(chosen.completed(job.program.settings))
-
-
 def _not_modelled(job: Job) -> str:
     """Return why the motion of the job's programs is not known between the nodes; else empty."""
     if job.robot.externals:
@@ -191,8 +196,6 @@ def _not_modelled(job: Job) -> str:
         return f"{job.program.language} has no zones: what its controller does is not known"
     if job.program.zone == 0:
         return 'the robot stops at every node; write zone_mm = "auto" in [program]'
-    if job.options.between_nodes == "guaranteed" and not _rules(job).zone_lengths:
-        return f"the zones of {job.program.language} are no lengths, as it is set up"
     return ""
 
 
@@ -211,9 +214,11 @@ def _unknown(why: str) -> Check:
 def _check(what: str, peak: Peak, bound: float, run: Executed, plan: Plan) -> Check:
     """Return a row about the largest share of one kind of limits."""
     proved = not run.sampled
+    how = "at every instant" if proved else "sampled"
+    how += ", corners assumed" if run.controller.assumed else ""
     return Check(
         code=f"{what}-as-run",
-        title=f"joint {what} share as run, {'at every instant' if proved else 'sampled'}",
+        title=f"joint {what} share as run, {how}",
         value=max(peak.share, bound) if proved else peak.share,
         limit=1.0 + SLACK,
         unit="share",

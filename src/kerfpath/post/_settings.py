@@ -122,8 +122,6 @@ class Rules:
         The longest lead time of a switch on the path.
     point_step, angle_step : float m, rad
         What the digits of targets leave of positions and angles.
-    zone_lengths : bool
-        Whether the zones of straight moves are lengths, so that it is known where corners begin.
     """
 
     longest_name: int = 32
@@ -135,6 +133,5 @@ class Rules:
     longest_lead: float = np.inf
     point_step: float = 0.0
     angle_step: float = 0.0
-    zone_lengths: bool = True
 
     __repr__ = short_repr

@@ -13,10 +13,12 @@ from kerfpath.job.as_run import checks_of_unknown, run_judged
 from kerfpath.job.format import Job
 from kerfpath.job.programs._read import ReadCut
 from kerfpath.plans import Plan
-from kerfpath.post import CircularMove, Language, LanguageSettings, LinearMove
+from kerfpath.post import CircularMove, Controller, Language, LanguageSettings, LinearMove
 
 __all__ = ["check_run"]
 
+UNSAID = 1.0
+"""m: a zone that the text has no length for; any but zero."""
 SHORTEST = 1e-9
 """s: no move is shorter."""
 
@@ -31,14 +33,15 @@ def check_run(
     """
     if not chosen.zones:
         return [*checks_of_unknown(job, f"{chosen.name} has no zones")]
-    if any(move.zone is None for move in cut.targets):
+    controller = chosen.controller(settings)
+    if any(move.zone is None for move in cut.targets) and not controller.rounds_by_itself:
         return [*checks_of_unknown(job, f"the zones of {chosen.name} here are no lengths")]
     runs = [
         run_along(
             part, job.robot, T_base_part=job.placement, T_flange_tip=job.tool,
-            controller=chosen.controller(settings),
+            controller=controller,
         )
-        for part in from_stop_to_stop(_moves(cut))
+        for part in from_stop_to_stop(_moves(cut, controller))
     ]  # fmt: skip
     if not runs:
         return [*checks_of_unknown(job, "the robot stops at every node")]
@@ -58,15 +61,19 @@ def check_run(
     ]
 
 
-def _moves(cut: ReadCut) -> list[LinearMove]:
-    """Return the moves of a cut as its text has them, the first only for where it ends."""
+def _moves(cut: ReadCut, controller: Controller) -> list[LinearMove]:
+    """Return the moves of a cut as its text has them, the first only for where it ends.
+
+    Where the text has no length for a zone it is the controller's.
+    """
     found: list[LinearMove] = []
     before = int(cut.ends[0])
     for move, node in zip(cut.targets, cut.ends, strict=True):
-        T, q, zone = cut.T_part_tip[node], cut.q[node], move.zone or 0.0
+        T, q = cut.T_part_tip[node], cut.q[node]
         took = max(float(cut.took[before:node].sum()), SHORTEST)
         way = np.diff(cut.T_part_tip[before : node + 1, :3, 3], axis=0)
         speed = move.speed or float(np.linalg.norm(way, axis=1).sum()) / took
+        zone = controller.zone(UNSAID, speed) if move.zone is None else move.zone
         if move.T_part_via is None:
             made = LinearMove(T_part_tip=T, q=q, speed=speed, duration=took, zone=zone)
         else:

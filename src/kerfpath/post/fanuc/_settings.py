@@ -11,10 +11,12 @@ from pydantic import StringConstraints
 from kerfpath.post._controller import Controller
 from kerfpath.post._settings import OrientationSetting, PortSettings, Rules, numbered, setting
 
-__all__ = ["FanucSettings", "is_reserved", "rules", "unit"]
+__all__ = ["CORNER_MS", "FanucSettings", "is_reserved", "rules", "unit"]
 
 UNITS = {"cm/min": 0.01 / 60, "mm/sec": 1e-3}
 """Units of speeds in m/s; controllers count both in whole numbers."""
+CORNER_MS = 100.0
+"""How long before and after a corner CNT100 is taken to round it where nobody has said."""
 LONGEST_LEAD = 30.0
 """s; the longest time of TB."""
 SPECIAL = re.compile(r"(RSR|PNS|STYLE)\d*|CON|PRN|AUX|NUL|(COM|LPT)\d", re.IGNORECASE)
@@ -55,6 +57,10 @@ class FanucSettings(PortSettings, output=Output, input=Input):
         Literal["CNT", "CR"], setting("CNT, or CR where the controller has it", '"CR"')
     ] = "CNT"
     cnt_percent: Annotated[int, setting("a CNT value, 0 to 100", "50", ge=0, le=100)] = 100
+    corner_ms: Annotated[
+        float | None,
+        setting("a time from 1 to 1000, in ms, in which CNT100 rounds", "100.0", ge=1, le=1000),
+    ] = None
     turns: Annotated[
         Literal["J1 J4 J6", "J4 J5 J6"],
         setting("the axes whose turns are counted, J1 J4 J6 or J4 J5 J6", '"J4 J5 J6"'),
@@ -82,8 +88,23 @@ def rules(settings: FanucSettings) -> Rules:
         longest_lead=LONGEST_LEAD,
         point_step=half_digit * 1e-3,
         angle_step=float(np.radians(half_digit)),
-        zone_lengths=settings.corner == "CR",
-        controller=Controller(orientation=settings.orientation),
+        controller=_controller(settings),
+    )
+
+
+def _controller(settings: FanucSettings) -> Controller:
+    """Return the controller: CNT rounds within a time, whatever zone a program has."""
+    if settings.corner == "CR":
+        return Controller(orientation=settings.orientation)
+    full = CORNER_MS if settings.corner_ms is None else settings.corner_ms
+    assumed = (
+        f"CNT100 is taken to round from {CORNER_MS:g} ms before a corner to as long after it; "
+        "write corner_ms in [program.fanuc]"
+    )
+    return Controller(
+        orientation=settings.orientation,
+        corner_time=full * 1e-3 * max(settings.cnt_percent, 1) / 100,  # CNT0 rounds, but hardly
+        assumed=assumed if settings.corner_ms is None else "",
     )
 
 

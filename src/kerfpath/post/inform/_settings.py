@@ -10,8 +10,10 @@ from pydantic import AfterValidator, StringConstraints
 from kerfpath.post._controller import Controller
 from kerfpath.post._settings import OrientationSetting, PortSettings, Rules, numbered, setting
 
-__all__ = ["InformSettings", "is_reserved", "rules"]
+__all__ = ["LEVEL_MM", "InformSettings", "is_reserved", "rules"]
 
+LEVEL_MM = 12.5
+"""How far from a corner a position level is taken to round it where nobody has said."""
 SPEED_STEP = 1e-4
 """Speeds (m/s) have one decimal of mm/s."""
 POINT_STEP = 0.5e-6
@@ -50,6 +52,10 @@ class InformSettings(PortSettings, output=Output, input=Input):
     position_level: Annotated[
         int, setting("a position level for corners, 1 to 8", "1", ge=1, le=8)
     ] = 1
+    position_level_mm: Annotated[
+        float | None,
+        setting("a length from 0.01 to 500, in mm, that the level has", "12.5", ge=0.01, le=500),
+    ] = None
     fastest_mm_s: Annotated[
         float, setting("the largest speed of MOVL, in mm/s", "1500.0", ge=1, le=20_000)
     ] = 1500.0
@@ -80,8 +86,21 @@ def rules(settings: InformSettings) -> Rules:
         speed_step=SPEED_STEP,
         point_step=POINT_STEP,
         angle_step=float(np.radians(max(ANGLE_STEP_DEG, 0.5 / pulses.min()))),
-        controller=Controller(orientation=settings.orientation),
-        zone_lengths=False,  # a position level says how the corner is rounded, not by how much
+        controller=_controller(settings),
+    )
+
+
+def _controller(settings: InformSettings) -> Controller:
+    """Return the controller: the length of a position level is one of its parameters."""
+    level, length = settings.position_level, settings.position_level_mm
+    assumed = (
+        f"PL={level} is taken to round from {LEVEL_MM:g} mm before a corner; write "
+        f"position_level_mm in [program.inform], the controller's parameter S1CxG{32 + level:03d}"
+    )
+    return Controller(
+        orientation=settings.orientation,
+        corner=(LEVEL_MM if length is None else length) * 1e-3,
+        assumed=assumed if length is None else "",
     )
 
 
