@@ -150,7 +150,7 @@ def _narrower(controller: Controller) -> str:
     """Say what makes corners less round."""
     if controller.rounds_by_itself:
         return "let the controller round less, see the page of its language"
-    return "lower zone_error_mm in [program]"
+    return "write a lower zone_error_mm in [program]"
 
 
 def _node(run: Executed, plan: Plan, time: float) -> int:

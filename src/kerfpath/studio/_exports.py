@@ -77,7 +77,9 @@ def in_language(result: JobResult, language: str | None) -> JobResult:
         said = error.errors(include_url=False)[0]["msg"]
         raise InputError(f"program in {language}: {said}; correct [program]") from None
     # The name is the job's, whatever the copy of it is called that was read.
-    options = replace(program_options(asked, result.job.program.name), language=language)
+    job = result.job
+    options = program_options(asked, job.program.name, job.tolerances)
+    options = replace(options, language=language)
     return replace(result, job=replace(result.job, program=options))
 
 

@@ -168,3 +168,27 @@ def test_samples_alone_are_no_guarantee(tmp_path):
         (row,) = [row for row in cut.as_run.checks if not row.ok]
         assert (row.code, row.level) == ("between-nodes", "error")
         assert "moves the wrist by its joints nothing is proved" in row.issue().message
+
+
+def with_tolerance(mm, program=""):
+    text = with_program(program)
+    assert "path_tolerance_mm = 0.1 " in text
+    return text.replace("path_tolerance_mm = 0.1 ", f"path_tolerance_mm = {mm} ")
+
+
+@pytest.mark.parametrize("mm", [0.02, 0.3])
+def test_automatic_zones_follow_the_tolerance_of_the_path(tmp_path, mm):
+    result = cuts_of(tmp_path, with_tolerance(mm))
+    assert result.job.program.zone_error == pytest.approx(mm * 1e-3)
+    for cut in result.cuts:
+        rows = {row.code: row for row in cut.as_run.checks}
+        assert 0 < rows["tip-as-run"].value <= rows["tip-as-run"].limit == pytest.approx(mm * 1e-3)
+        assert rows["speed-as-run"].ok
+        assert cut.as_run.timing.held == 1.0
+
+
+def test_a_zone_error_that_is_stated_is_kept(tmp_path):
+    job = tmp_path / "job.toml"
+    (tmp_path / "b_pillar.step").write_bytes((DEMO / "b_pillar.step").read_bytes())
+    job.write_text(with_tolerance(0.3, "zone_error_mm = 0.05"))
+    assert read_job(job).program.zone_error == pytest.approx(5e-5)

@@ -147,8 +147,12 @@ def tolerances_of(table: AuditTable) -> Tolerances:
     )
 
 
-def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
-    """Return the options of a [program] table; `stem` names the program where it does not."""
+def program_options(table: ProgramTable, stem: str, allowed: Tolerances) -> ProgramOptions:
+    """Return the options of a [program] table; `stem` names the program where it does not.
+
+    Corners are rounded as far as the path may be left, where the table does not say how far.
+    """
+    error = table.zone_error_mm
     stem = re.sub(r"[^A-Za-z0-9_]", "_", stem)
     stem = stem if stem[:1].isascii() and stem[:1].isalpha() else f"job_{stem}"
     return ProgramOptions(
@@ -156,7 +160,7 @@ def program_options(table: ProgramTable, stem: str) -> ProgramOptions:
         name=table.name or stem[:_NAME_LENGTH],
         retract=table.retract_mm / 1000,
         zone=table.zone_mm if table.zone_mm == "auto" else table.zone_mm / 1000,
-        zone_error=table.zone_error_mm / 1000,
+        zone_error=allowed.path if error is None else error / 1000,
         settings=table.settings(),
         lead_time=table.lead_time_s,
         pierce_time=table.pierce_time_s,

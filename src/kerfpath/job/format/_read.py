@@ -248,7 +248,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         sequence=file.sequence,
         layout=file.layout,
         tolerances=tolerances_of(file.audit),
-        program=program_options(file.program, (copy_of or path).stem),
+        program=program_options(file.program, (copy_of or path).stem, tolerances_of(file.audit)),
         source=source,
         text=text,
     )

@@ -193,7 +193,10 @@ def _planned_requirements(prepared: PreparedJob, file: PlanFile) -> PreparedJob:
     of the job as it is now, and refused where the planned moves do not meet its retract.
     """
     stem = prepared.job.path.stem
-    then = table_of(file, "program", ProgramTable, lambda table: program_options(table, stem))
+    allowed = table_of(file, "audit", AuditTable, tolerances_of)
+    then = table_of(
+        file, "program", ProgramTable, lambda table: program_options(table, stem, allowed)
+    )
     return replace(prepared, job=replace(prepared.job, program=then))
 
 
@@ -246,11 +249,12 @@ def _first_failed(table: Sequence[Check]) -> Check | None:
 
 def _options(file: PlanFile, language: str, stem: str) -> ProgramOptions:
     find_language(language)
+    allowed = table_of(file, "audit", AuditTable, tolerances_of)
     return table_of(
         file,
         "program",
         ProgramTable,
-        lambda table: program_options(table, stem),
+        lambda table: program_options(table, stem, allowed),
         language=language,
     )
 

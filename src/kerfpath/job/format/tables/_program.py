@@ -30,7 +30,7 @@ class ProgramTable(Table):
     zone_mm: Annotated[
         NotNegative | Literal["auto"], key('"auto" or a number not below 0, in mm', '"auto"')
     ] = "auto"
-    zone_error_mm: Annotated[Positive, key("a number above 0, in mm", "0.1")] = 0.1
+    zone_error_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.1")] = None
     lead_time_s: Annotated[NotNegative, key("a number not below 0, in s", "0.02")] = 0.02
     arcs_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.01")] = None
     gas_lead_s: Annotated[NotNegative | None, key("a number not below 0, in s", "0.3")] = None
