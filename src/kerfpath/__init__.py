@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from kerfpath.errors import InputError as InputError
     from kerfpath.errors import KerfpathError as KerfpathError
     from kerfpath.errors import NoFeasiblePath as NoFeasiblePath
+    from kerfpath.execution import keep_limits as keep_limits
     from kerfpath.front import ParetoSet as ParetoSet
     from kerfpath.front import pareto as pareto
     from kerfpath.job import read_plan_file as read_plan_file
@@ -61,6 +62,7 @@ _HOME = {
     "audit": "auditor",
     "fastest_speed": "planner",
     "join": "contour",
+    "keep_limits": "execution",
     "pareto": "front",
     "placed": "placement",
     "placement_from_points": "placement",

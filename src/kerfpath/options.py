@@ -134,8 +134,8 @@ class PlanOptions:
     between_nodes : {"reported", "kept", "guaranteed"}
         The limits hold at the nodes, and what the program needs between them is "reported"; where
         that is more, the nodes are held to less if the limits can be "kept" so at every instant;
-        or the audit fails unless that is proved, "guaranteed". A job does so; see
-        `kerfpath.execution.keep_limits` for a plan.
+        or the audit fails unless that is proved, "guaranteed". A job does so; `plan` holds the
+        limits at the nodes, and `kerfpath.keep_limits` those between them.
     interruptions : {"none", "fewest"}
         Whether a contour that cannot be cut in one go is cut in pieces, see `plan_in_pieces`.
     least_piece : float m, optional
@@ -330,9 +330,9 @@ def with_keywords(
     known = allowed.__annotations__
     for name in keywords:
         if name not in known:
-            raise TypeError(
-                f"unexpected keyword argument {name!r}; the options are {', '.join(sorted(known))}"
-            )
+            said = f"the options are {', '.join(sorted(known))}"
+            said = KEEPS if name == "between_nodes" else said
+            raise TypeError(f"unexpected keyword argument {name!r}; {said}")
     return replace(options or PlanOptions(), **keywords, **more)
 
 
@@ -347,6 +347,7 @@ _KNOWN: dict[str, tuple[str, ...]] = {
     "interruptions": get_args(Interruptions),
 }
 
+KEEPS = "kerfpath.keep_limits(plan) makes a plan keep its limits between the nodes, too"
 EXACT_OR_BETTER = ("continuous", "exact")
 """Methods that hold (5) and (6) throughout."""
 GIVEN = object()

@@ -1,10 +1,13 @@
 """Plans that keep the limits between the nodes: the proof against dense sampling."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import kerfpath
+from conftest import ROOT
 from kerfpath import PlanOptions, plan
 from kerfpath.execution import executed, keep_limits
 from kerfpath.post import build_program
@@ -89,5 +92,21 @@ def test_where_the_robot_stops_at_every_node_there_is_nothing_to_keep(tight):
     assert (kept.done, kept.run, kept.plan) == (True, None, tight)
 
 
-def test_plan_itself_takes_no_such_option():
+def test_plan_itself_says_which_call_does_it(circle, arm, tool, placement):
     assert PlanOptions().between_nodes == "reported"
+    assert kerfpath.keep_limits is keep_limits
+    with pytest.raises(TypeError, match=r"between_nodes.*kerfpath\.keep_limits\(plan\)"):
+        plan(circle, arm, tool=tool, placement=placement, speed=0.1, between_nodes="kept")
+
+
+def test_the_example_of_the_page_runs(capsys):
+    page = (ROOT / "docs" / "programs.md").read_text()
+    (code,) = [c for c in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "keep_limits" in c]
+    made = {}
+    exec(compile(code, "programs.md", "exec"), made)
+    assert capsys.readouterr().out.startswith("True it keeps the limits between the nodes")
+    before, after = (
+        executed(made["program"](one), controller=made["controller"])[0].acceleration_bound
+        for one in (made["plan"], made["kept"].plan)
+    )
+    assert after <= 1 < before
