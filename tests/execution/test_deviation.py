@@ -24,7 +24,8 @@ def run_round_a_corner(zone, lean=0.0):
     time = np.linspace(0, course.time[-1], 2001)
     none = np.zeros((len(time), 6))
     run = Executed(
-        section="", course=course, time=time, q=none, T=course.poses(time), velocity_share=none,
+        section="", course=course, time=time, planned=time, q=none, T=course.poses(time),
+        velocity_share=none,
         acceleration_share=none, velocity_bound=0.0, acceleration_bound=0.0,
     )  # fmt: skip
     points = np.array([[0, 0, 0], [SIDE / 2, 0, 0], [SIDE, 0, 0], [SIDE, SIDE / 2, 0]])

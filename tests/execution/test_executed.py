@@ -69,6 +69,15 @@ def test_between_zones_that_meet_rounding_is_not_taken_for_acceleration(made):
     assert run.acceleration_bound == pytest.approx(run.peak_acceleration.share, rel=0.03)
 
 
+def test_it_is_known_when_a_run_was_planned_to_be_where_it_is(made):
+    run = run_of(made)
+    # Chords of a circle are shorter than their arcs.
+    assert run.course.time[-1] < made.time[-1] * (1 - 1e-4)
+    at_targets = np.interp(run.course.time, run.time, run.planned)[1:-1]
+    # Interpolated over the corners that it has at the targets.
+    np.testing.assert_allclose(at_targets, made.time[1:-1], rtol=0, atol=1e-4 * made.time[1])
+
+
 def test_the_peak_says_the_joint_and_when(made):
     run = run_of(made, zone=0.001)
     share, joint, time = run.peak_acceleration

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks._random_contours import cut
 
 import kerfpath
 from conftest import ROOT
@@ -90,6 +91,35 @@ def test_zones_that_are_too_narrow_are_said_with_what_would_help(tight):
 def test_where_the_robot_stops_at_every_node_there_is_nothing_to_keep(tight):
     kept = keep_limits(tight, lambda one: build_program([one], zone=0.0))
     assert (kept.done, kept.run, kept.plan) == (True, None, tight)
+
+
+def kept_of(name, number):
+    """What comes of keeping the limits of a random contour, the tip as free as the nodes let it."""
+    drawn = cut(name, number)
+    made = plan(
+        drawn.contour, drawn.robot, tool=drawn.tool, placement=np.eye(4), speed=drawn.speed,
+        certify=None,
+    )  # fmt: skip
+    limits = drawn.robot.joint_limits()
+    wider = drawn.robot.with_limits(lower=limits.lower - 0.2, upper=limits.upper + 0.2)
+    return keep_limits(
+        replace(made, robot=wider), lambda one: build_program([one], zone_error=0.01)
+    )
+
+
+def test_nodes_are_held_where_more_is_needed_though_a_run_is_ahead_of_its_plan():
+    kept = kept_of("staubli_tx2_90xl", 1)
+    time, plan_time = kept.run.course.time, kept.plan.time - kept.plan.time[0]
+    # Chords are shorter than the path: by a tenth of an interval at its end.
+    assert plan_time[-1] - time[-1] > 0.1 * plan_time[1]
+    assert kept.done
+    assert kept.rounds <= 4
+
+
+def test_what_a_straight_stretch_takes_is_said_to_be_that():
+    kept = kept_of("abb_irb2400_155", 0)
+    assert not kept.done
+    assert "what the straight stretch between two zones takes" in kept.statement
 
 
 def test_plan_itself_says_which_call_does_it(circle, arm, tool, placement):

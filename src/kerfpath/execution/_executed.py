@@ -48,6 +48,8 @@ class Executed:
     course : ToolCourse
     time : (m,) s
         Where the joints were looked at, from the start of the run.
+    planned : (m,) s
+        When that was planned to be: chords are shorter than the path, so that a run is ahead.
     q : (m, n) rad
         NaN where the posture of the targets does not reach.
     T : (m, 4, 4) m
@@ -68,6 +70,7 @@ class Executed:
     section: str
     course: ToolCourse
     time: Array
+    planned: Array
     q: Array
     T: Array
     velocity_share: Array
@@ -190,11 +193,11 @@ def run_along(
     begin, long = borders[:-1][seen], long[seen]
     time = (begin[:, None] + long[:, None] * np.array(WHERE)).ravel()
     step = np.repeat(STEP * long, len(WHERE))
-    planned = np.array([move.q for move in moves])
+    targets = np.array([move.q for move in moves])
     wrist = controller.orientation == "wrist"
     joints = _by_wrist if wrist else _by_pose
     before, q, after = (
-        joints(robot, course, time + sign * step, planned, T_base_part, T_flange_tip)
+        joints(robot, course, time + sign * step, targets, T_base_part, T_flange_tip)
         for sign in (-1, 0, 1)
     )
     T = course.poses(time)
@@ -206,6 +209,7 @@ def run_along(
         section=section,
         course=course,
         time=time,
+        planned=np.interp(time, course.time, np.cumsum([0.0, *(m.duration for m in moves[1:])])),
         q=q,
         T=T,
         velocity_share=(after - before) / (2 * step[:, None]) / velocity,
@@ -236,21 +240,21 @@ def run_along(
 
 
 def _by_pose(
-    robot: Robot, course: ToolCourse, time: Array, planned: Array, T_base_part: Array,
+    robot: Robot, course: ToolCourse, time: Array, targets: Array, T_base_part: Array,
     T_flange_tip: Array,
 ) -> Array:  # fmt: skip
-    """Return the joints (m, n) at times (m,), next to those planned at the targets (K, n)."""
-    near = np.stack([np.interp(time, course.time, joint) for joint in planned.T], axis=1)
+    """Return the joints (m, n) at times (m,), next to those at the targets (K, n)."""
+    near = np.stack([np.interp(time, course.time, joint) for joint in targets.T], axis=1)
     return robot.nearest(T_base_part @ course.poses(time) @ np.linalg.inv(T_flange_tip), near)
 
 
 def _by_wrist(
-    robot: Robot, course: ToolCourse, time: Array, planned: Array, T_base_part: Array,
+    robot: Robot, course: ToolCourse, time: Array, targets: Array, T_base_part: Array,
     T_flange_tip: Array,
 ) -> Array:  # fmt: skip
     """Return the joints (m, n) at times (m,), the wrist going evenly from target to target."""
     require_wrist(robot)
-    near = course.blended(planned, time)
+    near = course.blended(targets, time)
     tip = T_base_part @ course.poses(time)
     return joints_with_wrist(robot, tip[:, :3, 3], near, T_flange_tip)
 

@@ -100,6 +100,9 @@ def keep_limits(
         if np.isinf(worst) or np.isinf(run.acceleration_bound):
             why = run.sampled or "nothing can be proved there for this arm"
             break
+        if worst > 1 >= max(run.peak_velocity.share, np.abs(_in_zones(run)).max()):
+            why = "that is what the straight stretch between two zones takes, whatever nodes do"
+            break
         aim -= CLOSER if worst <= 1 else 0.0
         kept = _held(made, run, kept, aim)
         refined = refine(made, kept=kept)
@@ -125,18 +128,29 @@ def _held(plan: Plan, run: Executed, kept: KeptShares, aim: float) -> KeptShares
     """
     settings, time = plan.settings, plan.time - plan.time[0]
     intervals, nodes = len(kept.velocity), len(kept.acceleration)
-    of_interval = np.clip(np.searchsorted(time, run.time) - 1, 0, intervals - 1)
+    of_interval = np.clip(np.searchsorted(time, run.planned) - 1, 0, intervals - 1)
     # The run ends where the plan does: of a closed contour at the node that it began with.
-    of_node = np.abs(run.time[:, None] - time[None]).argmin(axis=1) - 1
+    of_node = np.abs(run.planned[:, None] - time[None]).argmin(axis=1) - 1
     v, a = plan.velocity_share, np.zeros_like(kept.acceleration)
     a[: intervals - 1] = plan.acceleration_share  # the robot stops at a seam
     return KeptShares(
         _less(kept.velocity, v, run.velocity_share, of_interval, aim, settings.eta_v),
         _less(
-            kept.acceleration, a, run.acceleration_share, np.clip(of_node, 0, nodes - 1), aim,
+            kept.acceleration, a, _in_zones(run), np.clip(of_node, 0, nodes - 1), aim,
             settings.eta_a,
         ),
     )  # fmt: skip
+
+
+def _in_zones(run: Executed) -> Array:
+    """Return what is needed of acceleration limits (m, n) in zones; 0 on what is straight.
+
+    What a straight stretch needs does not depend on how its ends are turned into.
+    """
+    course = run.course
+    after = np.searchsorted(course.time, run.time).clip(1, len(course.time) - 1)
+    zone = [np.abs(run.time - course.time[k]) < course.half[k] for k in (after - 1, after)]
+    return np.asarray(np.where((zone[0] | zone[1])[:, None], run.acceleration_share, 0.0))
 
 
 def _less(kept: Array, own: Array, needed: Array, place: Ints, aim: float, eta: float) -> Array:
@@ -152,7 +166,8 @@ def _need(plan: Plan, run: Executed, why: str) -> str:
     velocity, acceleration = run.peak_velocity, run.peak_acceleration
     fast = velocity.share > 1
     peak, what = (velocity, "velocity") if fast else (acceleration, "acceleration")
-    s = np.interp(peak.time, plan.time - plan.time[0], plan.contour.s)
+    at = np.interp(peak.time, run.time, run.planned)
+    s = np.interp(at, plan.time - plan.time[0], plan.contour.s)
     said = (
         f"between the nodes joint {peak.joint + 1} needs {peak.share:.3g} of its {what} limit at "
         f"s = {s * 1000:.1f} mm, and {why}"
