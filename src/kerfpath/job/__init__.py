@@ -53,6 +53,7 @@ from kerfpath.job.programs import program_from_file as program_from_file
 from kerfpath.job.programs import program_language as program_language
 from kerfpath.job.programs import program_of as program_of
 from kerfpath.job.programs import touch_up as touch_up
+from kerfpath.job.run import ContourSpeed as ContourSpeed
 from kerfpath.job.run import CutResult as CutResult
 from kerfpath.job.run import JobPreview as JobPreview
 from kerfpath.job.run import JobResult as JobResult

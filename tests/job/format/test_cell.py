@@ -155,9 +155,10 @@ def test_a_blocked_contour_says_that_it_is_collision(folder):
 def test_the_fastest_speed_in_a_cell_is_clear_and_no_higher(folder):
     coarse = SMALL.replace("spacing_mm = 1", "spacing_mm = 3")
     free = coarse[: coarse.index("[cell]")] + NO_PROGRAM
-    ((_, _, alone),) = fastest_speeds(read_job(job(folder, free, "free.toml")))
-    ((_, _, there),) = fastest_speeds(read_job(job(folder, coarse, "coarse.toml")))
-    assert 0 < there.on_grid <= alone.on_grid
+    (alone,) = fastest_speeds(read_job(job(folder, free, "free.toml")))
+    (there,) = fastest_speeds(read_job(job(folder, coarse, "coarse.toml")))
+    assert 0 < there.at_nodes.on_grid <= alone.at_nodes.on_grid
+    assert 0 < alone.as_run <= alone.at_nodes.speed
 
 
 @pytest.mark.parametrize("key", ['feed = "dip"', 'interruptions = "fewest"'])

@@ -2,17 +2,42 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+from kerfpath._repr import short_repr
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import ContourSpec, Job, cell_of_job
+from kerfpath.job.run._speed_as_run import speed_as_run
 from kerfpath.planner import FastestSpeed, fastest_speed
 from kerfpath.progress import Progress, no_progress
 
-__all__ = ["fastest_along", "fastest_speeds", "leaves_grid"]
+__all__ = ["ContourSpeed", "fastest_along", "fastest_speeds", "leaves_grid"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContourSpeed:
+    """How fast a contour can be cut.
+
+    Parameters
+    ----------
+    task : ContourSpec
+    nodes : Contour
+    at_nodes : FastestSpeed or NoFeasiblePath
+        The fastest constant speed at which the limits hold at the nodes; or why there is none.
+    as_run : float m/s, optional
+        One at which they hold between the nodes, too, see `speed_as_run`; None where the job does
+        not keep them there, or where none was found.
+    """
+
+    task: ContourSpec
+    nodes: Contour
+    at_nodes: FastestSpeed | NoFeasiblePath
+    as_run: float | None = None
+
+    __repr__ = short_repr
 
 
 def fastest_along(
@@ -48,10 +73,8 @@ def leaves_grid(job: Job) -> bool:
     return job.options.refine or job.options.method == "continuous"
 
 
-def fastest_speeds(
-    job: Job, *, progress: Progress = no_progress
-) -> list[tuple[ContourSpec, Contour, FastestSpeed | NoFeasiblePath]]:
-    """Return, for each contour of a job, its task, its nodes and the fastest constant speed.
+def fastest_speeds(job: Job, *, progress: Progress = no_progress) -> list[ContourSpeed]:
+    """Return the fastest constant speed of each contour of a job, at its nodes and as run.
 
     The speeds that the job asks for, and shares of them, play no part, nor does what comfort costs.
 
@@ -62,7 +85,7 @@ def fastest_speeds(
     """
     part = job.read_part()
     cell = cell_of_job(job, part)
-    answers: list[tuple[ContourSpec, Contour, FastestSpeed | NoFeasiblePath]] = []
+    answers = []
     tasks = job.tasks(part)
     for i, task in enumerate(tasks):
         progress("contours", i, len(tasks))
@@ -70,7 +93,11 @@ def fastest_speeds(
         nodes, own = task.evenly_fast(part), replace(job, options=task.asked(job.options))
         try:
             found = fastest_along(own, nodes, cell, refine=leaves_grid(job), ceiling=True)
-            answers.append((task, nodes, found))
         except NoFeasiblePath as broken:
-            answers.append((task, nodes, broken))
+            answers.append(ContourSpeed(task=task, nodes=nodes, at_nodes=broken))
+            continue
+        progress(f"{task.name}: between the nodes", 0, 0)
+        free = replace(own, options=own.options.without_penalties)
+        as_run = speed_as_run(free, nodes, cell, found.speed)
+        answers.append(ContourSpeed(task=task, nodes=nodes, at_nodes=found, as_run=as_run))
     return answers

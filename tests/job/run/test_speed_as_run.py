@@ -1,0 +1,48 @@
+"""A speed at which the program keeps the limits, too: a job that asks for it is guaranteed."""
+
+import re
+
+import pytest
+
+from jobs import DEMO, SMALL
+from kerfpath.job import fastest_speeds, read_job, run_job
+
+GUARANTEED = re.sub(
+    "eta_acceleration = .*",
+    "eta_acceleration = 1",
+    SMALL.replace("[plan]", '[plan]\ncertify = false\nbetween_nodes = "guaranteed"'),
+).replace("spacing_mm = 1 ", "spacing_mm = 4 ")
+"""Every share of the limits is used at the nodes, which are far apart."""
+
+
+def read(folder, text):
+    (folder / "b_pillar.step").write_bytes((DEMO / "b_pillar.step").read_bytes())
+    (folder / "job.toml").write_text(text)
+    return read_job(folder / "job.toml")
+
+
+def at(speeds):
+    """The job at a speed, m/s, for each of its two contours."""
+    parts = re.split(r"speed_m_min = [\d.]+", GUARANTEED)
+    assert len(parts) == 3
+    first, second = (f"speed_m_min = {speed * 60!r}" for speed in speeds)
+    return first.join(parts[:2]) + second + parts[2]
+
+
+def test_at_the_speed_as_run_the_job_is_guaranteed_at_that_of_the_nodes_not(tmp_path):
+    found = fastest_speeds(read(tmp_path, GUARANTEED))
+    speeds = [each.as_run for each in found]
+    fastest = [each.at_nodes.speed for each in found]
+    assert all(0.5 * most < speed <= most for speed, most in zip(speeds, fastest, strict=True))
+    assert any(speed < most for speed, most in zip(speeds, fastest, strict=True))
+    assert run_job(read(tmp_path, at(speeds))).passed
+    assert not run_job(read(tmp_path, at([0.9999 * most for most in fastest]))).passed
+
+
+@pytest.mark.parametrize("without", ['between_nodes = "guaranteed"', 'language = "rapid"'])
+def test_where_nothing_is_kept_there_is_no_such_speed(tmp_path, without):
+    instead = {"b": 'between_nodes = "reported"', "l": 'language = "none"'}[without[0]]
+    text = GUARANTEED.replace(without, instead)
+    text = text.replace('between_nodes = "guaranteed"', 'between_nodes = "kept"')
+    assert text != GUARANTEED
+    assert [each.as_run for each in fastest_speeds(read(tmp_path, text))] == [None, None]
