@@ -13,6 +13,7 @@ import numpy as np
 from benchmarks._certified import in_processes
 from benchmarks._figures import Report, Sheet
 from benchmarks._random_contours import ROBOTS, cut
+from benchmarks._shipped import report_shipped
 from kerfpath import NoFeasiblePath, Plan, plan
 from kerfpath.execution import Executed, executed, keep_limits, timing_of
 from kerfpath.post import Program, Zone, build_program
@@ -97,6 +98,7 @@ def run(*, quick: bool) -> list[Report]:
         _report([peaks for each in made for peaks in each], len(keys)),
         _kept_report([one for each in kept for one in each], len(keys)),
         _timed_report([one for each in timed for one in each], len(keys)),
+        report_shipped(quick=quick),
     ]
 
 
