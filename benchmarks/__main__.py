@@ -37,6 +37,7 @@ NAMES = (
     "continuum_bounds",
     "continuum_infeasible",
     "execution",
+    "external",
     "certificate_audits",
     "studio",
     "studio-endurance",
@@ -95,6 +96,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import large_drawings
 
         return [large_drawings.run(quick=quick)]
+    if name == "external":
+        from benchmarks import external
+
+        return external.run(quick=quick)
     if name == "execution":
         from benchmarks import execution
 
