@@ -6,8 +6,8 @@ from time import perf_counter
 
 import numpy as np
 
-from benchmarks._figures import Report, Sheet, peak_megabytes
-from kerfpath import Contour, NoFeasiblePath, fastest_speed, plan, robot
+from benchmarks._figures import Report, Sheet
+from kerfpath import Contour, NoFeasiblePath, PlanOptions, fastest_speed, plan, robot
 from kerfpath._arrays import Array
 from kerfpath.robots import Robot
 
@@ -17,8 +17,8 @@ POINT = np.array([1.3, 0.0, 0.6])
 """m: a point of the chuck's axis, in the robot base."""
 SPEED = 0.1
 """m/s, of the tube."""
-LIMITS = {"velocity": 3.0, "acceleration": 6.0}
-OPTIONS = {"gamma_step": np.radians(3), "certify": None}
+STEP = np.radians(3)
+"""Of gamma."""
 
 HOW = """\
 Tube: once around a tube of 80 mm radius that lies along y, a wave of 30 mm along it, 400 nodes, at
@@ -38,8 +38,8 @@ def run(*, quick: bool) -> list[Report]:
 
 def _tool() -> Array:
     T = np.eye(4)
-    T[:3, :3] = [[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]]
-    T[:3, 3] = 0.15, 0, 0.30
+    T[:3, :3] = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
+    T[:3, 3] = 0.15, 0.0, 0.30
     return T
 
 
@@ -60,8 +60,10 @@ def _ring(count: int) -> Contour:
 
 
 def _chucked(arm: Robot) -> Robot:
-    travel = {"lower": -np.pi, "upper": np.pi, "endless": True, **LIMITS}
-    return arm.with_positioner([0, 1, 0], POINT, name="chuck", **travel)  # type: ignore[arg-type]
+    return arm.with_positioner(
+        [0, 1, 0], POINT, name="chuck", lower=-np.pi, upper=np.pi, endless=True,
+        velocity=3.0, acceleration=6.0,
+    )  # fmt: skip
 
 
 def _railed(arm: Robot) -> Robot:
@@ -81,15 +83,16 @@ def _tube(*, quick: bool) -> Sheet:
     ):
         cost, seconds = _planned(contour, each, external)
         rows.append((name, cost, seconds, *_fastest(contour, each, external)))
-    rows.append(("peak memory", f"{peak_megabytes():.0f} MB", "", "", ""))
     return Sheet(columns=("tube", "cost", "plan, s", "fastest, m/s", "seconds"), rows=rows)
 
 
 def _planned(contour: Contour, each: Robot, external: Array | None) -> tuple[str, str]:
-    space = {"tool": _tool(), "placement": _placement(), "speed": SPEED, **OPTIONS}
     begin = perf_counter()
     try:
-        made = plan(contour, each, external=external, **space)  # type: ignore[arg-type]
+        made = plan(
+            contour, each, tool=_tool(), placement=_placement(), speed=SPEED, external=external,
+            gamma_step=STEP, certify=None,
+        )  # fmt: skip
         cost = f"{made.cost:.4g}"
     except NoFeasiblePath:
         cost = "none"
@@ -97,10 +100,12 @@ def _planned(contour: Contour, each: Robot, external: Array | None) -> tuple[str
 
 
 def _fastest(contour: Contour, each: Robot, external: Array | None) -> tuple[str, str]:
-    space = {"tool": _tool(), "placement": _placement(), "gamma_step": OPTIONS["gamma_step"]}
     begin = perf_counter()
     try:
-        speed = f"{fastest_speed(contour, each, external=external, **space).speed:.3f}"  # type: ignore[arg-type]
+        found = fastest_speed(
+            contour, each, tool=_tool(), placement=_placement(), external=external, gamma_step=STEP
+        )
+        speed = f"{found.speed:.3f}"
     except NoFeasiblePath:
         speed = "none"
     return speed, f"{perf_counter() - begin:.1f}"
@@ -112,18 +117,8 @@ def _random(*, quick: bool) -> Sheet:
         ratios, missed, extra, none = [], 0, 0, 0
         for seed in range(3 if quick else 40):
             contour, each = _case(case, seed)
-            space = {"tool": _tool(), "placement": _placement(), "speed": 0.2}
-            costs = []
-            for method, step in (("exact", 10), ("continuous", 3)):
-                try:
-                    made = plan(
-                        contour, each, method=method, gamma_step=np.radians(step),
-                        certify=None, **space,
-                    )  # type: ignore[arg-type, misc]  # fmt: skip
-                    costs.append(made.cost)
-                except NoFeasiblePath:
-                    costs.append(np.nan)
-            dense, found = costs
+            dense = _cost(contour, each, PlanOptions(method="exact", gamma_step=np.radians(10)))
+            found = _cost(contour, each, PlanOptions(gamma_step=STEP, certify=None))
             missed += np.isnan(found) and not np.isnan(dense)
             extra += np.isnan(dense) and not np.isnan(found)
             none += np.isnan(dense) and np.isnan(found)
@@ -139,6 +134,15 @@ def _random(*, quick: bool) -> Sheet:
     return Sheet(columns=columns, rows=rows)
 
 
+def _cost(contour: Contour, each: Robot, options: PlanOptions) -> float:
+    """Return the cost of a plan, NaN where there is none."""
+    try:
+        made = plan(contour, each, tool=_tool(), placement=_placement(), speed=0.2, options=options)
+    except NoFeasiblePath:
+        return np.nan
+    return made.cost
+
+
 def _case(case: str, seed: int) -> tuple[Contour, Robot]:
     rng = np.random.default_rng(seed)
     y, wave = np.linspace(-0.3, 0.3, 9), rng.uniform(0.02, 0.15)
@@ -148,9 +152,11 @@ def _case(case: str, seed: int) -> tuple[Contour, Robot]:
     each = _arm()
     if case != "table":
         low = float(rng.uniform(-0.6, 0.0))
-        rail = {"lower": low, "upper": low + 0.8, "velocity": 1.0, "acceleration": 2.0}
-        each = each.on_rail([0, 1, 0], step=0.05, **rail)  # type: ignore[arg-type]
+        each = each.on_rail(
+            [0, 1, 0], lower=low, upper=low + 0.8, velocity=1.0, acceleration=2.0, step=0.05
+        )
     if case != "rail":
-        table = {"lower": -0.4, "upper": 0.4, "velocity": 1.0, "acceleration": 2.0}
-        each = each.with_positioner([0, 0, 1], POINT, step=0.1, **table)  # type: ignore[arg-type]
+        each = each.with_positioner(
+            [0, 0, 1], POINT, lower=-0.4, upper=0.4, velocity=1.0, acceleration=2.0, step=0.1
+        )
     return Contour(points, axes, name=f"{case} {seed}"), each

@@ -2,8 +2,8 @@
 
     python examples/model_drawings.py [FOLDER]
 
-Writes bracket.step, tube.step, beam.step and blank.dxf beside their jobs in examples/parts; all lengths are in
-mm, as in the files.
+Writes bracket.step, tube.step, beam.step and blank.dxf beside their jobs in examples/parts; all
+lengths are in mm, as in the files.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def tube() -> TopoDS_Shape:
 
 
 def beam() -> TopoDS_Shape:
-    """Return a channel 4 m long, its web up: a slot along it, and a hole beyond each end of that."""
+    """Return a channel 4 m long, its web up: a slot along it, a hole beyond each end of that."""
     length, width, height, wall = 4000.0, 120.0, 60.0, 3.0
     shape = BRepPrimAPI_MakeBox(length, width, height).Shape()
     hollow = BRepPrimAPI_MakeBox(

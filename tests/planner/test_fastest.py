@@ -134,7 +134,7 @@ def test_with_an_external_axis_motions_grow_quicker_too(kind, arm, tool, placeme
         robot = arm.with_positioner([0, 0, 1], [1.2, 0, 0], **limits)
     posed = task(drawn(0, nodes=11), robot, tool, placement)
     found = list(quick_motions(posed, ClearSearch(posed, None)))
-    # What the fastest path on the grid is quickened to, its axis off the grid, too, may be the last.
+    # What the fastest path on the grid is quickened to, its axis with it, may be the last.
     assert found[-1].dt <= found[1].dt < found[0].dt
     for motion in found[1:]:
         assert np.abs(motion.plan.velocity_share).max() <= 1

@@ -14,7 +14,7 @@ from kerfpath.cad import read
 PARTS = ROOT / "examples" / "parts"
 
 
-@pytest.mark.parametrize("name", ["bracket.step", "tube.step", "blank.dxf"])
+@pytest.mark.parametrize("name", ["bracket.step", "tube.step", "beam.step", "blank.dxf"])
 def test_the_shipped_drawings_are_what_the_script_models(examples, tmp_path, name):
     shape = getattr(examples, name.removesuffix(".step"), None)
     if shape is None:
@@ -34,6 +34,8 @@ JOBS = [
     ("bracket", 3, 4, 4, {"trim"}),
     ("tube", 10, 15, 10, set()),
     ("blank", 5, 15, 7, {"trim"}),
+    ("turned_tube", 3, 6, 9, set()),
+    ("beam", 3, 6, 3, set()),
 ]
 
 
@@ -42,7 +44,7 @@ JOBS = [
 def test_an_example_part_is_planned_audited_and_written(
     tmp_path, name, step, coarser, contours, last
 ):
-    for file in PARTS.glob(f"{name}.*"):
+    for file in (PARTS / f"{name}.toml", *PARTS.glob("*.step"), *PARTS.glob("*.dxf")):
         shutil.copy(file, tmp_path)
     job = tmp_path / f"{name}.toml"
     text = job.read_text()
