@@ -17,7 +17,15 @@ from kerfpath._arrays import Array, Ints, floats, freeze, positive, scalar
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
-__all__ = ["AccelerationLimit", "Limits", "RateLimit", "VelocityLimit", "meetings", "rates_of"]
+__all__ = [
+    "AccelerationLimit",
+    "JerkLimit",
+    "Limits",
+    "RateLimit",
+    "VelocityLimit",
+    "meetings",
+    "rates_of",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,6 +87,15 @@ class AccelerationLimit(RateLimit):
     quantity = "acceleration"
     eta = "eta_a"
     order = 2
+
+
+class JerkLimit(RateLimit):
+    """Bound on the jerk of each joint: on the change of the change of its increment."""
+
+    __slots__ = ()
+    quantity = "jerk"
+    eta = "eta_j"
+    order = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

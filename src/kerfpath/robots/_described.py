@@ -96,9 +96,11 @@ def build_robot(
     upper: ArrayLike | None = None,
     velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
+    jerk: ArrayLike | None = None,
+    torque: ArrayLike | None = None,
     endless: ArrayLike | None = None,
 ) -> A:
-    """Return the robot of a description; limits given (rad, s) come before those written.
+    """Return the robot of a description; limits given (rad, s, N m) come before those written.
 
     Raises
     ------
@@ -133,9 +135,13 @@ def build_robot(
         velocity=_velocity(description) if velocity is None else np.asarray(velocity),
         acceleration=None if acceleration is None else np.asarray(acceleration),
         acceleration_source="" if acceleration is None else source,
+        jerk=_jerk(description) if jerk is None else np.asarray(jerk),
+        torque=_torque(description) if torque is None else np.asarray(torque),
         endless=continuous if endless is None else np.asarray(endless),
         chain=description.chain,
         bodies=description.bodies,
+        inertia=description.inertia,
+        inertia_missing=description.inertia_missing,
         frames={"base": description.base, "tip": description.tip},
         sources={"geometry_limits_velocity": f"URDF {Path(description.path).name}"},
     )
@@ -174,13 +180,32 @@ def _ranges(
 def _acceleration(description: Description) -> Array | None:
     """Return the accelerations (n,) that are written, as URDF 1.2 can; None unless all are."""
     found = [joint.acceleration for joint in description.joints]
-    for joint in description.joints:
-        if joint.acceleration is not None and joint.acceleration <= 0:
-            what = (
-                f"has the acceleration limit {joint.acceleration:g} rad/s^2, so that it cannot move"
-            )
-            raise _lacks(description, joint.name, what, "acceleration=")
+    _require_positive(description, found, "acceleration", "rad/s^2")
     return None if None in found else np.array(found, dtype=float)
+
+
+def _jerk(description: Description) -> Array | None:
+    """Return the jerks (n,) that are written, as URDF 1.2 can, infinity for other joints."""
+    found = [joint.jerk for joint in description.joints]
+    _require_positive(description, found, "jerk", "rad/s^3")
+    written = np.array([np.inf if jerk is None else jerk for jerk in found])
+    return written if np.isfinite(written).any() else None
+
+
+def _torque(description: Description) -> Array | None:
+    """Return the efforts (n,) that are written; None unless all are."""
+    found = [joint.effort for joint in description.joints]
+    return None if None in found else np.array(found, dtype=float)
+
+
+def _require_positive(
+    description: Description, found: list[float | None], name: str, unit: str
+) -> None:
+    """Raise InputError where a limit of a kind that is written lets a joint not move."""
+    for joint, value in zip(description.joints, found, strict=True):
+        if value is not None and value <= 0:
+            what = f"has the {name} limit {value:g} {unit}, so that it cannot move"
+            raise _lacks(description, joint.name, what, f"{name}=")
 
 
 def _velocity(description: Description) -> Array:

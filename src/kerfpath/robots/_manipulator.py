@@ -13,6 +13,7 @@ from kerfpath.errors import InputError
 from kerfpath.kernels import turns
 from kerfpath.kernels.enclosure import Curves
 from kerfpath.losses import Loss, Reason
+from kerfpath.robots._burden import Burden
 from kerfpath.robots._coupling import AXIS_3, Coupling
 from kerfpath.robots._enclosure import Enclosure, ball_frames, require_cells
 from kerfpath.robots._external import ExternalAxis, base_in_part, require_distinct_axes
@@ -24,7 +25,7 @@ __all__ = ["Manipulator"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Manipulator:
+class Manipulator(Burden):
     """A manipulator as `Robot` describes it, without the ways to read or change one."""
 
     id: str
@@ -89,6 +90,7 @@ class Manipulator:
         for name in ("velocity", "acceleration"):
             if getattr(self, name) is not None:
                 _set(self, name, positive(getattr(self, name), name, (n,)))
+        self.cast_burden(arm)
         self._require_order()
 
     @property

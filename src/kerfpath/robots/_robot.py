@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats
+from kerfpath.dynamics import STANDARD_GRAVITY, ArmDynamics, Load, TorqueLimit
 from kerfpath.errors import InputError
 from kerfpath.robots._described import build_robot, read_description
 from kerfpath.robots._external import ExternalAxis, Travel, base_in_part
@@ -49,6 +50,10 @@ class Robot(Manipulator):
         Largest joint speeds.
     acceleration : (n,) rad/s^2 or None
         Largest joint accelerations; most makers publish none.
+    jerk : (arm joints,) rad/s^3 or None
+        Largest joint jerks.
+    torque : (arm joints,) N m or None
+        Largest joint torques.
     endless : (n,) bool
         Joints that turn without end; their limits do not apply.
     couplings : tuple of Coupling
@@ -60,6 +65,14 @@ class Robot(Manipulator):
         The joint frames of the description that the robot comes from: the audit's kinematics.
     bodies : tuple of Body
         Collision bodies of that description.
+    inertia : ChainInertia, optional
+        What the joints of that description carry, and
+    inertia_missing : str
+        why it is not known.
+    load : Load, optional
+        What the flange carries; with it torques are known, see `with_load`.
+    gravity : (3,) m/s^2
+        In the robot base; default: that of a robot that stands upright.
     externals : tuple of ExternalAxis
         Rails and positioners: joints more, the last of q and of the limits. See `on_rail`.
 
@@ -96,9 +109,9 @@ class Robot(Manipulator):
         manufacturer, axis_3, axis_3_limits : str, str, (2,) rad
             Whose controller moves it; what its axis 3 measures and, if "horizontal", its limits as
             shown there; default: as a robot of the library with the same lengths has it.
-        **limits : (n,) rad, rad/s, rad/s^2
-            lower, upper, velocity, acceleration, endless: instead of what is written there. No
-            description states accelerations. Continuous joints are endless.
+        **limits : (n,) rad, rad/s, rad/s^2, rad/s^3, N m
+            lower, upper, velocity, acceleration, jerk, torque, endless: instead of what is written
+            there; few descriptions state accelerations and jerks. Continuous joints are endless.
 
         Raises
         ------
@@ -122,20 +135,65 @@ class Robot(Manipulator):
         upper: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
+        jerk: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
         endless: ArrayLike | None = None,
     ) -> Robot:
-        """Return this robot with some of its limits replaced (rad, rad/s, rad/s^2)."""
+        """Return this robot with some of its limits replaced (rad, s, N m)."""
         given = {
             "lower": lower,
             "upper": upper,
             "velocity": velocity,
             "acceleration": acceleration,
+            "jerk": jerk,
+            "torque": torque,
             "endless": endless,
         }
         changes = {name: value for name, value in given.items() if value is not None}
         if acceleration is not None:
             changes["acceleration_source"] = "given by the user"
         return replace(self, **changes)  # type: ignore[arg-type]  # cast by __post_init__
+
+    def with_load(self, load: Load, *, gravity: ArrayLike = STANDARD_GRAVITY) -> Robot:
+        """Return this robot with a load on its flange, so that its torques are known.
+
+        Parameters
+        ----------
+        load : Load
+        gravity : (3,) m/s^2
+            In the robot base.
+
+        Raises
+        ------
+        InputError
+            What the links weigh or what torques the joints bear is not known, see `torque_limit`.
+        """
+        loaded = replace(self, load=load, gravity=gravity)  # type: ignore[arg-type]  # is cast
+        loaded.torque_limit()
+        return loaded
+
+    def torque_limit(self) -> TorqueLimit | None:
+        """Return what limits the torques; None where no load is given.
+
+        Raises
+        ------
+        InputError
+            A load is given, but no robot description with a positive definite inertia of every
+            link, or no torque limits; or there is an external axis.
+        """
+        if self.load is None:
+            return None
+        why = self.inertia_missing or "only a description (URDF) says what its links weigh"
+        if self.externals:
+            names = " and ".join(axis.name for axis in self.externals)
+            why = f"what {names} does to them is not known"
+        if self.chain is None or self.inertia is None or self.externals:
+            raise InputError(f"robot {self.id!r}: its torques are not known: {why}")
+        if self.torque is None:
+            raise self._lacks("joint torques", "torque=")
+        inertia = self.load.on(self.inertia, self.chain.end)
+        dynamics = ArmDynamics(chain=self.chain, inertia=inertia, gravity=self.gravity)
+        return TorqueLimit(bound=self.torque, dynamics=dynamics)
 
     def on_rail(self, direction: ArrayLike, **travel: Unpack[Travel]) -> Robot:
         """Return this robot with its base on a rail along `direction` (3,).
@@ -229,7 +287,10 @@ class Robot(Manipulator):
             chain = replace(chain, origins=origins)
         # A family without lengths has the chain for its model: that has been moved already.
         foot = T @ self.T_base_foot if self.family.lengths else self.T_base_foot
-        return replace(self.alone(), T_base_foot=foot, chain=chain)
+        # Seen from the part; what carries the robot turns the arm in gravity as it does.
+        part = np.array([axis.carries == "part" for axis in self.externals])
+        gravity = base_in_part(self.externals, np.where(part, at, 0.0))[:3, :3] @ self.gravity
+        return replace(self.alone(), T_base_foot=foot, chain=chain, gravity=gravity)
 
 
 def robot(name: str, *, acceleration_ratio: str | None = None) -> Robot:

@@ -1,4 +1,4 @@
-"""Robot descriptions (URDF): the chain of joints from base to tip, its limits and its bodies.
+"""Robot descriptions (URDF): the chain of joints from base to tip, its limits, bodies and masses.
 
 Knows nothing of kinematic families: `kerfpath.Robot.from_urdf` recognises those, and therefore
 this package lies below `robots` and imports nothing of it.
@@ -9,3 +9,6 @@ from kerfpath.urdf._chain import KinematicChain as KinematicChain
 from kerfpath.urdf._chain import turns as turns
 from kerfpath.urdf._description import Description as Description
 from kerfpath.urdf._description import read_urdf as read_urdf
+from kerfpath.urdf._inertia import ChainInertia as ChainInertia
+from kerfpath.urdf._inertia import joined as joined
+from kerfpath.urdf._inertia import require_tensor as require_tensor

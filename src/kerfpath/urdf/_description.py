@@ -13,6 +13,7 @@ from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.urdf._bodies import LinkBody, bodies_of
 from kerfpath.urdf._chain import KinematicChain
+from kerfpath.urdf._inertia import ChainInertia, inertia_of
 from kerfpath.urdf._xml import Joint, Tree, read_tree
 
 __all__ = ["Description", "read_urdf"]
@@ -41,6 +42,10 @@ class Description:
     left_out : tuple of str
         Links on moving joints outside the chain: where they are is not known, and no body of
         theirs is in `bodies`.
+    inertia : ChainInertia or None
+        What the joints carry; None where it is not known.
+    inertia_missing : str
+        Why it is not known.
     """
 
     path: Path
@@ -51,6 +56,8 @@ class Description:
     chain: KinematicChain
     bodies: tuple[LinkBody, ...]
     left_out: tuple[str, ...]
+    inertia: ChainInertia | None = None
+    inertia_missing: str = ""
 
     __repr__ = short_repr
 
@@ -111,6 +118,7 @@ def read_urdf(
         if meshes
         else []
     )
+    inertia, inertia_missing = _inertia(tree, carried, moving)
     return Description(
         path=tree.path,
         name=tree.name,
@@ -120,7 +128,19 @@ def read_urdf(
         chain=chain,
         bodies=tuple(bodies),
         left_out=tuple(link for link in tree.links if link not in carried),
+        inertia=inertia,
+        inertia_missing=inertia_missing,
     )
+
+
+def _inertia(
+    tree: Tree, carried: dict[str, tuple[int, Array]], joints: list[Joint]
+) -> tuple[ChainInertia | None, str]:
+    """Return what the joints carry, or why that is not known: only torques need it."""
+    try:
+        return inertia_of(tree, carried, joints), ""
+    except InputError as fault:
+        return None, str(fault)
 
 
 def _ends(tree: Tree, base: str | None, tip: str | None) -> tuple[str, str]:

@@ -41,6 +41,9 @@ class Joint:
     velocity : float rad/s or None
     acceleration : float rad/s^2 or None
         The smaller of those for speeding up and for slowing down, as far as they are written.
+    jerk : float rad/s^3 or None
+    effort : float N m or None
+        None also where what is written is no limit: 0, or no number.
     mimics : str
         The joint that it follows, or nothing.
     """
@@ -55,6 +58,8 @@ class Joint:
     upper: float | None
     velocity: float | None
     acceleration: float | None
+    jerk: float | None
+    effort: float | None
     mimics: str
 
     __repr__ = short_repr
@@ -172,7 +177,7 @@ def _joint(element: ElementTree.Element, snap: float, path: Path) -> Joint:
         if not np.abs(axis).max() > NO_AXIS:
             raise InputError(f"{where}: its axis is nearly 0 0 0, which is no direction")
     limit, mimic = child(element, "limit", where), child(element, "mimic", where)
-    names = ("lower", "upper", "velocity", "acceleration", "deceleration")
+    names = ("lower", "upper", "velocity", "acceleration", "deceleration", "jerk")
     written: dict[str, float | None] = dict.fromkeys(names)
     if limit is not None:
         for key in written:
@@ -193,10 +198,20 @@ def _joint(element: ElementTree.Element, snap: float, path: Path) -> Joint:
         child=ends["child"],
         origin=pose_of(element, where, snap),
         axis=freeze(np.asarray(axis / np.linalg.norm(axis))),
+        effort=None if limit is None else _effort(limit.get("effort")),
         mimics="" if mimic is None else mimic.get("joint", "another"),
         acceleration=min((rate for rate in rates if rate is not None), default=None),
         **written,
     )
+
+
+def _effort(text: str | None) -> float | None:
+    """Return an effort limit, N m; None where it is none: many descriptions write 0 there."""
+    try:
+        effort = float(text or 0.0)
+    except ValueError:
+        return None
+    return effort if 0 < effort < np.inf else None
 
 
 def pose_of(element: ElementTree.Element, where: str, snap: float = 0.0) -> Array:

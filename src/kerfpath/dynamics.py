@@ -1,0 +1,200 @@
+"""What torques a motion asks of the joints of an arm, and what limits them.
+
+Rigid links on rigid joints: inertias as a robot description states them, a load on the flange, and
+gravity. Friction and the inertia of rotors and gears are in no description and are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath._arrays import Array, floats, freeze, not_negative, positive
+from kerfpath._repr import short_repr
+from kerfpath.errors import InputError
+from kerfpath.kernels.dynamics import ArmBodies, torques
+from kerfpath.limits import meetings, rates_of
+from kerfpath.urdf import ChainInertia, KinematicChain, joined, require_tensor
+
+__all__ = ["STANDARD_GRAVITY", "ArmDynamics", "Load", "TorqueLimit"]
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+"""m/s^2, in the base of a robot that stands on the floor."""
+TORQUE_SLACK = 1e-9
+"""Share of a torque limit: far below what any controller measures, far above rounding."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Load:
+    """What the flange carries: the tool and all that is fixed to it.
+
+    Parameters
+    ----------
+    mass : float kg
+        0 where there is nothing.
+    centre : (3,) m, optional
+        Centre of mass in the flange frame; needed of any mass but 0.
+    tensor : (3, 3) kg m^2, optional
+        Inertia about the centre of mass, along the axes of the flange frame; default: none, the
+        mass is in one point.
+
+    Raises
+    ------
+    InputError
+        A mass that is negative or without a centre, an inertia that is not positive definite.
+    """
+
+    mass: float
+    centre: Array | None = None
+    tensor: Array | None = None
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        _set = object.__setattr__
+        _set(self, "mass", not_negative(self.mass, "load mass", unit="kg"))
+        if self.centre is not None:
+            _set(self, "centre", floats(self.centre, "load centre", (3,)))
+        elif self.mass > 0:
+            raise InputError(
+                f"load centre: expected the centre of mass of {self.mass:g} kg in the flange frame "
+                "(3 numbers, m), got none"
+            )
+        if self.tensor is not None:
+            tensor = floats(self.tensor, "load tensor", (3, 3))
+            require_tensor(tensor, "load tensor")
+            _set(self, "tensor", tensor)
+
+    def on(self, inertia: ChainInertia, T_joint_flange: Array) -> ChainInertia:
+        """Return what the joints of an arm carry with this load; the pose is of the flange, m."""
+        if self.mass == 0:
+            return inertia
+        assert self.centre is not None
+        R, tensor = T_joint_flange[:3, :3], self.tensor
+        own = np.zeros((3, 3)) if tensor is None else R @ tensor @ R.T
+        last = inertia.mass[-1], inertia.centre[-1], inertia.tensor[-1]
+        load = self.mass, T_joint_flange[:3, 3] + R @ self.centre, own
+        mass, centre, tensor = joined([last, load])
+        return ChainInertia(
+            mass=np.append(inertia.mass[:-1], mass),
+            centre=np.vstack([inertia.centre[:-1], centre]),
+            tensor=np.concatenate([inertia.tensor[:-1], tensor[None]]),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ArmDynamics:
+    """An arm as rigid bodies under gravity.
+
+    Parameters
+    ----------
+    chain : KinematicChain
+        Its joints; the end is the flange.
+    inertia : ChainInertia
+        What each of them carries, the load included.
+    gravity : (3,) m/s^2
+        In the robot base.
+    """
+
+    chain: KinematicChain
+    inertia: ChainInertia
+    gravity: Array
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gravity", floats(self.gravity, "gravity", (3,)))
+        if len(self.inertia.mass) != len(self.chain.axes):
+            raise InputError(
+                f"inertia: expected {len(self.chain.axes)} bodies, one for each joint, got "
+                f"{len(self.inertia.mass)}"
+            )
+
+    @property
+    def bodies(self) -> ArmBodies:
+        """The arm as the kernels take it."""
+        return ArmBodies(
+            rotation=np.ascontiguousarray(self.chain.origins[:, :3, :3]),
+            position=np.ascontiguousarray(self.chain.origins[:, :3, 3]),
+            axis=self.chain.axes,
+            mass=self.inertia.mass,
+            centre=self.inertia.centre,
+            tensor=self.inertia.tensor,
+            gravity=self.gravity,
+        )
+
+    def torque(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
+        """Return the torques (B, n) N m that a motion asks of the joints.
+
+        Parameters
+        ----------
+        q, dq, ddq : (B, n) rad, rad/s, rad/s^2
+            Joints, their velocities and their accelerations.
+
+        Raises
+        ------
+        InputError
+            Arrays of another shape, NaN.
+        """
+        n = len(self.chain.axes)
+        rows = floats(q, "q", (None, n), copy=False)
+        shape = rows.shape
+        found = np.empty(shape)
+        torques(
+            self.bodies,
+            rows,
+            floats(dq, "dq", shape, copy=False),
+            floats(ddq, "ddq", shape, copy=False),
+            found,
+        )
+        return freeze(found)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TorqueLimit:
+    """Bound on the torque of each joint, and the arm that says what it is.
+
+    Held at the nodes, where (6) holds the acceleration: at node k between intervals of length
+    t_k and t_{k+1}, where the joints are q_k, the velocity is the mean of those of both intervals
+    and the acceleration their difference over (t_k + t_{k+1}) / 2. Of equal intervals these are the
+    central differences. At the two ends of an open path nothing is held, as by (6).
+
+    Parameters
+    ----------
+    bound : (n,) N m
+    dynamics : ArmDynamics
+
+    Raises
+    ------
+    InputError
+        A bound that is not positive, or of another number of joints.
+    """
+
+    bound: Array
+    dynamics: ArmDynamics
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        n = len(self.dynamics.chain.axes)
+        object.__setattr__(self, "bound", positive(self.bound, "torque", (n,)))
+
+    def shares(self, q: Array, tau: Array, *, periodic: bool = False) -> Array:
+        """Return the signed shares (M, n) of the bound that a motion asks for at its nodes.
+
+        Parameters
+        ----------
+        q : (K, n) rad
+            Joints, not wrapped.
+        tau : (K-1,) s
+            Time of each interval.
+        periodic : bool
+            Whether the last interval is followed by the first.
+        """
+        dq = np.diff(q, axis=0)
+        v, a = rates_of(dq, tau, periodic=periodic)
+        before, after = meetings(len(tau), periodic=periodic)
+        middle = (v[before] + v[after]) / 2
+        return freeze(self.dynamics.torque(q[after], middle, a) / self.bound)

@@ -1,0 +1,142 @@
+"""The masses of a description: what each joint of the chain carries, as one rigid body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfpath._arrays import Array, floats, freeze
+from kerfpath._repr import short_repr
+from kerfpath.errors import InputError
+from kerfpath.urdf._xml import Joint, Tree, child, numbers, pose_of
+
+__all__ = ["ChainInertia", "inertia_of", "joined", "require_tensor"]
+
+SOLID = ("visual", "collision")
+"""Elements that a link with a shape has; one without any is a frame, which has no mass."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ChainInertia:
+    """The rigid bodies of a chain, one on each joint, in the turned frame of that joint.
+
+    Parameters
+    ----------
+    mass : (n,) kg
+    centre : (n, 3) m
+        Centre of mass.
+    tensor : (n, 3, 3) kg m^2
+        Inertia about the centre of mass, along the axes of the joint frame.
+    """
+
+    mass: Array
+    centre: Array
+    tensor: Array
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        n = len(self.mass)
+        object.__setattr__(self, "mass", floats(self.mass, "mass", (n,)))
+        object.__setattr__(self, "centre", floats(self.centre, "centre", (n, 3)))
+        object.__setattr__(self, "tensor", floats(self.tensor, "tensor", (n, 3, 3)))
+
+
+def inertia_of(
+    tree: Tree, carried: Mapping[str, tuple[int, Array]], joints: list[Joint]
+) -> ChainInertia:
+    """Return the rigid bodies on the joints of the chain, links that are fixed together as one.
+
+    Parameters
+    ----------
+    tree : Tree
+    carried : mapping of str to (int, (4, 4))
+        Number of joints that move each link, and its pose in the frame of the last of them, m.
+    joints : list of Joint
+        The joints of the chain.
+
+    Raises
+    ------
+    InputError
+        A moving link with a shape and no <inertial>, with a mass that is not positive or an inertia
+        that is not positive definite; a joint that carries no mass; a link that hangs on the chain
+        by a joint outside it. The message names the link.
+    """
+    found: list[list[tuple[float, Array, Array]]] = [[] for _ in joints]
+    for link, (number, T) in carried.items():
+        body = _body(tree, link) if number else None
+        if body is not None:
+            mass, centre, tensor = body
+            R = T[:3, :3]
+            found[number - 1].append((mass, T[:3, 3] + R @ centre, R @ tensor @ R.T))
+    for link in _hanging(tree, carried):
+        raise InputError(
+            f"{tree.path}: link {link!r} hangs on the chain by a joint outside it, so that where "
+            f"its mass is is not known; make joint {tree.parent[link].name!r} fixed"
+        )
+    for joint, bodies in zip(joints, found, strict=True):
+        if not bodies:
+            raise InputError(
+                f"{tree.path}: link {joint.child!r} has no <inertial>, nor has any link fixed to it"
+            )
+    whole = [joined(bodies) for bodies in found]
+    return ChainInertia(
+        mass=np.array([mass for mass, _, _ in whole]),
+        centre=np.array([centre for _, centre, _ in whole]),
+        tensor=np.array([tensor for _, _, tensor in whole]),
+    )
+
+
+def joined(bodies: list[tuple[float, Array, Array]]) -> tuple[float, Array, Array]:
+    """Return mass (kg), centre (3,) m and tensor (3, 3) kg m^2 of bodies, given so, as one."""
+    mass = sum(mass for mass, _, _ in bodies)
+    centre = sum((mass * centre for mass, centre, _ in bodies), np.zeros(3)) / mass
+    tensor = np.zeros((3, 3))
+    for m, c, own in bodies:
+        off = c - centre  # Huygens and Steiner: of the mass at its own centre
+        tensor += own + m * (off @ off * np.eye(3) - np.outer(off, off))
+    return mass, freeze(centre), freeze(tensor)
+
+
+def require_tensor(tensor: Array, where: str) -> None:
+    """Raise InputError unless an inertia (3, 3) kg m^2 is symmetric and positive definite."""
+    if not (np.array_equal(tensor, tensor.T) and (np.linalg.eigvalsh(tensor) > 0).all()):
+        least = np.linalg.eigvalsh((tensor + tensor.T) / 2)[0]
+        raise InputError(
+            f"{where}: its inertia is not positive definite (least principal moment "
+            f"{least:.3g} kg m^2)"
+        )
+
+
+def _body(tree: Tree, link: str) -> tuple[float, Array, Array] | None:
+    """Return mass, centre and tensor of a link in its own frame; None for a frame without any."""
+    element, where = tree.links[link], f"{tree.path}: link {link!r}"
+    inertial = child(element, "inertial", where)
+    if inertial is None:
+        if any(element.find(tag) is not None for tag in SOLID):
+            raise InputError(f"{where} has a shape and no <inertial>")
+        return None
+    parts = [child(inertial, tag, where) for tag in ("mass", "inertia")]
+    if parts[0] is None or parts[1] is None or parts[0].get("value") is None:
+        raise InputError(f"{where}: its <inertial> lacks <mass value=...> or <inertia>")
+    mass = float(numbers(parts[0], "value", where, (0.0,))[0])
+    if not mass > 0:
+        raise InputError(f"{where}: its mass is not positive, {mass:g} kg")
+    xx, xy, xz, yy, yz, zz = (
+        float(numbers(parts[1], f"i{key}", where, (0.0,))[0])
+        for key in ("xx", "xy", "xz", "yy", "yz", "zz")
+    )
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    require_tensor(tensor, where)
+    pose = pose_of(inertial, where)
+    R = pose[:3, :3]
+    return mass, pose[:3, 3], R @ tensor @ R.T
+
+
+def _hanging(tree: Tree, carried: Mapping[str, tuple[int, Array]]) -> Iterator[str]:
+    """Yield the links that moving joints outside the chain hang on links that it moves."""
+    for link, joint in tree.parent.items():
+        if link not in carried and joint.parent in carried and carried[joint.parent][0]:
+            yield link
