@@ -57,3 +57,19 @@ def arm_with_masses(tmp_path, name="abb_irb4600_60_205", seed=0, **limits):
         "acceleration": known.acceleration, "endless": known.endless,
     }  # fmt: skip
     return Robot.from_urdf(described_with_masses(tmp_path, name, seed), **{**given, **limits})
+
+
+def job_of_arm(folder, text, load="mass_kg = 25\ncentre_mm = [0, 0, 120]", robot_keys="", seed=0):
+    """Return a job's text with the demo's robot described, masses and all, and a load."""
+    described_with_masses(folder, "abb_irb4600_60_205", seed)
+    known = robot("abb_irb4600_60_205")
+    lines = [
+        'urdf = "arm.urdf"',
+        'manufacturer = "ABB"',
+        f"lower_deg = {np.degrees(known.lower).round(6).tolist()}",
+        f"upper_deg = {np.degrees(known.upper).round(6).tolist()}",
+        f"velocity_deg_s = {np.degrees(known.velocity).round(6).tolist()}",
+        robot_keys,
+    ]
+    text = text.replace('model = "abb_irb4600_60_205"', "\n".join(lines))
+    return text.replace("[tool]\n", f"[tool]\n{load}\n")

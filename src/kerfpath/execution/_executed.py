@@ -57,6 +57,9 @@ class Executed:
     velocity_share, acceleration_share : (m, n)
         Signed, of the full limit of each joint. Where one is above 1 in size, the robot cannot run
         at the programmed speed: a controller slows down.
+    torque_share : (m, n) or None
+        As those, of rigid links at the samples; None where the robot has no load, see
+        `Robot.with_load`.
     velocity_bound, acceleration_bound : float
         No joint uses more of a limit at any instant: proved, without a sample, and at most 2 % more
         than what was seen, as far as a limit allows. Infinite where nothing is proved: next to a
@@ -75,6 +78,7 @@ class Executed:
     T: Array
     velocity_share: Array
     acceleration_share: Array
+    torque_share: Array | None = None
     velocity_bound: float
     acceleration_bound: float
     sampled: str = ""
@@ -93,8 +97,13 @@ class Executed:
         return self._peak(self.acceleration_share)
 
     @property
+    def peak_torque(self) -> Peak | None:
+        """The largest share of a torque limit at the samples; nothing is proved between them."""
+        return None if self.torque_share is None else self._peak(self.torque_share)
+
+    @property
     def most(self) -> float:
-        """The largest share of a limit of either kind."""
+        """The largest share of a limit of velocity or acceleration."""
         return max(self.peak_velocity.share, self.peak_acceleration.share)
 
     @property
@@ -116,7 +125,8 @@ def executed(program: Program, *, controller: Controller = PLAIN) -> tuple[Execu
     The motion is that of `ToolCourse`, at the programmed speeds throughout: neither speeding up
     from the stop nor slowing down for a limit is modelled. The joints follow it exactly. Their
     velocities and accelerations are looked at three times in each stretch that is smooth; bounds
-    that hold everywhere come with them, see `kerfpath.auditor.rates_along`.
+    that hold everywhere come with them, see `kerfpath.auditor.rates_along`. Torques are those at
+    the samples.
 
     Parameters
     ----------
@@ -205,6 +215,7 @@ def run_along(
         reached = ~np.isnan(q).any(axis=1)
         T[reached] = np.linalg.inv(T_base_part) @ robot.forward(q[reached]) @ T_flange_tip
     velocity, acceleration = robot.speed_limits()
+    v, a = (after - before) / (2 * step[:, None]), (after - 2 * q + before) / step[:, None] ** 2
     run = Executed(
         section=section,
         course=course,
@@ -212,8 +223,9 @@ def run_along(
         planned=np.interp(time, course.time, np.cumsum([0.0, *(m.duration for m in moves[1:])])),
         q=q,
         T=T,
-        velocity_share=(after - before) / (2 * step[:, None]) / velocity,
-        acceleration_share=(after - 2 * q + before) / step[:, None] ** 2 / acceleration,
+        velocity_share=v / velocity,
+        acceleration_share=a / acceleration,
+        torque_share=_torque_share(robot, q, v, a),
         velocity_bound=np.inf,
         acceleration_bound=np.inf,
         sampled=_sampled(robot, controller),
@@ -266,6 +278,17 @@ def _sampled(robot: Robot, controller: Controller) -> str:
     if robot.kinematics not in ENCLOSED:
         return f"nothing is proved for arms of the family {robot.kinematics}"
     return ""
+
+
+def _torque_share(robot: Robot, q: Array, v: Array, a: Array) -> Array | None:
+    """Return the shares (m, n) of the torque limits, NaN out of reach; None without a load."""
+    limit = robot.torque_limit()
+    if limit is None:
+        return None
+    there = np.isfinite(q + v + a).all(axis=1)
+    shares = np.full(q.shape, np.nan)
+    shares[there] = limit.dynamics.torque(q[there], v[there], a[there]) / limit.bound
+    return shares
 
 
 def _enough(seen: float) -> float:

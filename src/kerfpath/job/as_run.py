@@ -60,7 +60,8 @@ class AsRun:
 def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsRun:
     """Return a plan as its program has it run; without checks where it does not run straight.
 
-    They hold at every instant where the arm is one whose rates can be bounded, else at samples.
+    Those of velocity and acceleration hold at every instant where the arm is one whose rates can be
+    bounded, else at samples, as those of torque do.
     Where a joint needs more than its full limit between the nodes a controller slows down: that is
     a warning, or an error where the job asks for a guarantee. `kept` is what came of keeping them.
     """
@@ -97,11 +98,27 @@ def run_judged(job: Job, run: Executed, plan: Plan, path: Contour, why: str = ""
         why = f'{why}; write zone_mm = "auto" in [program]'.removeprefix("; ")
     advice = [f"{row.advice}; {why}".removesuffix("; ") for row in shares]
     kept = [replace(r, level=level, advice=a) for r, a in zip(shares, advice, strict=True)]
-    rows = (*kept, *unproved, *_deviations(job, run, plan, path))
+    torque = [replace(row, level=level) for row in _torque(run, plan)]
+    rows = (*kept, *unproved, *torque, *_deviations(job, run, plan, path))
     if np.isnan(run.acceleration_share).any():
         return AsRun(checks=rows)
     timing = timing_of(run, job.robot)
     return AsRun(checks=(*rows, _speed(run, plan, timing)), timing=timing)
+
+
+def _torque(run: Executed, plan: Plan) -> Iterator[Check]:
+    """Yield the largest share of a torque limit, where the load is known."""
+    peak = run.peak_torque
+    if peak is not None:
+        yield Check(
+            code="torque-as-run",
+            title="joint torque share as run, sampled, without friction and rotors",
+            value=peak.share,
+            limit=1.0 + SLACK,
+            unit="share",
+            node=_node(run, plan, peak.time),
+            advice=f"joint {peak.joint + 1} needs it: go more slowly, or carry less",
+        )
 
 
 def _speed(run: Executed, plan: Plan, timing: Timing) -> Check:

@@ -209,8 +209,14 @@ def with_robot(job: Job, candidate: Robot) -> Job:
     Raises
     ------
     InputError
-        A posture that its family has not; a cell that asks for the links of a description.
+        A posture that its family has not; a cell that asks for the links of a description; a job
+        with a load.
     """
+    if job.robot.load is not None:
+        raise InputError(
+            "what its links weigh is not known: remove mass_kg, torque_nm and gravity_m_s2 to "
+            "compare robots without torque limits"
+        )
     words = job.source.get("plan", {}).get("posture")
     postures = None if words is None else postures_named(words, candidate.kinematics)
     if job.cell is not None and job.cell.links == "description":

@@ -17,6 +17,7 @@ from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour
+from kerfpath.dynamics import STANDARD_GRAVITY
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format._contour import ContourSpec, task_of
@@ -216,7 +217,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
     except ValidationError as error:
         raise refusal(path, text, error) from None
     described = file.cell is not None and file.cell.links != "capsules"
-    robot = file.robot.resolve(path.parent, bodies=described)
+    robot = _loaded(path, file, file.robot.resolve(path.parent, bodies=described))
     if file.plan.rotation_deg is not None and not robot.endless.any():
         raise refusal_at(
             path,
@@ -267,6 +268,31 @@ def home_of(sequence: SequenceTable | None, external: Sequence[ExternalTable]) -
     if sequence is None or sequence.home_deg is None:
         return None
     return freeze(np.append(np.radians(sequence.home_deg), [table.home for table in external]))
+
+
+def _loaded(path: Path, file: JobFile, robot: Robot) -> Robot:
+    """Return the robot with what its flange carries, where the job says; then torques are known."""
+    table, load = file.robot, file.tool.load()
+    asked = next((k for k in ("torque_nm", "gravity_m_s2") if getattr(table, k) is not None), None)
+    if load is None:
+        if asked is not None:
+            said = (
+                f"expected mass_kg and centre_mm of what the flange carries, as {asked} is given, "
+                "got none; add them, or mass_kg = 0 where it carries nothing"
+            )
+            raise refusal_at(path, ("tool", "mass_kg"), said)
+        return robot
+    try:
+        return robot.with_load(load, gravity=table.gravity_m_s2 or STANDARD_GRAVITY)
+    except InputError as error:
+        if robot.torque is None and robot.inertia is not None:
+            said = (
+                f"expected joint torques, as {table.urdf} does not state those of every joint, got "
+                f"none; add torque_nm = [{robot.joints} numbers, N m]"
+            )
+            raise refusal_at(path, ("robot", "torque_nm"), said) from None
+        said = f"{error}; give urdf with inertias in [robot], or remove mass_kg"
+        raise refusal_at(path, ("tool", "mass_kg"), said) from None
 
 
 def _comfort(file: JobFile, robot: Robot) -> Comfort | None:

@@ -21,6 +21,7 @@ from kerfpath.job.format._values import (
     Ratio,
     Signs,
     Text,
+    Three,
     existing,
     fault,
     fault_in_words,
@@ -135,6 +136,16 @@ class RobotTable(Table):
             "[320, 270, 420, 1300, 1400, 2000]",
         ),
     ] = None
+    torque_nm: Annotated[
+        JointsPositive | None,
+        key(
+            "numbers above 0, the largest joint torques in N m",
+            "[3000, 3000, 1500, 400, 400, 200]",
+        ),
+    ] = None
+    gravity_m_s2: Annotated[
+        Three | None, key("3 numbers, gravity in the robot base in m/s^2", "[0, 0, 9.81]")
+    ] = None
     acceleration_ratio: Annotated[
         Ratio | None, key("a ratio of acceleration to speed, by its name", '"iontec_20_to_70kg"')
     ] = None
@@ -232,7 +243,7 @@ class RobotTable(Table):
 
     def _require_for_each_joint(self, n: int) -> None:
         """Require as many numbers as the robot has joints, and no axis beyond them."""
-        for name in given(self, *LIMITS, "sign", "offset_deg"):
+        for name in given(self, *LIMITS, "torque_nm", "sign", "offset_deg"):
             if (got := len(getattr(self, name))) != n:
                 raise fault(f"{n} numbers, one for every joint", f"{got}", "give as many", (name,))
         axes = self.endless or ()
@@ -336,6 +347,7 @@ class RobotTable(Table):
             "upper": _radians(self.upper_deg),
             "velocity": _radians(self.velocity_deg_s),
             "acceleration": _radians(self.acceleration_deg_s2),
+            "torque": self.torque_nm,
             "endless": None if axes is None else np.isin(np.arange(1, n + 1), axes),
         }
 

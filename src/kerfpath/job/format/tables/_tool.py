@@ -1,21 +1,32 @@
-"""The [tool] table: the cutting head, or where its tip is."""
+"""The [tool] table: the cutting head, or where its tip is; and what the flange carries."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
 from pydantic import model_validator
 
 from kerfpath._arrays import Array
+from kerfpath.dynamics import Load
+from kerfpath.errors import InputError
 from kerfpath.job.format._poses import heads, pose
-from kerfpath.job.format._values import Head, Three, fault, key
+from kerfpath.job.format._values import (
+    Head,
+    NotNegative,
+    Number,
+    Three,
+    fault,
+    fault_in_words,
+    key,
+)
 from kerfpath.job.format.tables._table import Table, given
 
 __all__ = ["ToolTable"]
 
 
 class ToolTable(Table):
-    """[tool]: a shipped cutting head, or where the tip is in the flange."""
+    """[tool]: a shipped cutting head, or where the tip is in the flange; what that carries."""
 
     head: Annotated[Head | None, key("a cutting head, by its name", '"laser-head-straight"')] = None
     xyz_mm: Annotated[
@@ -23,6 +34,24 @@ class ToolTable(Table):
     ] = None
     rpy_deg: Annotated[
         Three | None, key("3 numbers, the tip's roll, pitch and yaw in deg", "[0, 45, 0]")
+    ] = None
+
+    mass_kg: Annotated[
+        NotNegative | None, key("0 or a number above it, what the flange carries in kg", "25")
+    ] = None
+    centre_mm: Annotated[
+        Three | None, key("3 numbers, its centre of mass in the flange in mm", "[0, 0, 120]")
+    ] = None
+    inertia_kg_m2: Annotated[
+        tuple[Number, ...] | None,
+        key(
+            "6 numbers, its inertia xx, yy, zz, xy, xz and yz about the centre of mass, along the "
+            "flange's axes, in kg m^2",
+            "[0.4, 0.5, 0.3, 0, 0, 0]",
+            strict=False,
+            min_length=6,
+            max_length=6,
+        ),
     ] = None
 
     @model_validator(mode="after")
@@ -41,6 +70,40 @@ class ToolTable(Table):
             other = "rpy_deg" if found == ["xyz_mm"] else "xyz_mm"
             raise fault(f"{other} together with {found[0]}", "nothing", "add it", (other,))
         return self
+
+    @model_validator(mode="after")
+    def _possible_load(self) -> ToolTable:
+        """Require all that torques need of what the flange carries, once some of it is given."""
+        found = given(self, "centre_mm", "inertia_kg_m2")
+        if self.mass_kg is None and found:
+            raise fault("mass_kg, too", "none", "add it", ("mass_kg",))
+        if self.mass_kg and self.centre_mm is None:
+            raise fault(
+                f"the centre of mass of {self.mass_kg:g} kg in the flange, in mm",
+                "none",
+                "add centre_mm",
+                ("centre_mm",),
+            )
+        try:
+            self.load()
+        except InputError as error:
+            said = str(error).removeprefix("load tensor: ")
+            raise fault_in_words(f"{said}; correct it", ("inertia_kg_m2",)) from None
+        return self
+
+    def load(self) -> Load | None:
+        """Return what the flange carries; None where the job does not say."""
+        if self.mass_kg is None:
+            return None
+        centre, tensor = self.centre_mm, None
+        if self.inertia_kg_m2 is not None:
+            xx, yy, zz, xy, xz, yz = self.inertia_kg_m2
+            tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return Load(
+            mass=self.mass_kg,
+            centre=None if centre is None else np.array(centre) / 1000,
+            tensor=tensor,
+        )
 
     def resolve(self) -> Array:
         """Return T_flange_tip, (4, 4), m."""
