@@ -1,9 +1,13 @@
 """Arms with masses: descriptions of library robots with an <inertial> in every link."""
 
 import numpy as np
+import pinocchio as pin
+from scipy.spatial.transform import Rotation
 from tests.urdf.test_urdf import LIMIT, described
 
 from kerfpath import Robot, robot
+from kerfpath.dynamics import ArmDynamics
+from kerfpath.urdf import ChainInertia, KinematicChain
 
 MASSES = (180.0, 150.0, 70.0, 30.0, 12.0, 3.0)
 """kg: about those of an arm that carries 60 kg."""
@@ -73,3 +77,37 @@ def job_of_arm(folder, text, load="mass_kg = 25\ncentre_mm = [0, 0, 120]", robot
     ]
     text = text.replace('model = "abb_irb4600_60_205"', "\n".join(lines))
     return text.replace("[tool]\n", f"[tool]\n{load}\n")
+
+
+def random_arm(rng, n):
+    """Return an arm of n joints at random, as dynamics and as pinocchio has it."""
+    model, parent = pin.Model(), 0
+    origins, axes = np.tile(np.eye(4), (n, 1, 1)), rng.normal(size=(n, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    origins[:, :3, :3] = Rotation.random(n, rng=rng).as_matrix()
+    origins[:, :3, 3] = rng.normal(0, 0.4, (n, 3))
+    mass, centre = rng.uniform(1, 30, n), rng.normal(0, 0.2, (n, 3))
+    body = rng.normal(0, 0.3, (n, 3, 3))
+    tensor = body @ body.transpose(0, 2, 1)
+    gravity = rng.normal(0, 6, 3)
+    model.gravity.linear = gravity
+    for i in range(n):
+        pose = pin.SE3(origins[i, :3, :3], origins[i, :3, 3])
+        parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(axes[i]), pose, f"j{i}")
+        inertia = pin.Inertia(mass[i], centre[i], tensor[i])
+        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+    chain = KinematicChain(origins=origins, axes=axes, end=np.eye(4))
+    inertia = ChainInertia(mass=mass, centre=centre, tensor=tensor)
+    return ArmDynamics(chain=chain, inertia=inertia, gravity=gravity), model
+
+
+def oracle_of(model, bound, dt):
+    """Return what says, by pinocchio, which pairs of increments keep torque bounds (n,) N m."""
+    data = model.createData()
+
+    def kept(q, before, after):
+        rows = zip(q, (before + after) / (2 * dt), (after - before) / dt**2, strict=True)
+        tau = [pin.rnea(model, data, *row) for row in rows]
+        return (np.abs(np.reshape(tau, q.shape)) <= bound * (1 + 1e-9)).all(axis=1)
+
+    return kept

@@ -66,16 +66,27 @@ def path_planning(
     return np.array(path[::-1]), cost
 
 
-def second_order(q, start, closure, passable=None, **o):
+def second_order(q, start, closure, passable=None, kept=None, **o):
     """Optimal (cost, tie-breaking sum) under (5) and (6), or None: every pair of edges is tried.
 
-    passable, one matrix for each pair of layers, leaves out edges that are closed.
+    passable, one matrix for each pair of layers, leaves out edges that are closed; kept(q, before,
+    after), each (B, n), says which pairs of increments may follow each other at joints q.
     """
     layers = [q[a:b] for a, b in itertools.pairwise(start)]
     vertex = [o["vertex_cost"][a:b] for a, b in itertools.pairwise(start)]
     if len(layers) == 1:
         return (vertex[0].min(), vertex[0].min()) if len(vertex[0]) else None
     D, bound_a, steps = _edges(layers, vertex, o, passable)
+
+    def may_follow(middle, before, after):
+        """Of increments (l, p, n) to vertices (p, n) and (p, j, n) from them: (l, p, j)."""
+        ok = (np.abs(after[None] - before[:, :, None]) <= bound_a).all(-1)
+        if kept is not None:
+            i, p, j = np.nonzero(ok)
+            ok[i, p, j] = kept(middle[p], before[i, p], after[p, j])
+        return ok
+
+    follows = [None, *(may_follow(layers[k], D[k - 1], D[k]) for k in range(1, len(D)))]
 
     def best(objective, cap):
         join = np.add if objective == "sum" else np.maximum
@@ -84,7 +95,7 @@ def second_order(q, start, closure, passable=None, **o):
         def run(first):
             d = first
             for k in range(1, len(D)):
-                ok = (np.abs(D[k][None] - D[k - 1][:, :, None]) <= bound_a).all(-1)
+                ok = follows[k]
                 d = join(np.where(ok, d[:, :, None], np.inf).min(axis=0, initial=np.inf), step[k])
             return d
 
@@ -95,7 +106,8 @@ def second_order(q, start, closure, passable=None, **o):
         for i, j in zip(*np.nonzero(np.isfinite(first)), strict=True):
             only = np.full_like(first, np.inf)
             only[i, j] = first[i, j]
-            seam = (np.abs(D[0][i, j] - D[-1][:, i]) <= bound_a).all(-1)
+            last, seen = D[-1][:, i : i + 1], D[0][i, j][None, None]
+            seam = may_follow(layers[0][i : i + 1], last, seen)[:, 0, 0]
             least = min(least, run(only)[seam, i].min(initial=np.inf))
         return least
 

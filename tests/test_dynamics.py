@@ -14,7 +14,8 @@ from tests.arms import (
 )
 
 from kerfpath import InputError, Robot, robot
-from kerfpath.dynamics import ArmDynamics, Load, TorqueLimit
+from kerfpath.dynamics import ArmDynamics, Load
+from kerfpath.limits import TorqueLimit
 from kerfpath.urdf import read_urdf
 
 LOAD = Load(mass=25.0, centre=(0.05, -0.02, 0.12), tensor=np.diag((0.4, 0.5, 0.3)))

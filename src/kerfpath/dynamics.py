@@ -1,4 +1,4 @@
-"""What torques a motion asks of the joints of an arm, and what limits them.
+"""What torques a motion asks of the joints of an arm.
 
 Rigid links on rigid joints: inertias as a robot description states them, a load on the flange, and
 gravity. Friction and the inertia of rotors and gears are in no description and are left out.
@@ -11,19 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, floats, freeze, not_negative, positive
+from kerfpath._arrays import Array, floats, freeze, not_negative
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels.dynamics import ArmBodies, torques
-from kerfpath.limits import meetings, rates_of
 from kerfpath.urdf import ChainInertia, KinematicChain, joined, require_tensor
 
-__all__ = ["STANDARD_GRAVITY", "ArmDynamics", "Load", "TorqueLimit"]
+__all__ = ["STANDARD_GRAVITY", "ArmDynamics", "Load"]
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """m/s^2, in the base of a robot that stands on the floor."""
-TORQUE_SLACK = 1e-9
-"""Share of a torque limit: far below what any controller measures, far above rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -116,8 +113,8 @@ class ArmDynamics:
     def bodies(self) -> ArmBodies:
         """The arm as the kernels take it."""
         return ArmBodies(
-            rotation=np.ascontiguousarray(self.chain.origins[:, :3, :3]),
-            position=np.ascontiguousarray(self.chain.origins[:, :3, 3]),
+            rotation=freeze(np.ascontiguousarray(self.chain.origins[:, :3, :3])),
+            position=freeze(np.ascontiguousarray(self.chain.origins[:, :3, 3])),
             axis=self.chain.axes,
             mass=self.inertia.mass,
             centre=self.inertia.centre,
@@ -150,51 +147,3 @@ class ArmDynamics:
             found,
         )
         return freeze(found)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TorqueLimit:
-    """Bound on the torque of each joint, and the arm that says what it is.
-
-    Held at the nodes, where (6) holds the acceleration: at node k between intervals of length
-    t_k and t_{k+1}, where the joints are q_k, the velocity is the mean of those of both intervals
-    and the acceleration their difference over (t_k + t_{k+1}) / 2. Of equal intervals these are the
-    central differences. At the two ends of an open path nothing is held, as by (6).
-
-    Parameters
-    ----------
-    bound : (n,) N m
-    dynamics : ArmDynamics
-
-    Raises
-    ------
-    InputError
-        A bound that is not positive, or of another number of joints.
-    """
-
-    bound: Array
-    dynamics: ArmDynamics
-
-    __repr__ = short_repr
-
-    def __post_init__(self) -> None:
-        n = len(self.dynamics.chain.axes)
-        object.__setattr__(self, "bound", positive(self.bound, "torque", (n,)))
-
-    def shares(self, q: Array, tau: Array, *, periodic: bool = False) -> Array:
-        """Return the signed shares (M, n) of the bound that a motion asks for at its nodes.
-
-        Parameters
-        ----------
-        q : (K, n) rad
-            Joints, not wrapped.
-        tau : (K-1,) s
-            Time of each interval.
-        periodic : bool
-            Whether the last interval is followed by the first.
-        """
-        dq = np.diff(q, axis=0)
-        v, a = rates_of(dq, tau, periodic=periodic)
-        before, after = meetings(len(tau), periodic=periodic)
-        middle = (v[before] + v[after]) / 2
-        return freeze(self.dynamics.torque(q[after], middle, a) / self.bound)

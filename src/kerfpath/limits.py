@@ -1,13 +1,13 @@
 """How the joints may move: limits as objects that say what they bound.
 
-A limit bounds a time derivative of every joint. Between nodes at equal intervals the derivative is
-a difference of as many orders, so that a limit is a bound on a difference. The share of it that may
-be used, eta, is applied here and nowhere else.
+A rate limit bounds a time derivative of every joint. Between nodes at equal intervals the
+derivative is a difference of as many orders, so that such a limit is a bound on a difference. The
+share of it that may be used, eta, is applied here and nowhere else.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Ints, floats, freeze, positive, scalar
 from kerfpath._repr import short_repr
+from kerfpath.dynamics import ArmDynamics
 from kerfpath.errors import InputError
 
 __all__ = [
@@ -99,6 +100,55 @@ class JerkLimit(RateLimit):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TorqueLimit:
+    """Bound on the torque of each joint, and the arm that says what it is.
+
+    Held at the nodes, where (6) holds the acceleration: at node k between intervals of length
+    t_k and t_{k+1}, where the joints are q_k, the velocity is the mean of those of both intervals
+    and the acceleration their difference over (t_k + t_{k+1}) / 2. Of equal intervals these are the
+    central differences. At the two ends of an open path nothing is held, as by (6).
+
+    Parameters
+    ----------
+    bound : (n,) N m
+    dynamics : ArmDynamics
+
+    Raises
+    ------
+    InputError
+        A bound that is not positive, or of another number of joints.
+    """
+
+    bound: Array
+    dynamics: ArmDynamics
+
+    __repr__ = short_repr
+    quantity: ClassVar[str] = "torque"
+
+    def __post_init__(self) -> None:
+        n = len(self.dynamics.chain.axes)
+        object.__setattr__(self, "bound", positive(self.bound, "torque", (n,)))
+
+    def shares(self, q: Array, tau: Array, *, periodic: bool = False) -> Array:
+        """Return the signed shares (M, n) of the bound that a motion asks for at its nodes.
+
+        Parameters
+        ----------
+        q : (K, n) rad
+            Joints, not wrapped.
+        tau : (K-1,) s
+            Time of each interval.
+        periodic : bool
+            Whether the last interval is followed by the first.
+        """
+        dq = np.diff(q, axis=0)
+        v, a = rates_of(dq, tau, periodic=periodic)
+        before, after = meetings(len(tau), periodic=periodic)
+        middle = (v[before] + v[after]) / 2
+        return freeze(self.dynamics.torque(q[after], middle, a) / self.bound)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Limits:
     """What bounds a motion in time, joint by joint.
 
@@ -106,10 +156,16 @@ class Limits:
     ----------
     velocity : VelocityLimit
     acceleration : AccelerationLimit
+    torque : TorqueLimit, optional
+        Held by the exact search and the refinement, as the acceleration at the nodes.
+    jerk : JerkLimit, optional
+        Held by the refinement: a search would have to know three steps back.
     """
 
     velocity: VelocityLimit
     acceleration: AccelerationLimit
+    torque: TorqueLimit | None = None
+    jerk: JerkLimit | None = None
 
     __repr__ = short_repr
 
@@ -121,6 +177,8 @@ class Limits:
         *,
         eta_v: float = 1.0,
         eta_a: float = 1.0,
+        torque: TorqueLimit | None = None,
+        jerk: JerkLimit | None = None,
     ) -> Limits:
         """Return the limits of a robot, all finite, and the shares of them that may be used."""
         return cls(
@@ -128,18 +186,20 @@ class Limits:
             acceleration=AccelerationLimit(
                 bound=positive(acceleration, "acceleration", (None,)), share=eta_a
             ),
+            torque=torque,
+            jerk=jerk,
         )
 
     def require_joints(self, n: int) -> None:
         """Raise InputError unless each limit is one of n joints."""
-        for limit in (self.velocity, self.acceleration):
-            if len(limit.bound) != n:
+        for limit in (self.velocity, self.acceleration, self.torque, self.jerk):
+            if limit is not None and len(limit.bound) != n:
                 raise InputError(f"{limit.quantity}: expected shape ({n}), got {limit.bound.shape}")
 
     def without_acceleration(self) -> Limits:
-        """Return the limits with none on the acceleration."""
+        """Return the limits on the velocity alone."""
         free = np.full(len(self.acceleration.bound), np.inf)
-        return replace(self, acceleration=AccelerationLimit(bound=free))
+        return Limits(velocity=self.velocity, acceleration=AccelerationLimit(bound=free))
 
 
 def meetings(intervals: int, *, periodic: bool = False) -> tuple[Ints, Ints]:
@@ -166,3 +226,15 @@ def rates_of(dq: Array, tau: Array, *, periodic: bool = False) -> tuple[Array, A
     v, (before, after) = dq / tau[:, None], meetings(len(tau), periodic=periodic)
     span = (tau[before] + tau[after]) / 2
     return v, (v[after] - v[before]) / span[:, None]
+
+
+def jerks_of(a: Array, tau: Array, *, periodic: bool = False) -> Array:
+    """Return the jerks (J, n) between nodes of accelerations (M, n) at them, rad and s.
+
+    Over each interval that both ends of have an acceleration: third differences over dt^3 where
+    all intervals are alike. The arguments are as of `rates_of`.
+    """
+    _, after = meetings(len(tau), periodic=periodic)
+    if periodic:
+        return np.asarray((np.roll(a, -1, axis=0) - a) / tau[after, None])
+    return np.asarray(np.diff(a, axis=0) / tau[after[:-1], None])

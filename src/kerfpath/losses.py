@@ -38,6 +38,7 @@ class Loss(IntEnum):
     NO_ROOM = 14, "no room to back off by {}"
     FLOOR = 15, "below the floor"
     PINNED = 16, "outside the pinned window of gamma"
+    TORQUE = 17, "torque, joint {}"
 
 
 class Reason(str):

@@ -1,4 +1,4 @@
-"""Recursion (16) made exact under the acceleration limit (6).
+"""Recursion (16) made exact under the acceleration limit (6), and under torque limits.
 
 The procedure of section 3.2 tests the acceleration against the best predecessor alone and can lose
 the optimum. Here the state is an edge (p, j): (5) is then a test on a state and (6) one on two
@@ -6,8 +6,9 @@ neighbouring states, and the recursion
 
     d(p, j) = rho(p, j) + min over l of d(l, p), with (6) for l, p, j
 
-is exact. The first-order problem solved backwards is a bound h(j) on what is still to come: with a
-bound on the cost, only states with d + h inside it are ever kept.
+is exact. Torques at p are functions of the same two states, see `kerfpath.kernels.torque`. The
+first-order problem solved backwards is a bound h(j) on what is still to come: with a bound on the
+cost, only states with d + h inside it are ever kept.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from kerfpath.kernels.search import (
     shut_edges,
 )
 from kerfpath.kernels.states import Scratch, States, group_by_vertex, joined_states, with_more_room
+from kerfpath.kernels.torque import TorqueRoom, torque_excess, torque_room
 
 __all__ = ["RecursionResult", "count_closing", "recursion", "trace"]
 
@@ -93,10 +95,21 @@ def _begin(
 
 
 @jit_inline
+def _breaks(
+    layers: SortedLayers, aim: Aim, p: int, dq_before: Array, dq: Array, room: TorqueRoom
+) -> bool:
+    """Whether (6) or a torque limit forbids to go on from dq_before to dq at vertex p."""
+    if acceleration_excess(dq, dq_before, aim.acceleration) >= 0:
+        return True
+    return torque_excess(aim.torque, layers.given, p, dq_before, dq, room) >= 0
+
+
+@jit_inline
 def _predecessor(
-    states: States, a: int, b: int, aim: Aim, step: float, dq: Array, rest: float, bound: float
-) -> tuple[int, float, float]:
-    """Find which of the states a..b, cheapest first, goes on by dq at the least cost.
+    layers: SortedLayers, aim: Aim, states: States, a: int, b: int, p: int, step: float, dq: Array,
+    rest: float, bound: float, room: TorqueRoom,
+) -> tuple[int, float, float]:  # fmt: skip
+    """Find which of the states a..b of p, cheapest first, goes on by dq at the least cost.
 
     `step` is the cost of the step on its own, `rest` that of what is to come. Returns the state, -1
     if none keeps the bound; the cost up to and with the step; and the least one over the bound.
@@ -108,7 +121,7 @@ def _predecessor(
         f = combined(aim.minimax, d, rest)
         if f > bound:
             return -1, np.inf, f
-        if states.parent[s] < 0 or acceleration_excess(dq, states.dq[s], aim.acceleration) < 0:
+        if states.parent[s] < 0 or not _breaks(layers, aim, p, states.dq[s], dq, room):
             return s, d, np.inf
     return -1, np.inf, np.inf
 
@@ -202,9 +215,11 @@ def _fill_from(
         if is_shut(layers.shut, first, last, j):  # looked at last: few come so far
             continue
         fill_increment(layers, p, j, dq)
-        if closes and acceleration_excess(seam, dq, aim.acceleration) >= 0:
+        if closes and _breaks(layers, aim, j, dq, seam, scratch.torque):
             continue
-        s, cost, dropped = _predecessor(states, a, b, aim, step, dq, h[j], bound)
+        s, cost, dropped = _predecessor(
+            layers, aim, states, a, b, p, step, dq, h[j], bound, scratch.torque
+        )
         lowest = min(lowest, dropped)
         if s >= 0:
             out.vertex[count], out.parent[count], out.d[count] = j, s, cost
@@ -238,7 +253,10 @@ def _extend(
     """States of layer k + 1 from those of layer k, sorted; and the least cost dropped."""
     n, lowest = len(layers.endless), np.inf
     begin, end, first = layers.start[k + 1], layers.start[k + 2], states.first
-    scratch = Scratch(np.empty(end - begin, np.int64), np.empty(n), np.empty(n), np.empty(n))
+    scratch = Scratch(
+        np.empty(end - begin, np.int64), np.empty(n), np.empty(n), np.empty(n),
+        torque_room(len(aim.torque.bound)),
+    )  # fmt: skip
     room = 2 * (end - begin)
     vertex, parent = np.empty(room, np.int64), np.empty(room, np.int64)
     out = States(vertex, np.empty(room), np.empty((room, n)), parent, first)
@@ -285,7 +303,7 @@ def _next(
 def recursion(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, room: int, width: int
 ) -> RecursionResult:
-    """Best path whose cost keeps `bound`, exactly, under (5) and (6).
+    """Best path whose cost keeps `bound`, exactly, under (5), (6) and `aim.torque`.
 
     h (N,) is `cost_to_go`; seam (n,) is the increment that the last one must go on to by (6), or
     (0,). The states of all layers are recorded for `trace` as long as they are no more than `room`.
@@ -347,11 +365,11 @@ def count_closing(layers: SortedLayers, aim: Aim, states: States, k: int) -> tup
     """Count, for ways from the states of layer k-1 into layer k, what forbids them.
 
     Row 0: edges whose first velocity excess (5) is at joint i; row 1: of the others that are not
-    shut, the pairs of state and edge whose first acceleration excess (6) is at joint i. Also
-    returns how many edges are shut.
+    shut, the pairs of state and edge whose first acceleration excess (6) is at joint i; row 2: of
+    the others, those whose first torque excess is. Also returns how many edges are shut.
     """
     n, shut = len(layers.endless), 0
-    counts, dq = np.zeros((2, n), np.int64), np.empty(n)
+    counts, dq, room = np.zeros((3, n), np.int64), np.empty(n), torque_room(len(aim.torque.bound))
     for i in range(len(states.first) - 1):
         a, b, p = states.first[i], states.first[i + 1], layers.start[k - 1] + i
         if a == b:
@@ -371,4 +389,8 @@ def count_closing(layers: SortedLayers, aim: Aim, states: States, k: int) -> tup
                     excess = acceleration_excess(dq, states.dq[s], aim.acceleration)
                     if excess >= 0:
                         counts[1, excess] += 1
+                        continue
+                    excess = torque_excess(aim.torque, layers.given, p, states.dq[s], dq, room)
+                    if excess >= 0:
+                        counts[2, excess] += 1
     return counts, shut

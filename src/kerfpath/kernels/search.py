@@ -15,6 +15,7 @@ from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels._jit import jit, jit_inline
 from kerfpath.kernels.limits import acceleration_excess, exceeds
 from kerfpath.kernels.metric import apart, extend, finish, increment, wrap_angle
+from kerfpath.kernels.torque import NO_TORQUE, TorqueTest
 
 __all__ = [
     "Aim",
@@ -77,7 +78,7 @@ class LostTime(NamedTuple):
 
 
 class Aim(NamedTuple):
-    """What (14) or (15) puts together, and the bounds (5) and (6) on the increments."""
+    """What (14) or (15) puts together, and the bounds (5) and (6) on increments, and on torques."""
 
     weight: Array
     """(n,) 1/rad."""
@@ -94,6 +95,8 @@ class Aim(NamedTuple):
     """(6) does not forbid a change: it asks for the node intervals in which it would hold, which
     are costs by (15), and by (14) cost what `lost` says."""
     lost: LostTime = LostTime()
+    torque: TorqueTest = NO_TORQUE
+    """Held by the exact recursion, where nothing is timed."""
 
 
 @jit

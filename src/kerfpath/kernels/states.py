@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kerfpath._arrays import Array, Ints
 from kerfpath.kernels._jit import jit
+from kerfpath.kernels.torque import TorqueRoom
 
 __all__ = ["EVERY", "Scratch", "States", "group_by_vertex", "joined_states", "with_more_room"]
 
@@ -46,6 +47,7 @@ class Scratch(NamedTuple):
     """(n,): middle of the box,"""
     by: Array
     """(n,): and its half width."""
+    torque: TorqueRoom
 
 
 @jit

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats
-from kerfpath.dynamics import STANDARD_GRAVITY, ArmDynamics, Load, TorqueLimit
+from kerfpath.dynamics import STANDARD_GRAVITY, ArmDynamics, Load
 from kerfpath.errors import InputError
+from kerfpath.limits import JerkLimit, TorqueLimit
 from kerfpath.robots._described import build_robot, read_description
 from kerfpath.robots._external import ExternalAxis, Travel, base_in_part
 from kerfpath.robots._library import read_robot
@@ -194,6 +195,13 @@ class Robot(Manipulator):
         inertia = self.load.on(self.inertia, self.chain.end)
         dynamics = ArmDynamics(chain=self.chain, inertia=inertia, gravity=self.gravity)
         return TorqueLimit(bound=self.torque, dynamics=dynamics)
+
+    def jerk_limit(self) -> JerkLimit | None:
+        """Return what limits the jerks, nothing that of an external axis; None where none does."""
+        if self.jerk is None:
+            return None
+        free = np.full(self.joints - len(self.jerk), np.inf)
+        return JerkLimit(bound=np.append(self.jerk, free))
 
     def on_rail(self, direction: ArrayLike, **travel: Unpack[Travel]) -> Robot:
         """Return this robot with its base on a rail along `direction` (3,).

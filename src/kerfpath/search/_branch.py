@@ -18,13 +18,14 @@ from kerfpath._arrays import Array, Bools, Ints
 from kerfpath.kernels.limits import LIMIT_TOLERANCE, acceleration_excess
 from kerfpath.kernels.metric import increments, increments_between
 from kerfpath.kernels.search import Aim, SortedLayers
+from kerfpath.kernels.torque import exceeds_torque
 from kerfpath.search._exact import NO_SEAM, BestPath, NoPathProof, best_allowed, best_path, dead_end
 
 __all__ = ["best_closed_path", "best_near_start"]
 
 
 def best_closed_path(layers: SortedLayers, aim: Aim) -> BestPath | NoPathProof:
-    """Return the best path that returns to the vertex it left, with (6) across the seam."""
+    """Return the best path that returns to the vertex it left, with (6) and torques kept there."""
     if len(layers.start) == 2:
         return best_path(layers, aim)
     free = np.full(len(layers.endless), np.inf)
@@ -157,7 +158,9 @@ def _increments(layers: SortedLayers, path: Ints) -> Array:
 
 def _passes_seam(layers: SortedLayers, aim: Aim, path: Ints) -> bool:
     dq = _increments(layers, path)
-    return acceleration_excess(dq[0], dq[-1], aim.acceleration) < 0
+    if acceleration_excess(dq[0], dq[-1], aim.acceleration) >= 0:
+        return False
+    return not exceeds_torque(aim.torque, layers.given, int(path[-1]), dq[-1], dq[0])
 
 
 def _split(layers: SortedLayers, starts: Ints, a: int, b: int) -> tuple[Ints, Ints]:

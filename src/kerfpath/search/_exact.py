@@ -47,9 +47,9 @@ class NoPathProof:
     ----------
     layers : int
         Number of layers that some admissible path reaches.
-    counts : (2, n) int
-        Of the ways into the next layer, how many each joint's velocity (row 0) and acceleration
-        (row 1) forbids,
+    counts : (3, n) int
+        Of the ways into the next layer, how many each joint's velocity (row 0), acceleration
+        (row 1) and torque (row 2) forbids,
     shut : int
         and how many are shut edges.
     reached : (m,) int
@@ -185,7 +185,7 @@ def dead_end(layers: SortedLayers, aim: Aim) -> NoPathProof:
     K, n = len(layers.start) - 1, len(layers.endless)
     ends = np.unique(reached.last.vertex)
     if reached.layers in (0, K):
-        none = np.zeros((2, n), np.int64)
+        none = np.zeros((3, n), np.int64)
         return NoPathProof(layers=reached.layers, counts=none, shut=0, reached=ends)
     counts, shut = exact.count_closing(layers, aim, reached.last, reached.layers)
     return NoPathProof(layers=reached.layers, counts=counts, shut=int(shut), reached=ends)

@@ -14,7 +14,7 @@ from kerfpath.kernels.metric import CHEBYCHEV, increments, increments_between
 from kerfpath.kernels.search import Aim
 from kerfpath.search._exact import quickest_path
 from kerfpath.search._layers import Layers, require_joined, sort_layers
-from kerfpath.search._problem import SearchProblem, refuse_ends
+from kerfpath.search._problem import SearchProblem, refuse_ends, refuse_torque
 
 __all__ = ["LeastInterval", "aim_at_least_time", "find_least_interval", "quickest", "times_asked"]
 
@@ -65,9 +65,10 @@ def find_least_interval(problem: SearchProblem) -> LeastInterval:
     NoFeasiblePath
         An empty layer, or closed vertices and shut edges that leave no path; says where.
     InputError
-        A single layer, other vertex costs, a closure or a rotation limit.
+        A single layer, other vertex costs, a closure or a limit on rotation, torque or jerk.
     """
     refuse_ends(problem, "least node interval")
+    refuse_torque(problem, "least node interval")
     if len(problem.start) < 3:
         raise InputError("start: a node interval needs at least two layers, got 1")
     if not np.isin(problem.vertex_cost, (0.0, np.inf)).all():

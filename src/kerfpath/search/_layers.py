@@ -29,6 +29,10 @@ _VERTICES_SAMPLED = 16
 """Vertices of each of them whose windows are counted."""
 
 
+TESTS = (Loss.VELOCITY, Loss.ACCELERATION, Loss.TORQUE)
+"""What may forbid an edge, in the order in which it is tested."""
+
+
 class Layers(NamedTuple):
     """A layered graph as it is given: a row for each vertex."""
 
@@ -124,7 +128,7 @@ def broken_edge(k: int, forbidden: Ints, shut: int, *, proved: bool) -> NoFeasib
     """Return the answer that no admissible edge leads into layer k: what forbids how many."""
     counts: dict[str, int] = {
         Reason(test, i + 1): int(number)
-        for test, row in zip((Loss.VELOCITY, Loss.ACCELERATION), forbidden, strict=True)
+        for test, row in zip(TESTS, forbidden, strict=True)
         for i, number in enumerate(row)
         if number
     }
@@ -155,7 +159,7 @@ def require_joined(layers: Layers) -> None:
             shut = int(ways[here].sum())
             here = here & (ways < reached.sum())
             if shut and not here.any():
-                none = np.zeros((2, q.shape[1]), np.int64)
+                none = np.zeros((3, q.shape[1]), np.int64)
                 raise broken_edge(k, none, shut, proved=True)
         if not here.any():
             raise empty_layer(layers, k)

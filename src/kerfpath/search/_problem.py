@@ -23,6 +23,7 @@ from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric as metrics
 from kerfpath.kernels.search import Aim
+from kerfpath.kernels.torque import NO_TORQUE, TorqueTest
 from kerfpath.limits import Limits
 from kerfpath.search._layers import Layers
 
@@ -35,6 +36,7 @@ __all__ = [
     "SearchProblem",
     "offsets",
     "refuse_ends",
+    "refuse_torque",
     "rotation_limits",
 ]
 
@@ -61,7 +63,7 @@ class SearchProblem:
     q, start, dt, endless, vertex_cost, shut, weights, metric, objective, closure, rotation, posture
         As in `kerfpath.shortest_path`; q is not copied.
     limits : Limits
-        What (5) and (6) hold each step to.
+        What (5), (6) and torque limits hold each step to; a limit on the jerk is not held here.
     method : {"exact", "paper", "known"}
         How the shortest path is searched; all other searches are exact.
 
@@ -69,8 +71,8 @@ class SearchProblem:
     ------
     InputError
         Arrays that do not fit each other, NaN, a dt that is not positive, unknown names, a finite
-        rotation of a joint that is not endless, another method than the exact one for a closure or
-        a rotation.
+        rotation of a joint that is not endless, another method than the exact one for a closure, a
+        rotation, or a limit on torque or jerk.
     """
 
     q: Array
@@ -145,6 +147,9 @@ class SearchProblem:
             raise InputError(f'closure: "periodic" needs method="exact", got method={method!r}')
         if method != "exact" and np.isfinite(self.rotation).any():
             raise InputError(f'rotation: a limit needs method="exact", got method={method!r}')
+        for name in ("torque", "jerk"):
+            if method != "exact" and getattr(limits, name) is not None:
+                raise InputError(f'{name}: a limit needs method="exact", got method={method!r}')
 
     @property
     def layers(self) -> Layers:
@@ -163,12 +168,16 @@ class SearchProblem:
     @property
     def aim(self) -> Aim:
         """What the kernels are to minimise, and the bounds on the increments."""
+        torque = self.limits.torque
         return Aim(
             weight=self.weights,
             metric=METRIC_CODES[self.metric],
             minimax=self.objective == "max",
             velocity=self.limits.velocity.per_interval(self.dt),
             acceleration=self.limits.acceleration.per_interval(self.dt),
+            torque=NO_TORQUE
+            if torque is None
+            else TorqueTest(arm=torque.dynamics.bodies, bound=torque.bound, dt=self.dt),
         )
 
 
@@ -238,6 +247,13 @@ def rotation_limits(rotation: ArrayLike | None, endless: Bools) -> Array:
             f"got {limit[plain[0]]:g}"
         )
     return limit
+
+
+def refuse_torque(problem: SearchProblem, what: str) -> None:
+    """Refuse limits on torque and jerk, which a search does not know."""
+    for name in ("torque", "jerk"):
+        if getattr(problem.limits, name) is not None:
+            raise InputError(f"{what}: limits on the {name} are not known to it")
 
 
 def refuse_ends(problem: SearchProblem, what: str) -> None:

@@ -15,7 +15,7 @@ from kerfpath.kernels.exact import count_closing
 from kerfpath.kernels.metric import increments_between
 from kerfpath.kernels.search import Aim, SortedLayers
 from kerfpath.kernels.states import States
-from kerfpath.limits import Limits
+from kerfpath.limits import Limits, TorqueLimit
 from kerfpath.search._branch import best_closed_path
 from kerfpath.search._exact import BestPath, best_path, dead_end
 from kerfpath.search._layers import Layers, broken_edge, empty_layer, reverse, sort_layers
@@ -39,7 +39,8 @@ class LayeredPath:
     cost : float
         Objective (14) or (15), vertex costs included.
     optimal : bool
-        True only when the path is proved to be the best on this graph under (5) and (6).
+        True only when the path is proved to be the best on this graph under (5), (6) and what
+        limits torques.
     """
 
     index: Ints
@@ -68,6 +69,7 @@ def shortest_path(
     rotation: ArrayLike | None = None,
     eta_v: float = 1.0,
     eta_a: float = 1.0,
+    torque: TorqueLimit | None = None,
 ) -> LayeredPath:
     """Return the best path that takes one vertex of each layer, in order.
 
@@ -109,6 +111,8 @@ def shortest_path(
         begins; infinity: no limit (default); exact method only.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
+    torque : TorqueLimit, optional
+        Held where (6) holds the acceleration, by central differences; exact method only.
 
     Raises
     ------
@@ -131,7 +135,7 @@ def shortest_path(
         q=q,
         start=start,
         dt=dt,
-        limits=Limits.of(velocity, acceleration, eta_v=eta_v, eta_a=eta_a),
+        limits=Limits.of(velocity, acceleration, eta_v=eta_v, eta_a=eta_a, torque=torque),
         endless=endless,
         vertex_cost=vertex_cost,
         shut=shut,

@@ -15,7 +15,7 @@ from kerfpath.kernels.states import EVERY
 from kerfpath.search._exact import FIRST_GAP, NO_SEAM, ROOM, ROUNDING, UNLIMITED, lifted
 from kerfpath.search._fastest import times_asked
 from kerfpath.search._layers import Layers, require_joined, sort_layers
-from kerfpath.search._problem import SearchProblem, refuse_ends
+from kerfpath.search._problem import SearchProblem, refuse_ends, refuse_torque
 
 __all__ = ["SlowedPath", "find_slowed"]
 
@@ -69,9 +69,11 @@ def find_slowed(problem: SearchProblem, *, penalty: float = 100.0) -> SlowedPath
     NoFeasiblePath
         An empty layer, or closed vertices and shut edges that leave no path; says where.
     InputError
-        Another objective, a closure or a rotation limit; a penalty that is not positive.
+        Another objective, a closure or a limit on rotation, torque or jerk; a penalty that is not
+        positive.
     """
     refuse_ends(problem, "slowed path")
+    refuse_torque(problem, "slowed path")
     if problem.objective != "sum":
         raise InputError(f'objective: a slowed path needs "sum", got "{problem.objective}"')
     penalty = scalar(penalty, "penalty", above=0.0)
