@@ -242,7 +242,8 @@ class PlanOptions:
 
     def limits(self, robot: Robot) -> Limits:
         """Return the limits of a robot in time, and the shares of them that may be used."""
-        return Limits.of(*robot.speed_limits(), eta_v=self.eta_v, eta_a=self.eta_a)
+        rates = Limits.of(*robot.speed_limits(), eta_v=self.eta_v, eta_a=self.eta_a)
+        return replace(rates, torque=robot.torque_limit(), jerk=robot.jerk_limit())
 
     @property
     def without_penalties(self) -> PlanOptions:

@@ -12,8 +12,9 @@ from kerfpath.auditor._collision import collisions
 from kerfpath.auditor._margins import margins
 from kerfpath.auditor._motion import Interpolation, Motion, joint_increments, motion_of
 from kerfpath.auditor._nominal import axes_asked_for, tilt_turns
+from kerfpath.auditor._rates import rate_checks
 from kerfpath.auditor._room import retract_checks
-from kerfpath.auditor._rounding import MOST_ROUNDED, Rounding
+from kerfpath.auditor._rounding import Rounding
 from kerfpath.auditor._table import Check, Issue, Level, Unit
 from kerfpath.auditor._windows import window_checks
 from kerfpath.cell import Cell
@@ -27,8 +28,6 @@ TIP_AT_NODES = 1e-6
 """m: two kinematics in double precision agree far better; a wrong tool or frame is far worse."""
 AXIS_AT_NODES = 1e-5
 """rad, for the same reason."""
-SHARE_SLACK = 1e-6
-"""Relative slack on limits that the planner may use up to the last digit."""
 LIMIT_SLACK = 1e-8
 """rad, or m on a rail: slack on joint positions, for the same reason."""
 LENGTH_AGREES = 1e-6
@@ -125,7 +124,7 @@ def checks(
         *window_checks(plan, tool),
         *_between_nodes(plan, motion, reached, path, path_tolerance, axis_tolerance),
         *_positions(plan, motion, reached, rounding),
-        *_rates(plan, reached, rounding),
+        *rate_checks(plan, reached, rounding),
         *margins(plan, chain, rounding),
         *retract_checks(plan, plan.settings.retract),
         *([] if cell is None else collisions(cell, motion, chain)),
@@ -266,48 +265,6 @@ def _positions(
     step = np.abs(joint_increments(plan)[:, own]).max(axis=1)
     rows.append(_worst("joint-step", "joint step between nodes", step, np.pi * (1 - 1e-9), "rad"))
     return rows
-
-
-def _rates(plan: Plan, reached: BetweenNodes, rounding: Rounding | None) -> list[Check]:
-    velocity, acceleration = plan.robot.speed_limits()
-    eta_v, eta_a = plan.settings.eta_v, plan.settings.eta_a
-    dt = np.diff(plan.time)
-    dq = joint_increments(plan)
-    speed = np.abs(dq / dt[:, None]) / velocity
-    fine = reached.speed / dt[:, None] / velocity
-    left = None if rounding is None else rounding.of_velocity(dq, dt) / velocity
-    rows = [
-        _per_joint(plan, "velocity", "joint velocity from node to node", speed, eta_v, left),
-        _per_joint(plan, "velocity-between", "joint velocity between the nodes", fine, 1.0, left),
-    ]
-    if len(dq) > 1:
-        change = np.diff(dq / dt[:, None], axis=0) / ((dt[1:] + dt[:-1]) / 2)[:, None]
-        share = np.abs(change) / acceleration
-        left = None if rounding is None else rounding.of_acceleration(dq, dt) / acceleration
-        rows.append(
-            _per_joint(plan, "acceleration", "joint acceleration at the nodes", share, eta_a, left)
-        )
-    return rows
-
-
-def _per_joint(
-    plan: Plan, code: str, title: str, share: Array, limit: float, left: Array | None
-) -> Check:
-    """Check shares (rows, joints) of a limit, wider by what is `left` to digits at each."""
-    first = len(plan.q) - 1 - len(share)  # accelerations begin at node 1
-    wider = np.zeros(share.shape) if left is None else np.minimum(left, MOST_ROUNDED)
-    over = np.where(np.isnan(share), np.inf, share - wider)
-    row, joint = (int(i) for i in np.unravel_index(np.argmax(over), over.shape))
-    digits = f"; {wider[row, joint] * 100:.2g} % of it for digits" if left is not None else ""
-    return Check(
-        code=code,
-        title=f"{title} (highest: {plan.robot.joint_names[joint]}{digits})",
-        value=float(share[row, joint]),
-        limit=limit * (1 + SHARE_SLACK) + float(wider[row, joint]),
-        unit="share",
-        node=first + row,
-        advice="lower the speed or eta, or move the part",
-    )
 
 
 def _worst(

@@ -21,7 +21,7 @@ from kerfpath.front._subproblem import Subproblem
 from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss
 from kerfpath.options import PlanOptions
-from kerfpath.planner import node_interval, relaxations
+from kerfpath.planner import node_interval, relaxations, require_rates_alone
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 from kerfpath.search import Relaxations
@@ -162,6 +162,9 @@ class ParetoProblem:
     audit: Callable[[Plan], Sequence[object]] | None = None
 
     __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        require_rates_alone(self.robot, "the Pareto set")
 
     @cached_property
     def dt(self) -> float:

@@ -8,6 +8,7 @@ from kerfpath.planner._draft import draft as draft
 from kerfpath.planner._fastest import FastestSpeed as FastestSpeed
 from kerfpath.planner._fastest import fastest_speed as fastest_speed
 from kerfpath.planner._fastest import relaxations as relaxations
+from kerfpath.planner._fastest import require_rates_alone as require_rates_alone
 from kerfpath.planner._graph import layered_graph as layered_graph
 from kerfpath.planner._graph import longest_step as longest_step
 from kerfpath.planner._graph import node_interval as node_interval

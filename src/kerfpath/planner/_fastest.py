@@ -31,7 +31,7 @@ from kerfpath.search import (
     find_relaxations,
 )
 
-__all__ = ["FastestSpeed", "fastest_speed", "relaxations"]
+__all__ = ["FastestSpeed", "fastest_speed", "relaxations", "require_rates_alone"]
 
 
 class SpeedKeywords(GraphKeywords, total=False):
@@ -109,8 +109,10 @@ def fastest_speed(
     NoFeasiblePath
         Some node has no admissible pose at all, or no path is clear in the cell.
     InputError
-        Limits that are not known, nodes unevenly spaced, values out of range, costs of comfort.
+        Limits that are not known, or on torque or jerk; nodes unevenly spaced, values out of range,
+        costs of comfort.
     """
+    require_rates_alone(robot, "the fastest speed")
     require_even(contour, np.diff(contour.s), "m")
     asked = with_keywords(options, keywords, SpeedKeywords)
     if enough is not None:
@@ -136,6 +138,16 @@ def fastest_speed(
     interval = longest_step(contour) / found.speed
     share = impossible_share(task, interval, nodes)
     return found if share is None else replace(found, ceiling=found.speed / share)
+
+
+def require_rates_alone(robot: Robot, what: str) -> None:
+    """Raise InputError where the torque or the jerk of a robot is limited, too."""
+    for name, limit in (("torque", robot.torque_limit()), ("jerk", robot.jerk_limit())):
+        if limit is not None:
+            raise InputError(
+                f"{what}: limits on velocity and acceleration alone are known to it, and the robot "
+                f"has some on {name}; ask it of the robot without them"
+            )
 
 
 def _fastest(
@@ -176,6 +188,7 @@ def relaxations(
 
     Arguments as in `plan`; what to ask after a `NoFeasiblePath` whose node has poses.
     """
+    require_rates_alone(robot, "what would open the way")
     problem = SearchProblem(
         q=graph.q,
         start=graph.start,

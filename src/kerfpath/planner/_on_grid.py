@@ -11,10 +11,10 @@ from kerfpath.planner._dip import plan_slowed
 from kerfpath.planner._quickest import quick_motions
 from kerfpath.planner._refined import plan_off_grid, plan_slowly, refine_plan
 from kerfpath.planner._task import PlanningTask
-from kerfpath.planner._words import ON_THIS_GRID
+from kerfpath.planner._words import ON_THIS_GRID, limits_named
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import posture_name
-from kerfpath.search import Method, find_shortest
+from kerfpath.search import SearchProblem, find_shortest
 
 __all__ = ["plan_on_grid"]
 
@@ -40,7 +40,7 @@ def plan_on_grid(
         path = finder.find(find_shortest, task.problem)
     except NoFeasiblePath as at_speed:
         return _otherwise(task, finder, at_speed, begin, refine=refine)
-    proof = _proof(task.problem.method, path.optimal, finder)
+    proof = _proof(task.problem, path.optimal, finder)
     made = task.plan(path.index, path.cost, proof)
     if not refine:
         return made
@@ -98,12 +98,14 @@ def _from_quickest(
         None was found; says of what that is proved, and what the quickest one found would take.
     """
     asked = task.settings
-    # The quickest motions know neither a closure nor what clearance costs. On a grid of external
-    # axes they may take minutes to begin: the long steps between its samples leave the arm nearly
-    # every edge, and the exact search for the fastest path on the grid keeps each as a state.
+    # The quickest motions know no closure, torque or jerk, and not what clearance costs. On a grid
+    # of external axes they may take minutes to begin: the long steps between its samples leave the
+    # arm nearly every edge, and the exact search for the fastest path keeps each as a state.
     priced = asked.comfort is not None and asked.comfort.prices_clearance
+    held = task.problem.limits
+    unknown = held.torque is not None or held.jerk is not None
     on_a_grid = task.robot.externals and task.external is None
-    if asked.closure == "periodic" or priced or on_a_grid:
+    if asked.closure == "periodic" or priced or unknown or on_a_grid:
         raise _judged(broken, task, begin) from None
     judged, best = None, None
     begin("search for the quickest motion")
@@ -152,12 +154,10 @@ def _bracket(broken: NoFeasiblePath, task: PlanningTask) -> str:
     return f"{said}; the posture would have to change from {' to '.join(names)}"
 
 
-def _proof(method: Method, optimal: bool, finder: ClearSearch) -> Proof:
+def _proof(problem: SearchProblem, optimal: bool, finder: ClearSearch) -> Proof:
     if optimal:
-        claim = finder.claimed(
-            "the best path on this graph under the velocity and acceleration limits"
-        )
-    elif method == "known":
+        claim = finder.claimed(f"the best path on this graph under {limits_named(problem)}")
+    elif problem.method == "known":
         claim = "no claim: the known technique tests neither velocity nor acceleration"
     else:
         claim = "no claim: the acceleration test of the paper's procedure is greedy"

@@ -20,6 +20,7 @@ from kerfpath.planner._continuous import clear_motion, grid_reason
 from kerfpath.planner._courses import along_a_course
 from kerfpath.planner._refined import refine_plan
 from kerfpath.planner._task import PlanningTask, task_of
+from kerfpath.planner._words import limits_named
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import Robot
 from kerfpath.search import Piece, find_interrupted
@@ -76,7 +77,8 @@ def plan_in_pieces(
     ------
     NoFeasiblePath
         No number of interruptions helps: a node without a pose, or an interval between two nodes
-        that no poses can pass; or no pieces of the least length.
+        that no poses can pass; or no pieces of the least length. Or of a piece no motion was found
+        that keeps the jerk limits.
     InputError
         As `plan`; another method or closure, a rotation limit, a tilt.
     """
@@ -128,7 +130,7 @@ def _plan_piece(
     task: PlanningTask, finder: ClearSearch, piece: Piece, number: int, count: int
 ) -> tuple[PlanningTask, Plan]:
     """Return the task of one piece, and its plan on the grid."""
-    claim = "the best path on this graph under the velocity and acceleration limits"
+    claim = f"the best path on this graph under {limits_named(task.problem)}"
     if count > 1:
         last = piece.first + len(piece.index) - 1
         task = task.part(piece.first, last, f"{task.contour.name}, piece {number} of {count}")

@@ -23,18 +23,32 @@ def refine_plan(task: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
 
     A refinement ends in the nearest optimum. The grid quantises the acceleration, so that its best
     path under (6) may lie far from the best motion, and its best path without (6) close by: both
-    are begun from.
+    are begun from. A limit on the jerk, which the grid does not know, may make it dearer.
+
+    Raises
+    ------
+    NoFeasiblePath
+        The jerk is limited, and no motion was found that keeps it.
     """
     first = plan_first_order(task, finder)
     starts = [made]
     if first is not None and not np.array_equal(first.q, made.q):
         starts.append(first)
     found = [refiner.refine(start) for start in starts]
-    done = [f for f in found if f.done and f.cost_after <= made.cost]
+    jerk = task.robot.jerk_limit()
+    done = [f for f in found if f.done and (jerk is not None or f.cost_after <= made.cost)]
     clear = [f for f in done if finder.is_clear(f.plan)]
     if not clear:
         why = f"not refined: off the grid it would {'not be clear' if done else 'cost more'}"
-        statement = f"{made.proof.statement}; {why if found[0].done else found[0].statement}"
+        why = why if found[0].done else found[0].statement
+        if jerk is not None:
+            raise NoFeasiblePath(
+                f"contour {task.contour.name!r}: no motion was found within the jerk limits, "
+                f"which the grid does not know; {why}",
+                proved=False,
+                node=len(made.q) - 1,
+            )
+        statement = f"{made.proof.statement}; {why}"
         return replace(made, proof=replace(made.proof, statement=statement))
     best = min(clear, key=lambda f: f.cost_after)
     how = "" if best is found[0] else " by way of the best path without acceleration limits"
@@ -42,7 +56,8 @@ def refine_plan(task: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
         f"{made.proof.statement}; refined off the grid{how}: cost {made.cost:.6g} to "
         f"{best.cost_after:.6g}"
     )
-    proof = Proof(optimal=made.proof.optimal, statement=statement, grid_cost=made.cost)
+    optimal = made.proof.optimal and best.cost_after <= made.cost
+    proof = Proof(optimal=optimal, statement=statement, grid_cost=made.cost)
     return replace(best.plan, proof=proof)
 
 

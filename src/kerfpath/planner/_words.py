@@ -11,8 +11,9 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.losses import Loss
 from kerfpath.options import PlanOptions
+from kerfpath.search import SearchProblem
 
-__all__ = ["FINER", "ON_THIS_GRID", "at_least", "at_most", "with_windows_said"]
+__all__ = ["FINER", "ON_THIS_GRID", "at_least", "at_most", "limits_named", "with_windows_said"]
 
 ON_THIS_GRID = "on this grid of the rotation"
 """Where a statement holds."""
@@ -28,6 +29,12 @@ def at_most(value: float, digits: int = 4) -> str:
 def at_least(value: float, digits: int = 4) -> str:
     """Return a positive value in so many digits, never less than it is."""
     return _rounded(value, digits, ROUND_CEILING)
+
+
+def limits_named(problem: SearchProblem) -> str:
+    """Return the limits that a search of the grid keeps."""
+    held = ["velocity", "acceleration"] + ["torque"] * (problem.limits.torque is not None)
+    return f"the {', '.join(held[:-1])} and {held[-1]} limits"
 
 
 def with_windows_said(broken: NoFeasiblePath, asked: PlanOptions) -> NoFeasiblePath:

@@ -141,7 +141,7 @@ class Descent:
             return MotionState(
                 free=free, q=q, cost=np.inf, excess=np.inf, lost=np.inf, outside=np.inf
             )
-        excess = self.rates.excess(np.diff(q, axis=0))
+        excess = self.rates.excess(q)
         if self.cap < np.inf:
             longest = path_cost(np.diff(q, axis=0), self.weight, self.metric, "max")
             excess = max(excess, longest / self.cap - 1)
@@ -150,7 +150,7 @@ class Descent:
             q=q,
             cost=self.cost(q),
             excess=excess,
-            lost=self.rates.lost(np.diff(q, axis=0)),
+            lost=self.rates.lost(q),
             outside=self._outside(q),
         )
 
@@ -245,27 +245,26 @@ class Descent:
                 return _Step(there, promised, longest, programs)
             if there.outside == np.inf:
                 break
-            model = self._model(there, radius)
-            model = replace(model, q=there.q - _moved(model, delta))
+            model = self._model(there, radius).through(delta)
         return _Step(None, promised, longest, programs)
 
     def _modelled(self, model: LinearModel, delta: Array, target: Target) -> float:
-        q = model.q + _moved(model, delta)
-        dq = np.diff(q, axis=0)
+        q = model.q + model.moved(delta)
         if target == "excess":
-            return self.rates.excess(dq)
-        return self.cost(q) + (PRICE * self.rates.lost(dq) if target == "lost" else 0.0)
+            return self.rates.excess(q)
+        return self.cost(q) + (PRICE * self.rates.lost(q) if target == "lost" else 0.0)
 
     def _model(self, at: MotionState, radius: float) -> LinearModel:
         slope = self.curves.slope(at.free, at.q)
         # At the edge of reach a node stays where it is.
         movable = np.asarray(np.isfinite(slope).all(axis=(1, 2)))
+        slope = np.where(movable[:, None, None], slope, 0.0)
         endless = self.limits.endless
         # A range may be a single point.
         room = np.minimum(MARGIN, (self.limits.upper - self.limits.lower) / 2)
         return LinearModel(
             q=at.q,
-            slope=np.where(movable[:, None, None], slope, 0.0),
+            slope=slope,
             radius=np.repeat(np.where(movable, radius, 0.0)[:, None], at.free.shape[1], axis=1),
             least=np.clip((self.low - at.free) / radius, -1.0, 0.0),
             most=np.clip((self.high - at.free) / radius, 0.0, 1.0),
@@ -278,6 +277,7 @@ class Descent:
             weight=self.weight,
             metric=self.metric,
             cap=self.cap,
+            torque=self.rates.linear_torque(at.q, slope[..., 0]),
         )
 
     def _outside(self, q: Array) -> float:
@@ -287,8 +287,3 @@ class Descent:
         over = np.maximum(limits.row_lower - value, value - limits.row_upper)
         turned = np.abs(q - q[0]) - self.rotation
         return float(max(beyond.max(), over.max(initial=-np.inf), turned.max()))
-
-
-def _moved(model: LinearModel, delta: Array) -> Array:
-    """Return by how much the joints (K, n) move by the linear model where `delta` (K, F) does."""
-    return np.asarray((model.slope @ delta[..., None])[..., 0])

@@ -1,15 +1,15 @@
 """The convex program of one step: limits and ranges linear in what is free, costs convex.
 
 Free at a node are gamma and its external axes, F numbers f_k. With
-q_k(f_k + delta_k) = q_k + J_k delta_k the limits (5) and (6) and the ranges of the joints
-are linear in delta, and the distances of (14) and (15) are convex: a linear program for the
-Manhattan and Chebychev metrics, a second-order cone program for the Euclidean one. The unknowns are
-x = delta / radius, so that all lie in [-1, 1].
+q_k(f_k + delta_k) = q_k + J_k delta_k the limits (5), (6) and on jerks and the ranges of the joints
+are linear in delta, and torques, of arms without such axes, are taken to be. The distances of (14)
+and (15) are convex: a linear program for the Manhattan and Chebychev metrics, a second-order cone
+program for the Euclidean one. The unknowns are x = delta / radius, so that all lie in [-1, 1].
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -17,7 +17,7 @@ from scipy import sparse
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
-from kerfpath.refiner._rates import RateLimits
+from kerfpath.refiner._rates import LinearTorque, RateLimits
 from kerfpath.refiner._rows import ConstraintRows, Sparse, span_of, wide
 from kerfpath.search import Metric
 
@@ -56,6 +56,8 @@ class LinearModel:
     metric : str
     cap : float
         Largest distance that is allowed; infinite: any.
+    torque : LinearTorque or None
+        Shares of the torque limits; None where there are none.
     """
 
     q: Array
@@ -72,8 +74,22 @@ class LinearModel:
     weight: Array
     metric: Metric
     cap: float
+    torque: LinearTorque | None = None
 
     __repr__ = short_repr
+
+    def moved(self, delta: Array) -> Array:
+        """Return by how much the joints (K, n) move where `delta` (K, F) does."""
+        return np.asarray((self.slope @ delta[..., None])[..., 0])
+
+    def through(self, delta: Array) -> LinearModel:
+        """Return the model, whose values are those after changes delta (K, F), before them."""
+        torque = self.torque
+        return replace(
+            self,
+            q=self.q - self.moved(delta),
+            torque=None if torque is None else torque._replace(share=torque.at(-delta[:, 0])),
+        )
 
 
 def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None:
@@ -84,7 +100,7 @@ def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None
     beyond = None
     if target in ("excess", "lost"):
         beyond = rows.new(1 if target == "excess" else len(rates.tau) + len(rates.meetings[0]))
-    _limits(rows, dq, D, rates, beyond)
+    _limits(rows, dq, D, model, rates, beyond)
     _ranges(rows, model)
     for sign, bound in ((1.0, model.most), (-1.0, -model.least)):
         rows.hold(sign * sparse.eye_array(size, format="csr"), bound.ravel())
@@ -139,9 +155,14 @@ def _slopes(model: LinearModel) -> Sparse:
 
 
 def _limits(
-    rows: ConstraintRows, dq: Array, D: Sparse, rates: RateLimits, beyond: Sparse | None
+    rows: ConstraintRows,
+    dq: Array,
+    D: Sparse,
+    model: LinearModel,
+    rates: RateLimits,
+    beyond: Sparse | None,
 ) -> None:
-    """Hold (5) and (6), up to a share beyond them where that is unknown.
+    """Hold (5), (6), torques and jerks, up to a share beyond them where that is unknown.
 
     One unknown for all, or one for each interval and then each node, none of these negative.
     """
@@ -156,18 +177,35 @@ def _limits(
     joints = np.arange(n)
     before, after = ((joints + n * at[:, None]).ravel() for at in meetings)
     A = _scaled(np.repeat(1 / span, n), V[after] - V[before])
-    for value, slope, limit, of in (
-        (v, V, rates.velocity, owner[:edges]),
-        (a, A, rates.acceleration, owner[edges:]),
-    ):
-        share = (value / limit).ravel()
-        per_share = _scaled(1 / limit.ravel(), slope)
+    held = [
+        (v / rates.velocity, _scaled(1 / rates.velocity.ravel(), V), owner[:edges]),
+        (a / rates.acceleration, _scaled(1 / rates.acceleration.ravel(), A), owner[edges:]),
+    ]
+    if model.torque is not None:
+        held.append((model.torque.share, _torques(model, model.torque), owner[edges:]))
+    if rates.limits.jerk is not None and len(jerk := rates.jerk_share(dq)):
+        over = meetings[1][: len(jerk)]
+        here = (joints + n * np.arange(len(jerk))[:, None]).ravel()
+        there = (here + n) % A.shape[0]
+        per = np.outer(1 / rates.tau[over], 1 / rates.limits.jerk.usable).ravel()
+        held.append((jerk, _scaled(per, A[there] - A[here]), owner[:edges][over]))
+    for value, per_share, of in held:
+        share = value.ravel()
         for sign in (1.0, -1.0):
             if beyond is None:
                 rows.at_most(sign * share, sign * per_share, 1 - MARGIN)
             else:
                 spread = beyond[np.repeat(of, n)]
                 rows.hold(wide(sign * per_share, rows.variables) - spread, 1 - sign * share)
+
+
+def _torques(model: LinearModel, torque: LinearTorque) -> Sparse:
+    """Slopes (M n, K) of the shares of torque limits, node after node; gamma alone is free."""
+    values = torque.slope * model.radius[torque.column]
+    m, n = torque.share.shape
+    row = np.tile(np.arange(m * n), 3)
+    column = np.repeat(torque.column.ravel(), n)
+    return _matrix(values.ravel(), row, column, (m * n, len(model.q)))
 
 
 def _ranges(rows: ConstraintRows, model: LinearModel) -> None:

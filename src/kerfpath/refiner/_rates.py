@@ -9,9 +9,12 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
-from kerfpath.limits import Limits, meetings, rates_of
+from kerfpath.limits import Limits, jerks_of, meetings, rates_of
 
-__all__ = ["KeptShares", "RateLimits"]
+__all__ = ["KeptShares", "LinearTorque", "RateLimits"]
+
+DERIVATIVE_STEP = 1e-4
+"""rad: central differences are good to 1e-8 of the third derivative, rounding to 1e-11."""
 
 
 class KeptShares(NamedTuple):
@@ -24,6 +27,22 @@ class KeptShares(NamedTuple):
     acceleration: Array
 
 
+class LinearTorque(NamedTuple):
+    """Shares of the torque limits at nodes, as linear functions of changes of gamma.
+
+    share : (M, n), at no change; column : (3, M) int, the node before, the node and the one after;
+    slope : (3, M, n) 1/rad, by their gamma.
+    """
+
+    share: Array
+    column: Ints
+    slope: Array
+
+    def at(self, delta: Array) -> Array:
+        """Return the shares (M, n) at changes of gamma (K,) rad."""
+        return np.asarray(self.share + (self.slope * delta[self.column][..., None]).sum(axis=0))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RateLimits:
     """What the motion is held to, in time.
@@ -33,7 +52,7 @@ class RateLimits:
     tau : (K-1,) s
         Time of each interval.
     limits : Limits
-        What (5) and (6) hold it to.
+        What (5) and (6) hold it to, and limits on torque and jerk where there are any.
     periodic : bool
         The last node is the first one again, and (6) holds across the seam.
     kept : KeptShares, optional
@@ -75,11 +94,69 @@ class RateLimits:
         )
         return np.asarray(share * self.limits.acceleration.usable)
 
-    def excess(self, dq: Array) -> float:
-        """Return the largest share of a limit that increments (K-1, n) rad ask for, less one."""
-        fast, sharp = self.shares(dq)
-        return float(max(fast.max(), sharp.max(initial=0.0))) - 1
+    def torque_share(self, q: Array) -> Array:
+        """Return the signed shares (M, n) of the torque limits of joints (K, n) rad; (0, n): none.
 
-    def lost(self, dq: Array) -> float:
+        M counts the nodes where intervals meet.
+        """
+        if self.limits.torque is None:
+            return np.empty((0, q.shape[1]))
+        return self.limits.torque.shares(q, self.tau, periodic=self.periodic)
+
+    def jerk_share(self, dq: Array) -> Array:
+        """Return the signed shares (J, n) of the jerk limits of increments (K-1, n); (0, n): none.
+
+        J counts the intervals at both ends of which others meet them.
+        """
+        if self.limits.jerk is None:
+            return np.empty((0, dq.shape[1]))
+        jerk = jerks_of(self.of(dq)[1], self.tau, periodic=self.periodic)
+        return np.asarray(jerk / self.limits.jerk.usable)
+
+    def linear_torque(self, q: Array, slope: Array) -> LinearTorque | None:
+        """Return how shares of torque limits change with gamma; None where there are none.
+
+        slope : (K, n) is that of the joints q (K, n) rad by gamma.
+        """
+        limit = self.limits.torque
+        before, after = self.meetings
+        if limit is None or not len(before):
+            return None
+        v, a = self.of(np.diff(q, axis=0))
+        middle, b, c = (v[before] + v[after]) / 2, self.tau[before, None], self.tau[after, None]
+        column = np.stack([before, after, after + 1])
+        # How joints, velocities and accelerations at the node move with each of the three nodes.
+        moves = (
+            (0.0, -1 / (2 * b), 2 / (b * (b + c))),
+            (1.0, 1 / (2 * b) - 1 / (2 * c), -2 / (b * c)),
+            (0.0, 1 / (2 * c), 2 / (c * (b + c))),
+        )
+        slopes = []
+        for nodes, (at, speed, bend) in zip(column, moves, strict=True):
+            step = DERIVATIVE_STEP * slope[nodes]
+            ahead, behind = (
+                limit.dynamics.torque(
+                    q[after] + sign * at * step,
+                    middle + sign * speed * step,
+                    a + sign * bend * step,
+                )
+                for sign in (1.0, -1.0)
+            )
+            slopes.append((ahead - behind) / (2 * DERIVATIVE_STEP) / limit.bound)
+        share = limit.dynamics.torque(q[after], middle, a) / limit.bound
+        return LinearTorque(share, column, np.array(slopes))
+
+    def excess(self, q: Array) -> float:
+        """Return the largest share of a limit that joints (K, n) rad ask for, less one."""
+        return float(max(share.max(initial=0.0) for share in self._every_share(q))) - 1
+
+    def lost(self, q: Array) -> float:
         """Return what all intervals and nodes ask for beyond the limits, in shares of them."""
-        return float(sum(np.maximum(s.max(axis=1) - 1, 0).sum() for s in self.shares(dq) if len(s)))
+        shares = [share for share in self._every_share(q) if len(share)]
+        return float(sum(np.maximum(share.max(axis=1) - 1, 0).sum() for share in shares))
+
+    def _every_share(self, q: Array) -> tuple[Array, Array, Array, Array]:
+        """Return the shares of limits of every kind, not signed, a row for each place."""
+        dq = np.diff(q, axis=0)
+        torque, jerk = np.abs(self.torque_share(q)), np.abs(self.jerk_share(dq))
+        return *self.shares(dq), torque, jerk

@@ -91,9 +91,10 @@ def refine(
 ) -> Refinement:
     """Return the plan with gamma moved off its grid: better, or within limits the grid cannot meet.
 
-    Sequential convex programming on the true kinematics: (5), (6), the ranges of joints and of
-    couplings and a periodic closure are hard constraints of every iteration, and a motion is taken
-    only when, evaluated with the kinematics and not with the linear model, it keeps all of them.
+    Sequential convex programming on the true kinematics: (5), (6), limits on torque and jerk, the
+    ranges of joints and of couplings and a periodic closure are hard constraints of every
+    iteration, and a motion is taken only when, evaluated with the kinematics and the dynamics and
+    not with the linear model, it keeps all of them.
 
     Parameters
     ----------
@@ -342,6 +343,18 @@ def _closest(descent: Descent, at: MotionState) -> str:
     fast, sharp = rates.shares(np.diff(at.q, axis=0))
     if at.outside > 0:
         return f"a joint stays out of its range by {np.degrees(at.outside):.3g} deg"
+    after = rates.meetings[1]
+    more = {
+        "torque": np.abs(rates.torque_share(at.q)),
+        "jerk": np.abs(rates.jerk_share(np.diff(at.q, axis=0))),
+    }
+    what, share = max(more.items(), key=lambda each: float(each[1].max(initial=0.0)))
+    if share.max(initial=0.0) > max(fast.max(), sharp.max(initial=0.0)):
+        row, joint = np.unravel_index(np.argmax(share), share.shape)
+        return (
+            f"the {what} of joint {joint + 1} at node {after[row]} could not be brought below "
+            f"{share.max():.4f} of its limit"
+        )
     _, worst = _binding(descent, fast, sharp)
     return (
         f"the {worst.limit} of joint {worst.joint + 1} at node {worst.node} could not be brought "

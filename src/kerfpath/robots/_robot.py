@@ -52,9 +52,9 @@ class Robot(Manipulator):
     acceleration : (n,) rad/s^2 or None
         Largest joint accelerations; most makers publish none.
     jerk : (arm joints,) rad/s^3 or None
-        Largest joint jerks.
+        Largest joint jerks; plans keep them where they are known.
     torque : (arm joints,) N m or None
-        Largest joint torques.
+        Largest joint torques; plans keep them where there is a load.
     endless : (n,) bool
         Joints that turn without end; their limits do not apply.
     couplings : tuple of Coupling
@@ -71,7 +71,7 @@ class Robot(Manipulator):
     inertia_missing : str
         why it is not known.
     load : Load, optional
-        What the flange carries; with it torques are known, see `with_load`.
+        What the flange carries; with it torques are known and limited, see `with_load`.
     gravity : (3,) m/s^2
         In the robot base; default: that of a robot that stands upright.
     externals : tuple of ExternalAxis
@@ -156,7 +156,7 @@ class Robot(Manipulator):
         return replace(self, **changes)  # type: ignore[arg-type]  # cast by __post_init__
 
     def with_load(self, load: Load, *, gravity: ArrayLike = STANDARD_GRAVITY) -> Robot:
-        """Return this robot with a load on its flange, so that its torques are known.
+        """Return this robot with a load on its flange, so that its torques are known and limited.
 
         Parameters
         ----------

@@ -29,13 +29,14 @@ def technique_message(
     """Return the course of a technique along a contour, on the graph that its plan began from."""
     asked, notes = _without(cut.request.options, prepared, method)
     job, first = prepared.job, float(nodes.s[0])
+    robot = replace(job.robot, load=None, jerk=None)
     base = TechniqueMessage(
         revision=revision, contour=cut.contour, method=method, s=[], gamma=[], posture=[],
         cost=None, peak_velocity=[], peak_acceleration=[], statement="", notes=notes,
     )  # fmt: skip
     try:
         made = plan(
-            nodes, job.robot, tool=job.tool, placement=job.placement, speed=cut.candidate.speed,
+            nodes, robot, tool=job.tool, placement=job.placement, speed=cut.candidate.speed,
             options=asked, graph=graph,
         )  # fmt: skip
     except NoFeasiblePath as broken:
@@ -70,6 +71,8 @@ def _without(
         "a reduced feed": options.feed == "constant",
         "interruptions": options.interruptions == "none",
         "limits between the nodes": options.between_nodes != "guaranteed",
+        "limits on torque": prepared.job.robot.load is None,
+        "limits on jerk": prepared.job.robot.jerk is None,
         "collisions in the cell": prepared.cell is None,
     }
     left = [words for words, none in kept.items() if not none]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfpath._arrays import Array, floats, freeze
+from kerfpath._arrays import Array, floats, freeze, positive
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.urdf._xml import Joint, Tree, child, numbers, pose_of
@@ -29,6 +29,11 @@ class ChainInertia:
         Centre of mass.
     tensor : (n, 3, 3) kg m^2
         Inertia about the centre of mass, along the axes of the joint frame.
+
+    Raises
+    ------
+    InputError
+        A mass that is not positive, an inertia that is not positive definite, unlike numbers.
     """
 
     mass: Array
@@ -39,9 +44,11 @@ class ChainInertia:
 
     def __post_init__(self) -> None:
         n = len(self.mass)
-        object.__setattr__(self, "mass", floats(self.mass, "mass", (n,)))
+        object.__setattr__(self, "mass", positive(self.mass, "mass", (n,)))
         object.__setattr__(self, "centre", floats(self.centre, "centre", (n, 3)))
         object.__setattr__(self, "tensor", floats(self.tensor, "tensor", (n, 3, 3)))
+        for i, tensor in enumerate(self.tensor):
+            require_tensor((tensor + tensor.T) / 2, f"body {i + 1}")
 
 
 def inertia_of(

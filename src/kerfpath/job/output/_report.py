@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from kerfpath.cad import Departure
 from kerfpath.job.format import Job
 from kerfpath.job.run import JobResult
 from kerfpath.report import ContourSection, render
+from kerfpath.robots import Robot
 from kerfpath.transfer import TransferMove
 
 __all__ = ["report_text"]
@@ -54,6 +55,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
             "Joint acceleration limits",
             f"{_row(acceleration)} deg/s^2 ({robot.acceleration_source})",
         ),
+        *_more_limits(robot),
         ("Endless axes", _row(np.flatnonzero(robot.endless) + 1) or "none"),
     ]
     # From home and back to it the way is long, and would make the part small.
@@ -70,6 +72,15 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
         notes=notes,
         job_text=job.text,
     )
+
+
+def _more_limits(robot: Robot) -> Iterator[tuple[str, str]]:
+    """Yield the limits on jerk and torque, where there are any."""
+    if robot.jerk is not None:
+        yield "Joint jerk limits", f"{_row(np.degrees(robot.jerk).round(1))} deg/s^3"
+    if robot.load is not None:
+        load = f"load {robot.load.mass:g} kg, without friction and rotors"
+        yield "Joint torque limits", f"{_row(robot.torque)} N m ({load})"
 
 
 def _sampling(found: Departure) -> list[tuple[str, str]]:

@@ -158,8 +158,11 @@ def _robot(job: Job) -> str:
         ("upper", limits.upper, before.upper),
         ("velocity", own.velocity, known["velocity"]),
         ("acceleration", own.acceleration, known["acceleration"]),
+        ("jerk", own.jerk, plain.jerk),
         ("endless", own.endless, plain.endless),
     ):
+        if new is None:
+            continue
         if old is None or not np.array_equal(np.asarray(new), np.asarray(old)):
             changed[name] = np.asarray(new)
     text = f"arm = robot({model!r})"

@@ -71,6 +71,19 @@ class CouplingData(TypedDict):
     note: str
 
 
+class DynamicsData(TypedDict):
+    """The torque limits that were used, and what weighs on the joints."""
+
+    torque_nm: Row
+    gravity_m_s2: Row
+    mass_kg: Row
+    centre_m: list[Row]
+    inertia_kg_m2: list[list[Row]]
+    load_mass_kg: float
+    load_centre_m: Row | None
+    load_inertia_kg_m2: list[Row] | None
+
+
 class LimitsData(TypedDict):
     """The limits of the arm's joints that were used."""
 
@@ -81,6 +94,8 @@ class LimitsData(TypedDict):
     acceleration_rad_s2: Row
     acceleration_source: str
     couplings: list[CouplingData]
+    jerk_rad_s3: NotRequired[list[float | None]]
+    dynamics: NotRequired[DynamicsData]
 
 
 class NearestData(TypedDict):

@@ -14,8 +14,9 @@ from kerfpath._repr import short_repr
 from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError
 from kerfpath.job.plan_file._certificate import read_certificate
+from kerfpath.job.plan_file._dynamics import with_dynamics
 from kerfpath.job.plan_file._external import add_externals, joints
-from kerfpath.job.plan_file._layout import PlanData, PlanDocument
+from kerfpath.job.plan_file._layout import LimitsData, PlanData, PlanDocument
 from kerfpath.job.plan_file._schema import read_document
 from kerfpath.job.plan_file._sequence import read_moves
 from kerfpath.options import OptionData, PlanOptions
@@ -140,9 +141,10 @@ def table_of(
         raise InputError(f"{file.path}: its [{name}] table is not valid ({said})") from None
 
 
-def _read_robot(robot: Mapping[str, Any], limits: Mapping[str, Any]) -> Robot:
+def _read_robot(robot: Mapping[str, Any], limits: LimitsData) -> Robot:
     """Return the arm; its arrays are cast and checked by itself."""
-    return Robot(
+    said: Mapping[str, Any] = limits
+    arm = Robot(
         id=robot["id"],
         manufacturer=robot["manufacturer"],
         model=robot["model"],
@@ -154,17 +156,18 @@ def _read_robot(robot: Mapping[str, Any], limits: Mapping[str, Any]) -> Robot:
         T_base_foot=robot["T_base_foot"],
         T_end_flange=robot["T_end_flange"],
         chain=KinematicChain(**robot["chain"]) if robot["chain"] else None,
-        lower=limits["lower_rad"],
-        upper=limits["upper_rad"],
-        endless=limits["endless"],
-        velocity=limits["velocity_rad_s"],
-        acceleration=limits["acceleration_rad_s2"],
-        acceleration_source=limits["acceleration_source"],
+        lower=said["lower_rad"],
+        upper=said["upper_rad"],
+        endless=said["endless"],
+        velocity=said["velocity_rad_s"],
+        acceleration=said["acceleration_rad_s2"],
+        acceleration_source=said["acceleration_source"],
         couplings=tuple(
             Coupling(row=c["row"], lower=c["lower_rad"], upper=c["upper_rad"], note=c["note"])
-            for c in limits["couplings"]
+            for c in said["couplings"]
         ),
     )
+    return with_dynamics(limits, arm)
 
 
 def _read_plan(entry: PlanData, robot: Robot, tool: Any, placement: Any) -> Plan:

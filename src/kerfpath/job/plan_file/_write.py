@@ -17,6 +17,7 @@ from kerfpath.cell import Cell, caveats
 from kerfpath.comfort import MEASURES
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.plan_file._certificate import certificate_entry
+from kerfpath.job.plan_file._dynamics import dynamics_entry
 from kerfpath.job.plan_file._external import apart, external_entries
 from kerfpath.job.plan_file._layout import (
     BrokenData,
@@ -216,6 +217,7 @@ def _limits_entry(robot: Robot) -> LimitsData:
             {"row": c.row.tolist(), "lower_rad": c.lower, "upper_rad": c.upper, "note": c.note}
             for c in robot.couplings
         ],
+        **dynamics_entry(robot),
     }
 
 

@@ -132,13 +132,14 @@ def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutRes
 
     That is to leave out windows of gamma, and the speed and the limits that would do. With poses
     everywhere slower would do; for a loop that cannot close, or an axis that may not turn as far,
-    it need not, and a reduced feed has tried.
+    it need not, a reduced feed has tried, and with torque or jerk limits it is not known.
     """
     options, graph = replace(cut.request.options, certify=None), cut.graph
     job, cell, run = replace(prepared.job, options=options), prepared.cell, cut.request.run
     if run is not None:
         graph, cell = run.graph(graph, job.robot.endless), run.cell(cell)
     plain = options.closure == "free" and options.rotation is None
+    plain = plain and job.robot.load is None and job.robot.jerk is None
     constant = options.feed == "constant" and cut.candidate.nodes.time is None
     broken = cut.broken
     if broken is None:

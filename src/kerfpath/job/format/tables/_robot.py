@@ -136,6 +136,13 @@ class RobotTable(Table):
             "[320, 270, 420, 1300, 1400, 2000]",
         ),
     ] = None
+    jerk_deg_s3: Annotated[
+        JointsPositive | None,
+        key(
+            "numbers above 0, the largest joint jerks in deg/s^3",
+            "[3000, 3000, 4000, 13000, 14000, 20000]",
+        ),
+    ] = None
     torque_nm: Annotated[
         JointsPositive | None,
         key(
@@ -243,7 +250,7 @@ class RobotTable(Table):
 
     def _require_for_each_joint(self, n: int) -> None:
         """Require as many numbers as the robot has joints, and no axis beyond them."""
-        for name in given(self, *LIMITS, "torque_nm", "sign", "offset_deg"):
+        for name in given(self, *LIMITS, "jerk_deg_s3", "torque_nm", "sign", "offset_deg"):
             if (got := len(getattr(self, name))) != n:
                 raise fault(f"{n} numbers, one for every joint", f"{got}", "give as many", (name,))
         axes = self.endless or ()
@@ -347,6 +354,7 @@ class RobotTable(Table):
             "upper": _radians(self.upper_deg),
             "velocity": _radians(self.velocity_deg_s),
             "acceleration": _radians(self.acceleration_deg_s2),
+            "jerk": _radians(self.jerk_deg_s3),
             "torque": self.torque_nm,
             "endless": None if axes is None else np.isin(np.arange(1, n + 1), axes),
         }
