@@ -82,8 +82,11 @@ def retime(
     Raises
     ------
     InputError
-        Arrays that do not fit each other, NaN, times that are not positive.
+        Arrays that do not fit each other, NaN, times that are not positive; limits on torque or
+        jerk.
     """
+    if limits.torque is not None or limits.jerk is not None:
+        raise InputError("retime: limits on velocity and acceleration alone are known to it")
     dq, dt, velocity, acceleration = _inputs(dq, dt, limits)
     least = np.maximum(dt, (np.abs(dq) / velocity).max(axis=1, initial=0.0))
     rows = _rows(dq / acceleration, least, periodic)

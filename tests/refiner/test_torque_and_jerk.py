@@ -12,9 +12,11 @@ from kerfpath import Contour, InputError, NoFeasiblePath, fastest_speed, pareto,
 from kerfpath.auditor import audit, checks
 from kerfpath.dynamics import Load
 from kerfpath.limits import JerkLimit, Limits, jerks_of, rates_of
+from kerfpath.options import PlanOptions
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._program import solve
 from kerfpath.refiner._rates import LinearTorque, RateLimits
+from kerfpath.retime import retime
 
 STEP = np.radians(5)
 SPEED = 0.3
@@ -285,6 +287,12 @@ def test_what_does_not_hold_them_refuses(circle, arm, tool, placement):
             pareto(circle, robot, speed=0.2, **here)
     with pytest.raises(InputError, match="jerk: a limit is kept by the refinement alone"):
         plan(circle, smooth, speed=0.2, method="exact", **here)
+
+
+def test_times_are_not_stretched_under_limits_that_are_not_known(arm):
+    for robot in (arm.with_load(LOAD), arm.with_limits(jerk=np.full(6, 100.0))):
+        with pytest.raises(InputError, match="retime: limits on velocity and acceleration alone"):
+            retime(np.full((5, 6), 0.01), 0.1, PlanOptions().limits(robot))
 
 
 def test_few_nodes_have_no_jerk(arm, tool, placement):

@@ -112,7 +112,8 @@ def _torque(run: Executed, plan: Plan) -> Iterator[Check]:
     if peak is not None:
         yield Check(
             code="torque-as-run",
-            title="joint torque share as run, sampled, without friction and rotors",
+            title=f"joint torque share as run, sampled, without friction and rotors (highest: "
+            f"joint {peak.joint + 1})",
             value=peak.share,
             limit=1.0 + SLACK,
             unit="share",

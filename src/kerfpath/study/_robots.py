@@ -210,12 +210,12 @@ def with_robot(job: Job, candidate: Robot) -> Job:
     ------
     InputError
         A posture that its family has not; a cell that asks for the links of a description; a job
-        with a load.
+        with a load or jerk limits.
     """
-    if job.robot.load is not None:
+    if job.robot.load is not None or job.robot.jerk is not None:
         raise InputError(
-            "what its links weigh is not known: remove mass_kg, torque_nm and gravity_m_s2 to "
-            "compare robots without torque limits"
+            "its limits on torque and jerk are not known: remove mass_kg and jerk_deg_s3 to "
+            "compare robots without them"
         )
     words = job.source.get("plan", {}).get("posture")
     postures = None if words is None else postures_named(words, candidate.kinematics)
