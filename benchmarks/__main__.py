@@ -38,6 +38,7 @@ NAMES = (
     "continuum_infeasible",
     "execution",
     "external",
+    "torque",
     "certificate_audits",
     "studio",
     "studio-endurance",
@@ -104,6 +105,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import execution
 
         return execution.run(quick=quick)
+    if name == "torque":
+        from benchmarks import torque
+
+        return torque.run(quick=quick)
     if name == "kerf":
         from benchmarks import kerf
 

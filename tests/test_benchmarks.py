@@ -19,6 +19,7 @@ from benchmarks import (
     continuum_infeasible,
     continuum_random,
     part,
+    torque,
 )
 
 import kerfpath
@@ -342,3 +343,9 @@ def test_a_plan_above_the_ceiling_is_told_apart_from_one_below():
     assert counts == ["1 of 4 (25.0 %) of those without a plan", "3", "3", "1", "1"]
     assert report.sheets[0].rows[-1] == ("all", "7", "1", "2", "1", "3", "2", "1")
     assert report.sheets[0].rows[1] == ("kuka_kr16_r1610_2", *("0",) * 5, "-", "-")
+
+
+def test_the_yardstick_of_torque_limits_is_the_search_by_another_dynamics():
+    report = torque._against_brute(torque._arm_with_masses(), 6)  # asserts that they agree
+    assert "agrees on all 6 graphs" in report.findings[0]
+    assert "dearer with them" in report.findings[0]
