@@ -14,7 +14,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph, build, gamma_grid
 from kerfpath.losses import Loss, Reason
-from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
+from kerfpath.options import EXACT_OR_BETTER, GraphKeywords, PlanOptions, with_keywords
 from kerfpath.plans import has_room
 from kerfpath.robots import Robot, lowest_joint
 from kerfpath.search import GammaSamples
@@ -27,6 +27,7 @@ __all__ = [
     "longest_step",
     "node_interval",
     "require_even",
+    "require_held",
     "require_no_empty_layer",
     "require_windows_fit",
     "samples_of",
@@ -240,4 +241,25 @@ def require_no_empty_layer(contour: Contour, graph: LayeredGraph) -> None:
             node=k - 1,
             back=int(empty[-1]) + 1,
             counts=counts,
+        )
+
+
+def require_held(robot: Robot, options: PlanOptions) -> None:
+    """Raise InputError where the way that is asked for does not hold a limit on torque or jerk."""
+    limits, comfort = options.limits(robot), options.comfort
+    refined = options.method == "continuous" or (options.method == "exact" and options.refine)
+    priced = comfort is not None and comfort.prices_clearance
+    for what, held in (("torque", limits.torque), ("jerk", limits.jerk)):
+        if held is None:
+            continue
+        if options.method not in EXACT_OR_BETTER:
+            raise InputError(
+                f'{what}: a limit needs method "continuous" or "exact", got "{options.method}"'
+            )
+        if options.feed != "constant":
+            raise InputError(f'{what}: a limit needs feed "constant", got "{options.feed}"')
+    if limits.jerk is not None and not (refined and robot.family.free_rotation and not priced):
+        raise InputError(
+            "jerk: a limit is kept by the refinement alone: it must be on, the robot must leave a "
+            "rotation free, and clearance must cost nothing"
         )

@@ -17,11 +17,12 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments, wrap
 from kerfpath.losses import Loss
-from kerfpath.options import EXACT_OR_BETTER, PlanOptions
+from kerfpath.options import PlanOptions
 from kerfpath.planner._graph import (
     course_of,
     layered_graph,
     node_interval,
+    require_held,
     require_no_empty_layer,
     require_windows_fit,
     samples_of,
@@ -259,7 +260,7 @@ def task_of(
     if options.closure == "periodic" and not contour.closed:
         raise InputError(f"closure: contour {contour.name!r} is open and cannot be periodic")
     options = options.resolve(robot, dt)
-    _require_held(robot, options)
+    require_held(robot, options)
     require_windows_fit(contour, robot, options)
     x = None if external is None else course_of(external, contour, robot)[:, 0]
     if graph is not None:
@@ -357,27 +358,6 @@ def _at_any_gamma(
     if closed is None:
         return empty.with_message(f"{empty}; whether it has one off the grid is undecided")
     return empty.with_message(f"{empty}; proved for every rotation: {closed}", closed=closed)
-
-
-def _require_held(robot: Robot, options: PlanOptions) -> None:
-    """Raise InputError where the way that is asked for does not hold a limit on torque or jerk."""
-    limits, comfort = options.limits(robot), options.comfort
-    refined = options.method == "continuous" or (options.method == "exact" and options.refine)
-    priced = comfort is not None and comfort.prices_clearance
-    for what, held in (("torque", limits.torque), ("jerk", limits.jerk)):
-        if held is None:
-            continue
-        if options.method not in EXACT_OR_BETTER:
-            raise InputError(
-                f'{what}: a limit needs method "continuous" or "exact", got "{options.method}"'
-            )
-        if options.feed != "constant":
-            raise InputError(f'{what}: a limit needs feed "constant", got "{options.feed}"')
-    if limits.jerk is not None and not (refined and robot.family.free_rotation and not priced):
-        raise InputError(
-            "jerk: a limit is kept by the refinement alone: it must be on, the robot must leave a "
-            "rotation free, and clearance must cost nothing"
-        )
 
 
 def _require_fitting(

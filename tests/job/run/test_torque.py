@@ -197,4 +197,6 @@ def test_jobs_that_no_motion_keeps_say_so(folder):
     assert "no feasible path" in found.stdout
     assert "jerk" in found.stdout
     for command in ("speed", "pareto", "layout"):
-        assert_refused(run(command, path), "limits on velocity and acceleration alone are known")
+        assert_refused(
+            run(command, path, cwd=folder), "limits on velocity and acceleration alone are known"
+        )
