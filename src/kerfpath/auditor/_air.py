@@ -51,9 +51,9 @@ def transfer_checks(
     list of Check
         Their node is the corner that a motion starts from.
     """
-    if robot.externals:
+    if robot.externals and cell is not None:
         name = robot.externals[0].name
-        raise InputError(f"air move: it is not known yet how {name} moves in it")
+        raise InputError(f"air move: the cell does not know how {name} moves in it")
     corners = floats(q, "q", (None, robot.joints))
     duration = np.diff(floats(time, "time", (len(corners),)))
     needed = _least_times(robot, np.abs(np.diff(corners, axis=0)), eta_v, eta_a)
@@ -61,10 +61,17 @@ def transfer_checks(
     limits = robot.joint_limits()
     beyond = np.maximum(limits.lower - corners, corners - limits.upper)
     beyond[:, robot.endless] = -np.inf
+    arm = robot.family.joints
     rows = [
         _check("air-time", "time that a transfer move needs", late, 1 + SLACK, "share"),
-        _check("air-limits", "excess over the joint limits", beyond.max(axis=1), SLACK, "rad"),
+        _check(
+            "air-limits", "excess over the joint limits", beyond[:, :arm].max(axis=1), SLACK, "rad"
+        ),
     ]
+    for i, axis in enumerate(robot.externals, arm):
+        if not robot.endless[i]:
+            title = f"excess over the limits of {axis.name}"
+            rows.append(_check("air-external-limits", title, beyond[:, i], SLACK, axis.unit))
     if cell is not None and len(cell.pairs):
         samples, leg = _sample_motions(corners)
         steps = np.flatnonzero(leg[1:] == leg[:-1])

@@ -68,12 +68,18 @@ def rounding_of(plan: Plan, point: float, angle: float, time: Array, *, jointed:
     jointed : bool
         The text says joints, not poses: `angle` is that of a joint.
     """
+    arm = plan.robot.family.joints
+    linear = np.array([unit == "m" for unit in plan.robot.units])
+    own = np.where(linear, point, angle)
     if jointed:
-        return Rounding(q=np.full(plan.q.shape, angle), time=time)
+        return Rounding(q=np.tile(own, (len(plan.q), 1)), time=time)
     chain = chain_of(plan.robot)
     chain = replace(chain, tip=chain.tip @ plan.T_flange_tip)
-    _, jacobian = chain.jacobian(plan.q)
+    tips, jacobian = chain.jacobian(plan.q)
     inverse = np.linalg.pinv(jacobian, rcond=SINGULAR)
+    # The text says where external axes are, and the arm makes up for those digits, too.
+    carried = np.abs(inverse @ chain.twists(plan.q, tips[:, :3, 3])) @ own[arm:]
     off = np.sqrt(3.0) * point * np.linalg.norm(inverse[..., :3], axis=-1)
     turned = AXES * angle * np.linalg.norm(inverse[..., 3:], axis=-1)
-    return Rounding(q=np.asarray(off + turned), time=time)
+    external = np.tile(own[arm:], (len(plan.q), 1))
+    return Rounding(q=np.hstack([off + turned + carried, external]), time=time)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, floats, freeze
 from kerfpath._repr import short_repr
+from kerfpath.post._external import arm_joints
 from kerfpath.robots import Robot
 
 __all__ = ["AxisCount", "offset_near", "wrist_in_plane"]
@@ -45,12 +46,12 @@ class AxisCount:
     __repr__ = short_repr
 
     def from_joints(self, robot: Robot, q: ArrayLike) -> Array:
-        """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad."""
-        angles = robot.sign * floats(q, "q", (None, 6))
+        """Return the controller's axes (K, 6) rad of the arm, of joint vectors q (K, n) rad."""
+        angles = robot.sign * arm_joints(robot, q)
         return freeze(np.asarray(angles @ self.matrix.T + self._shift(robot), dtype=np.float64))
 
     def to_joints(self, robot: Robot, axes: ArrayLike) -> Array:
-        """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
+        """Return the joints (K, 6) rad of the arm at a controller's axes (K, 6) rad."""
         rows = floats(axes, "axes", (None, 6)) - self._shift(robot)
         angles = rows @ np.linalg.inv(self.matrix).T
         return freeze(np.asarray(robot.sign * angles, dtype=np.float64))
@@ -63,14 +64,14 @@ class AxisCount:
 def wrist_in_plane(robot: Robot, q: Array) -> tuple[Array, Array]:
     """Return how far the wrist centre is ahead of axis 1, and of the lower arm, (K,) m each.
 
-    At joint vectors q (K, 6) rad. In the plane of the arm, with x ahead and z up, the lower arm
+    At joint vectors q (K, n) rad. In the plane of the arm, with x ahead and z up, the lower arm
     points along u = (sin q2, cos q2) and the wrist centre lies at
     w = c3 (sin q23, cos q23) + a2 (cos q23, -sin q23) from axis 3. It is behind the lower arm, the
     second value negative, where w turns from u towards the back: u_x w_z > u_z w_x, that is
     c3 sin q3 + a2 cos q3 < 0.
     """
     arm = robot.arm()
-    _, q2, q3, *_ = (arm.sign * q - arm.offset).T
+    _, q2, q3, *_ = (arm.sign * arm_joints(robot, q) - arm.offset).T
     ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
     bend = arm.c3 * np.sin(q3) + arm.a2 * np.cos(q3)
     return np.asarray(ahead), np.asarray(bend)

@@ -112,8 +112,11 @@ def build_program(
     if not plans:
         raise InputError("build_program: expected at least one plan, got none")
     first = plans[0]
-    for axis in (axis for plan in plans for axis in plan.robot.externals):
-        raise InputError(f"program: no language writes {axis.name} of a plan yet")
+    if arc_tolerance is not None and first.robot.externals:
+        moving = ", ".join(axis.name for axis in first.robot.externals)
+        raise InputError(
+            f"program: how controllers move {moving} along an arc differs; leave arcs_mm out"
+        )
     for plan in plans[1:]:
         _require_same_cell(first, plan)
     process = _Process(
@@ -311,8 +314,10 @@ def _kinematics(robot: Robot) -> tuple[object, ...]:
     chain = robot.chain
     parts = [robot.sign, robot.offset, robot.T_base_foot, robot.T_end_flange]
     parts += [] if chain is None else [chain.origins, chain.axes, chain.end]
+    parts += [x for axis in robot.externals for x in (axis.axis, axis.point)]
     numbers = np.concatenate([part.ravel() for part in parts])
-    return robot.id, robot.kinematics, *robot.geometry.values(), *numbers.tolist()
+    names = [(axis.name, axis.kind, axis.carries) for axis in robot.externals]
+    return robot.id, robot.kinematics, *names, *robot.geometry.values(), *numbers.tolist()
 
 
 def _require_on_contour(plan: Plan) -> None:

@@ -26,6 +26,7 @@ from kerfpath.post._program import (
 from kerfpath.post._read import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
 from kerfpath.post._settings import LanguageSettings, Rules
 from kerfpath.post._times import air_times, cruises
+from kerfpath.robots import Robot
 
 __all__ = ["deviations", "handshake_in_words", "switches_in_words"]
 
@@ -161,17 +162,39 @@ def _compare_places(
         left = q.shape[1] * rules.angle_step
         tips, tips_back = forward(q) @ tool, forward(q_back) @ tool
         yield from _compare_poses(backs, tips, tips_back, point + REACH * left, angle + left)
-        off = np.abs(q - q_back).max(axis=1)
+        arm = program.robot.family.joints
+        apart = np.abs(q - q_back)[:, :arm]
+        off = apart.max(axis=1)
         for k in np.flatnonzero(off > angle).tolist():
-            joint = int(np.abs(q[k] - q_back[k]).argmax()) + 1
+            joint = int(apart[k].argmax()) + 1
             yield _issue(backs[k], f"joint {joint} is {np.degrees(off[k]):.4f} deg off")
+    yield from _compare_external(program.robot, pairs, point, angle)
     for move, back in pairs:
         if back.q is not None and _joints_follow(back):
-            off_by = float(np.abs(move.q - back.q).max())
+            off_by = float(np.abs(move.q - back.q)[: program.robot.family.joints].max())
             if off_by > DERIVED:
                 yield _issue(back, f"its words lead to joints {np.degrees(off_by):.1f} deg off")
         if back.q is None and back.T_part_tip is None:
             yield _issue(back, "says no target")
+
+
+def _compare_external(
+    robot: Robot, pairs: list[tuple[Move, ReadMove]], point: float, angle: float
+) -> Iterator[ProgramIssue]:
+    """Compare the values of external axes at all targets; a text has to say them."""
+    arm = robot.family.joints
+    for move, back in pairs if robot.externals else ():
+        values = back.external_of(robot.externals)
+        if values is None:
+            yield _issue(back, f"says no value of {robot.externals[0].name}")
+            continue
+        for axis, ours, theirs in zip(robot.externals, move.q[arm:], values, strict=True):
+            off = abs(float(ours - theirs))
+            if off > (point if axis.kind == "linear" else angle):
+                by = (
+                    f"{off * 1e3:.4f} mm" if axis.kind == "linear" else f"{np.degrees(off):.4f} deg"
+                )
+                yield _issue(back, f"{axis.name} is {by} off")
 
 
 def _joints_follow(back: ReadMove) -> bool:

@@ -13,6 +13,7 @@ from kerfpath.post._compare import (
     FRAME,
     LEAD,
     POINT,
+    REACH,
     SHARE,
     handshake_in_words,
     switches_in_words,
@@ -22,6 +23,7 @@ from kerfpath.post._matching import MovePair, Stop, match_groups, pair_moves
 from kerfpath.post._orientations import distances
 from kerfpath.post._read import ReadMove, ReadProgram
 from kerfpath.post._settings import Rules
+from kerfpath.robots import ExternalAxis
 
 __all__ = ["Difference", "differences", "not_compared"]
 
@@ -31,6 +33,8 @@ SAID = {"speeds": "speed", "zones": "zone", "switches": "switches", "postures": 
 """Which of `ReadMove.elsewhere` a difference is about."""
 UNSAID = (("speed", "speeds"), ("duration", "times"), ("cruise", "times"), ("zone", "zones"))
 """What a move may leave unsaid, and the code of a difference in it."""
+JOINTS = 9
+"""A robot has no more."""
 Names = tuple[str, str]
 """What programs A and B are called."""
 
@@ -42,8 +46,8 @@ class Difference:
     Parameters
     ----------
     code : str
-        frames, added, removed, order, targets, joints, kinds, speeds, times, zones, switches,
-        waits, postures or handshakes.
+        frames, added, removed, order, targets, joints, external, kinds, speeds, times, zones,
+        switches, waits, postures or handshakes.
     count : int
         How many contours or moves it is found at.
     message : str
@@ -77,9 +81,13 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Digits:
-    """How far (m, rad, sine, m/s, s) what two texts say may be apart for their digits."""
+    """How far (m, rad, sine, m/s, s) what two texts say may be apart for their digits.
+
+    Tips of joints that both say may be `by_joints` (m) farther: those are compared, too.
+    """
 
     point: float
+    by_joints: float
     angle: float
     frame: float
     speed: float
@@ -121,6 +129,7 @@ def differences(
     point, angle, speed = np.sum(steps, axis=0).tolist()
     digits = _Digits(
         point=POINT + point,
+        by_joints=REACH * JOINTS * angle,
         angle=ANGLE + angle,
         frame=FRAME + point + angle,
         speed=1e-9 + 0.51 * speed,
@@ -136,7 +145,8 @@ def differences(
     both = [(pair.a, pair.b) for pair in pairs if pair.a is not None and pair.b is not None]
     found += _name_moves(pairs, names)
     found += _compare_targets(both, digits)
-    found += _compare_joints(both, digits)
+    found += _compare_joints(both, digits, len(b.externals))
+    found += _compare_external(both, digits, b.externals)
     found += _compare_values(both, digits, names)
     if strict:
         found += _find_unsaid(both, names)
@@ -222,7 +232,10 @@ def _compare_targets(both: Both, digits: _Digits) -> Iterator[Difference]:
     off, turned = distances(
         np.array([one[2] for one in posed]), np.array([one[3] for one in posed])
     )
-    moved = np.flatnonzero((off > digits.point) | (turned > digits.angle))
+    jointed = np.array([a.move.q is not None and b.move.q is not None for a, b, _, _ in posed])
+    point = digits.point + jointed * digits.by_joints
+    angle = digits.angle + jointed * digits.by_joints / REACH
+    moved = np.flatnonzero((off > point) | (turned > angle))
     if moved.size:
         a, b, _, _ = posed[moved[np.lexsort((turned[moved], off[moved]))[-1]]]
         message = (
@@ -232,17 +245,34 @@ def _compare_targets(both: Both, digits: _Digits) -> Iterator[Difference]:
         yield _difference("targets", len(moved), message, a, b)
 
 
-def _compare_joints(both: Both, digits: _Digits) -> Iterator[Difference]:
-    """Compare the joints of targets, where both programs say them."""
+def _compare_joints(both: Both, digits: _Digits, external: int) -> Iterator[Difference]:
+    """Compare the joints of the arm, where both programs say them; the last are external axes."""
     said = [(a, b) for a, b in both if a.move.q is not None and b.move.q is not None]
     if not said:
         return
-    off = np.abs(np.array([a.move.q for a, _ in said]) - [b.move.q for _, b in said]).max(axis=1)
+    q = np.abs(np.array([a.move.q for a, _ in said]) - [b.move.q for _, b in said])
+    off = q[:, : q.shape[1] - external].max(axis=1)
     moved = np.flatnonzero(off > digits.angle)
     if moved.size:
         worst = int(moved[np.argmax(off[moved])])
         message = f"{len(moved)} moved, at most by {np.degrees(off[worst]):.4f} deg"
         yield _difference("joints", len(moved), message, *said[worst])
+
+
+def _compare_external(
+    both: Both, digits: _Digits, axes: Sequence[ExternalAxis]
+) -> Iterator[Difference]:
+    """Compare the values of external axes, where both programs say them."""
+    values = ((a.move.external_of(axes), b.move.external_of(axes), a, b) for a, b in both)
+    said = [(np.abs(x - y), a, b) for x, y, a, b in values if x is not None and y is not None]
+    for i, axis in enumerate(axes):
+        least = digits.point if axis.kind == "linear" else digits.angle
+        moved = [(float(off[i]), a, b) for off, a, b in said if off[i] > least]
+        if moved:
+            off, a, b = max(moved, key=lambda each: each[0])
+            by = f"{off * 1e3:.4f} mm" if axis.kind == "linear" else f"{np.degrees(off):.4f} deg"
+            message = f"{axis.name} at {len(moved)} targets, at most by {by}"
+            yield _difference("external", len(moved), message, a, b)
 
 
 def _difference(code: str, count: int, message: str, a: Stop, b: Stop) -> Difference:

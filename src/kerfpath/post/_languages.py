@@ -20,7 +20,7 @@ from kerfpath.post._read import Reader
 from kerfpath.post._settings import LanguageSettings, Rules
 from kerfpath.robots import AXIS_3, Robot
 
-__all__ = ["ENTRY_POINTS", "Language", "language", "languages"]
+__all__ = ["ENTRY_POINTS", "Language", "language", "languages", "no_settings_needed"]
 
 ENTRY_POINTS = "kerfpath.languages"
 """Group of entry points whose objects are languages."""
@@ -41,6 +41,11 @@ BROKEN = (ImportError, AttributeError, NameError, SyntaxError, TypeError, ValueE
 
 def _none_is_reserved(name: str) -> bool:
     return False
+
+
+def no_settings_needed(robot: Robot, settings: object) -> Iterator[str]:
+    """Yield nothing: external axes are said by their own names and units."""
+    yield from ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +87,9 @@ class Language:
         Whether its moves are straight lines and arcs whose corners the controller rounds.
     assumed : mapping of str to value
         Settings that are taken where a person has left them None; the preflight warns of outputs.
+    externals : callable, optional
+        (robot, settings) to what is missing or wrong in the settings to say the robot's external
+        axes and have the motion coordinated with them, sentences; None where it cannot say them.
     read : Reader, optional
         Reads back what is written; without one a program cannot be audited.
     """
@@ -101,6 +109,7 @@ class Language:
     ahead: bool = True
     zones: bool = True
     assumed: Mapping[str, Any] = field(default_factory=dict)
+    externals: Callable[[Robot, Any], Iterator[str]] | None = None
     read: Reader | None = None
     axis_3: tuple[str, ...] = AXIS_3
 
@@ -120,6 +129,12 @@ class Language:
         """Say why no program in this language can move a robot; empty where one can."""
         if self.families and robot.kinematics not in self.families:
             return f"language {self.name!r} cannot yet say the axes of an arm like {robot.id!r}"
+        if robot.externals and self.externals is None:
+            names = ", ".join(axis.name for axis in robot.externals)
+            return (
+                f"language {self.name!r} has no external kinematics as it is written here, and "
+                f"cannot move {names}; take another language, or plan the arm alone"
+            )
         if robot.axis_3 in self.axis_3:
             return ""
         if robot.axis_3:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kerfpath.errors import InputError
+from kerfpath.losses import Loss, Reason
 from kerfpath.post._divide import find_long_contours
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import Language
@@ -102,6 +103,9 @@ def foresee(program: Program, chosen: Language, settings: LanguageSettings) -> l
     outputs = list(_check_outputs(program, chosen, settings))
     settings = chosen.completed(settings)
     outputs += _check_ports(program, chosen, settings)
+    if program.robot.externals and chosen.externals is not None:
+        found = chosen.externals(program.robot, settings)
+        outputs += [ProgramIssue("error", "external-axes", each, "program") for each in found]
     issues += numbers + outputs
     # Speeds and zones are named by their formatted values: only finite ones can be.
     unnamed = any(issue.level == "error" for issue in outputs)
@@ -270,14 +274,16 @@ def _check_motion(program: Program, section: Section, rules: Rules) -> Iterator[
     q = np.array([move.q for move in moves])
     lengths, turn = distances(T[:-1], T[1:])
     on_path = np.array([isinstance(move, LinearMove) for move in moves[1:]])
-    step = np.abs(np.diff(q, axis=0))
+    linear = np.array([unit == "m" for unit in program.robot.units])
+    step = np.where(linear, 0.0, np.abs(np.diff(q, axis=0)))
     for k in np.flatnonzero(on_path & (step.max(axis=1) >= LARGEST_JOINT_STEP)).tolist():
         joint = int(np.argmax(step[k]))
+        name, by_deg = program.robot.joint_names[joint], np.degrees(step[k, joint])
         yield ProgramIssue(
             "error",
             "joint-step",
-            f"joint {joint + 1} turns {np.degrees(step[k, joint]):.1f} deg in one move of the "
-            f"path, expected less than {np.degrees(LARGEST_JOINT_STEP):g} deg; use finer nodes",
+            f"{name} turns {by_deg:.1f} deg in one move of the path, expected less than "
+            f"{np.degrees(LARGEST_JOINT_STEP):g} deg; use finer nodes",
             f"{section.name}, move {k + 1}",
         )
     for k in np.flatnonzero(on_path & (turn >= LARGEST_ORIENTATION_STEP)).tolist():
@@ -328,19 +334,20 @@ def _check_lead_times(section: Section, lengths: list[float]) -> Iterator[Progra
 def _check_limits(program: Program, section: Section) -> Iterator[ProgramIssue]:
     if not section.moves:
         return
-    limits = program.robot.joint_limits()
-    words = program.robot.bounds()
+    robot = program.robot
+    limits, arm = robot.joint_limits(), robot.family.joints
     q = np.array([move.q for move in section.moves])
+    below, above = limits.lower - q, q - limits.upper
+    below[:, limits.endless] = above[:, limits.endless] = -np.inf
     sums = q @ limits.rows.T
-    below = np.hstack([limits.lower - q, limits.row_lower - sums])
-    above = np.hstack([q - limits.upper, sums - limits.row_upper])
-    endless = np.flatnonzero(limits.endless)
-    below[:, endless] = above[:, endless] = -np.inf
+    below = np.insert(below, [arm], limits.row_lower - sums, axis=1)
+    above = np.insert(above, [arm], sums - limits.row_upper, axis=1)
     excess = np.stack([below, above], axis=2).reshape(len(q), -1)
+    words = list(robot.bounds())
+    words += [Reason(end, axis.name) for axis in robot.externals for end in (Loss.LOW, Loss.HIGH)]
+    linear = {axis.name for axis in robot.externals if axis.kind == "linear"}
     for k, i in np.argwhere(excess > LIMIT_NOISE).tolist():
-        yield ProgramIssue(
-            "error",
-            "axis-limit",
-            f"{words[i]}: {np.degrees(excess[k, i]):.3f} deg beyond its limit",
-            f"{section.name}, move {k}",
-        )
+        in_mm, by = words[i].which in linear, float(excess[k, i])
+        said = f"{by * 1e3:.3f} mm" if in_mm else f"{np.degrees(by):.3f} deg"
+        message = f"{words[i]}: {said} beyond its limit"
+        yield ProgramIssue("error", "axis-limit", message, f"{section.name}, move {k}")

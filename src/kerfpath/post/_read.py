@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, get_args
 
@@ -12,7 +12,7 @@ from kerfpath._arrays import Array, freeze
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.post._program import Handshake, Switch
-from kerfpath.robots import Robot
+from kerfpath.robots import ExternalAxis, Robot
 
 __all__ = [
     "MOVE_KINDS", "MoveKind", "ReadHandshake", "ReadMove", "ReadProgram", "ReadSection",
@@ -59,11 +59,14 @@ class ReadMove(_InFile):
     zone : float m or None
         None where the language has no length for it.
     q : (n,) rad or None
-        Joints of the target, of the robot's model, where the text says them.
+        Joints of the target, of the robot's model, where the text says them; m of linear axes.
     T_part_tip : (4, 4) m or None
         Tip pose in the part frame, where the text says it.
     T_part_via : (4, 4) m or None
         That of the point on the way of a circular move.
+    external : (E,) m, rad or None
+        Values of the external axes at a target that is said by a pose; where joints are said they
+        are the last of q.
     posture : tuple
         What the text says of posture and turns, as `Language.posture` does; empty where nothing.
     switches : tuple of Switch
@@ -80,11 +83,21 @@ class ReadMove(_InFile):
     q: Array | None = None
     T_part_tip: Array | None = None
     T_part_via: Array | None = None
+    external: Array | None = None
     posture: tuple[int | str, ...] = ()
     switches: tuple[Switch, ...] = ()
     elsewhere: Mapping[str, str] = field(default_factory=dict)
 
     __repr__ = short_repr
+
+    def external_of(self, axes: Sequence[ExternalAxis]) -> Array | None:
+        """Return the values (E,) m and rad of the external axes of the robot, where it says them.
+
+        Those of its joints, where it says both.
+        """
+        if self.q is not None:
+            return self.q[len(self.q) - len(axes) :]
+        return self.external
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,12 +147,15 @@ class ReadProgram:
         In the order in which they run.
     T_flange_tip, T_base_part : (4, 4) m or None
         Tool and work object; None where the text only gives their numbers.
+    externals : tuple of ExternalAxis
+        Of the robot that it was read for.
     """
 
     name: str
     sections: tuple[ReadSection, ...]
     T_flange_tip: Array | None = None
     T_base_part: Array | None = None
+    externals: tuple[ExternalAxis, ...] = ()
 
     __repr__ = short_repr
 

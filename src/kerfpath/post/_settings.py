@@ -17,6 +17,7 @@ __all__ = [
     "LinesPerFile",
     "OrientationSetting",
     "PortSettings",
+    "PositionerFrame",
     "Rules",
     "handshakes",
     "numbered",
@@ -44,6 +45,16 @@ OrientationSetting = Annotated[
     Orientation,
     setting("how the tool turns between targets: slerp, two-angle or wrist", '"slerp"'),
 ]
+
+PositionerFrame = Annotated[
+    Annotated[list[float], Field(min_length=6, max_length=6)] | None,
+    setting(
+        "six numbers: where the frame that moves with the part stands in the robot base with all "
+        "external axes at 0, x, y, z in mm and turns about x, y, z in deg, axes fixed",
+        "[1200.0, 0.0, 300.0, 0.0, 0.0, 90.0]",
+    ),
+]
+"""Of languages that couple the part's frame to what carries the part; see `carrier_frame`."""
 
 
 class LanguageSettings(BaseModel):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -137,17 +137,24 @@ def read_program(
     Raises
     ------
     InputError
-        An unknown language or one without a reader, a file that is not there, a line that is not
-        of our making, or that does not fit the others: file and line.
+        An unknown language or one without a reader, a file that is not there, external axes that
+        the settings or the language do not say, a line that is not of our making, or that does not
+        fit the others: file and line.
     """
     chosen = find_language(language)
     settings = chosen.completed(settings)
     if chosen.read is None:
         raise InputError(f"language {language!r} has no reader, so that its programs stay unread")
     main = next(iter(files)) if main is None else main
+    if robot.externals:
+        says = chosen.externals
+        unsaid = [chosen.refusal(robot)] if says is None else [*says(robot, settings)]
+        if unsaid:
+            raise InputError(f"{main}: {unsaid[0]}")
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            return chosen.read(main, CheckedTexts(files), robot, settings)
+            read = chosen.read(main, CheckedTexts(files), robot, settings)
+            return replace(read, externals=robot.externals)
     except KeyError as missing:
         raise InputError(f"{main}: the file {missing.args[0]!r} is not there") from None
     except InputError:

@@ -8,6 +8,7 @@ from kerfpath.robots._chain import model_chain as model_chain
 from kerfpath.robots._coupling import AXIS_3 as AXIS_3
 from kerfpath.robots._coupling import Coupling as Coupling
 from kerfpath.robots._enclosure import Enclosure as Enclosure
+from kerfpath.robots._external import MOST_EXTERNAL as MOST_EXTERNAL
 from kerfpath.robots._external import ExternalAxis as ExternalAxis
 from kerfpath.robots._external import Travel as Travel
 from kerfpath.robots._external import base_in_part as base_in_part

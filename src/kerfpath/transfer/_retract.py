@@ -19,7 +19,7 @@ End = Literal["start", "end"]
 def back_off(plan: Plan, end: End, retract: float) -> Array:
     """Return the joints (n,) rad after backing off an end of a plan along the tool axis.
 
-    The posture is kept, and an endless joint stays on its turn.
+    The posture is kept, an endless joint stays on its turn, and external axes stand still.
 
     Parameters
     ----------
@@ -35,10 +35,12 @@ def back_off(plan: Plan, end: End, retract: float) -> Array:
     node = 0 if end == "start" else len(plan.q) - 1
     # Where endless joints are after all their turns along the contour.
     q = plan.q[0] + plan.increments[:node].sum(axis=0)
-    T = plan.robot.forward(q) @ plan.T_flange_tip
+    arm, n = plan.robot.alone(), plan.robot.family.joints
+    T = arm.forward(q[:n]) @ plan.T_flange_tip
     T[:3, 3] -= retract * T[:3, 2]
-    found = plan.robot.inverse(T @ np.linalg.inv(plan.T_flange_tip))
+    found = arm.inverse(T @ np.linalg.inv(plan.T_flange_tip))
     q_found = found.q[found.posture == plan.posture[node]]
+    q_found = np.hstack([q_found, np.tile(q[n:], (len(q_found), 1))])
     # An endless joint is solved within one turn: bring it onto the turn that the contour is on.
     turns = np.round((q - q_found) / (2 * np.pi)) * plan.robot.endless
     q_found = q_found + 2 * np.pi * turns

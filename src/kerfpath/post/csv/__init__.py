@@ -1,6 +1,6 @@
 """A table of all targets (CSV), for spreadsheets and programs of one's own."""
 
-from kerfpath.post._languages import Language
+from kerfpath.post._languages import Language, no_settings_needed
 from kerfpath.post._times import check_times
 from kerfpath.post.csv._read import read
 from kerfpath.post.csv._write import Csv as Csv
@@ -19,6 +19,7 @@ CSV = Language(
     is_reserved=is_reserved,
     check=check_times,
     zones=False,
+    externals=no_settings_needed,
     read=read,
 )
 """What is registered."""

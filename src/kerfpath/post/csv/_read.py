@@ -9,6 +9,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
+from kerfpath.post._external import from_said
 from kerfpath.post._line_reader import LineReader
 from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import SIGNALS, Switch
@@ -26,10 +27,14 @@ _KINDS = (*MOVE_KINDS, "via", "wait")
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: CsvSettings) -> ReadProgram:
     """Return the program that a table of ours says; see `kerfpath.post.Reader`."""
     header, *lines = files[main].splitlines() or [""]
-    if header != ",".join(columns(robot.joints)):
-        expected = ",".join(columns(robot.joints)[:6])
+    if header != ",".join(columns(robot)):
+        names, got = columns(robot), header.split(",")
+        first = next(
+            (k for k, (a, b) in enumerate(zip(names, got, strict=False)) if a != b), len(names)
+        )
         raise InputError(
-            f"{main}, line 1: expected the columns {expected},..., got {header[:60]!r}"
+            f"{main}, line 1: expected the columns {','.join(names[: max(first + 1, 6)])},..., got "
+            f"{header[:60]!r}"
         )
     reader = _Reader(main, robot, settings)
     for reader.line, line in enumerate(lines, 2):
@@ -50,12 +55,12 @@ class _Reader(LineReader):
 
     def __init__(self, file: str, robot: Robot, settings: CsvSettings) -> None:
         super().__init__(file, robot, settings)
-        self.line, self.joints = 1, robot.joints
+        self.line, self.columns = 1, columns(robot)
         self.sections: dict[str, list[ReadStep]] = {}
 
     def read_row(self, fields: list[str]) -> None:
-        if len(fields) != len(columns(self.joints)):
-            raise self.fault(f"expected {len(columns(self.joints))} fields, got {len(fields)}")
+        if len(fields) != len(self.columns):
+            raise self.fault(f"expected {len(self.columns)} fields, got {len(fields)}")
         name, kind, time, *rest = fields
         target, (speed, share, zone, events) = rest[:-4], rest[-4:]
         if kind not in _KINDS:
@@ -104,13 +109,13 @@ class _Reader(LineReader):
         self.via = None
 
     def target(self, fields: list[str]) -> tuple[Array, Array]:
-        """Return the joints (n,) rad and the tip's pose (4, 4) m."""
-        values = self.numbers(fields)
-        q, point, wxyz = np.split(values, [self.joints, self.joints + len(POSE) - 4])
+        """Return the joints (n,) rad, external axes the last, and the tip's pose (4, 4) m."""
+        values, n, arm = self.numbers(fields), self.robot.joints, self.robot.family.joints
+        q, x, point, wxyz = np.split(values, [arm, n, n + len(POSE) - 4])
         T = pose_of(point * 1e-3, wxyz)
         if T is None:
             raise self.fault("the quaternion must have length 1")
-        return freeze(np.radians(q)), T
+        return freeze(np.append(np.radians(q), from_said(self.robot, x))), T
 
     def switches(self, text: str) -> tuple[Switch, ...]:
         found = []

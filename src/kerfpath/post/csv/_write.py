@@ -1,7 +1,7 @@
 """A table with one row for each target and wait: this module only formats.
 
-The first row names the columns and their units. Joints are in deg, tips in mm and as unit
-quaternions (w first) in the part's frame, times in s from the first target.
+The first row names the columns and their units. Joints are in deg, external axes in mm or deg, tips
+in mm and as unit quaternions (w first) in the part's frame, times in s from the first target.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from kerfpath.post._divide import require_one_file
+from kerfpath.post._external import arm_joints, said, said_unit
 from kerfpath.post._formatter import Formatter, number
+from kerfpath.post._names import identifier
 from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import (
     CircularMove,
@@ -25,6 +27,7 @@ from kerfpath.post._program import (
 )
 from kerfpath.post._settings import LanguageSettings, LinesPerFile, Rules
 from kerfpath.post._times import timetable
+from kerfpath.robots import Robot
 
 __all__ = ["Csv", "CsvSettings", "columns", "event", "is_reserved", "rules"]
 
@@ -47,9 +50,11 @@ def is_reserved(name: str) -> bool:
     return name.lower() == "trajectory"
 
 
-def columns(joints: int) -> list[str]:
-    """Return the names of the columns of a robot of so many joints."""
-    axes = [f"q{i}_deg" for i in range(1, joints + 1)]
+def columns(robot: Robot) -> list[str]:
+    """Return the names of the columns of a robot."""
+    axes = [f"q{i}_deg" for i in range(1, robot.family.joints + 1)]
+    for i, axis in enumerate(robot.externals, 1):
+        axes.append(f"e{i}_{identifier(axis.name)}_{said_unit(axis)}")
     rest = ["speed_mm_s", "speed_percent", "zone_mm", "events"]
     return ["section", "kind", "t_s", *axes, *POSE, *rest]
 
@@ -69,7 +74,7 @@ class Csv(Formatter):
         """Return the one table."""
         program = self.program
         self._ends = iter([number(end, 9) for _, end in timetable(program)])
-        lines = [",".join(columns(program.robot.joints))]
+        lines = [",".join(columns(program.robot))]
         for section in program.sections:
             lines += (f"{section.name},{row}" for row in self.lines(section))
         return require_one_file(f"{program.name}.csv", lines, self.settings.lines_per_file)
@@ -113,7 +118,8 @@ class Csv(Formatter):
         """Joints and tip of each target, those on the way first."""
         program, moves = self.program, list(dict.fromkeys(self.program.moves))
         points, tips = targets_of(moves), dict(zip(moves, program.tips(moves), strict=True))
-        q_deg = np.degrees([q for _, q, _ in points]).round(9)
+        robot, q = program.robot, np.array([q for _, q, _ in points])
+        q_deg = np.hstack([np.degrees(arm_joints(robot, q)), said(robot, q)]).round(9)
         T = np.array([tips[move] if T is None else T for move, _, T in points])
         point_mm, wxyz = (T[:, :3, 3] * 1e3).round(7), quaternions(T).round(11)
         text = ",".join(["%.9f"] * q_deg.shape[1] + ["%.7f"] * 3 + ["%.11f"] * 4)

@@ -1,6 +1,6 @@
 """TP, the language of FANUC controllers, as the listings (.ls) that they load."""
 
-from kerfpath.post._languages import Language
+from kerfpath.post._languages import Language, no_settings_needed
 from kerfpath.post.fanuc._axes import axes_from_joints as axes_from_joints
 from kerfpath.post.fanuc._axes import joints_from_axes as joints_from_axes
 from kerfpath.post.fanuc._axes import posture as posture
@@ -26,6 +26,7 @@ FANUC = Language(
     check=check,
     sayable=sayable,
     assumed={"laser_output": 1},
+    externals=no_settings_needed,
     read=read,
 )
 """What is registered."""

@@ -44,18 +44,18 @@ TURNING = {"J1 J4 J6": [0, 3, 5], "J4 J5 J6": [3, 4, 5]}
 
 
 def turns(robot: Robot, q: ArrayLike, settings: FanucSettings) -> Ints:
-    """Return the turns (K, 3) of the axes that the settings name, of joint vectors (K, 6) rad."""
+    """Return the turns (K, 3) of the axes that the settings name, of joint vectors (K, n) rad."""
     axes_deg = np.degrees(axes_from_joints(robot, q))[:, TURNING[settings.turns]]
     axes_deg = np.round(axes_deg, NOISE_DECIMALS)
     return freeze((np.sign(axes_deg) * np.floor((np.abs(axes_deg) + 180) / 360)).astype(np.int64))
 
 
 def posture(robot: Robot, q: Array, settings: FanucSettings) -> list[tuple[int | str, ...]]:
-    """Return the configurations of joint vectors q (K, 6) rad: three letters and three turns.
+    """Return the configurations of joint vectors q (K, n) rad: three letters and three turns.
 
     Shoulder and elbow as `wrist_in_plane` has them.
     """
-    q = floats(q, "q", (None, 6))
+    q = floats(q, "q", (None, robot.joints))
     ahead, bend = wrist_in_plane(robot, q)
     flipped = np.sin(axes_from_joints(robot, q)[:, 4]) > NOISE
     letters = zip(

@@ -51,7 +51,7 @@ def check(program: Program, settings: FanucSettings) -> Iterator[ProgramIssue]:
         if settings.corner == "CR":
             yield from _check_corners(section)
         yield from _check_speeds(section, unit(settings))
-        q = np.array([move.q for move in section.moves]).reshape(-1, 6)
+        q = np.array([move.q for move in section.moves]).reshape(-1, program.robot.joints)
         yield from _check_turns(section, turns(program.robot, q, settings), settings)
         letters = [words[:3] for words in posture(program.robot, q, settings)]
         yield from warn_of_changed_postures(section, letters)

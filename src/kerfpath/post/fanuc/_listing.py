@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from kerfpath.post._line_reader import LineReader
+from kerfpath.post.fanuc._external import leads
 from kerfpath.post.fanuc._settings import FanucSettings
 from kerfpath.robots import Robot
 
@@ -16,9 +17,14 @@ __all__ = ["Listing"]
 
 _ATTRIBUTE = re.compile(
     r"(?:(?:OWNER|COMMENT|PROG_SIZE|CREATE|MODIFIED|FILE_NAME|VERSION|MEMORY_SIZE|PROTECT|"
-    r"CONTROL_CODE|LOCAL_REGISTERS)\s*=[^;]*;|DEFAULT_GROUP\s*= [1*](?:,\*){4,7};|"
+    r"CONTROL_CODE|LOCAL_REGISTERS)\s*=[^;]*;|"
     r"(?:TCD:)?\s+[A-Z_]+\s*= \d+[,;])"
 )
+_GROUPS = {
+    False: re.compile(r"DEFAULT_GROUP\s*= [1*](?:,\*){4,7};"),
+    True: re.compile(r"DEFAULT_GROUP\s*= (?:1,1|\*,\*)(?:,\*){3,6};"),
+}
+"""The motion groups of a program, by whether group 2 carries the part."""
 _COUNT = re.compile(r"LINE_COUNT\s*= (\d+);")
 _NUMBERED = re.compile(r" *(\d+):(.*?) *;")
 _VIA = re.compile(r" *\d+:C P\[\d+\] *")
@@ -47,7 +53,7 @@ class Listing(LineReader):
         while (row := self.next_row()) != "/MN":
             if match := _COUNT.fullmatch(row):
                 counted = int(match[1])
-            elif not _ATTRIBUTE.fullmatch(row):
+            elif not _ATTRIBUTE.fullmatch(row) and not _GROUPS[leads(self.robot)].fullmatch(row):
                 raise self.fault(f"not an attribute: {row[:60]!r}")
         number = 0
         while (row := self.next_row()) != "/POS":

@@ -11,6 +11,7 @@ import numpy as np
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._called import off_name
+from kerfpath.post._external import standing
 from kerfpath.post._frames import faceplate, from_euler, world
 from kerfpath.post._line_reader import patterns
 from kerfpath.post._program import Await, Switch
@@ -23,6 +24,7 @@ from kerfpath.post._read import (
     ReadStep,
 )
 from kerfpath.post.fanuc._axes import joints_from_axes
+from kerfpath.post.fanuc._external import EXTENDED, GROUP_2, leads, read_values
 from kerfpath.post.fanuc._listing import Listing
 from kerfpath.post.fanuc._settings import UNITS, FanucSettings
 from kerfpath.post.fanuc._switching import time_before
@@ -49,7 +51,7 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: FanucSetti
     sections = []
     for name in top.calls:
         listing = _Section(f"{name}.ls", files[f"{name}.ls"], robot, settings)
-        steps = _time_early(listing.completed(), listing.early, robot, part, tool)
+        steps = _time_early(listing.completed(part), listing.early, robot, part, tool)
         sections.append(ReadSection(name=listing.name, steps=steps))
     return ReadProgram(name=top.name, sections=tuple(sections), T_flange_tip=tool, T_base_part=part)
 
@@ -82,7 +84,7 @@ def _time_early(
 
 
 _NUMBER = r"(-?\d*\.\d+)"
-_END = rf"(\d+)(cm/min|mm/sec) (?:(FINE)|CNT(\d+)|CR(\d+))({WRIST})?"
+_END = rf"(\d+)(cm/min|mm/sec) (?:(FINE)|CNT(\d+)|CR(\d+))({WRIST})?( COORD)?"
 _TB = r"((?: TB +\d*\.\d\dsec,DO\[\d+\]=O(?:N|FF))*)"
 _SWITCH = re.compile(r" TB +(\d*\.\d\d)sec,DO\[(\d+)\]=(ON|OFF)")
 _MAIN = patterns(
@@ -115,7 +117,7 @@ _POSITION = re.compile(
     + r",\s*".join(rf"{k} = *{_NUMBER} deg" for k in "WPR")
     + "|"
     + r",\s*".join(rf"J{k}= *{_NUMBER} deg" for k in range(1, 7))
-    + r")\n\};\n"
+    + rf"){EXTENDED}{GROUP_2}\n\}};\n"
 )
 
 
@@ -190,6 +192,7 @@ class _Section(Listing):
         self.named: dict[int, list[int]] = {}
         """Numbers of the targets of each motion, by its line."""
         self.targets: dict[int, tuple[str | None, ...]] = {}
+        self.externals: dict[int, Array] = {}
         self.said_at: dict[int, str] = {}
         self.early: dict[int, tuple[Switch, ...]] = {}
         self.pending: tuple[Switch, ...] = ()
@@ -216,12 +219,16 @@ class _Section(Listing):
 
     def path_end(
         self, speed: str, unit: str, fine: str | None, cnt: str | None, corner: str | None,
-        wrist: str | None, before: str,
+        wrist: str | None, coordinated: str | None, before: str,
     ) -> tuple[float, float | None, str]:  # fmt: skip
         """Return speed (m/s), zone and what is switched, of the end of a line."""
         if (wrist is not None) != (self.settings.orientation == "wrist"):
             word = WRIST.strip()
             raise self.fault(f"expected no {word}" if wrist else f"expected {word}")
+        if bool(coordinated) != leads(self.robot):
+            raise self.fault(
+                f"expected {'COORD' if leads(self.robot) else 'no COORD'} on this line"
+            )
         if corner is not None and self.settings.corner != "CR":
             raise self.fault(f"expected CNT{self.settings.cnt_percent} or FINE, got CR{corner}")
         if cnt is not None and self.settings.corner != "CNT":
@@ -289,21 +296,34 @@ class _Section(Listing):
             match = _POSITION.match(text, at)
             if not match:
                 raise self.fault("no position of ours begins after this line")
-            number, user, tool, *said = match.groups()
+            number, user, tool, *said, extended, user_2, tool_2, leading = match.groups()
             self.said_at[int(number)] = f"{self.file}, line {self.line + 1}"
             self.row += match[0].count("\n")
             self.line += match[0].count("\n")
             self.require_frames(user, tool)
+            self.require_frames(user_2 or user, tool_2 or tool)
+            self.read_external(int(number), extended, leading or "")
             if int(number) in self.targets:
                 raise self.fault(f"P[{number}] is there twice")
             self.targets[int(number)] = tuple(said)
             at = match.end()
 
-    def completed(self) -> list[ReadStep]:
+    def read_external(self, number: int, extended: str, leading: str) -> None:
+        try:
+            self.externals[number] = read_values(self.robot, extended, leading)
+        except InputError as error:
+            raise self.fault(f"P[{number}]: {error}") from None
+
+    def completed(self, T_base_part: Array) -> list[ReadStep]:
         """Return the steps with their targets, all of which are turned into SI units at once."""
         values = np.array([_six(words) for words in self.targets.values()]).reshape(-1, 6)
-        q = dict(zip(self.targets, joints_from_axes(self.robot, np.radians(values)), strict=True))
-        poses = dict(zip(self.targets, from_euler(values, ANGLES), strict=True))
+        arm = joints_from_axes(self.robot, np.radians(values))
+        external = np.array(list(self.externals.values())).reshape(len(arm), -1)
+        T = from_euler(values, ANGLES)
+        if leads(self.robot):
+            T = np.linalg.inv(standing(self.robot, T_base_part, external)) @ T
+        q = dict(zip(self.targets, freeze(np.hstack([arm, external])), strict=True))
+        poses = dict(zip(self.targets, freeze(T), strict=True))
         steps = [
             self.with_targets(step, q, poses) if isinstance(step, ReadMove) else step
             for step in self.steps
@@ -332,6 +352,7 @@ class _Section(Listing):
         return replace(
             move,
             T_part_tip=poses[at],
+            external=self.externals[at] if self.robot.externals else None,
             T_part_via=poses[vias[0]] if vias else None,
             posture=_posture(self.targets[at]),
             elsewhere=elsewhere,

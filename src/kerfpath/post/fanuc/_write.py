@@ -18,6 +18,7 @@ from typing import Final
 import numpy as np
 
 from kerfpath.post._called import CalledFormatter
+from kerfpath.post._external import standing
 from kerfpath.post._formatter import number
 from kerfpath.post._frames import euler
 from kerfpath.post._program import (
@@ -33,6 +34,7 @@ from kerfpath.post._program import (
 )
 from kerfpath.post._settings import outputs
 from kerfpath.post.fanuc._axes import axes_from_joints, posture
+from kerfpath.post.fanuc._external import extended_rows, group_2_rows, groups, leads, remarks
 from kerfpath.post.fanuc._settings import FanucSettings, unit
 from kerfpath.post.fanuc._switching import split_switches
 
@@ -69,7 +71,7 @@ TCD:  STACK_SIZE\t= 0,
       BUSY_LAMP_OFF\t= 0,
       ABORT_REQUEST\t= 0,
       PAUSE_REQUEST\t= 0;
-DEFAULT_GROUP\t= {group},*,*,*,*;
+DEFAULT_GROUP\t= {group};
 CONTROL_CODE\t= 00000000 00000000;
 """
 """Controllers count sizes themselves; the date is that of the settings, so that bytes repeat."""
@@ -110,13 +112,14 @@ class Fanuc(CalledFormatter):
     def files(self) -> dict[str, str]:
         """Return the main program and those that it calls."""
         name, settings = self.program.name, self.settings
-        files = {f"{name}.ls": _listing(name, self.main(), [], settings)}
+        own = groups(self.program.robot)
+        files = {f"{name}.ls": _listing(name, self.main(), [], settings, own)}
         for section in self.program.sections:
             lines = list(self.lines(section))
             positions = self._positions(section)
-            files[f"{section.name}.ls"] = _listing(section.name, lines, positions, settings)
+            files[f"{section.name}.ls"] = _listing(section.name, lines, positions, settings, own)
         off = self.off_name
-        files[f"{off}.ls"] = _listing(off, watch_lines(settings), [], settings, group="*")
+        files[f"{off}.ls"] = _listing(off, watch_lines(settings), [], settings, "*,*,*,*,*")
         return files
 
     def main(self) -> list[str]:
@@ -125,6 +128,7 @@ class Fanuc(CalledFormatter):
         lines = self.heading(
             f"{self.off_name} as BG logic switches off at a stop.",
             "The cell's safety has to switch the laser off, too.",
+            *remarks(program.robot),
             "Enter these frames (mm, deg). World: on J1, at the height of J2.",
             frame=f"UFRAME {settings.user_frame}",
             tool=f"UTOOL {settings.tool_frame}",
@@ -185,6 +189,7 @@ class Fanuc(CalledFormatter):
             end = f"CNT{settings.cnt_percent}"
         elif move.zone > 0:
             end = f"CR{number(move.zone * 1e3, 0)}"
+        end += " COORD" if leads(self.program.robot) else ""
         timed = split_switches(move).timed
         before = "".join(f" TB {_seconds(s.lead_time)}sec,{self._set(s)}" for s in timed)
         end += WRIST if settings.orientation == "wrist" else ""
@@ -207,17 +212,24 @@ class Fanuc(CalledFormatter):
         robot, settings = self.program.robot, self.settings
         q = np.array([target.q for target in targets])
         axes_deg = np.degrees(axes_from_joints(robot, q)).tolist()
-        poses = euler([np.eye(4) if T is None else T for _, _, T in targets], ANGLES).tolist()
+        tips = np.array([np.eye(4) if T is None else T for _, _, T in targets])
+        if leads(robot):
+            external = q[:, robot.family.joints :]
+            tips = standing(robot, self.program.T_base_part, external) @ tips
+        poses = euler(tips, ANGLES).tolist()
         configurations = posture(robot, q, settings)
         frames = f"\tUF : {settings.user_frame}, UT : {settings.tool_frame},\t"
         texts = []
-        for n, (_, _, T) in enumerate(targets):
+        for n, (_, joints, T) in enumerate(targets):
             if T is None:
                 rows = [frames, *self._values(JOINT_WORDS, axes_deg[n])]
             else:
                 *letters, first, second, third = configurations[n]
                 words = f"{' '.join(map(str, letters))}, {first}, {second}, {third}"
                 rows = [f"{frames}\tCONFIG : '{words}',", *self._values(POSE_WORDS, poses[n])]
+            if extended := extended_rows(robot, joints):
+                rows = [*rows[:-1], f"{rows[-1]},", *extended]
+            rows += group_2_rows(robot, joints, frames)
             texts.append(NEW_LINE.join([f"P[{n + 1}]{{", "   GP1:", *rows, "};"]))
         return texts
 
@@ -238,9 +250,9 @@ def _seconds(time: float) -> str:
 
 
 def _listing(
-    name: str, lines: list[str], positions: list[str], settings: FanucSettings, group: str = "1"
+    name: str, lines: list[str], positions: list[str], settings: FanucSettings, group: str
 ) -> str:
-    """Return a program as a listing; that of no motion has the group "*"."""
+    """Return a program as a listing; that of no motion has the group "*" throughout."""
     numbered = [f"{n:4d}:{line}" for n, line in enumerate(lines, 1)]
     day, time = settings.date.split(" ")
     head = ATTRIBUTES.format(count=len(lines), day=day, time=time, group=group).splitlines()

@@ -7,6 +7,7 @@ from kerfpath.post.inform._axes import joints_from_axes as joints_from_axes
 from kerfpath.post.inform._axes import manipulator_type as manipulator_type
 from kerfpath.post.inform._axes import posture
 from kerfpath.post.inform._check import check
+from kerfpath.post.inform._external import missing
 from kerfpath.post.inform._read import read
 from kerfpath.post.inform._settings import InformSettings as InformSettings
 from kerfpath.post.inform._settings import is_reserved, rules
@@ -28,6 +29,7 @@ INFORM = Language(
     sayable=stop_to_switch,
     ahead=False,
     assumed={"laser_output": 1},
+    externals=missing,
     read=read,
 )
 """What is registered."""

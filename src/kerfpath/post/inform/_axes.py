@@ -48,11 +48,11 @@ NOISE_DECIMALS = 6
 
 
 def manipulator_type(robot: Robot, q: ArrayLike, flip: Literal["B", "R"] = "B") -> Ints:
-    """Return the six bits of RCONF, (K, 6), of joint vectors q (K, 6) rad.
+    """Return the six bits of RCONF, (K, 6), of joint vectors q (K, n) rad.
 
     Shoulder and elbow as `wrist_in_plane` has them; the first bit by axis B or R.
     """
-    q = floats(q, "q", (None, 6))
+    q = floats(q, "q", (None, robot.joints))
     ahead, bend = wrist_in_plane(robot, q)
     axes_deg = np.round(np.degrees(axes_from_joints(robot, q)), NOISE_DECIMALS)
     turned = axes_deg[:, 3] % 360.0
@@ -63,7 +63,7 @@ def manipulator_type(robot: Robot, q: ArrayLike, flip: Literal["B", "R"] = "B") 
 
 
 def posture(robot: Robot, q: Array, settings: InformSettings) -> list[tuple[int | str, ...]]:
-    """Return `manipulator_type` of joint vectors q (K, 6) rad, as tuples."""
+    """Return `manipulator_type` of joint vectors q (K, n) rad, as tuples."""
     return [tuple(row) for row in manipulator_type(robot, q, settings.flip).tolist()]
 
 

@@ -22,7 +22,8 @@ WHOLE_TURN_DEG = 360.0
 
 def check(program: Program, settings: InformSettings) -> Iterator[ProgramIssue]:
     """Yield the issues that only this language has."""
-    if settings.pulses_per_deg is None and any(isinstance(m, JointMove) for m in program.moves):
+    pulses = program.robot.externals or settings.pulses_per_deg is not None
+    if not pulses and any(isinstance(m, JointMove) for m in program.moves):
         yield ProgramIssue(
             "warning",
             "joint-targets",
@@ -53,7 +54,7 @@ def _check_turns(
     program: Program, section: Section, settings: InformSettings
 ) -> Iterator[ProgramIssue]:
     """Check that the turns of R, T and S can be said where a position is no pulses."""
-    if not section.moves:
+    if not section.moves or program.robot.externals:
         return
     q = np.array([move.q for move in section.moves])
     axes_deg = np.degrees(axes_from_joints(program.robot, q))

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from kerfpath._arrays import Array, freeze
+from kerfpath.errors import InputError
 from kerfpath.post._called import off_name
 from kerfpath.post._frames import faceplate, from_euler, world
 from kerfpath.post._line_reader import LineReader, patterns
 from kerfpath.post._program import Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection
 from kerfpath.post.inform._axes import joints_at, joints_from_axes
+from kerfpath.post.inform._external import ExternalPulses
 from kerfpath.post.inform._settings import InformSettings
 from kerfpath.post.inform._write import (
     ANGLES,
@@ -33,7 +35,7 @@ _NUMBER, _WHOLE = r"(-?\d+\.\d+)", r"(-?\d+)"
 _POSE = re.compile(rf"C(\d{{5}})={','.join([_NUMBER] * 6)}", re.ASCII)
 _PULSES = re.compile(rf"C(\d{{5}})={','.join([_WHOLE] * 6)}", re.ASCII)
 _TYPE = re.compile(r"///RCONF ([01](?:,[01])*)", re.ASCII)
-_COUNT = re.compile(r"///NPOS (\d+),0,0,0,0,0", re.ASCII)
+_COUNT = re.compile(r"///NPOS ((\d+)(?:,\d+){5})", re.ASCII)
 _MAIN = patterns(
     {
         "remark": r"' .*",
@@ -87,6 +89,7 @@ class _Text(LineReader):
         rows = [(n, row.rstrip()) for n, row in enumerate(text.splitlines(), 1)]
         super().__init__(file, robot, settings, rows)
         self.name = file.rpartition("/")[2].removesuffix(SUFFIX)
+        self.external = ExternalPulses(robot, settings)
 
     def require_rows(self, expected: Sequence[str]) -> None:
         """Read rows that are known."""
@@ -95,16 +98,21 @@ class _Text(LineReader):
 
     def begin(self) -> int:
         """Take the first lines; return how many positions the job is said to have."""
-        *known, _ = head(self.name, 0)
+        *known, _ = head(self.name, "")
         self.require_rows(known)
         match = _COUNT.fullmatch(self.next_row())
-        if match is None:
-            raise self.fault("expected the number of positions, ///NPOS n,0,0,0,0,0")
-        return int(match[1])
+        if match is None or match[1] != self.external.counts(int(match[2])):
+            expected = self.external.counts(1).replace("1", "n")
+            raise self.fault(f"expected the number of positions, ///NPOS {expected}")
+        return int(match[2])
 
     def instructions(self, kinds: Mapping[str, re.Pattern[str]]) -> None:
         """Read instructions to END."""
         while (row := self.next_row()) != "END":
+            try:
+                row = self.external.plain(row)
+            except InputError as error:
+                raise self.fault(str(error)) from None
             self.read(row, kinds)
         self.require_complete()
         if any(row for _, row in self.rows[self.line :]):
@@ -119,7 +127,7 @@ class _Off(_Text):
         super().__init__(file, text, robot, settings)
         if self.begin():
             raise self.fault("this job must have no positions")
-        self.require_rows(middle("main", settings)[1])
+        self.require_rows(middle("main", settings, self.external)[1])
         self.required = switch_off_lines(settings)
         self.instructions({})
 
@@ -133,7 +141,7 @@ class _Main(_Text):
         self.calls: list[str] = []
         if self.begin():
             raise self.fault("the main job must have no positions")
-        self.require_rows(middle("main", settings)[1])
+        self.require_rows(middle("main", settings, self.external)[1])
         self.instructions(_MAIN)
         if self.calls[:1] != [off_name(self.name, settings)]:
             raise self.fault(f"expected {off_name(self.name, settings)} to be called first")
@@ -172,7 +180,9 @@ class _Job(_Text):
         self.stands = False
         count = self.begin()
         pulses = "///POSTYPE PULSE" in [row for _, row in self.rows[self.line + 1 : self.line + 2]]
-        before, after = middle("pulse" if pulses else "user", settings)
+        if robot.externals and not pulses:
+            raise self.fault("with external axes positions must be in pulses")
+        before, after = middle("pulse" if pulses else "user", settings, self.external)
         self.require_rows(before)
         self.said_at: list[str] = []
         self.target_at = ""
@@ -195,7 +205,14 @@ class _Job(_Text):
         rows = [self._position(_PULSES, self.next_row(), k) for k in range(count)]
         pulses = np.array(rows, dtype=np.float64).reshape(-1, 6)
         axes = np.radians(pulses / np.array(self.settings.pulses_per_deg))
-        self.q = joints_from_axes(self.robot, axes)
+        more = np.zeros((count, len(self.robot.externals)))
+        for word in self.external.kinds():
+            for k in range(count):
+                try:
+                    self.external.read(self.next_row(), word, k, more[k])
+                except InputError as error:
+                    raise self.fault(str(error)) from None
+        self.q = np.hstack([joints_from_axes(self.robot, axes), self.external.values(more)])
 
     def _read_poses(self, count: int) -> None:
         rows: list[tuple[str, ...]] = []
@@ -246,6 +263,11 @@ class _Job(_Text):
     def path(
         self, kind: MoveKind, target: str, speed: str, level: str, via: Array | None = None
     ) -> None:
+        if self.robot.externals:
+            self.last = None
+            q = freeze(self.q[self.number(target)])
+            self.move(kind, float(speed) * 1e-3, level, q=q)
+            return
         T, posture = self.pose(target)
         self.last = T
         said = {"T_part_tip": T, "T_part_via": via, "posture": posture}

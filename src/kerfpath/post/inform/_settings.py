@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, StringConstraints
+from pydantic import AfterValidator, Field, StringConstraints
 
 from kerfpath.post._controller import Controller
 from kerfpath.post._settings import OrientationSetting, PortSettings, Rules, numbered, setting
+from kerfpath.robots import MOST_EXTERNAL
 
 __all__ = ["LEVEL_MM", "InformSettings", "is_reserved", "rules"]
 
@@ -49,6 +50,16 @@ class InformSettings(PortSettings, output=Output, input=Input):
             max_length=6,
         ),
     ] = None
+    external_pulses: Annotated[
+        Annotated[
+            list[float], Field(min_length=1, max_length=MOST_EXTERNAL), AfterValidator(_not_zero)
+        ]
+        | None,
+        setting(
+            "a list of numbers, the pulses of each external axis per mm or per deg",
+            "[100.0, -1019.7]",
+        ),
+    ] = None
     position_level: Annotated[
         int, setting("a position level for corners, 1 to 8", "1", ge=1, le=8)
     ] = 1
@@ -78,14 +89,15 @@ class InformSettings(PortSettings, output=Output, input=Input):
 def rules(settings: InformSettings) -> Rules:
     """Return what jobs must keep to."""
     pulses = np.abs(settings.pulses_per_deg or [np.inf])
+    external = np.abs(settings.external_pulses or [np.inf])
     return Rules(
         longest_name=settings.longest_name,
         name=r"[A-Z][A-Z0-9_]*",
         slowest=SPEED_STEP,
         fastest=settings.fastest_mm_s * 1e-3,
         speed_step=SPEED_STEP,
-        point_step=POINT_STEP,
-        angle_step=float(np.radians(max(ANGLE_STEP_DEG, 0.5 / pulses.min()))),
+        point_step=max(POINT_STEP, 0.5e-3 / float(external.min())),
+        angle_step=float(np.radians(max(ANGLE_STEP_DEG, 0.5 / min(pulses.min(), external.min())))),
         controller=_controller(settings),
     )
 

@@ -35,6 +35,7 @@ from kerfpath.post._program import (
 from kerfpath.post._settings import outputs
 from kerfpath.post._standing import stop_to_switch
 from kerfpath.post.inform._axes import axes_from_joints, manipulator_type
+from kerfpath.post.inform._external import ExternalPulses
 from kerfpath.post.inform._settings import InformSettings
 
 __all__ = [
@@ -61,12 +62,14 @@ POSE = "%.3f,%.3f,%.3f,%.4f,%.4f,%.4f"
 FRAME_WORDS = ("X", "Y", "Z", "RX", "RY", "RZ")
 
 
-def head(name: str, count: int) -> list[str]:
-    """Return the first lines of a job with so many positions."""
-    return ["/JOB", f"//NAME {name}", "//POS", f"///NPOS {count},0,0,0,0,0"]
+def head(name: str, counts: str) -> list[str]:
+    """Return the first lines of a job with so many positions of each kind."""
+    return ["/JOB", f"//NAME {name}", "//POS", f"///NPOS {counts}"]
 
 
-def middle(kind: str, settings: InformSettings) -> tuple[list[str], list[str]]:
+def middle(
+    kind: str, settings: InformSettings, external: ExternalPulses
+) -> tuple[list[str], list[str]]:
     """Return the lines before and after the positions of a job: "pulse", "user" or "main"."""
     user, tool = f"///USER {settings.user_frame}", f"///TOOL {settings.tool_number}"
     before = {
@@ -77,7 +80,7 @@ def middle(kind: str, settings: InformSettings) -> tuple[list[str], list[str]]:
     relative = kind == "user"
     after = ["//INST", f"///DATE {settings.date}", f"///ATTR SC,RW{',RJ' if relative else ''}"]
     after += [f"////FRAME USER {settings.user_frame}"] if relative else []
-    return before, [*after, "///GROUP1 RB1", "NOP"]
+    return before, [*after, *external.groups(), "NOP"]
 
 
 def switch_off_lines(settings: InformSettings) -> list[str]:
@@ -115,6 +118,7 @@ class Inform(CalledFormatter):
         super().__init__(split_by_kind(stop_to_switch(program)), settings)
         self._targets: list[tuple[Array, Array | None]] = []
         self._labels = count(1)
+        self._external = ExternalPulses(program.robot, settings)
         moves = self.program.moves
         self._before = dict(zip(moves[1:], moves, strict=False))
 
@@ -149,6 +153,7 @@ class Inform(CalledFormatter):
         yield from self.heading(
             f"{self.off_name} switches off: run it after a stop.",
             "A stop does not switch the laser off: the cell's safety has to.",
+            *self._external.remarks(),
             "Enter these frames (mm, deg). Robot frame: on S, as high as L.",
             frame=f"UFRAME {settings.user_frame}",
             tool=f"TOOL {settings.tool_number}",
@@ -164,11 +169,13 @@ class Inform(CalledFormatter):
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a MOVJ."""
         T = None if self.settings.pulses_per_deg else self.program.tips([move])[0]
-        yield f"MOVJ {self._position(move.q, T)} VJ={number(move.speed * 100, 2)}{self._end(move)}"
+        share = f"VJ={number(move.speed * 100, 2)}"
+        yield self._external.moved(f"MOVJ {self._position(move.q, T)} {share}{self._end(move)}")
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
         """Yield a MOVL and what is switched at its end."""
-        yield f"MOVL {self._position(move.q, move.T_part_tip)} {_speed(move)}{self._end(move)}"
+        target = self._position(move.q, move.T_part_tip)
+        yield self._external.moved(f"MOVL {target} {_speed(move)}{self._end(move)}")
         yield from self._switched(move)
 
     def circular_move(self, move: CircularMove) -> Iterator[str]:
@@ -218,14 +225,18 @@ class Inform(CalledFormatter):
 
     def _in_pulses(self, section: Section) -> bool:
         joint = any(isinstance(move, JointMove) for move in section.moves)
+        if self.program.robot.externals:
+            return bool(section.moves)
         return joint and self.settings.pulses_per_deg is not None
 
     def _pulses(self) -> list[str]:
         """Return the lines of the positions so far, in pulses."""
-        axes = axes_from_joints(self.program.robot, [q for q, _ in self._targets])
+        q = np.array([q for q, _ in self._targets])
+        axes = axes_from_joints(self.program.robot, q)
         pulses = np.round(np.degrees(axes) * np.array(self.settings.pulses_per_deg))
         rows = pulses.astype(np.int64).tolist()
-        return [f"C{k:05d}={','.join(map(str, row))}" for k, row in enumerate(rows)]
+        arm = [f"C{k:05d}={','.join(map(str, row))}" for k, row in enumerate(rows)]
+        return [*arm, *self._external.rows(q)]
 
     def _poses(self) -> list[str]:
         """Return the lines of the positions so far, in the user frame, types where they change."""
@@ -246,9 +257,10 @@ class Inform(CalledFormatter):
         return lines
 
     def _job(self, name: str, kind: str, positions: Sequence[str], lines: Sequence[str]) -> str:
-        before, after = middle(kind, self.settings)
+        before, after = middle(kind, self.settings, self._external)
         targets = sum(line.startswith("C") for line in positions)
-        rows = [*head(name, targets), *before, *positions, *after, *lines, "END", ""]
+        counts = self._external.counts(targets)
+        rows = [*head(name, counts), *before, *positions, *after, *lines, "END", ""]
         return NEW_LINE.join(rows)
 
 

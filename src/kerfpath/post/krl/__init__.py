@@ -6,6 +6,7 @@ from kerfpath.post.krl._axes import joints_from_axes as joints_from_axes
 from kerfpath.post.krl._axes import posture
 from kerfpath.post.krl._axes import status_and_turn as status_and_turn
 from kerfpath.post.krl._check import check
+from kerfpath.post.krl._external import missing
 from kerfpath.post.krl._read import read
 from kerfpath.post.krl._settings import KrlSettings as KrlSettings
 from kerfpath.post.krl._settings import is_reserved, rules
@@ -25,6 +26,7 @@ KRL = Language(
     posture=posture,
     check=check,
     assumed={"laser_output": 1},
+    externals=missing,
     read=read,
 )
 """What is registered."""

@@ -32,18 +32,18 @@ NOISE_DECIMALS = 6
 
 
 def status_and_turn(robot: Robot, q: ArrayLike) -> Ints:
-    """Return Status and Turn, (K, 2), of joint vectors q (K, 6) rad.
+    """Return Status and Turn, (K, 2), of joint vectors q (K, n) rad.
 
     An endless axis counts modulo 360 deg, from -180 deg on.
     """
-    q = floats(q, "q", (None, 6))
+    q = floats(q, "q", (None, robot.joints))
     arm = robot.arm()
     ahead, _ = wrist_in_plane(robot, q)
     axes_deg = np.degrees(axes_from_joints(robot, q))
     stretched_deg = np.degrees(np.arctan2(-arm.a2, arm.c3))
     bent = np.round(axes_deg[:, 2] - stretched_deg, NOISE_DECIMALS) >= 0
     once = (axes_deg + 180.0) % 360.0 - 180.0
-    negative = np.round(np.where(robot.endless, once, axes_deg), NOISE_DECIMALS) < 0
+    negative = np.round(np.where(robot.endless[:6], once, axes_deg), NOISE_DECIMALS) < 0
     found = np.empty((len(q), 2), dtype=np.int64)
     found[:, 0] = (ahead < 0) + 2 * bent + 4 * negative[:, 4]
     found[:, 1] = negative @ (1 << np.arange(6))
@@ -51,5 +51,5 @@ def status_and_turn(robot: Robot, q: ArrayLike) -> Ints:
 
 
 def posture(robot: Robot, q: Array, settings: object) -> list[tuple[int | str, ...]]:
-    """Return `status_and_turn` of joint vectors q (K, 6) rad, as tuples."""
+    """Return `status_and_turn` of joint vectors q (K, n) rad, as tuples."""
     return [tuple(row) for row in status_and_turn(robot, q).tolist()]

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath.post._external import said
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._program import JointMove, Program
 from kerfpath.post.krl._axes import axes_from_joints, joints_from_axes
-from kerfpath.post.krl._settings import KrlSettings
+from kerfpath.post.krl._settings import AXES, KrlSettings
 from kerfpath.robots import Robot
 
 __all__ = ["check"]
@@ -34,8 +35,10 @@ def check(program: Program, settings: KrlSettings) -> Iterator[ProgramIssue]:
     places = [
         f"{s.name}, move {number}" for s in program.sections for number in range(len(s.moves))
     ]
-    axes_deg = np.degrees(axes_from_joints(program.robot, np.array([move.q for move in moves])))
-    beyond = (np.abs(axes_deg) > TURN_DEG) & ~program.robot.endless
+    q = np.array([move.q for move in moves])
+    axes_deg = np.degrees(axes_from_joints(program.robot, q))
+    beyond = (np.abs(axes_deg) > TURN_DEG) & ~program.robot.endless[:6]
+    axes_deg = np.hstack([axes_deg, said(program.robot, q)])
     for k, i in np.argwhere(beyond).tolist():
         message = f"A{i + 1} = {axes_deg[k, i]:.1f} deg cannot be said by Status and Turn"
         fix = "only an endless axis may pass 360 deg: set endless, or bound the axis"
@@ -51,7 +54,7 @@ def check(program: Program, settings: KrlSettings) -> Iterator[ProgramIssue]:
 def _check_frames(robot: Robot) -> Iterator[ProgramIssue]:
     """Check that the robot's base and flange are $ROBROOT and the controller's flange."""
     g = robot.geometry
-    T = robot.forward(joints_from_axes(robot, HOME))[0]
+    T = robot.alone().forward(joints_from_axes(robot, HOME))[0]
     point = np.array([g["a1"] + g["c3"] + g["c4"], g["b"], g["c1"] + g["c2"] - g["a2"]])
     off = max(np.abs(T[:3, 3] - point).max(), np.abs(T[:3, :3] - FLANGE).max())
     if off > FRAME:
@@ -70,12 +73,13 @@ def _check_short_way(program: Program, step_deg: Array, place: str) -> Iterator[
 
     Where the way through the air has been checked, another one is an error.
     """
+    names = [*AXES, *(axis.name for axis in program.robot.externals)]
     for i in np.flatnonzero(program.robot.endless & (np.abs(step_deg) > HALF_TURN_DEG)).tolist():
         short = (step_deg[i] + 180.0) % 360.0 - 180.0
         yield ProgramIssue(
             "error" if program.air_checked else "warning",
             "short-way",
-            f"A{i + 1} is endless and would turn the short way, by {short:.1f} deg, not by "
+            f"{names[i]} is endless and would turn the short way, by {short:.1f} deg, not by "
             f"{step_deg[i]:.1f} deg as planned",
             place,
         )

@@ -9,15 +9,16 @@ import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
+from kerfpath.post._external import carrier_frame
 from kerfpath.post._frames import from_euler
 from kerfpath.post._line_reader import LineReader, only, patterns, statements
 from kerfpath.post._program import Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection, ReadStep
 from kerfpath.post.krl._axes import joints_from_axes
-from kerfpath.post.krl._settings import KrlSettings
+from kerfpath.post.krl._external import coupled, read_fields
+from kerfpath.post.krl._settings import AXES, KrlSettings
 from kerfpath.post.krl._write import (
     ANGLES,
-    AXES,
     FIRST,
     HEAD,
     PASSED,
@@ -34,11 +35,13 @@ __all__ = ["read"]
 _NAME = r"([A-Za-z]\w*)"
 _NUMBER = r"(-?\d+(?:\.\d+)?)"
 _POINT = ",".join(f"{field} {_NUMBER}" for field in "XYZABC")
+_EXTERNAL = r"((?:,E\d -?\d+(?:\.\d+)?)*)"
+_MACHINE = r"MACHINE_DEF\[(\d+)\]"
 _LINES = patterns(
     {
-        "linear": rf"LIN {{{_POINT},S (\d+),T (\d+)}}( C_DIS)?",
-        "circular": rf"CIRC {{{_POINT}}},{{{_POINT},S (\d+),T (\d+)}}( C_DIS)?",
-        "joint": rf"PTP {{{','.join(f'{axis} {_NUMBER}' for axis in AXES)}}}",
+        "linear": rf"LIN {{{_POINT},S (\d+),T (\d+){_EXTERNAL}}}( C_DIS)?",
+        "circular": rf"CIRC {{{_POINT}}},{{{_POINT},S (\d+),T (\d+){_EXTERNAL}}}( C_DIS)?",
+        "joint": rf"PTP {{{','.join(f'{axis} {_NUMBER}' for axis in AXES)}{_EXTERNAL}}}",
         "speed": rf"\$VEL\.CP={_NUMBER}",
         "zone": rf"\$APO\.CDIS={_NUMBER}",
         "share": r"BAS\(#VEL_PTP,(\d+)\)",
@@ -54,12 +57,13 @@ _LINES = patterns(
         "routine": rf"DEF {_NAME}\((|{PASSED} :IN)\)",
         "tool": rf"\$TOOL={{{_POINT}}}",
         "base": rf"\$BASE={{{_POINT}}}",
+        "coupled_base": rf"\$BASE=EK\({_MACHINE}\.ROOT,{_MACHINE}\.MECH_TYPE,{{{_POINT}}}\)",
     }
 )
 
 _OUTSIDE = only(_LINES, "routine")
 _IN_FIRST = only(_LINES, "condition", "call", "end_condition", "end")
-_IN_MAIN = only(_LINES, "tool", "base", "again") | _IN_FIRST
+_IN_MAIN = only(_LINES, "tool", "base", "coupled_base", "again") | _IN_FIRST
 _IN_ROUTINE = only(
     _LINES,
     "linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "request",
@@ -250,7 +254,17 @@ class _File(LineReader):
         self.frame("tool", self.settings.tool_number, point)
 
     def base(self, *point: str) -> None:
+        if coupled(self.robot):
+            raise self.fault("expected a base that moves with the part, $BASE=EK(...)")
         self.frame("base", self.settings.base_number, point)
+
+    def coupled_base(self, root: str, kind: str, *point: str) -> None:
+        if not coupled(self.robot) or {int(root), int(kind)} != {self.settings.machine_number}:
+            expected = f"MACHINE_DEF[{self.settings.machine_number}]"
+            raise self.fault(f"expected a base that moves with {expected}, if anything does")
+        self.frame("base", self.settings.base_number, point)
+        frame = carrier_frame(self.robot, self.settings.positioner_frame)
+        self.frames["base"] = freeze(np.asarray(frame @ self.frames["base"]))
 
     def frame(self, kind: str, numbered: int | None, point: Sequence[str]) -> None:
         if numbered is not None or kind in self.frames:
@@ -277,10 +291,11 @@ class _File(LineReader):
         switch = Switch(signal=self.signal(int(output)), on=state == "TRUE", lead_time=lead)
         self.switches += (switch,)
 
-    def joint(self, *axes_deg: str) -> None:
+    def joint(self, *fields: str) -> None:
+        *axes_deg, external = fields
         axes = np.radians([[float(axis) for axis in axes_deg]])
         speed = self.holds("share", "BAS(#VEL_PTP,...)")
-        q = joints_from_axes(self.robot, axes)[0]
+        q = np.append(joints_from_axes(self.robot, axes)[0], self.external(external))
         self.add_move("joint", speed, q=q, elsewhere={"speed": self.held_at["share"]})
 
     def linear(self, *fields: str | None) -> None:
@@ -292,12 +307,14 @@ class _File(LineReader):
     def path(
         self, kind: MoveKind, fields: Sequence[str | None], T_part_via: Array | None = None
     ) -> None:
-        *point, status, turn, blended = fields
+        *point, status, turn, said, blended = fields
+        external = self.external(str(said))
         self.add_move(
             kind,
             self.holds("speed", "$VEL.CP"),
             T_part_tip=self.pose(point),
             T_part_via=T_part_via,
+            external=external if len(external) else None,
             posture=(int(str(status)), int(str(turn))),
             zone=self.holds("zone", "$APO.CDIS") if blended else 0.0,
             switches=self.switches,
@@ -305,6 +322,13 @@ class _File(LineReader):
         )
         self.switches = ()
         self.held_at.pop("switches", None)
+
+    def external(self, text: str) -> Array:
+        """Return the values (E,) m and rad of the external axes of a target."""
+        try:
+            return freeze(read_fields(self.robot, text, self.settings))
+        except InputError as error:
+            raise self.fault(str(error)) from None
 
     def pose(self, fields: Sequence[str | None]) -> Array:
         """Return the pose (4, 4) m of X, Y, Z in mm and A, B, C in deg."""

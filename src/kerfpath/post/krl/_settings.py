@@ -5,19 +5,23 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from kerfpath.post._controller import Controller
 from kerfpath.post._settings import (
     LinesPerFile,
     OrientationSetting,
     PortSettings,
+    PositionerFrame,
     Rules,
     numbered,
     setting,
 )
+from kerfpath.robots import MOST_EXTERNAL
 
-__all__ = ["LONGEST_NAME", "KrlSettings", "is_reserved", "rules"]
+__all__ = ["AXES", "LONGEST_NAME", "KrlSettings", "is_reserved", "rules"]
 
+AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
 LONGEST_NAME = 24
 """Characters of a name."""
 SLOWEST = 1e-5
@@ -53,6 +57,12 @@ RESERVED = frozenset((KEYWORDS + " " + MEANINGS).split())
 Output = Annotated[int | None, numbered("a digital output", 8192)]
 Input = Annotated[int | None, numbered("a digital input", 8192)]
 
+Number = Annotated[int, Field(ge=1, le=6)]
+Numbers = Annotated[
+    Annotated[list[Number], Field(min_length=1, max_length=MOST_EXTERNAL)] | None,
+    setting("a list of numbers from 1 to 6, one for each external axis", "[1, 2]"),
+]
+
 
 class KrlSettings(PortSettings, output=Output, input=Input):
     """Which outputs, tool and base, and what the machine data allow."""
@@ -67,6 +77,11 @@ class KrlSettings(PortSettings, output=Output, input=Input):
     largest_speed_m_s: Annotated[
         float, setting("a speed from 0.01 to 10, in m/s ($VEL_MA.CP)", "3.0", ge=0.01, le=10)
     ] = 3.0
+    machine_number: Annotated[
+        int, setting("the number of a MACHINE_DEF, 1 to 16", "2", ge=1, le=16)
+    ] = 2
+    external_numbers: Numbers = None
+    positioner_frame: PositionerFrame = None
     turning_speed_deg_s: Annotated[
         float, setting("a speed from 1 to 1000, in deg/s ($VEL.ORI1)", "200.0", ge=1, le=1000)
     ] = 200.0

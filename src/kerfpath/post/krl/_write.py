@@ -19,6 +19,7 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.post._divide import divide_program, rename_sections
+from kerfpath.post._external import carrier_frame
 from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._frames import euler
 from kerfpath.post._program import (
@@ -35,7 +36,8 @@ from kerfpath.post._program import (
 )
 from kerfpath.post._settings import outputs
 from kerfpath.post.krl._axes import axes_from_joints, status_and_turn
-from kerfpath.post.krl._settings import LONGEST_NAME, KrlSettings
+from kerfpath.post.krl._external import coupled, external_fields, remarks
+from kerfpath.post.krl._settings import AXES, LONGEST_NAME, KrlSettings
 
 __all__ = [
     "ANGLES",
@@ -67,7 +69,6 @@ SWITCH_OFF = "switch_off"
 INTERRUPT = 20
 TIMER = 20
 """The interrupt and the timer that are used; KUKA's own programs take others."""
-AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
 ANGLES: Final = "ZYX"
 """A, B, C turn about Z, the new Y, the new X."""
 
@@ -273,15 +274,21 @@ class Krl(Formatter):
         program, settings = self.program, self.settings
         load = ["Complete the load of the tool: $LOAD."] * (settings.tool_number is None)
         base = ["$BASE is the part in the robot's base, which is $WORLD, too."]
-        base *= settings.base_number is None
-        yield from (f"; {remark}" for remark in self.head(*load, *base))
+        base *= settings.base_number is None and not coupled(program.robot)
+        axes = remarks(program.robot, settings)
+        yield from (f"; {remark}" for remark in self.head(*load, *base, *axes))
         yield f"; {SWITCH_OFF}() runs at a stop message; the safety circuit of the cell has to"
         yield "; switch the laser off, too."
         yield f"; To begin at a contour set {FIRST} in the .dat to its number, and reset."
         yield from opening_lines(settings)
         if settings.tool_number is None:
             yield f"$TOOL={{{_frames(program.T_flange_tip[None])[0]}}}"
-        if settings.base_number is None:
+        if coupled(program.robot):
+            frame = carrier_frame(program.robot, settings.positioner_frame)
+            part = _frames((np.linalg.inv(frame) @ program.T_base_part)[None])[0]
+            machine = f"MACHINE_DEF[{settings.machine_number}]"
+            yield f"$BASE=EK({machine}.ROOT,{machine}.MECH_TYPE,{{{part}}})"
+        elif settings.base_number is None:
             yield f"$BASE={{{_frames(program.T_base_part[None])[0]}}}"
 
     def _target_texts(self) -> dict[Move, str]:
@@ -291,15 +298,18 @@ class Krl(Formatter):
         axes_deg = np.degrees(axes_from_joints(robot, q)).tolist()
         words = status_and_turn(robot, q).tolist()
         frames = iter(_frames([T for _, _, T in points if T is not None]))
+        external = external_fields(robot, q, self.settings)
         texts: dict[Move, str] = {}
-        for (move, _, T), axes, (status, turn) in zip(points, axes_deg, words, strict=True):
+        for (move, _, T), axes, (status, turn), more in zip(
+            points, axes_deg, words, external, strict=True
+        ):
             if T is None:
-                texts[move] = f"{{{_fields(AXES, axes, 6)}}}"
+                texts[move] = f"{{{_fields(AXES, axes, 6)}{more}}}"
             elif isinstance(move, CircularMove) and T is move.T_part_via:
                 texts[move] = f"{{{next(frames)}}},"
             else:
                 via = texts[move] if isinstance(move, CircularMove) else ""
-                texts[move] = f"{via}{{{next(frames)},S {status},T {turn}}}"
+                texts[move] = f"{via}{{{next(frames)},S {status},T {turn}{more}}}"
         return texts
 
 

@@ -5,6 +5,7 @@ from kerfpath.post.rapid._axes import axes_from_joints as axes_from_joints
 from kerfpath.post.rapid._axes import confdata as confdata
 from kerfpath.post.rapid._axes import joints_from_axes as joints_from_axes
 from kerfpath.post.rapid._axes import posture
+from kerfpath.post.rapid._external import missing
 from kerfpath.post.rapid._read import read
 from kerfpath.post.rapid._settings import RapidSettings as RapidSettings
 from kerfpath.post.rapid._settings import is_reserved, rules
@@ -22,6 +23,7 @@ RAPID = Language(
     formatter=Rapid,
     is_reserved=is_reserved,
     posture=posture,
+    externals=missing,
     read=read,
 )
 """What is registered."""

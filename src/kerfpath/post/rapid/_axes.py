@@ -33,7 +33,7 @@ NOISE_DECIMALS = 6
 
 
 def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
-    """Return the controller's axes (K, 6) rad of joint vectors q (K, 6) rad.
+    """Return the controller's axes (K, 6) rad of the arm, of joint vectors q (K, n) rad.
 
     With a parallel rod (IRB 2400, IRB 4400: `Robot.axis_3` is "horizontal") axis 3 is joint 2 +
     joint 3. Descriptions that count joints otherwise than ABB are converted by the arm's model.
@@ -42,7 +42,7 @@ def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
 
 
 def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
-    """Return the joint vectors (K, 6) rad of a controller's axes (K, 6) rad."""
+    """Return the joints (K, 6) rad of the arm at a controller's axes (K, 6) rad."""
     return _count(robot).to_joints(robot, axes)
 
 
@@ -51,11 +51,11 @@ def _count(robot: Robot) -> AxisCount:
 
 
 def confdata(robot: Robot, q: ArrayLike) -> Ints:
-    """Return cf1, cf4, cf6 and cfx, (K, 4), of joint vectors q (K, 6) rad.
+    """Return cf1, cf4, cf6 and cfx, (K, 4), of joint vectors q (K, n) rad.
 
     See the module's text for what is ABB's and what is our reading.
     """
-    q = floats(q, "q", (None, 6))
+    q = floats(q, "q", (None, robot.joints))
     ahead, bend = wrist_in_plane(robot, q)
     axes_deg = np.round(np.degrees(axes_from_joints(robot, q)), NOISE_DECIMALS)
     conf = np.empty((len(q), 4), dtype=np.int64)
@@ -65,5 +65,5 @@ def confdata(robot: Robot, q: ArrayLike) -> Ints:
 
 
 def posture(robot: Robot, q: Array, settings: object) -> list[tuple[int | str, ...]]:
-    """Return `confdata` of joint vectors q (K, 6) rad, as tuples."""
+    """Return `confdata` of joint vectors q (K, n) rad, as tuples."""
     return [tuple(row) for row in confdata(robot, q).tolist()]

@@ -28,6 +28,7 @@ _LINES = patterns(
         "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
         "wait": r"WaitTime ([\d.]+);",
         "load": r'Load \\Dynamic,"([^"]*)/([^"/]*)";',
+        "activate": rf"(Act|Deact)Unit {_NAME};",
         "condition": rf"IF {FIRST}<=(\d+) THEN",
         "late_call": rf'%"{_NAME}"%;',
         "unload": r'UnLoad "([^"]*)/([^"/]*)";',
@@ -45,7 +46,15 @@ MODULE = only(_LINES, "module")
 OUTSIDE = only(_LINES, *DECLARED, "routine", "end_module")
 IN_PART = only(_LINES, "routine", "end_module")
 IN_MAIN = only(
-    _LINES, "set_trigger", "load", "condition", "late_call", "unload", "call", "end_routine"
+    _LINES,
+    "activate",
+    "set_trigger",
+    "load",
+    "condition",
+    "late_call",
+    "unload",
+    "call",
+    "end_routine",
 )
 IN_ROUTINE = only(
     _LINES,

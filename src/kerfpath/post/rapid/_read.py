@@ -10,11 +10,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath.post._external import carrier_frame
 from kerfpath.post._line_reader import statements
 from kerfpath.post._program import Switch
 from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep
 from kerfpath.post.rapid._aggregates import Aggregates
 from kerfpath.post.rapid._axes import joints_from_axes
+from kerfpath.post.rapid._external import ExternalSpeeds, ExternalUnits
 from kerfpath.post.rapid._lines import DECLARED, IN_MAIN, IN_PART, IN_ROUTINE, MODULE, OUTSIDE
 from kerfpath.post.rapid._settings import SWITCH_OFF, RapidSettings
 from kerfpath.post.rapid._write import (
@@ -69,6 +71,8 @@ class _Reader(Aggregates):
         self.homes: dict[str, str] = {}
         self.first_number = 0
         self.number: str | None = None
+        self.units = ExternalUnits(robot, settings)
+        self.active: list[str] = []
 
     def read_module(self, file: str) -> None:
         self.file, self.ended, self.name = file, False, ""
@@ -105,6 +109,9 @@ class _Reader(Aggregates):
         if unknown or "main" not in self.routines:
             names = ", ".join(sorted({name for name, _ in unknown}))
             raise self.fault(f"main and routines do not match: {names}")
+        if self.active != [*self.units.activated(), *self.units.deactivated()]:
+            expected = " ".join([*self.units.activated(), *self.units.deactivated()]) or "none"
+            raise self.fault(f"mechanical units are not activated as they should be: {expected}")
         if not 1 <= self.first_number <= len(self.called_in):
             raise self.fault(f"{FIRST} must be the number of a contour")
         return ReadProgram(
@@ -127,18 +134,26 @@ class _Reader(Aggregates):
         held, pose, load = self.values(text, 3)
         if held is not True or not isinstance(load, list) or len(load) != 6:
             raise self.fault("expected a tool held by the robot, with its load")
-        self.declare("tool", name, pose)
+        self.declare("tool", name, self.pose(pose))
 
     def work_object(self, name: str, text: str) -> None:
         held, fixed, unit, pose, inner = self.values(text, 5)
-        if [held, fixed, unit] != [False, True, ""] or inner != [[0, 0, 0], [1, 0, 0, 0]]:
+        here = [[0, 0, 0], [1, 0, 0, 0]]
+        coupled = self.units.coupled
+        if coupled:
+            if [held, fixed, unit] != [False, False, coupled] or pose != here:
+                raise self.fault(f"expected a work object that {coupled} moves, without user frame")
+            frame = carrier_frame(self.robot, self.settings.positioner_frame)
+            self.declare("work_object", name, frame @ self.pose(inner))
+            return
+        if [held, fixed, unit] != [False, True, ""] or inner != here:
             raise self.fault("expected a fixed work object without an object frame")
-        self.declare("work_object", name, pose)
+        self.declare("work_object", name, self.pose(pose))
 
-    def declare(self, kind: str, name: str, pose: Any) -> None:
+    def declare(self, kind: str, name: str, T: Array) -> None:
         if kind in self.frames:
             raise self.fault(f"a second {kind.replace('_', ' ')}")
-        self.frames[kind] = (name, self.pose(pose))
+        self.frames[kind] = (name, T)
 
     def speed(self, name: str, text: str) -> None:
         self.unused(name, self.speeds)
@@ -201,6 +216,11 @@ class _Reader(Aggregates):
             signal=self.signal(output), on=value == "1", lead_time=float(lead_time)
         )
 
+    def activate(self, state: str, unit: str) -> None:
+        if (state == "Act") == bool(self.called_in):
+            raise self.fault("units are activated before the first contour and deactivated behind")
+        self.active.append(f"{state}Unit {unit};")
+
     def load(self, folder: str, file: str) -> None:
         if self.loaded or folder != self.settings.folder:
             raise self.fault(f"expected one module at a time, from {self.settings.folder}")
@@ -233,23 +253,25 @@ class _Reader(Aggregates):
         self, text: str, speed: str, timed: str | None, zone: str, tool: str, work_object: str
     ) -> None:
         axes_deg, external = self.values(text, 2)
-        self.require_frames(tool, work_object, external)
+        self.require_frames(tool, work_object)
         axes, said = np.radians(self.numbers(axes_deg, 6)), self.speed_of(speed, air_speed_data)
+        joints = joints_from_axes(self.robot, axes[None])[0]
         self.add_move(
             "joint",
             said if timed is None else None,
-            q=joints_from_axes(self.robot, axes[None])[0],
+            q=np.append(joints, self.external(external)),
             cruise=None if timed is None else float(timed),
             zone=self.named(zone, self.zones),
             elsewhere=self.elsewhere(speed=speed, zone=zone),
         )
 
     def linear_move(self, text: str, speed: str, zone: str, tool: str, work_object: str) -> None:
-        T_part_tip, quarters = self.target(text, tool, work_object)
+        T_part_tip, quarters, external = self.target(text, tool, work_object)
         self.add_move(
             "linear",
             self.speed_of(speed, linear_speed_data),
             T_part_tip=T_part_tip,
+            external=external if len(external) else None,
             posture=quarters,
             zone=self.named(zone, self.zones),
             elsewhere=self.elsewhere(speed=speed, zone=zone),
@@ -259,7 +281,7 @@ class _Reader(Aggregates):
         self, via: str, text: str, speed: str, zone: str, tool: str, work_object: str
     ) -> None:
         self.linear_move(text, speed, zone, tool, work_object)
-        T_part_via, _ = self.target(via, tool, work_object)
+        T_part_via, *_ = self.target(via, tool, work_object)
         self.steps[-1] = replace(self.last(), kind="circular", T_part_via=T_part_via)
 
     def switching_move(
@@ -274,13 +296,23 @@ class _Reader(Aggregates):
         self.circular_move(via, text, speed, zone, tool, work)
         self.add_triggers(triggers)
 
-    def target(self, text: str, tool: str, work_object: str) -> tuple[Array, tuple[int, ...]]:
+    def target(
+        self, text: str, tool: str, work_object: str
+    ) -> tuple[Array, tuple[int, ...], Array]:
         point, wxyz, conf, external = self.values(text, 4)
-        self.require_frames(tool, work_object, external)
+        self.require_frames(tool, work_object)
         quarters = self.numbers(conf, 4)
         if (quarters != np.round(quarters)).any():
             raise self.fault(f"configuration {conf} must be whole numbers")
-        return self.pose([point, wxyz]), tuple(quarters.astype(int).tolist())
+        words = tuple(quarters.astype(int).tolist())
+        return self.pose([point, wxyz]), words, self.external(external)
+
+    def external(self, values: Any) -> Array:
+        """Return the values (E,) m and rad of the external axes of a target."""
+        found = self.units.read(self.numbers(values, 6).tolist())
+        if isinstance(found, str):
+            raise self.fault(found)
+        return found
 
     def last(self) -> ReadMove:
         last = self.last_on_path()
@@ -296,12 +328,10 @@ class _Reader(Aggregates):
                 raise self.fault(f"{name} has not been set")
             self.add_switch(self.last(), switch, self.said_at[first])
 
-    def require_frames(self, tool: str, work_object: str, external: Any) -> None:
+    def require_frames(self, tool: str, work_object: str) -> None:
         known = [self.frames[kind][0] for kind in ("tool", "work_object") if kind in self.frames]
         if [tool, work_object] != known:
             raise self.fault(f"tool {tool} and work object {work_object} are not the module's")
-        if external != [9e9] * 6:
-            raise self.fault("external axes are not expected")
 
     def require_same(self, values: Array, data: str, what: str) -> None:
         """Require what follows the first value of data (of zones, the second) as it is written."""
@@ -309,11 +339,11 @@ class _Reader(Aggregates):
         if not np.array_equal(values[1:], expected[1:]):
             raise self.fault(f"{what}: expected {data}, got {values.tolist()}")
 
-    def speed_of(self, name: str, data: Callable[[float], str]) -> float:
+    def speed_of(self, name: str, data: Callable[[float, ExternalSpeeds], str]) -> float:
         """Return the speed of declared data, the rest of which is as `data` writes it."""
         values = self.named(name, self.speeds)
         speed = float(values[0]) * 1e-3 / (FULL_AIR_SPEED if data is air_speed_data else 1.0)
-        self.require_same(values, data(speed), f"speeds of {name}")
+        self.require_same(values, data(speed, self.units.speeds), f"speeds of {name}")
         return speed
 
     def named(self, name: str, known: Mapping[str, _T]) -> _T:

@@ -6,10 +6,17 @@ import re
 from typing import Annotated
 
 import numpy as np
-from pydantic import StringConstraints
+from pydantic import Field, StringConstraints
 
 from kerfpath.post._controller import Controller
-from kerfpath.post._settings import OrientationSetting, PortSettings, Rules, setting
+from kerfpath.post._settings import (
+    OrientationSetting,
+    PortSettings,
+    PositionerFrame,
+    Rules,
+    setting,
+)
+from kerfpath.robots import MOST_EXTERNAL
 
 __all__ = ["SWITCH_OFF", "TURNING_SPEED", "RapidSettings", "is_reserved", "rules"]
 
@@ -50,6 +57,14 @@ PREDEFINED = re.compile(r"[vz]\d+|vmax|vrot\d+|vlin\d+", re.IGNORECASE)
 Name = Annotated[str, StringConstraints(min_length=1, max_length=80)]
 Input = Annotated[Name | None, setting("the name of a digital input", '"diReady"')]
 Request = Annotated[Name | None, setting("the name of a digital output", '"doShutter"')]
+Units = Annotated[
+    Annotated[list[Name], Field(min_length=1, max_length=MOST_EXTERNAL)] | None,
+    setting("a list of mechanical units, one name for each external axis", '["TRACK_1", "STN_1"]'),
+]
+Letters = Annotated[
+    Annotated[str, StringConstraints(pattern=r"^[a-f]{1,3}$")] | None,
+    setting("letters from a to f, one for each external axis", '"ab"'),
+]
 Folder = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_:/.\-]{1,60}$")]
 
 
@@ -62,6 +77,9 @@ class RapidSettings(PortSettings, output=Request, input=Input):
     folder: Annotated[Folder, setting("a folder of the controller", '"HOME:"')] = "HOME:"
     work_object: Annotated[Name, setting("a name for the part's frame", '"wPart"')] = "wPart"
     orientation: OrientationSetting = "slerp"
+    mechanical_units: Units = None
+    external_letters: Letters = None
+    positioner_frame: PositionerFrame = None
 
 
 def rules(settings: RapidSettings) -> Rules:

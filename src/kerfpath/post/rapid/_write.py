@@ -17,6 +17,7 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.post._divide import divide_sections, rename_sections
+from kerfpath.post._external import carrier_frame
 from kerfpath.post._formatter import Formatter, number
 from kerfpath.post._names import identifiers
 from kerfpath.post._orientations import quaternions
@@ -36,6 +37,7 @@ from kerfpath.post._program import (
 from kerfpath.post._settings import handshakes, outputs
 from kerfpath.post._times import SHORTEST_CRUISE, cruises
 from kerfpath.post.rapid._axes import axes_from_joints, confdata
+from kerfpath.post.rapid._external import NO_EXTERNAL, ExternalSpeeds, ExternalUnits
 from kerfpath.post.rapid._settings import SWITCH_OFF, TURNING_SPEED, RapidSettings
 
 __all__ = [
@@ -56,15 +58,12 @@ FULL_AIR_SPEED = 1.0
 """Tip speed (m/s) that a joint move at its full share is given: RAPID knows no share."""
 WRIST = r"SingArea\Wrist;"
 """Lets the wrist go evenly from joints to joints, instead of the tool from pose to pose."""
-NO_EXTERNAL_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
-JOINT_TARGET = "[[" + ",".join(["%.6f"] * 6) + "]," + NO_EXTERNAL_AXES + "]"
-TARGET = "[[%.4f,%.4f,%.4f],[%.8f,%.8f,%.8f,%.8f],[%d,%d,%d,%d]," + NO_EXTERNAL_AXES + "]"
+JOINT_TARGET = "[[" + ",".join(["%.6f"] * 6) + "],"
+TARGET = "[[%.4f,%.4f,%.4f],[%.8f,%.8f,%.8f,%.8f],[%d,%d,%d,%d],"
 NO_POSE = np.eye(4)
 """Stands in for that of a joint move."""
 FIRST = "nFirst"
 """Number of the contour at which the program begins, for a restart."""
-EXTERNAL_SPEEDS = "5000,1000"
-"""mm/s and deg/s of external axes; there are none, but speed data must say something."""
 
 
 class Rapid(Formatter):
@@ -79,9 +78,14 @@ class Rapid(Formatter):
         moves = program.moves
         joint = [move for move in moves if isinstance(move, JointMove)]
         self._cruise = cruises(self.program)
-        self.air_speed = _number_names("vAir", (air_speed_data(move.speed) for move in joint))
+        self._units = ExternalUnits(self.program.robot, settings)
+        self._fast = self._units.speeds
+        self.air_speed = _number_names(
+            "vAir", (air_speed_data(move.speed, self._fast) for move in joint)
+        )
         self._laser_on = dict(_mark_laser(moves))
-        linear = [(on, linear_speed_data(move.speed)) for move, on in self._laser_on.items()]
+        fast = self._fast
+        linear = [(on, linear_speed_data(m.speed, fast)) for m, on in self._laser_on.items()]
         self.linear_speed = _number_names("vApproach", (key for key in linear if not key[0]))
         self.linear_speed |= _number_names("vCut", (key for key in linear if key[0]))
         self.zone = _number_names(
@@ -125,20 +129,22 @@ class Rapid(Formatter):
 
     def _module(self, calls: Iterable[str], sections: Iterable[Section]) -> Iterator[str]:
         program, settings = self.program, self.settings
-        tool, part = _pose(program.T_flange_tip), _pose(program.T_base_part)
+        tool = _pose(program.T_flange_tip)
         yield f"MODULE {program.name}"
-        head = self.head(
-            "Complete the load of the tool: mass -1 stands for not known.",
-            "The work object is the part in the robot's base, which is the world's, too.",
-        )
+        part = "The work object is the part in the robot's base, which is the world's, too."
+        if self._units.coupled:
+            part = (
+                f"The work object moves with {self._units.coupled}; the base is the world's, too."
+            )
+        load = "Complete the load of the tool: mass -1 stands for not known."
+        head = self.head(load, part, *self._units.remarks())
         yield from (f"  ! {remark}" for remark in head)
         yield f"  ! {SWITCH_OFF} is for the events STOP and QSTOP: enter it there. A stop switches"
         yield "  ! the laser off only then; the safety circuit of the cell has to, too."
         yield f"  ! To begin at a contour, set {FIRST} to its number and move PP to Main."
         load = "[-1,[0,0,0],[1,0,0,0],0,0,0]"
         yield f"  PERS tooldata {settings.tool_name}:=[TRUE,{tool},{load}];"
-        inner = "[[0,0,0],[1,0,0,0]]"
-        yield f'  PERS wobjdata {settings.work_object}:=[FALSE,TRUE,"",{part},{inner}];'
+        yield f"  PERS wobjdata {settings.work_object}:={self._work_object()};"
         yield from (f"  CONST speeddata {name}:={value};" for value, name in self._speed_data())
         yield from (f"  CONST zonedata {name}:={value};" for value, name in self.zone.items())
         yield from (f"  VAR triggdata {name};" for name in self.trigger.values())
@@ -147,6 +153,7 @@ class Rapid(Formatter):
         yield "  PROC main()"
         yield from (f"    {line}" for line in self.begin())
         yield from (f"    {line}" for line in calls)
+        yield from (f"    {line}" for line in self._units.deactivated())
         yield from (f"  {line}" for line in ending_lines())
         yield "  ENDPROC"
         yield ""
@@ -171,6 +178,7 @@ class Rapid(Formatter):
         for s in self.trigger:
             self.output(s.signal)
         yield f"{SWITCH_OFF};"
+        yield from self._units.activated()
         for s, name in self.trigger.items():
             lead = number(s.lead_time, 4)
             yield rf"TriggIO {name},{lead}\Time\DOp:={self.output(s.signal)},{int(s.on)};"
@@ -186,6 +194,7 @@ class Rapid(Formatter):
             (settings.laser_output, "the output of the laser"),
             *([] if gas is None else [(gas, "the output of the gas")]),
             *((name, f"the {way} of {who}") for (who, way), name in ports if name is not None),
+            *((unit, "a mechanical unit") for unit in dict.fromkeys(self._units.units)),
             ("main", "the main routine"),
             (SWITCH_OFF, "the routine that switches off"),
             (FIRST, "the number of the first contour"),
@@ -198,7 +207,7 @@ class Rapid(Formatter):
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a MoveAbsJ."""
-        speed = self.air_speed[air_speed_data(move.speed)]
+        speed = self.air_speed[air_speed_data(move.speed, self._fast)]
         cruise = self._cruise.get(move, 0.0)
         timed = rf"\T:={number(cruise, 4)}" if cruise >= SHORTEST_CRUISE else ""
         yield f"MoveAbsJ {self.target[move][-1]},{speed}{timed},{self.end(move)};"
@@ -243,11 +252,21 @@ class Rapid(Formatter):
         wxyz = quaternions(T).round(8) + 0.0
         rows = np.hstack([point_mm, wxyz, confdata(robot, q)]).tolist()
         texts: dict[Move, list[str]] = {move: [] for move in self.program.moves}
-        for (move, _, _), axes, row in zip(points, axes_deg, rows, strict=True):
-            texts[move].append(
-                JOINT_TARGET % tuple(axes) if isinstance(move, JointMove) else TARGET % tuple(row)
-            )
+        external = self._units.values(q)
+        for (move, _, _), axes, row, more in zip(points, axes_deg, rows, external, strict=True):
+            joint = isinstance(move, JointMove)
+            target = JOINT_TARGET % tuple(axes) if joint else TARGET % tuple(row)
+            texts[move].append(f"{target}{more}]")
         return texts
+
+    def _work_object(self) -> str:
+        """Return the frame of the part: in the base, or in what carries it."""
+        here, part = _pose(np.eye(4)), _pose(self.program.T_base_part)
+        if not self._units.coupled:
+            return f'[FALSE,TRUE,"",{part},[[0,0,0],[1,0,0,0]]]'
+        frame = carrier_frame(self.program.robot, self.settings.positioner_frame)
+        inner = _pose(np.linalg.inv(frame) @ self.program.T_base_part)
+        return f'[FALSE,FALSE,"{self._units.coupled}",{here},{inner}]'
 
     def _speed_data(self) -> list[tuple[str, str]]:
         linear = [(value, name) for (_, value), name in self.linear_speed.items()]
@@ -255,7 +274,7 @@ class Rapid(Formatter):
 
     def speed(self, move: LinearMove) -> str:
         """Return the name of the speed data of a move."""
-        return self.linear_speed[self._laser_on[move], linear_speed_data(move.speed)]
+        return self.linear_speed[self._laser_on[move], linear_speed_data(move.speed, self._fast)]
 
     def _switched(self, path: str, move: LinearMove) -> tuple[str, str]:
         names = [self.trigger[s] for s in move.switches]
@@ -306,18 +325,20 @@ def _pose(T: Array) -> str:
 
 
 @cache
-def linear_speed_data(speed: float) -> str:
+def linear_speed_data(speed: float, fast: ExternalSpeeds = NO_EXTERNAL) -> str:
     """Return the speed data of path moves at a speed of the tip (m/s)."""
-    return f"[{number(speed * 1e3, 2)},{number(np.degrees(TURNING_SPEED), 0)},{EXTERNAL_SPEEDS}]"
+    turning = number(np.degrees(TURNING_SPEED), 0)
+    return f"[{number(speed * 1e3, 2)},{turning},{fast.said(1.0)}]"
 
 
 @cache
-def air_speed_data(share: float) -> str:
+def air_speed_data(share: float, fast: ExternalSpeeds = NO_EXTERNAL) -> str:
     """Return the speed data of joint moves at a share of the full speed."""
     speed_mm_s = round(share * FULL_AIR_SPEED * 1e3, 2)
     # Of the speed as it is written: who reads it knows no other.
-    turning_deg_s = speed_mm_s / (FULL_AIR_SPEED * 1e3) * np.degrees(TURNING_SPEED)
-    return f"[{number(speed_mm_s, 2)},{number(turning_deg_s, 0)},{EXTERNAL_SPEEDS}]"
+    share = speed_mm_s / (FULL_AIR_SPEED * 1e3)
+    turning = number(share * np.degrees(TURNING_SPEED), 0)
+    return f"[{number(speed_mm_s, 2)},{turning},{fast.said(share)}]"
 
 
 @cache

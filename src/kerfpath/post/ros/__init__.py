@@ -1,6 +1,6 @@
 """ROS trajectories: trajectory_msgs/JointTrajectory as YAML, and what is switched when."""
 
-from kerfpath.post._languages import Language
+from kerfpath.post._languages import Language, no_settings_needed
 from kerfpath.post.ros._check import check
 from kerfpath.post.ros._read import read
 from kerfpath.post.ros._trajectory import Trajectory as Trajectory
@@ -20,6 +20,7 @@ ROS = Language(
     formatter=Ros,
     check=check,
     zones=False,
+    externals=no_settings_needed,
     read=read,
 )
 """What is registered."""

@@ -29,7 +29,7 @@ def check(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
 
 
 def _check_shape(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
-    count, joints = len(joint_names(program.robot.joints, settings)), program.robot.joints
+    count, joints = len(joint_names(program.robot, settings)), program.robot.joints
     if count != joints:
         message = f"joint_names has {count} names, the robot {joints} joints"
         yield ProgramIssue("error", "joint-names", message, "program")
@@ -60,7 +60,7 @@ def _check_limits(program: Program, settings: RosSettings) -> Iterator[ProgramIs
             yield ProgramIssue(
                 level,
                 f"joint-{what}",
-                f"joint {int(joint) + 1} needs {share.max():.0%} of its {what} limit "
-                f"{motion.time[k]:.3f} s after the start",
+                f"{program.robot.joint_names[int(joint)]} needs {share.max():.0%} of its "
+                f"{what} limit {motion.time[k]:.3f} s after the start",
                 "program",
             )

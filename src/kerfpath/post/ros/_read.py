@@ -76,7 +76,7 @@ class _Points:
         self.file, self.step_time = file, settings.step_ms * 1e-3
         lines = _lines(text)
         n = robot.joints
-        expected = head(joint_names(n, settings))
+        expected = head(joint_names(robot, settings))
         for (number, line), word in zip([*lines, (0, "nothing")], expected, strict=False):
             if line != word:
                 raise InputError(f"{file}, line {number}: expected {word!r}, got {line[:60]!r}")

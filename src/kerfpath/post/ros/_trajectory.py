@@ -12,6 +12,7 @@ from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.post._program import JointMove, LinearMove, Program, Wait
 from kerfpath.post._times import timetable
+from kerfpath.robots import base_in_part
 from kerfpath.transfer import least_time
 
 __all__ = ["Trajectory", "rates", "trajectory"]
@@ -130,13 +131,15 @@ def _straight(
     ends = Rotation.from_matrix(np.array([T_before[:3, :3], move.T_part_tip[:3, :3]]))
     T[:, :3, :3] = Slerp([0.0, 1.0], ends)(way[:, 0]).as_matrix()
     evenly = before + way * (move.q - before)
+    robot, n = program.robot, program.robot.family.joints
+    # External axes run evenly; where they have carried base and part, the arm sees the tip there.
+    seen = np.linalg.inv(base_in_part(robot.externals, evenly[:, n:])) @ program.T_base_part @ T
     # The tool's rotation about its axis counts only for arms that can choose it.
-    solved, reach = program.robot.inverse_nodes(
-        program.T_base_part @ T, np.zeros(1), program.T_flange_tip
-    )
-    apart = solved[:, 0] - evenly[:, None]
+    solved, reach = robot.alone().inverse_nodes(seen, np.zeros(1), program.T_flange_tip)
+    apart = solved[:, 0] - evenly[:, None, :n]
     apart -= 2 * np.pi * np.round(apart / (2 * np.pi))
     off = np.where(reach[:, 0], np.abs(apart).max(axis=2), np.inf)
     if not (off.min(axis=1) < BRANCH).all():
         raise InputError("a straight move leaves the robot's reach, or its posture, on the way")
-    return np.asarray(evenly + apart[np.arange(len(share)), off.argmin(axis=1)])
+    arm = evenly[:, :n] + apart[np.arange(len(share)), off.argmin(axis=1)]
+    return np.hstack([arm, evenly[:, n:]])

@@ -14,11 +14,14 @@ import numpy as np
 
 from kerfpath._arrays import Array, Ints
 from kerfpath.post._divide import require_one_file
-from kerfpath.post._formatter import Formatter, number
+from kerfpath.post._external import setup_remarks
+from kerfpath.post._formatter import Formatter, number, plain
+from kerfpath.post._names import identifiers
 from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import JointMove, LinearMove, Wait
 from kerfpath.post._settings import LanguageSettings, LinesPerFile, Rules, setting
 from kerfpath.post.ros._trajectory import Trajectory, rates, trajectory
+from kerfpath.robots import Robot
 
 __all__ = ["Ros", "RosSettings", "head", "joint_names", "rules"]
 
@@ -42,9 +45,14 @@ def rules(settings: RosSettings) -> Rules:
     return Rules(slowest=1e-6, angle_step=0.5e-9)
 
 
-def joint_names(joints: int, settings: RosSettings) -> list[str]:
-    """Return the names of so many joints: those of the settings, or joint_1 and so on."""
-    return settings.joint_names or [f"joint_{i}" for i in range(1, joints + 1)]
+def joint_names(robot: Robot, settings: RosSettings) -> list[str]:
+    """Return the names of all joints: those of the settings, or joint_1 and so on.
+
+    External axes, the last, have their own names.
+    """
+    arm = [f"joint_{i}" for i in range(1, robot.family.joints + 1)]
+    names = identifiers((axis.name for axis in robot.externals), taken=arm)
+    return settings.joint_names or [*arm, *names]
 
 
 def head(names: list[str]) -> list[str]:
@@ -79,8 +87,9 @@ class Ros(Formatter):
             "A trajectory_msgs/JointTrajectory; rad and s. Bring the robot to its first point."
         )
         yield from (f"# {remark}" for remark in self.head(message))
+        yield from (f"# {plain(remark)}" for remark in setup_remarks(robot, si=True))
         yield f"# What is switched when is in {program.name}.events.yaml."
-        yield from head(joint_names(robot.joints, self.settings))
+        yield from head(joint_names(robot, self.settings))
         ns = _ns(motion.time)
         velocity, acceleration = rates(ns / SECOND, motion.q, motion.stops)
         columns = zip(DECIMALS.items(), (motion.q, velocity, acceleration), strict=True)
@@ -108,7 +117,7 @@ class Ros(Formatter):
 
     def names(self) -> list[tuple[str, str]]:
         """Return the name of the files and those of the joints."""
-        joints = joint_names(self.program.robot.joints, self.settings)
+        joints = joint_names(self.program.robot, self.settings)
         return [(self.program.name, "the program"), *((name, "a joint") for name in joints)]
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
