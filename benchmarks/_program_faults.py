@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array
 from kerfpath.post import JointMove, LinearMove, Program, Section, Step, Switch, Wait
+from kerfpath.robots import Robot
 
 __all__ = ["Fault", "faults"]
 
@@ -37,7 +38,11 @@ def faults(program: Program, rng: np.random.Generator) -> Iterator[Fault]:
     """Yield every fault of a program of two contours or more, the places chosen by `rng`."""
     for number in range(len(program.sections)):
         section = program.sections[number]
-        for kind, steps in _section_faults(section.steps, rng):
+        found = [
+            *_section_faults(section.steps, rng),
+            *_external_faults(program.robot, section.steps, rng),
+        ]
+        for kind, steps in found:
             yield Fault(kind=kind, program=_with(program, number, replace(section, steps=steps)))
     for kind, sections in _order_faults(program.sections):
         yield Fault(kind=kind, program=replace(program, sections=tuple(sections)))
@@ -163,6 +168,31 @@ def _section_faults(steps: Sequence[Step], rng: np.random.Generator) -> Iterator
     yield "another joint move", inserted(joint[-1], away)
 
 
+def _external_faults(
+    robot: Robot, steps: Sequence[Step], rng: np.random.Generator
+) -> Iterator[tuple[str, Steps]]:
+    """Yield faults of the values of external axes, one axis at one target."""
+    path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
+    joint = [k for k, step in enumerate(steps) if isinstance(step, JointMove)]
+    middle = int(rng.choice(path[3:-3]))
+    assert robot.upper is not None
+    for i, axis in enumerate(robot.externals, robot.family.joints):
+        far, near = (0.05, 0.001) if axis.kind == "linear" else (0.2, 0.004)
+        over = float(robot.upper[i]) + far
+        for what, k, value in (
+            ("jumps in the cut", middle, None),
+            ("out of range in the cut", middle, over),
+            ("elsewhere at the start", joint[-1], None),
+            ("out of range at the start", joint[-1], over),
+            ("moves in the retract", path[-1], None),
+        ):
+            step: Any = steps[k]
+            q = np.array(step.q)
+            by = near if "retract" in what else far
+            q[i] = q[i] + by * float(rng.choice([-1, 1])) if value is None else value
+            yield f"external axis {what}", (*steps[:k], replace(step, q=q), *steps[k + 1 :])
+
+
 def _order_faults(sections: Sequence[Section]) -> Iterator[tuple[str, Sequence[Section]]]:
     first, second, *rest = sections
     yield "contours in another order", [second, first, *rest]
@@ -172,7 +202,7 @@ def _order_faults(sections: Sequence[Section]) -> Iterator[tuple[str, Sequence[S
 
 def _nudged(q: Array, rng: np.random.Generator, by_deg: float) -> Array:
     moved = np.array(q)
-    moved[int(rng.integers(len(q)))] += np.radians(by_deg) * float(rng.choice([-1, 1]))
+    moved[int(rng.integers(6))] += np.radians(by_deg) * float(rng.choice([-1, 1]))
     return moved
 
 

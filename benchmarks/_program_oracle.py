@@ -28,6 +28,9 @@ TIME = 2.5e-3
 """The same of waits and lead times, s: controllers count milliseconds."""
 RATE = 0.025
 """The same of speeds, as a share."""
+JUMP = 0.1
+"""How far (m, rad) an external axis goes aside at one node at least to do harm: less may lie within
+its limits, and the arm follows."""
 
 
 def verdict(edit: Edit, before: ReadProgram, after: ReadProgram) -> Verdict:
@@ -99,6 +102,11 @@ def _step(a: ReadStep, b: ReadStep, *, cut: bool) -> Literal["same", "either", "
         found += [_far(0, apart, point), _far(0, np.arccos(cosine), angle)]
         # About the beam the tool may turn as it likes, within the limits of the joints.
         found += [_far(0, float(turned), np.inf if cut else angle)]
+    if (a.external is None) != (b.external is None):
+        return "harmful"
+    if a.external is not None and b.external is not None:
+        aside = float(np.abs(a.external - b.external).max())
+        found.append(_far(0, aside, JUMP if cut else EXACT))
     if a.q is not None and b.q is not None and (a.q != b.q).any():
         off = float(np.abs(a.q - b.q).max())
         found.append(_far(0, off, np.radians(5) if cut else angle))

@@ -45,7 +45,7 @@ JOB = """\
 [robot]
 model = "{arm}"
 acceleration_deg_s2 = {acceleration}
-[tool]
+{external}[tool]
 head = "laser-head-45"
 [part]
 file = "points.csv"
@@ -73,6 +73,7 @@ lead_time_s = {lead}
 {more}
 [program.rapid]
 gas_output = "doGas"
+mechanical_units = ["TRACK_1", "STN_1"]
 [program.krl]
 laser_output = 5
 gas_output = 6
@@ -86,11 +87,35 @@ gas_output = 'BasicIO-1\\%Q1'
 laser_output = 5
 gas_output = 6
 pulses_per_deg = [1341.4, 1341.4, 1000.0, 1000.0, 800.0, 500.0]
+external_pulses = [400.0, 2000.0]
 [program.urscript]
 laser_output = 0
 gas_output = 1
 """
 """A hole with a micro joint and an open slit, gas, pierce and lead times."""
+EXTERNAL = """\
+floor = false
+[[robot.external]]
+name = "rail"
+kind = "linear"
+carries = "robot"
+axis = [0, 1, 0]
+lower_mm = -400
+upper_mm = 400
+velocity_mm_s = 1000
+acceleration_mm_s2 = 2000
+[[robot.external]]
+name = "table"
+kind = "rotary"
+carries = "part"
+axis = [0, 0, 1]
+point_mm = [{reach}, -100, 450]
+lower_deg = -60
+upper_deg = 60
+velocity_deg_s = 60
+acceleration_deg_s2 = 120
+"""
+"""A rail under the robot and a table under the part."""
 
 HOW = """\
 A job of two contours (a hole with a micro joint, an open slit; gas, pierce and lead times), written
@@ -194,10 +219,15 @@ class Tally:
         )
 
     def try_faults(
-        self, subject: Subject, rng: np.random.Generator, *, every: int = 1, first: int = 0
-    ) -> None:
-        """Write every fault of the program out, or `every` so manyth, and audit it."""
-        for fault in islice(faults(subject.program, rng), first % every, None, every):
+        self, subject: Subject, rng: np.random.Generator, *, every: int = 1, first: int = 0,
+        only: str = "",
+    ) -> None:  # fmt: skip
+        """Write every fault of the program out, or `every` so manyth, and audit it.
+
+        Of a kind that begins with `only`.
+        """
+        found = (f for f in faults(subject.program, rng) if f.kind.startswith(only))
+        for fault in islice(found, first % every, None, every):
             try:
                 files = subject.written(fault.program)
             except InputError:
@@ -217,7 +247,9 @@ class Tally:
             self.add(subject, edit.kind, said, judged, edit.files, (edit.file, edit.line))
 
 
-def subjects(folder: Path, only: tuple[str, ...] = (), more: str = "") -> Iterator[Subject]:
+def subjects(
+    folder: Path, only: tuple[str, ...] = (), more: str = "", *, external: bool = False
+) -> Iterator[Subject]:
     """Yield the job and its program in each language, planned once for each robot.
 
     Parameters
@@ -228,18 +260,24 @@ def subjects(folder: Path, only: tuple[str, ...] = (), more: str = "") -> Iterat
         Names of languages; default: all.
     more : str
         Lines of [program].
+    external : bool
+        Whether the robot has a rail and the part a table; in the languages that can say them.
     """
     _draw(folder / "points.csv")
     plans = {}
     for name, chosen in sorted(languages().items()):
         if only and name not in only:
             continue
+        if external and chosen.externals is None:
+            continue
         arm = ARMS.get(name, ARM)
         path = folder / f"{name}.toml"
+        reach = 1200 if arm == ARM else 900
         path.write_text(
             JOB.format(
-                arm=arm, acceleration=ACCELERATION, reach=1200 if arm == ARM else 900,
-                language=name, lead=0.01 if chosen.ahead else 0.0, more=more,
+                arm=arm, acceleration=ACCELERATION, reach=reach, language=name,
+                lead=0.01 if chosen.ahead else 0.0, more=more,
+                external=EXTERNAL.format(reach=reach) if external else "",
             )
         )  # fmt: skip
         audit = ProgramAudit.of(path)

@@ -45,6 +45,7 @@ WHAT = {
     "removed": "moves",
     "targets": "targets beside the cut",
     "joints": "joint targets",
+    "external": "external axes",
     "times": "times of moves",
     "zones": "corners and stops",
     "switches": "laser and gas",

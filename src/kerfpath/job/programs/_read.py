@@ -24,7 +24,7 @@ from kerfpath.post import (
     read_program,
     with_tips,
 )
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, base_in_part
 
 __all__ = [
     "ReadCut",
@@ -212,6 +212,8 @@ def _cut(group: ReadGroup, job: Job, interval: float | None = None) -> ReadCut:
         end = move.T_part_tip
         assert end is not None
         stops = [end]
+        if move.kind == "circular" and job.robot.externals:
+            raise InputError(f"{move.place}: arcs with external axes are not of our making")
         if T and move.kind == "circular" and move.T_part_via is not None:
             stops = _arc(T[-1], move.T_part_via, end, move, interval)
         for stop in stops:
@@ -225,7 +227,8 @@ def _cut(group: ReadGroup, job: Job, interval: float | None = None) -> ReadCut:
             laser = switch.on if switch.signal == "laser" else laser
     poses = np.array(T)
     flange = job.placement @ poses @ np.linalg.inv(job.tool)
-    q = follow_poses(job.robot, flange, _q(group.joint[-1]))
+    external = np.array([_external(move, job.robot) for move in moves])
+    q = follow_poses(job.robot, flange, _q(group.joint[-1]), external)
     last = len(poses) - 1
     switches = [s for move in group.path for s in move.switches if s.signal == "laser"]
     return ReadCut(
@@ -265,6 +268,16 @@ def _q(move: ReadMove) -> Array:
     return move.q
 
 
+def _external(move: ReadMove, robot: Robot) -> Array:
+    """Return the values (E,) m and rad of the external axes at the target of a move."""
+    values = move.external_of(robot.externals)
+    if values is None:
+        if not robot.externals:
+            return np.zeros(0)
+        raise InputError(f"{move.place}: no value of {robot.externals[0].name} is said")
+    return values
+
+
 def _arc(
     start: Array, via: Array, end: Array, move: ReadMove, interval: float | None
 ) -> list[Array]:
@@ -288,14 +301,23 @@ def _arc(
 
 
 def branch_of(robot: Robot, q: Array) -> int:
-    """Return which posture joints (n,) are in."""
+    """Return which posture joints (n,) are in; external axes have no part in it."""
+    robot, q = robot.alone(), q[: robot.family.joints]
     solved, reach = robot.inverse_all(robot.forward(q)[None])
     apart = np.abs((solved[0] - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
     return int(np.argmin(np.where(reach[0], apart, np.inf)))
 
 
-def follow_poses(robot: Robot, T: Array, q0: Array) -> Array:
-    """Return joints (K, n) at flange poses T (K, 4, 4), on the branch of q0; NaN out of reach."""
+def follow_poses(robot: Robot, T: Array, q0: Array, external: Array | None = None) -> Array:
+    """Return joints (K, n) at flange poses T (K, 4, 4), on the branch of q0; NaN out of reach.
+
+    External axes are at the values (K, E) m and rad that are given.
+    """
+    if external is not None and robot.externals:
+        # Where they have carried base and part, the arm alone sees the poses there.
+        seen = np.linalg.inv(base_in_part(robot.externals, external)) @ T
+        q = follow_poses(robot.alone(), seen, q0[: robot.family.joints])
+        return np.hstack([q, external])
     posture = branch_of(robot, q0)
     if robot.family.follow_all is None:
         q = robot.follow(T, np.tile(q0, (len(T), 1)), np.full(len(T), posture))
