@@ -189,10 +189,10 @@ class Fanuc(CalledFormatter):
             end = f"CNT{settings.cnt_percent}"
         elif move.zone > 0:
             end = f"CR{number(move.zone * 1e3, 0)}"
+        end += WRIST if settings.orientation == "wrist" else ""
         end += " COORD" if leads(self.program.robot) else ""
         timed = split_switches(move).timed
         before = "".join(f" TB {_seconds(s.lead_time)}sec,{self._set(s)}" for s in timed)
-        end += WRIST if settings.orientation == "wrist" else ""
         return f"{number(move.speed / unit(settings), 0)}{settings.speed_unit} {end}{before}"
 
     def _before(self, move: LinearMove) -> Iterator[str]:
