@@ -5,7 +5,7 @@ import pytest
 
 from kerfpath.auditor import chain_of
 from kerfpath.auditor._nearest import nearest
-from kerfpath.auditor._swept import Moves, frames_of
+from kerfpath.auditor._swept import Moves
 from kerfpath.cell import Mesh, box, cell_of
 
 
@@ -28,7 +28,7 @@ def test_the_least_of_all_distances_is_found(arm, cell, seed, lift):
     ends = np.array([0, 0.6 + lift, 0.3, 0, 0.8, 0]) + rng.uniform(-0.6, 0.6, (2, 6))
     q = np.linspace(*ends, 80)
     chain = chain_of(arm)
-    frames, moves = frames_of(chain, q), Moves(cell, chain, np.diff(q, axis=0))
+    frames, moves = chain.links(q), Moves(cell, chain, q[:-1], q[1:])
     beyond = cell.scene.distances(frames, np.inf) - cell.required
     for wanted in (cell.own, ~cell.own):
         among = np.where(wanted, beyond, np.inf)
@@ -42,7 +42,7 @@ def test_the_least_of_all_distances_is_found(arm, cell, seed, lift):
 def test_a_pose_that_is_no_number_is_the_worst(arm, cell):
     q = np.zeros((3, 6))
     chain = chain_of(arm)
-    frames, moves = frames_of(chain, q), Moves(cell, chain, np.diff(q, axis=0))
+    frames, moves = chain.links(q), Moves(cell, chain, q[:-1], q[1:])
     frames[1] = np.nan
     row, _, found = nearest(cell, moves.rates, q, frames, ~cell.own)
     assert row == 1

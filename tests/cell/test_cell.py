@@ -287,7 +287,7 @@ def test_every_pair_is_judged_or_left_out_for_a_reason():
     q = np.random.default_rng(9).uniform(-np.pi, np.pi, (300, 6))
     arm = [i for i, body in enumerate(cell.bodies) if body.kind in ("robot", "head")]
     pairs = [(a, b) for a, b in combinations(arm, 2) if cell.bodies[a].frame < cell.bodies[b].frame]
-    near = Scene(cell.bodies, np.array(pairs)).distances(cell.frames(q), np.inf) <= 0
+    near = Scene(cell.bodies, np.array(pairs), 0).distances(cell.frames(q), np.inf) <= 0
     depth = dict(zip(cell.pair_names, cell.depth, strict=True))
     for (a, b), touch in zip(pairs, near.T, strict=True):
         pair = cell.names[a], cell.names[b]

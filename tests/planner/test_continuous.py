@@ -321,7 +321,7 @@ def test_a_refinement_stays_within_what_it_is_given(task):
     made = plan(*task[0], method="exact", **task[1])
     free = refine(made)
     low, high = made.gamma - 0.02, made.gamma + 0.02
-    held = refine(made, within=(low, high), first=0.005)
+    held = refine(made, within=(low[:, None], high[:, None]), first=0.005)
     assert held.done
     away = np.angle(np.exp(1j * (held.plan.gamma - made.gamma)))
     assert np.abs(away).max() <= 0.02 + 1e-9

@@ -21,6 +21,7 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
+from kerfpath.robots import require_axes
 
 __all__ = ["audit", "checks"]
 
@@ -106,9 +107,8 @@ def checks(
         raise InputError(f"parts: expected a whole number >= 1, got {parts!r}")
     path_tolerance = scalar(path_tolerance, "path_tolerance", unit="m", above=0.0)
     axis_tolerance = scalar(axis_tolerance, "axis_tolerance", unit="rad", above=0.0)
-    if cell is not None and plan.robot.externals:
-        name = plan.robot.externals[0].name
-        raise InputError(f"cell: it does not know how {name} moves in it")
+    if cell is not None:
+        require_axes(cell.chain, plan.robot)
     chain = chain_of(plan.robot)
     motion = motion_of(plan, chain, interpolation, parts)
     path = plan.contour if reference is None else reference

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
 from kerfpath.robots import ExternalAxis, Robot
 
@@ -48,6 +48,28 @@ class JointChain:
         """Return the poses (B, 4, 4) of every joint frame, turned, of joint vectors q (B, n)."""
         return self._frames(q)[:-1]
 
+    def links(self, q: Array) -> Array:
+        """Return the poses (B, E+n+1, 4, 4) of what is moved, from the part to the last link.
+
+        As it stands in the ground, the robot base with every external axis at zero: first what
+        goes with the part, each next carried by one axis less; the ground itself; what the axes
+        that carry the robot carry, to its base; the links. Without external axes base and links.
+        """
+        steps = self._steps_to_base(q)
+        frames = np.stack([*steps, *self.joints(q)], axis=1)
+        still = sum(axis.carries == "part" for axis in self.externals)
+        if not still:
+            return np.ascontiguousarray(frames)
+        seen = np.ascontiguousarray(np.linalg.inv(steps[still])[:, None] @ frames)
+        seen[:, still] = np.eye(4)
+        return seen
+
+    @property
+    def order(self) -> Ints:
+        """The columns (E+n,) of q in the order in which they move `links`."""
+        n = len(self.axes)
+        return np.array([*(n + i for i in self._order()), *range(n)], dtype=np.int64)
+
     def jacobian(self, q: Array) -> tuple[Array, Array]:
         """Return tip poses (B, 4, 4) and geometric Jacobians (B, 6, n): linear over angular.
 
@@ -81,8 +103,13 @@ class JointChain:
                 columns[:, 3:, i] = direction
         return columns
 
+    @property
+    def passed(self) -> list[ExternalAxis]:
+        """The external axes on the way from the part to the robot's base."""
+        return [self.externals[i] for i in self._order()]
+
     def _order(self) -> list[int]:
-        """Return the external axes on the way from the part to the robot's base."""
+        """Return the numbers of the external axes from the part to the robot's base."""
         numbers = range(len(self.externals))
         part = [i for i in numbers if self.externals[i].carries == "part"]
         return part[::-1] + [i for i in numbers if self.externals[i].carries == "robot"]

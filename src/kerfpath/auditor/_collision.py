@@ -12,7 +12,7 @@ from kerfpath._arrays import Array, Ints
 from kerfpath.auditor._chain import JointChain
 from kerfpath.auditor._motion import Motion
 from kerfpath.auditor._nearest import nearest
-from kerfpath.auditor._swept import Moves, frames_of
+from kerfpath.auditor._swept import Moves
 from kerfpath.auditor._table import Check
 from kerfpath.cell import Cell
 
@@ -39,11 +39,11 @@ def collision_along(cell: Cell, q0: Array, q1: Array, node: Ints, chain: JointCh
 
     They are divided until nothing nearer can hide; where that cannot be said, it is counted.
     """
-    moves = Moves(cell, chain, q1 - q0)
+    moves = Moves(cell, chain, q0, q1)
     between, nodes, open_ = moves.in_between(q0, q1, node)
     q, first = np.unique(np.vstack([q0, q1, between]), axis=0, return_index=True)
     node = np.concatenate([node, node, nodes])[first]
-    frames = frames_of(chain, q)
+    frames = chain.links(q)
     left = Check(
         code="collision-open",
         title="steps between samples in which bodies may come nearer than is seen",

@@ -58,8 +58,11 @@ def _above_floor(plan: Plan, chain: JointChain) -> list[Check]:
     floor = plan.settings.floor
     if floor is None:
         return []
-    heights = [T[:, 2, 3] for T in (*chain.joints(plan.q)[ELBOW:], chain.forward(plan.q))]
-    deep = floor - np.min(heights, axis=0)
+    links = chain.links(plan.q)
+    heights = np.concatenate(
+        [links[:, len(chain.externals) + 1 + ELBOW :], links[:, -1:] @ chain.tip], axis=1
+    )[:, :, 2, 3]
+    deep = floor - heights.min(axis=1)
     node = int(np.argmax(deep))
     return [
         Check(

@@ -14,7 +14,7 @@ from kerfpath._arrays import Array, Ints
 from kerfpath.auditor._chain import JointChain
 from kerfpath.cell import Cell
 
-__all__ = ["Moves", "frames_of"]
+__all__ = ["Moves"]
 
 HIDDEN = 1e-4
 """m that bodies may come nearer to each other than at the samples."""
@@ -26,23 +26,22 @@ CURVED = 2.0
 """Joints on a straight move do not run quite evenly: what that bends is taken as much again."""
 
 
-def frames_of(chain: JointChain, q: Array) -> Array:
-    """Return the poses (B, n+1, 4, 4) of base and links at joints q (B, n) rad."""
-    frames = np.stack([np.broadcast_to(np.eye(4), (len(q), 4, 4)), *chain.joints(q)], axis=1)
-    return np.ascontiguousarray(frames)
-
-
 class Moves:
-    """The judged pairs of a cell, and how far their bodies come in steps dq (B, n) rad.
+    """The judged pairs of a cell, and how far their bodies come in steps q0 to q1 (B, n).
 
     Attributes
     ----------
     rates : (P, n) m/rad
-        How far a corner of each pair comes at most as a joint turns, seen from the other body.
+        How far a corner of each pair comes at most as a joint turns, or for each m of a linear
+        axis, seen from the other body; wherever all joints are between values that the steps have.
     """
 
-    def __init__(self, cell: Cell, chain: JointChain, dq: Array) -> None:
-        self._cell, self._chain, self._joints = cell, chain, np.arange(len(chain.axes))
+    def __init__(self, cell: Cell, chain: JointChain, q0: Array, q1: Array) -> None:
+        self._cell, self._chain, self._order = cell, chain, chain.order
+        self._joints = np.arange(len(self._order))
+        self._slides = np.zeros(len(self._order), np.bool_)
+        self._slides[: len(chain.passed)] = [axis.kind == "linear" for axis in chain.passed]
+        most = np.abs(np.vstack([q0, q1])).max(axis=0, initial=0.0)[self._order]
         bodies = cell.bodies
         pairs = [sorted((int(a), int(b)), key=lambda k: bodies[k].frame) for a, b in cell.pairs]
         self._pairs = [
@@ -52,11 +51,12 @@ class Moves:
             [(self._joints >= a) & (self._joints < b) for a, b, _ in self._pairs]
         ).reshape(len(pairs), -1)
         self._reach = np.array(
-            [_reach(chain, b, corners) for _, b, corners in self._pairs]
+            [_reach(chain, b, corners, most) for _, b, corners in self._pairs]
         ).reshape(len(pairs), -1)
-        self.rates = self._turns * self._reach
+        self.rates = np.empty(self._reach.shape)
+        self.rates[:, self._order] = self._turns * self._reach
         # Farther apart than any step could bring them, pairs are clear whatever they are.
-        self._enough = cell.required + self._way(dq).max(axis=0, initial=0.0)
+        self._enough = cell.required + self._way(q1 - q0).max(axis=0, initial=0.0)
 
     def in_between(self, q0: Array, q1: Array, node: Ints) -> tuple[Array, Ints, Ints]:
         """Return the joints (S, n) to be looked at between samples q0 and q1, and their nodes (B,).
@@ -67,7 +67,7 @@ class Moves:
         nodes: list[Ints] = []
         # Where a step ends, the next begins: each sample is looked at once.
         samples, place = np.unique(np.vstack([q0, q1]), axis=0, return_inverse=True)
-        frames = frames_of(self._chain, samples)
+        frames = self._chain.links(samples)
         apart, (at0, at1) = self._apart(frames), place.reshape(2, -1)
         F0, F1, d0, d1 = frames[at0], frames[at1], apart[at0], apart[at1]
         most = MOST * len(q0) + 1000
@@ -78,7 +78,7 @@ class Moves:
                 F0, F1, d0, d1 = F0[left], F1[left], d0[left], d1[left]
                 break
             half = (q0 + q1) / 2
-            F = frames_of(self._chain, half)
+            F = self._chain.links(half)
             d = self._apart(F)
             middle.append(half)
             nodes.append(node)
@@ -112,9 +112,10 @@ class Moves:
             moved = _relative(F1[at], a, b)[:, :3] - _relative(F0[at], a, b)[:, :3]
             shift = moved[:, :, :3] @ corners.T + moved[:, :, 3:]
             delta = np.sqrt((shift**2).sum(axis=1).max(axis=1))
-            outer = np.maximum.outer(self._joints, self._joints)
-            t = np.abs(dq[at]) * self._turns[p]
-            bend = np.einsum("bi,bj,ij->b", t, t, self._reach[p][outer])
+            # What a linear joint carries along it bends no way, what it is carried by does.
+            outer, inner = (f.outer(self._joints, self._joints) for f in (np.maximum, np.minimum))
+            t = np.abs(dq[at][:, self._order]) * self._turns[p]
+            bend = np.einsum("bi,bj,ij->b", t, t, self._reach[p][outer] * ~self._slides[inner])
             hides = delta / 2 + CURVED * bend / 8
             clear = (d0[at, p] + d1[at, p]) / 2 - hides > required[p]
             left[at] |= ~clear & (hides > HIDDEN)
@@ -126,10 +127,25 @@ def _relative(frames: Array, a: int, b: int) -> Array:
     return np.asarray(np.linalg.solve(frames[:, a], frames[:, b]))
 
 
-def _reach(chain: JointChain, frame: int, corners: Array) -> Array:
-    """Return how far (m) a corner in a frame can be from the axis of each joint before it."""
+def _reach(chain: JointChain, frame: int, corners: Array, most: Array) -> Array:
+    """Return how far (m) a corner in a frame can be from the axis of each joint before it.
+
+    1 of a linear one; the joints no farther from zero than `most` (E+n,), in their order.
+    """
+    base = len(chain.externals)
+    far, reach = float(np.linalg.norm(corners, axis=1).max()), np.zeros(base + len(chain.axes))
     origins = np.linalg.norm(chain.origins[:, :3, 3], axis=1)
-    own = float(np.linalg.norm(corners, axis=1).max())
-    return np.array(
-        [origins[j + 1 : frame].sum() + own if j < frame else 0.0 for j in range(len(origins))]
-    )
+    for place in range(frame - 1, -1, -1):
+        if place >= base:
+            reach[place] = far
+            far += float(origins[place - base])
+            continue
+        axis = chain.passed[place]
+        if axis.kind == "linear":
+            reach[place] = 1.0
+            far += float(most[place])
+        else:
+            off = float(np.linalg.norm(np.cross(axis.axis, axis.point)))
+            reach[place] = far + off
+            far += 2 * off
+    return reach

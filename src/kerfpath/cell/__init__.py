@@ -1,11 +1,11 @@
 """The cell as solids: which bodies may come how near, at a joint vector and along a motion."""
 
 from kerfpath.cell._bodies import Body as Body
+from kerfpath.cell._build import cell_of as cell_of
 from kerfpath.cell._caveats import UNPROVED as UNPROVED
 from kerfpath.cell._caveats import caveats as caveats
 from kerfpath.cell._caveats import odd_sizes as odd_sizes
 from kerfpath.cell._cell import Cell as Cell
-from kerfpath.cell._cell import cell_of as cell_of
 from kerfpath.cell._checker import CollisionChecker as CollisionChecker
 from kerfpath.cell._head import CuttingHead as CuttingHead
 from kerfpath.cell._head import MeshHead as MeshHead

@@ -1,4 +1,4 @@
-"""A body of a cell: a solid fixed in one frame of the robot."""
+"""A body of a cell: a solid fixed in one frame of its chain."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Kind = Literal["robot", "head", "part", "fixture", "floor"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Body:
-    """A solid fixed in one of the robot's frames.
+    """A solid fixed in one of the frames that the robot and its external axes move.
 
     Parameters
     ----------
@@ -27,7 +27,8 @@ class Body:
     shape : Shape
         In coordinates of the frame, m.
     frame : int
-        0 the robot base, where all that stands still is; i the link that joint i moves.
+        0 the robot base, where all that stands still is; i the link that joint i moves. With
+        external axes the frames that they carry come before, see `kerfpath.robots.CarriedChain`.
     kind : {"robot", "head", "part", "fixture", "floor"}
     approximate : bool
         The shape stands in for one that is not known, or is the hull around it.

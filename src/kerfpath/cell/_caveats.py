@@ -10,7 +10,7 @@ __all__ = ["UNPROVED", "caveats", "odd_sizes"]
 UNPROVED = "links drawn as capsules need not hold the real ones"
 """What follows "clear" wherever links are not known."""
 
-LARGE, SMALL = {"robot": 1.0, "head": 1.0, "part": 5.0, "fixture": 20.0, "floor": 20.0}, 0.005
+LARGE, SMALL = {"robot": 1.0, "head": 1.0, "part": 5.0, "fixture": 20.0}, 0.005
 """Of the arm's length: what is longer, or shorter, is likely to have been read in a wrong unit."""
 
 
@@ -60,7 +60,7 @@ def odd_sizes(cell: Cell) -> tuple[str, ...]:
     """Return a sentence for each body whose size is hardly one beside the arm's length."""
     arm = cell.chain.length
     said = []
-    for body in cell.bodies:
+    for body in (body for body in cell.bodies if body.kind != "floor"):
         size = float(body.size.max())
         most = LARGE[body.kind] * arm
         if not SMALL * arm <= size <= most:

@@ -9,11 +9,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, freeze, not_negative
+from kerfpath._arrays import Array, Bools, Ints, bools, floats, freeze, not_negative
 from kerfpath.cell._bodies import Body
-from kerfpath.cell._head import CuttingHead, MeshHead
-from kerfpath.cell._links import link_bodies
-from kerfpath.cell._mesh import Mesh
 from kerfpath.cell._motion import MotionBounds
 from kerfpath.cell._pairs import (
     BY_DESIGN,
@@ -25,16 +22,13 @@ from kerfpath.cell._pairs import (
     stand_still,
 )
 from kerfpath.cell._scene import Scene
-from kerfpath.cell._shapes import Shape, box_between
 from kerfpath.errors import InputError
-from kerfpath.robots import Robot, chain_of
 from kerfpath.urdf import KinematicChain
 
-__all__ = ["Cell", "cell_of"]
+__all__ = ["Cell", "Pair"]
 
 Pair = tuple[str, str]
-FLOOR_REACH, THICK = 2.0, 0.5
-"""Of the lengths of the arm, how far a floor reaches to each side; m: how thick it is."""
+"""Names of two bodies."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -110,7 +104,7 @@ class Cell:
         _set = object.__setattr__
         bodies = tuple(sorted(self.bodies, key=lambda body: body.frame))
         _set(self, "bodies", bodies)
-        n = len(self.chain.axes)
+        n = self.chain.joints
         _set(self, "endless", bools(self.endless, "endless", (n,)))
         names = self.names
         twice = {name for name in names if names.count(name) > 1}
@@ -129,7 +123,7 @@ class Cell:
         _set(self, "depth", freeze(depth))
         given = np.array([pair in own for pair in judged], dtype=np.bool_)
         _set(self, "own", freeze(given | (required < asked) | (depth > 0)))
-        _set(self, "_scene", _scene(bodies, judged))
+        _set(self, "_scene", _scene(bodies, judged, self.chain.still))
         _set(self, "_sweep", MotionBounds(self.chain, bodies, self.pairs))
         self._require_room_for_the_base()
 
@@ -188,7 +182,7 @@ class Cell:
         pair : (B,) int
             Which pair that is, a row of `pairs`.
         """
-        q = floats(q, "q", (None, len(self.chain.axes)))
+        q = floats(q, "q", (None, self.chain.joints))
         if not len(self.pairs):
             return np.full(len(q), np.inf), np.full(len(q), -1)
         over = self.distances(q) - self.required
@@ -206,7 +200,7 @@ class Cell:
         Endless joints go the short way round. Clear is what keeps more than the near-miss
         distances all the way; what keeps them by less than 0.1 mm may be refused.
         """
-        n = len(self.chain.axes)
+        n = self.chain.joints
         first, last = floats(q0, "q0", (None, n)), floats(q1, "q1", (None, n))
         if len(first) != len(last):
             raise InputError(f"q0, q1: expected as many of each, got {len(first)}, {len(last)}")
@@ -219,7 +213,7 @@ class Cell:
 
         As in `clear_motion`, but endless joints turn as q says.
         """
-        corners = floats(q, "q", (None, len(self.chain.axes)))
+        corners = floats(q, "q", (None, self.chain.joints))
         motions = self._sweep.clear(corners[:-1], corners[1:], self.required, self._scene.distances)
         return bool(motions.all())
 
@@ -229,8 +223,11 @@ class Cell:
         return np.where(self.endless, dq - 2 * np.pi * np.round(dq / (2 * np.pi)), dq)
 
     def frames(self, q: ArrayLike) -> Array:
-        """Return the poses (B, n+1, 4, 4) in the base of the frames at q (B, n) rad."""
-        return self.chain.frames(floats(q, "q", (None, len(self.chain.axes))))
+        """Return the poses (B, n+1, 4, 4) of the frames at q (B, n) rad.
+
+        In the robot base; with external axes, in the base as it stands with each at zero.
+        """
+        return self.chain.frames(floats(q, "q", (None, self.chain.joints)))
 
     @property
     def sweep(self) -> MotionBounds:
@@ -287,7 +284,8 @@ class Cell:
     def _require_room_for_the_base(self) -> None:
         """Raise InputError where a part or fixture overlaps what stands still of the robot."""
         free = {self._pair(pair, "may_touch") for pair in self.may_touch}
-        still = [body for body in self.bodies if body.frame == 0 and body.kind != "floor"]
+        base = self.chain.base
+        still = [body for body in self.bodies if body.frame == base and body.kind != "floor"]
         pairs = [
             (a, b)
             for a, b in combinations(range(len(still)), 2)
@@ -295,7 +293,8 @@ class Cell:
         ]
         if not pairs:
             return
-        gap = Scene(still, np.array(pairs)).distances(np.eye(4)[None, None], 1.0)[0]
+        stand = np.tile(np.eye(4), (1, base + 1, 1, 1))
+        gap = Scene(still, np.array(pairs), base).distances(stand, 1.0)[0]
         if gap.min() <= 0:
             a, b = pairs[int(np.argmin(gap))]
             one, two = sorted((still[a], still[b]), key=lambda body: body.kind != "robot")
@@ -307,81 +306,11 @@ class Cell:
             )
 
 
-def cell_of(
-    robot: Robot,
-    *,
-    tool: ArrayLike,
-    head: CuttingHead | MeshHead | Sequence[Body] | None = None,
-    part: Mesh | None = None,
-    placement: ArrayLike | None = None,
-    fixtures: Mapping[str, Shape] | None = None,
-    links: Sequence[Body] | None = None,
-    near_miss: float = 0.0,
-    near_miss_of: Mapping[Pair, float] | None = None,
-    may_touch: Sequence[Pair] | Mapping[Pair, str] = (),
-    floor: float | None = None,
-) -> Cell:
-    """Return the cell of a robot with a cutting head, a part and what else stands around.
-
-    The nozzle works at stand-off, so it is judged against the part by that: it must keep the
-    head's `share` of the stand-off to it. All else must keep the near-miss distance.
-
-    Parameters
-    ----------
-    robot : Robot
-    tool : (4, 4)
-        T_flange_tip, m.
-    head : CuttingHead, MeshHead or sequence of Body, optional
-        Default: the generic head.
-    part : Mesh, optional
-        In the part frame.
-    placement : (4, 4), optional
-        T_base_part, m; needed with a part.
-    fixtures : mapping of name to Shape, optional
-        In the robot base.
-    links : sequence of Body, optional
-        Default: `link_bodies(robot)`, the robot's description or else capsules.
-    near_miss, near_miss_of, may_touch
-        As in `Cell`.
-    floor : float m, optional
-        Height in the robot base of a floor, a body of this name; default: there is none.
-    """
-    chain = chain_of(robot)
-    head = CuttingHead() if head is None else head
-    own = dict(near_miss_of or {})
-    tool_bodies = tuple(head if isinstance(head, Sequence) else head.bodies(chain, tool))
-    parts: tuple[Body, ...] = ()
-    if part is not None:
-        if placement is None:
-            raise InputError("cell: a part needs its placement, T_base_part (4, 4)")
-        placed = part.moved(as_pose(placement, "placement"))
-        parts = (Body(name="part", shape=placed, frame=0, kind="part"),)
-        said = {frozenset(pair) for pair in (*own, *may_touch)}
-        if not isinstance(head, Sequence) and {"nozzle", "part"} not in said:
-            own["nozzle", "part"] = head.keeps
-    things = tuple(
-        Body(name=name, shape=shape, frame=0, kind="fixture")
-        for name, shape in (fixtures or {}).items()
-    )
-    ground: tuple[Body, ...] = ()
-    if floor is not None:
-        reach = FLOOR_REACH * chain.length
-        slab = box_between([-reach, -reach, floor - THICK], [reach, reach, floor])
-        ground = (Body(name="floor", shape=slab, frame=0, kind="floor"),)
-    links = link_bodies(robot) if links is None else links
-    return Cell(
-        chain=chain,
-        bodies=(*links, *tool_bodies, *parts, *things, *ground),
-        near_miss=near_miss,
-        near_miss_of=own,
-        may_touch=may_touch,
-        endless=robot.endless,
-        T_flange_tip=as_pose(tool, "tool"),
-        T_base_part=None if placement is None else as_pose(placement, "placement"),
-    )
-
-
-def _scene(bodies: Sequence[Body], judged: Mapping[Places, tuple[float, DesignClearance]]) -> Scene:
+def _scene(
+    bodies: Sequence[Body],
+    judged: Mapping[Places, tuple[float, DesignClearance]],
+    still: int,
+) -> Scene:
     """Return the bodies ready for distance queries, shaved where pairs overlap by design."""
     solids, ends = [*bodies], []
     for pair, (_, design) in judged.items():
@@ -391,7 +320,7 @@ def _scene(bodies: Sequence[Body], judged: Mapping[Places, tuple[float, DesignCl
             two[two.index(place)] = len(solids)
             solids.append(replace(bodies[place], shape=shape))
         ends.append(two)
-    return Scene(solids, np.array(ends, np.int64).reshape(-1, 2))
+    return Scene(solids, np.array(ends, np.int64).reshape(-1, 2), still)
 
 
 def _distance(value: float, names: Sequence[str], pair: tuple[int, int]) -> float:

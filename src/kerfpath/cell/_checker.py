@@ -15,6 +15,7 @@ from kerfpath._arrays import Array, Bools, Ints, floats, not_negative
 from kerfpath.cell._cell import Cell
 from kerfpath.cell._motion import TOLERANCE
 from kerfpath.cell._scene import ACCURACY
+from kerfpath.errors import InputError
 
 __all__ = ["CollisionChecker"]
 
@@ -53,7 +54,9 @@ class CollisionChecker:
         self, cell: Cell, q: Array, *, comfort: float = 0.0, comfort_cost: float = 0.0
     ) -> None:
         self._cell = cell
-        self._q = floats(q, "q", (None, len(cell.chain.axes)), copy=False)
+        self._q = floats(q, "q", (None, cell.chain.joints), copy=False)
+        if not cell.chain.bounded(self._q).all():
+            raise InputError("cell: it was built with less travel of external axes than asked")
         self._comfort = not_negative(comfort, "comfort", unit="m")
         self._comfort_cost = not_negative(comfort_cost, "comfort_cost")
         self._needed = cell.required + np.where(cell.own, 0.0, comfort if comfort_cost else 0.0)

@@ -138,7 +138,7 @@ class MeshHead(_Head):
 def _mounted(shapes: Mapping[str, Shape | None], chain: KinematicChain) -> tuple[Body, ...]:
     """Return the bodies of shapes in the flange frame, those that are there."""
     return tuple(
-        Body(name=name, shape=shape.moved(chain.end), frame=len(chain.axes), kind="head")
+        Body(name=name, shape=shape.moved(chain.end), frame=chain.joints, kind="head")
         for name, shape in shapes.items()
         if shape is not None
     )

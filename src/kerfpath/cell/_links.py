@@ -47,6 +47,7 @@ def link_bodies(robot: Robot, *, hulls: bool = True) -> tuple[Body, ...]:
     """
     found: list[Body] = []
     count: Counter[str] = Counter()
+    base = len(robot.externals)
     for described in robot.bodies:
         count[described.link] += 1
         number = count[described.link]
@@ -54,7 +55,7 @@ def link_bodies(robot: Robot, *, hulls: bool = True) -> tuple[Body, ...]:
             Body(
                 name=described.link if number == 1 else f"{described.link} {number}",
                 shape=_shape(described, hulls),
-                frame=described.joint,
+                frame=base + described.joint,
                 kind="robot",
                 approximate=described.kind == "mesh" and hulls,
             )
@@ -69,8 +70,9 @@ def link_capsules(robot: Robot) -> tuple[Body, ...]:
     Radii are typical ones over the arm's lengths; for judging a cell in earnest, take the meshes
     of the robot's description.
     """
-    chain, zero = chain_of(robot), np.zeros((1, robot.joints))
-    places = np.tile(np.eye(4), (robot.joints + 1, 1, 1))
+    arm, base = robot.alone(), len(robot.externals)
+    chain, zero = chain_of(arm), np.zeros((1, arm.joints))
+    places = np.tile(np.eye(4), (arm.joints + 1, 1, 1))
     if robot.kinematics in _LINES:
         lines = _LINES[robot.kinematics](robot.geometry)
         # Model and description name the same links by frames that are turned, and set, otherwise.
@@ -87,7 +89,7 @@ def link_capsules(robot: Robot) -> tuple[Body, ...]:
         Body(
             name=name,
             shape=Capsule(start=np.array(a), end=np.array(b), radius=radius).moved(places[frame]),
-            frame=frame,
+            frame=base + frame,
             kind="robot",
             approximate=True,
             holds=False,

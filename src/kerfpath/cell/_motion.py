@@ -10,7 +10,8 @@ way at least
 Where that does not clear a pair, its distance half way is found, and each half is judged alike:
 delta halves and M goes down to a quarter. The second derivatives of a chain of revolute joints are
 z_i x (z_j x (x - o_j)) for i <= j, hence M = sum over i, j of |dq_i| |dq_j| r_max(i,j), r_j
-bounding the distance of the point from axis j.
+bounding the distance of the point from axis j. A linear joint j has z_i x d_j with those before it,
+and nothing with those after it, nor with itself.
 """
 
 from __future__ import annotations
@@ -47,7 +48,9 @@ class MotionBounds:
 
     def __init__(self, chain: KinematicChain, bodies: Sequence[Body], pairs: Ints) -> None:
         self._chain = chain
-        joints = np.arange(len(chain.axes))
+        joints = np.arange(chain.joints)
+        self._slides = chain.slides
+        self._order = chain.order
         ways = [(bodies[a].frame, int(b)) for a, b in pairs]
         self._ways = sorted(set(ways))
         self._way = np.array([self._ways.index(way) for way in ways], dtype=np.int64)
@@ -59,8 +62,10 @@ class MotionBounds:
 
     @property
     def arms(self) -> Array:
-        """The longest reach (n,) m of any body from each joint's axis."""
-        return np.asarray(self._reach.max(axis=0, initial=0.0))
+        """The longest reach (n,) m of any body from each joint's axis; 1 of a linear one."""
+        longest = np.empty(len(self._order))
+        longest[self._order] = self._reach.max(axis=0, initial=0.0)
+        return longest
 
     def shift(self, frames0: Array, frames1: Array) -> Array:
         """Return how far (B, P) m any corner comes from poses (B, n+1, 4, 4) to others.
@@ -78,9 +83,13 @@ class MotionBounds:
 
     def bend(self, dq: Array) -> Array:
         """Return bounds M (B, P) m on the second derivatives of corners along dq (B, n) rad."""
-        total = np.cumsum(np.abs(dq)[:, None] * self._between, axis=2)
+        step = np.abs(dq)[:, None, self._order] * self._between
+        total = np.cumsum(np.where(self._slides, 0.0, step), axis=2)
         before = np.concatenate([np.zeros_like(total[..., :1]), total[..., :-1]], axis=2)
-        return np.asarray(((total**2 - before**2) * self._reach).sum(axis=2)[:, self._way])
+        bend = ((total**2 - before**2) * self._reach).sum(axis=2)
+        if self._slides.any():
+            bend += 2 * (before * np.where(self._slides, step, 0.0)).sum(axis=2)
+        return np.asarray(bend[:, self._way])
 
     def least(
         self, d0: Array, d1: Array, frames0: Array, frames1: Array, dq: Array
@@ -101,7 +110,7 @@ class MotionBounds:
 
         Of pairs that are not `wanted` (B, P) it is known already.
         """
-        clear = np.ones(len(q0), bool)
+        clear = self._chain.bounded(q0) & self._chain.bounded(q1)
         if not len(self._way):
             return clear
         motion = np.arange(len(q0))
@@ -137,7 +146,7 @@ class MotionBounds:
 
 def relative(frames: Array, a: int, b: int) -> Array:
     """Return the poses (B, 4, 4) of frame b in frame a."""
-    if a == 0:
+    if (frames[:, a] == np.eye(4)).all():
         return frames[:, b]
     R, at = frames[:, a, :3, :3], frames[:, a, :3, 3:]
     T = np.zeros((len(frames), 4, 4))

@@ -122,23 +122,23 @@ def designs(
         (a, b)
         for a, b in asked
         if {bodies[a].kind, bodies[b].kind} <= ARM
-        and 0 < bodies[b].frame - bodies[a].frame <= JOINTS
+        and bodies[b].frame - max(bodies[a].frame, chain.base) <= JOINTS
     ]
     if not pairs:
         return {}
-    frames = chain.frames(_poses(len(chain.axes)))
+    frames = chain.frames(_poses(chain))
     enough = np.array([_enough(asked[pair]) for pair in pairs])
     apart = np.full((POSES, len(pairs)), np.nan)
-    apart[:FIRST] = _apart(bodies, pairs, frames[:FIRST], enough)
+    apart[:FIRST] = _apart(chain, bodies, pairs, frames[:FIRST], enough)
     often = (apart[:FIRST] <= TOUCH).mean(axis=0) >= OFTEN / 2
     more = np.flatnonzero(often | (apart[:FIRST].max(axis=0) < enough))
     if more.size:
         some = [pairs[i] for i in more]
-        apart[FIRST:, more] = _apart(bodies, some, frames[FIRST:], enough[more])
+        apart[FIRST:, more] = _apart(chain, bodies, some, frames[FIRST:], enough[more])
     found = {}
     for i, pair in enumerate(pairs):
         if often[i] and (apart[:, i] <= TOUCH).mean() >= OFTEN:
-            found[pair] = _touching(bodies, pair, frames, enough[i], apart[:, i])
+            found[pair] = _touching(chain, bodies, pair, frames, enough[i], apart[:, i])
         else:
             found[pair] = _design(float(np.nanmax(apart[:, i])), enough[i])
     return found
@@ -153,12 +153,12 @@ def say_kept_all_round(
 ) -> str:
     """Return what a pair is proved to keep at every angle of the one joint between; "" if not."""
     a, b = (bodies[i].frame for i in pair)
-    if b - a != 1 or not {bodies[i].kind for i in pair} <= ARM:
+    if b - a != 1 or chain.slides[a] or not {bodies[i].kind for i in pair} <= ARM:
         return ""
     two, needed = shaved_pair(bodies, pair, design), np.array([design.keeps(asked)])
-    scene = Scene(two, np.array([[0, 1]]))
-    q = np.zeros((ARCS + 1, len(chain.axes)))
-    q[:, a] = np.linspace(-np.pi, np.pi, ARCS + 1)
+    scene = Scene(two, np.array([[0, 1]]), chain.still)
+    q = chain.spread(np.full((ARCS + 1, chain.joints), 0.5))
+    q[:, chain.order[a]] = np.linspace(-np.pi, np.pi, ARCS + 1)
     # Not worth a proof where it is not so, or hardly.
     if not (scene.distances(chain.frames(q), needed + FAIR) > needed + TOLERANCE).all():
         return ""
@@ -171,7 +171,7 @@ def say_kept_all_round(
         else f", but for {design.depth * 1e3:g} mm that they overlap by design"
     )
     less = "" if needed[0] >= asked or design.depth else f" of {asked * 1e3:g} mm"
-    return f"they keep {needed[0] * 1e3:.3g} mm{less} at every angle of joint {b}{said}"
+    return f"they keep {needed[0] * 1e3:.3g} mm{less} at every angle of {chain.say(a)}{said}"
 
 
 def shaved_pair(bodies: Sequence[Body], pair: Places, design: DesignClearance) -> tuple[Body, Body]:
@@ -184,12 +184,11 @@ def shaved_pair(bodies: Sequence[Body], pair: Places, design: DesignClearance) -
     return a, b
 
 
-def _poses(joints: int) -> Array:
-    """Return joint vectors (POSES, joints) rad, spread evenly over whole turns; zero is one."""
+def _poses(chain: KinematicChain) -> Array:
+    """Return joint vectors (POSES, n) rad, spread evenly over whole turns; zero is one."""
     from scipy.stats import qmc  # a quarter of a second to load, and not every job has a cell
 
-    spread = qmc.Sobol(joints, scramble=False).random(POSES)
-    return np.asarray(2 * np.pi * spread - np.pi, dtype=np.float64)
+    return chain.spread(qmc.Sobol(chain.joints, scramble=False).random(POSES))
 
 
 def _enough(asked: float) -> float:
@@ -197,9 +196,15 @@ def _enough(asked: float) -> float:
     return max(asked / (1 - SPARED), asked + TOUCH) + ACCURACY
 
 
-def _apart(bodies: Sequence[Body], pairs: Sequence[Places], frames: Array, enough: Array) -> Array:
+def _apart(
+    chain: KinematicChain,
+    bodies: Sequence[Body],
+    pairs: Sequence[Places],
+    frames: Array,
+    enough: Array,
+) -> Array:
     held = sorted({i for pair in pairs for i in pair})
-    scene = Scene([bodies[i] for i in held], np.searchsorted(held, pairs))
+    scene = Scene([bodies[i] for i in held], np.searchsorted(held, pairs), chain.still)
     return scene.distances(frames, enough)
 
 
@@ -208,7 +213,12 @@ def _design(most: float, enough: float) -> DesignClearance:
 
 
 def _touching(
-    bodies: Sequence[Body], pair: Places, frames: Array, enough: float, apart: Array
+    chain: KinematicChain,
+    bodies: Sequence[Body],
+    pair: Places,
+    frames: Array,
+    enough: float,
+    apart: Array,
 ) -> DesignClearance:
     """Return the design of two bodies that touch often: `apart` (POSES,) m is their distance."""
     touching = apart <= TOUCH
@@ -223,7 +233,7 @@ def _touching(
             return None
         found = DesignClearance(depth=depth, solid=solid)
         two = shaved_pair(bodies, pair, found)
-        left = _apart(two, [(0, 1)], frames[touching], np.array([enough]))[:, 0]
+        left = _apart(chain, two, [(0, 1)], frames[touching], np.array([enough]))[:, 0]
         return found if (left > TOUCH).mean() >= (FREE if always else GONE) else None
 
     less = 0.0

@@ -56,12 +56,14 @@ class Scene:
     bodies : sequence of Body
     pairs : (P, 2) int
         Which of them are judged against each other; frames do not decrease along a pair.
+    still : int
+        The frame that stands still: its pose is the identity always.
     """
 
     round: Bools
     """(P,): pairs of two capsules, whose distances follow from a formula."""
 
-    def __init__(self, bodies: Sequence[Body], pairs: Ints) -> None:
+    def __init__(self, bodies: Sequence[Body], pairs: Ints, still: int) -> None:
         self._names = [body.name for body in bodies]
         self._solids = [_solid(body) for body in bodies]
         self._pairs = [(int(a), int(b)) for a, b in pairs]
@@ -74,7 +76,7 @@ class Scene:
         self._low = np.array([s.low for s in self._solids])
         self._high = np.array([s.high for s in self._solids])
         ball = np.array([s.ball for s in self._solids])
-        self._still = (self._frame[self._ends[0]] == 0)[:, None]
+        self._still = (self._frame[self._ends[0]] == still)[:, None]
         self._held = ball[self._ends[1]] + np.where(self._still[:, 0], 0.0, ball[self._ends[0]])
         with_mesh = [any(self._solids[i].mesh for i in pair) for pair in self._pairs]
         self._order = np.argsort(with_mesh, kind="stable")

@@ -66,7 +66,7 @@ def _show_cell(cell: Cell) -> None:
         [
             escape(body.name),
             body.kind,
-            "base" if body.frame == 0 else f"joint {body.frame}",
+            escape(cell.chain.moves_with(body.frame)),
             " x ".join(f"{edge * 1e3:.0f}" for edge in body.size),
             _shape(body) + ("" if body.holds else ", not the real one"),
             f"{len(_partners(cell, i))}",
@@ -122,7 +122,8 @@ def _cell_entry(cell: Cell) -> dict[str, object]:
             {
                 "name": b.name,
                 "kind": b.kind,
-                "joint": b.frame,
+                "joint": max(b.frame - cell.chain.base, 0),
+                "moves_with": cell.chain.moves_with(b.frame),
                 "approximate": b.approximate,
                 "holds_the_real_one": b.holds,
                 "size_m": b.size.tolist(),

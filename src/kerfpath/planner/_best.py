@@ -54,7 +54,7 @@ def best_motion(
     task = task_of(
         contour, robot, options, tool=tool, placement=placement, speed=speed, graph=graph
     )
-    task = along_a_course(task)
+    task = along_a_course(task, ClearSearch(task, cell).clear)
     finder, begin = ClearSearch(task, cell), phase or (lambda what: None)
     why = grid_reason(task)
     begin("search")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -16,6 +17,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss, Reason
 from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan
+from kerfpath.robots import require_axes
 from kerfpath.search import CheckedEdges, FoundPath, SearchProblem, find_clear
 
 __all__ = ["ClearSearch"]
@@ -38,30 +40,43 @@ class ClearSearch:
     """How the searches of a task run: as they are or, in a cell, for what is clear in it."""
 
     def __init__(self, task: PlanningTask, cell: Cell | None) -> None:
-        self._cell = cell
+        self._task, self._cell = task, cell
         self._but = f" ({UNPROVED})" if cell is not None and cell.unproved else ""
-        if cell is None:
-            return
-        _require_same_cell(task, cell)
-        self._graph = task.graph
-        asked = task.settings.comfort
+        if cell is not None:
+            _require_same_cell(task, cell)
+
+    @property
+    def _graph(self) -> LayeredGraph:
+        return self._task.graph  # along a course of external axes it is built when it is known
+
+    @cached_property
+    def _checker(self) -> CollisionChecker:
+        assert self._cell is not None
+        asked = self._task.settings.comfort
         band = Band() if asked is None or asked.clearance is None else asked.clearance
-        self._checker = CollisionChecker(
-            cell, task.graph.q, comfort=band.width, comfort_cost=band.cost
+        return CollisionChecker(
+            self._cell, self._graph.q, comfort=band.width, comfort_cost=band.cost
         )
-        self._known = CheckedEdges(
-            task.graph.q,
-            task.graph.start,
+
+    @cached_property
+    def _known(self) -> CheckedEdges:
+        return CheckedEdges(
+            self._graph.q,
+            self._graph.start,
             price=self._checker.price,
             passable=self._checker.passable,
             blocked=self._checker.blocked,
-            around=_gamma_neighbours(task.graph),
+            around=_gamma_neighbours(self._graph),
         )
 
     @property
     def is_free(self) -> bool:
         """Whether there is no cell, so that other samples of gamma need no test for collisions."""
         return self._cell is None
+
+    def clear(self, q: Array) -> Bools:
+        """Return which of joint vectors q (B, n) rad are clear, whatever graph they are of."""
+        return np.ones(len(q), np.bool_) if self._cell is None else self._cell.clear(q)
 
     def of(self, task: PlanningTask) -> ClearSearch:
         """Return how the searches of another task run in the same cell."""
@@ -197,10 +212,8 @@ class ClearSearch:
 
 
 def _require_same_cell(task: PlanningTask, cell: Cell) -> None:
-    """Raise InputError where the cell was built for another tool or another place of the part."""
-    if task.robot.externals:
-        name = task.robot.externals[0].name
-        raise InputError(f"cell: it does not know how {name} moves in it")
+    """Raise InputError where the cell was built for another tool, place of the part or robot."""
+    require_axes(cell.chain, task.robot)
     for name, here, there in (
         ("tool", task.T_flange_tip, cell.T_flange_tip),
         ("placement", task.T_base_part, cell.T_base_part),

@@ -41,6 +41,8 @@ GAIN = 5e-3
 """What a refinement may take off the cost that a path promises, relative."""
 NARROWED = 6
 """Times that a refinement is kept nearer to its path where it is not clear."""
+FREE = 1.0
+"""rad or m: how far external axes may go from their course in a cell at first."""
 
 
 def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]) -> Plan:
@@ -249,8 +251,8 @@ def _refine_path(
 ) -> Refinement | None:
     """Return what a path is refined to, clear; None where the limits, or clearance, are not kept.
 
-    In a cell gamma stays between samples that are clear, and nearer to the path where the motion
-    between them is not.
+    In a cell gamma stays between samples that are clear, and gamma and external axes nearer to the
+    path where the motion that they are refined to is not.
     """
     clear = finder.corridor(path.one, path.other)
     if clear is None:
@@ -262,13 +264,19 @@ def _refine_path(
     at = below + path.share * (above - below)
     low = made.gamma - (at - graph.gamma_at(sample - clear[0]))
     high = made.gamma + graph.gamma_at(sample + (path.one != path.other) + clear[1]) - at
+    begun = np.column_stack([made.gamma, made.unwrapped[:, made.robot.family.joints :]])
+    low, high = (
+        np.column_stack([gamma, begun[:, 1:] + side * FREE])
+        for gamma, side in ((low, -1.0), (high, 1.0))
+    )
     for _ in range(NARROWED):
         found = refiner.refine(made, first=FIRST_STEP, within=(low, high))
         unclear = finder.unclear(found.plan)
         if not (found.done and unclear.any()):
             break
-        low = np.where(unclear, (low + made.gamma) / 2, low)
-        high = np.where(unclear, (high + made.gamma) / 2, high)
+        moved = unclear[:, None]
+        low = np.where(moved, (low + begun) / 2, low)
+        high = np.where(moved, (high + begun) / 2, high)
     return found if found.done and not unclear.any() else None
 
 

@@ -9,7 +9,7 @@ planned anew along it, and both together are refined by the true kinematics.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.optimize import lsq_linear
 
-from kerfpath._arrays import Array, Ints
+from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
@@ -44,7 +44,10 @@ FARTHEST = 2
 TURN = np.radians(40)
 """rad that gamma turns by at most."""
 
-
+ROUNDS = 16
+"""Ways looked at for one whose samples are all clear in the cell."""
+ABOUT = 2
+"""Steps of the grid around a place that collides, of which all samples are looked at."""
 SLOW, SLOWLY = 1e-6, 1e6
 """m/s and s from node to node: so slow that no limit binds."""
 
@@ -75,12 +78,15 @@ class _Coarse:
         Values of each axis in it.
     graph : LayeredGraph
         All samples within limits and margins; its variants are the places.
+    closed : (N,) bool
+        Its vertices that are known not to be clear; more become known.
     """
 
     nodes: Ints
     places: Array
     counts: tuple[int, ...]
     graph: LayeredGraph
+    closed: Bools
 
     __repr__ = short_repr
 
@@ -116,8 +122,12 @@ def external_course(
     return next(courses(task, (GENTLE,) if free else STYLES))
 
 
-def along_a_course(task: PlanningTask, *, at_any_speed: bool = False) -> PlanningTask:
+def along_a_course(
+    task: PlanningTask, clear: Callable[[Array], Bools], *, at_any_speed: bool = False
+) -> PlanningTask:
     """Return the task along the course that promises most, where its robot has external axes.
+
+    `clear` as of `courses`.
 
     A task that has a course or a graph is returned as it is, as is one that takes a grid of them.
 
@@ -129,12 +139,19 @@ def along_a_course(task: PlanningTask, *, at_any_speed: bool = False) -> Plannin
     if not task.robot.externals or task.placed or task.settings.method != "continuous":
         return task
     if at_any_speed:
-        return task.along(next(courses(replace(task, dt=SLOWLY), (GENTLE,))))
-    return task.along(next(courses(task)))
+        return task.along(next(courses(replace(task, dt=SLOWLY), (GENTLE,), clear)))
+    return task.along(next(courses(task, clear=clear)))
 
 
-def courses(task: PlanningTask, styles: tuple[_Style, ...] = STYLES) -> Iterator[Array]:
+def courses(
+    task: PlanningTask,
+    styles: tuple[_Style, ...] = STYLES,
+    clear: Callable[[Array], Bools] = lambda q: np.ones(len(q), np.bool_),
+) -> Iterator[Array]:
     """Yield courses (K, E) rad or m of a task's external axes, that which promises most first.
+
+    With `clear`, which says of joint vectors (B, n) whether they are clear (B,), ways lead through
+    clear samples, as far as some rounds of looking at those on them and about them bring it.
 
     Raises
     ------
@@ -144,7 +161,12 @@ def courses(task: PlanningTask, styles: tuple[_Style, ...] = STYLES) -> Iterator
     coarse, robot = _sampled(task), task.robot
     known: list[Array] = []
     for style in styles:
-        path = _best_way(coarse, task, style)
+        try:
+            path = _clear_way(coarse, task, style, clear)
+        except NoFeasiblePath:
+            if not known:
+                raise
+            return
         course = _smooth(coarse, robot, path, len(task.contour))
         if not any(np.allclose(course, other, atol=1e-3) for other in known):
             known.append(course)
@@ -173,7 +195,13 @@ def _sampled(task: PlanningTask) -> _Coarse:
         nodes=nodes,
         external=np.broadcast_to(places, (K, *places.shape)),
     )
-    return _Coarse(nodes=nodes, places=places, counts=counts, graph=graph)
+    return _Coarse(
+        nodes=nodes,
+        places=places,
+        counts=counts,
+        graph=graph,
+        closed=np.zeros(len(graph.q), np.bool_),
+    )
 
 
 def _grid(robot: Robot) -> tuple[Array, tuple[int, ...]]:
@@ -200,8 +228,46 @@ def _grid(robot: Robot) -> tuple[Array, tuple[int, ...]]:
     return places, counts
 
 
+def _clear_way(
+    coarse: _Coarse, task: PlanningTask, style: _Style, clear: Callable[[Array], Bools]
+) -> Ints:
+    """Return the best way whose samples are clear, or the last one tried; as `_best_way`."""
+    graph, counts = coarse.graph, coarse.counts
+    cells = np.stack(np.unravel_index(np.arange(len(coarse.places)), counts), axis=-1)
+    way = _best_way(coarse, task, style)
+    for _ in range(ROUNDS):
+        hit = np.flatnonzero(~clear(graph.q[_vertices(coarse, way)]))
+        if not hit.size:
+            break
+        looked = []
+        for k in hit:
+            own = np.arange(graph.start[k], graph.start[k + 1])
+            far = np.abs(cells[graph.variant[own]] - cells[way[k, 0]])
+            far = np.where(task.robot.endless[-len(counts) :], np.minimum(far, counts - far), far)
+            looked.append(own[(far <= ABOUT).all(axis=1) & ~coarse.closed[own]])
+        at = np.concatenate(looked)
+        coarse.closed[at] = ~clear(graph.q[at])
+        try:
+            way = _best_way(coarse, task, style)
+        except NoFeasiblePath:
+            break
+    return way[:, 0]
+
+
+def _vertices(coarse: _Coarse, way: Ints) -> Ints:
+    """Return the vertex of the graph (M,) that a way has at each sampled node."""
+    graph = coarse.graph
+    found = []
+    for k, (place, sample, posture) in enumerate(way.tolist()):
+        own = slice(graph.start[k], graph.start[k + 1])
+        same = (graph.variant[own] == place) & (graph.sample[own] == sample)
+        same &= graph.posture[own] == posture
+        found.append(int(graph.start[k]) + int(np.flatnonzero(same)[-1]))
+    return np.array(found)
+
+
 def _best_way(coarse: _Coarse, task: PlanningTask, style: _Style) -> Ints:
-    """Return the place (M,) of each sampled node on the best way."""
+    """Return the place, gamma and posture (M, 3) of each sampled node on the best way."""
     robot, graph, count = task.robot, coarse.graph, len(coarse.nodes)
     before = _layer(coarse, robot, 0)
     value = np.where(before.ok, 0.0, np.inf)
@@ -227,7 +293,7 @@ def _best_way(coarse: _Coarse, task: PlanningTask, style: _Style) -> Ints:
     for k in range(count - 1, 0, -1):
         at = int(back[k].flat[at])
         path.append(at)
-    return np.unravel_index(path[::-1], value.shape)[0].astype(np.int64)
+    return np.stack(np.unravel_index(path[::-1], value.shape), axis=1).astype(np.int64)
 
 
 def _layer(coarse: _Coarse, robot: Robot, k: int) -> CoarseLayer:
@@ -237,7 +303,7 @@ def _layer(coarse: _Coarse, robot: Robot, k: int) -> CoarseLayer:
     shape = len(coarse.places), len(graph.gamma), robot.postures
     q, ok = np.zeros((*shape, robot.family.joints)), np.zeros(shape, np.bool_)
     at = graph.variant[own], graph.sample[own], graph.posture[own]
-    q[at], ok[at] = graph.q[own, : robot.family.joints], True
+    q[at], ok[at] = graph.q[own, : robot.family.joints], ~coarse.closed[own]
     return CoarseLayer(q=q, ok=ok)
 
 

@@ -131,7 +131,7 @@ def fastest_speed(
         external=external,
         progress=progress,
     )
-    task = along_a_course(task, at_any_speed=True).whole()
+    task = along_a_course(task, ClearSearch(task, cell).clear, at_any_speed=True).whole()
     found, nodes = _fastest(task, ClearSearch(task, cell), enough)
     if not ceiling:
         return found

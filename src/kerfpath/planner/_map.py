@@ -89,10 +89,10 @@ def clearance_map(
     """
     band = not_negative(band, "band", unit="m")
     resolution = scalar(resolution, "resolution", unit="m", above=0.0)
-    if graph.q.shape[1] != len(cell.chain.axes):
+    if graph.q.shape[1] != cell.chain.joints:
         raise InputError(
             f"graph: its vertices have {graph.q.shape[1]} joints, but the cell's robot has "
-            f"{len(cell.chain.axes)}"
+            f"{cell.chain.joints}"
         )
     first, pose = _poses(graph)
     before = cell.queries

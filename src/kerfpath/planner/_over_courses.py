@@ -37,15 +37,16 @@ def plan_over_courses(
     best: Plan | None = None
     failed: list[NoFeasiblePath] = []
     open_: list[Array] = []
-    for course in courses(task):
+    for course in courses(task, clear=finder.clear):
         few = task.along(course).sampled(max(task.settings.gamma_step, GAMMA_STEP))
+        there = finder.of(few)
         try:
-            found = clear_motion(few, finder.of(few), begin, thorough=False)
+            found = clear_motion(few, there, begin, thorough=False)
         except NoFeasiblePath as broken:
             failed.append(broken)
             continue
         if found is not None:
-            made = replace(claimed(found, finder), settings=task.settings)
+            made = replace(claimed(found, there), settings=task.settings)
             same = best is not None and abs(made.cost - best.cost) <= SAME * best.cost
             best = made if best is None or made.cost < best.cost else best
             if same:  # two courses have led to one optimum
@@ -55,9 +56,9 @@ def plan_over_courses(
     if best is not None:
         return best
     for course in open_[:1]:
-        there = task.along(course)
+        whole = task.along(course)
         try:
-            return plan_continuous(there, finder.of(there), begin)
+            return plan_continuous(whole, finder.of(whole), begin)
         except NoFeasiblePath as broken:
             failed.append(broken)
     raise _unproved(task, max(failed, key=lambda broken: broken.node))

@@ -93,7 +93,7 @@ def plan_in_pieces(
         graph=graph,
         progress=progress,
     )
-    task = along_a_course(task).whole()
+    task = along_a_course(task, ClearSearch(task, cell).clear).whole()
     finder = ClearSearch(task, cell)
     begin = phase or (lambda what: None)
     begin("search for pieces")

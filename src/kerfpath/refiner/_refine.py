@@ -110,8 +110,8 @@ def refine(
     first : float rad, optional
         Largest change of gamma in the first iteration, for a motion that is close to the best;
         default: two steps of the plan's grid.
-    within : two of (K,) rad, optional
-        Least and largest gamma of each node, on the turn of the plan's.
+    within : two of (K, 1 + E) rad or m, optional
+        Least and largest gamma of each node, on the turn of the plan's, and of its external axes.
     least : float
         What motions such as this one are known to cost at least: one that comes to hardly more is
         not refined any further.
@@ -143,8 +143,7 @@ def refine(
     descent, start = _descent(asked, kept)
     low, high = descent.low.copy(), descent.high.copy()
     if within is not None:
-        low[:, 0] = np.maximum(low[:, 0], within[0])
-        high[:, 0] = np.minimum(high[:, 0], within[1])
+        low, high = np.maximum(low, within[0]), np.minimum(high, within[1])
     descent = replace(descent, first=first, low=low, high=high)
     descent = descent if most is None else replace(descent, most=most)
     begun, before = descent.admitted(start)

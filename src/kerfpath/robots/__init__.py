@@ -3,8 +3,10 @@
 from kerfpath.robots._axis_three import level as level
 from kerfpath.robots._axis_three import with_axis_3 as with_axis_3
 from kerfpath.robots._backing_off import can_back_off as can_back_off
+from kerfpath.robots._carried import CarriedChain as CarriedChain
 from kerfpath.robots._chain import chain_of as chain_of
 from kerfpath.robots._chain import model_chain as model_chain
+from kerfpath.robots._chain import require_axes as require_axes
 from kerfpath.robots._coupling import AXIS_3 as AXIS_3
 from kerfpath.robots._coupling import Coupling as Coupling
 from kerfpath.robots._enclosure import Enclosure as Enclosure

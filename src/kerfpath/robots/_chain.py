@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath.errors import InputError
+from kerfpath.robots._carried import CarriedChain
 from kerfpath.robots._robot import Robot
 from kerfpath.urdf import KinematicChain, turns
 
-__all__ = ["chain_of", "model_chain"]
+__all__ = ["chain_of", "model_chain", "require_axes"]
 
 X, Y, Z = np.eye(3)
 
@@ -19,17 +20,53 @@ X, Y, Z = np.eye(3)
 def chain_of(robot: Robot) -> KinematicChain:
     """Return the joint frames of a robot; their end is its flange.
 
+    With external axes they begin at what these carry, see `CarriedChain`.
+
     Raises
     ------
     InputError
-        The robot has no description, and its family no model that says where its joints are; or it
-        has an external axis.
+        The robot has no description, and its family no model that says where its joints are; of
+        one with external axes, limits that are not known.
     """
-    if robot.externals:
-        raise InputError(
-            f"robot {robot.id!r}: a cell does not know how {robot.externals[0].name} moves in it"
+    arm = model_chain(robot) if robot.chain is None else robot.chain
+    if not robot.externals:
+        return arm
+    limits = robot.joint_limits()
+    return CarriedChain(
+        origins=arm.origins,
+        axes=arm.axes,
+        end=arm.end,
+        externals=robot.externals,
+        travel=np.column_stack([limits.lower, limits.upper])[len(arm.axes) :],
+    )
+
+
+def require_axes(chain: KinematicChain, robot: Robot) -> None:
+    """Require that a cell's chain has the external axes of a robot, and all their travel.
+
+    Raises
+    ------
+    InputError
+        Other axes; or less travel, within which alone bounds on motions hold.
+    """
+    own = chain if isinstance(chain, CarriedChain) else None
+    axes = () if own is None else own.externals
+    one, two = (
+        [(a.name, a.kind, a.carries, *a.axis, *a.point) for a in some]
+        for some in (axes, robot.externals)
+    )
+    if one != two:
+        here, there = (
+            ", ".join(axis.name for axis in some) or "none" for some in (axes, robot.externals)
         )
-    return model_chain(robot) if robot.chain is None else robot.chain
+        raise InputError(
+            f"cell: it was built with other external axes ({here}) than the robot has ({there})"
+        )
+    if own is not None:
+        limits, arm = robot.joint_limits(), len(own.axes)
+        beyond = (limits.lower[arm:] < own.travel[:, 0]) | (limits.upper[arm:] > own.travel[:, 1])
+        if (beyond & ~robot.endless[arm:]).any():
+            raise InputError("cell: it was built with less travel of the external axes than asked")
 
 
 def model_chain(robot: Robot) -> KinematicChain:

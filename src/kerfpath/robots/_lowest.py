@@ -17,7 +17,8 @@ FIRST = 3
 def lowest_joint(robot: Robot, q: Array) -> Array:
     """Return the height (B,) m over the robot base of the lowest of elbow, wrist and flange.
 
-    Of joint vectors q (B, n) rad: by the middles of the joints from axis 3 on, and of the flange.
+    Of joint vectors q (B, n) rad: by the middles of the joints from axis 3 on, and of the flange;
+    over the base as it stands with every external axis at zero.
 
     Raises
     ------
@@ -27,4 +28,5 @@ def lowest_joint(robot: Robot, q: Array) -> Array:
     chain = chain_of(robot)
     frames = chain.frames(q)
     flange = frames[:, -1] @ chain.end
-    return np.asarray(np.minimum(frames[:, FIRST:, 2, 3].min(axis=1), flange[:, 2, 3]))
+    joints = frames[:, chain.base + FIRST :, 2, 3]
+    return np.asarray(np.minimum(joints.min(axis=1), flange[:, 2, 3]))

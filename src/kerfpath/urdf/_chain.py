@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfpath._arrays import Array, floats
+from kerfpath._arrays import Array, Bools, Ints, floats
 from kerfpath._repr import short_repr
 
 __all__ = ["KinematicChain", "turns"]
@@ -37,6 +37,47 @@ class KinematicChain:
         object.__setattr__(self, "origins", floats(self.origins, "chain origins", (n, 4, 4)))
         object.__setattr__(self, "axes", floats(self.axes, "chain axes", (n, 3)))
         object.__setattr__(self, "end", floats(self.end, "chain end", (4, 4)))
+
+    @property
+    def joints(self) -> int:
+        """How many joints there are."""
+        return len(self.axes)
+
+    @property
+    def still(self) -> int:
+        """The frame that stands still: the base."""
+        return 0
+
+    @property
+    def base(self) -> int:
+        """The frame of the robot's base."""
+        return 0
+
+    @property
+    def order(self) -> Ints:
+        """The column of q of each joint of the chain, (n,)."""
+        return np.arange(len(self.axes))
+
+    @property
+    def slides(self) -> Bools:
+        """Which joints of the chain are linear, (n,): none."""
+        return np.zeros(len(self.axes), np.bool_)
+
+    def say(self, place: int) -> str:
+        """Return what a joint of the chain is called in messages."""
+        return f"joint {place + 1}"
+
+    def moves_with(self, frame: int) -> str:
+        """Return what a frame moves with, in words."""
+        return f"joint {frame}" if frame else "base"
+
+    def spread(self, share: Array) -> Array:
+        """Return joints (B, n) rad at shares (B, n), 0 to 1, of whole turns."""
+        return np.asarray(2 * np.pi * share - np.pi, dtype=np.float64)
+
+    def bounded(self, q: Array) -> Bools:
+        """Return at which of q (B, n) bounds on motions hold: at all."""
+        return np.ones(len(q), np.bool_)
 
     @property
     def length(self) -> float:

@@ -6,6 +6,7 @@ import pytest
 from jobs import DEMO
 from kerfpath import InputError
 from kerfpath.job import read_job
+from kerfpath.job.format import cell_of_job
 
 RAIL = """
 [[robot.external]]
@@ -84,6 +85,37 @@ def test_a_fault_is_said_in_one_line(old, new, message, tmp_path):
     assert tables.count(old) == 1
     with pytest.raises(InputError, match=message):
         read_job(job(tmp_path, tables.replace(old, new)))
+
+
+def test_fixtures_stand_on_the_ground_or_on_an_axis(tmp_path):
+    clamp = """
+[[cell.fixture]]
+name = "clamp"
+size_mm = [100, 100, 100]
+xyz_mm = [1500, 400, 100]
+on = "table"
+"""
+    path = job(tmp_path, RAIL + TABLE)
+    text = path.read_text()
+    assert text.count("\n[cell]") == 0
+    path.write_text(
+        text
+        + "\n[cell]\nnear_miss_mm = 5\n"
+        + clamp
+        + clamp.replace('"clamp"', '"post"').replace('on = "table"', "").replace("400", "800")
+    )
+    read = read_job(path)
+    cell = cell_of_job(read, read.read_part())
+    moves = {body.name: cell.chain.moves_with(body.frame) for body in cell.bodies}
+    assert moves["clamp"] == moves["part"] == "table"
+    assert moves["post"] == moves["floor"] == "ground"
+    assert moves["base"] == "rail"
+    assert moves["nozzle"] == "joint 6"
+    path.write_text(path.read_text().replace('on = "table"', 'on = "crane"'))
+    wrong = read_job(path)
+    part, said = wrong.read_part(), r'fixture\.on: expected the name of a .*"crane"; there are'
+    with pytest.raises(InputError, match=said):
+        cell_of_job(wrong, part)
 
 
 def test_more_than_three_axes_are_refused(tmp_path):

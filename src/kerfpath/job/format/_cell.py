@@ -56,7 +56,16 @@ def cell_of_job(job: Job, part: Part) -> Cell | None:
     if table is None:
         return None
     fixtures: dict[str, Shape] = {}
+    axes = [axis.name for axis in job.robot.externals]
+    on = {fixture.name: fixture.on for fixture in table.fixture if fixture.on is not None}
     for i, fixture in enumerate(table.fixture):
+        if fixture.on is not None and fixture.on not in axes:
+            raise refusal_at(
+                job.path,
+                ("cell", "fixture", i, "on"),
+                f'expected the name of a [[robot.external]], got "{fixture.on}"; there are '
+                f"{', '.join(axes) or 'none'}",
+            )
         with _at(job, "cell", "fixture", i):
             fixtures[fixture.name] = _shape(fixture, job.path.parent, table.deviation_mm / 1000)
     solid = _solid(job, table, part) if table.part else None
@@ -70,6 +79,7 @@ def cell_of_job(job: Job, part: Part) -> Cell | None:
             part=solid,
             placement=job.placement,
             fixtures=fixtures,
+            on=on,
             links=link_capsules(job.robot) if table.links == "capsules" else None,
             near_miss=table.near_miss_mm / 1000,
             floor=None if "floor" in fixtures else job.options.floor,

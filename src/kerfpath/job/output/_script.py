@@ -136,6 +136,7 @@ def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
     """Return what a job asks for that a script has no few lines for; empty where there is none."""
     beyond = {
         "solids from files in [cell]": job.cell is not None and has_files(job.cell),
+        "[[robot.external]]": bool(job.robot.externals),
         "[sequence]": job.sequence is not None,
         "[robot] without model": "model" not in job.source["robot"],
         'start = "best" or direction = "best"': any(len(r.candidates) > 1 for r in requests),

@@ -54,6 +54,8 @@ def cell_lines(job: Job, cell: Cell) -> Iterator[str]:
     yield "}"
     floor = job.options.floor if all(each.name != "floor" for each in table.fixture) else None
     named |= {"placement": "T_base_part", "fixtures": "fixtures"}
+    if on := {each.name: each.on for each in table.fixture if each.on is not None}:
+        named["on"] = repr(on)
     if table.links == "capsules":
         named["links"] = "link_capsules(arm)"
     named |= {"near_miss": f"{table.near_miss_mm!r} * MM", "floor": repr(floor)}

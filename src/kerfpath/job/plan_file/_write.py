@@ -229,6 +229,7 @@ def _cell_entry(cell: Cell) -> dict[str, object]:
                 "name": b.name,
                 "kind": b.kind,
                 "frame": b.frame,
+                "moves_with": cell.chain.moves_with(b.frame),
                 "approximate": b.approximate,
                 "holds_the_real_one": b.holds,
             }

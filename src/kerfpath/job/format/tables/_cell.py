@@ -99,7 +99,7 @@ class HeadTable(Table):
 
 
 class FixtureTable(Table):
-    """[[cell.fixture]]: a thing that stands still, a box or a solid from a file."""
+    """[[cell.fixture]]: a box or a solid from a file, on the ground or on an external axis."""
 
     name: Annotated[Text, key("a name that no other body has", '"table"')]
     size_mm: Annotated[
@@ -117,6 +117,9 @@ class FixtureTable(Table):
     rpy_deg: Annotated[
         Three, key("3 numbers, roll, pitch and yaw in the robot base in deg", "[0, 0, 90]")
     ] = (0.0, 0.0, 0.0)
+    on: Annotated[
+        Text | None, key("the name of the external axis that it moves with", '"table"')
+    ] = None
 
     @model_validator(mode="after")
     def _one_shape(self) -> FixtureTable:
