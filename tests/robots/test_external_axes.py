@@ -10,7 +10,7 @@ from tests.robots.test_five_axes import ARM, TOOLS
 import naive
 from conftest import pose
 from kerfpath import Contour, InputError, NoFeasiblePath, Tilt, audit, plan
-from kerfpath.auditor import chain_of, checks, transfer_checks
+from kerfpath.auditor import chain_of, checks
 from kerfpath.cell import cell_of
 from kerfpath.certifier import certify
 from kerfpath.comfort import Band, Comfort, measure, measures
@@ -21,7 +21,6 @@ from kerfpath.planner import layered_graph
 from kerfpath.post import build_program
 from kerfpath.report import ContourSection
 from kerfpath.robots import Robot
-from kerfpath.transfer import transfer_move
 from kerfpath.urdf import KinematicChain
 
 RAIL = {"velocity": 2.0, "acceleration": 4.0, "step": 0.1}
@@ -271,10 +270,6 @@ def test_what_does_not_go_with_an_extra_joint_is_refused_in_one_line(
         audit(made, cell=cell)
     with pytest.raises(InputError, match="how controllers move rail along an arc differs"):
         build_program([made], arc_tolerance=1e-4)
-    with pytest.raises(InputError, match="how rail moves"):
-        transfer_move(railed, made.q[0], made.q[-1])
-    with pytest.raises(InputError, match="the cell does not know how rail moves"):
-        transfer_checks(railed, made.q[[0, -1]], [0.0, 9.0], cell=cell)
     space = {name: options[name] for name in ("tool", "placement", "gamma_step")}
     graph = layered_graph(short, railed, **space)
     with pytest.raises(InputError, match="does not show rail"):

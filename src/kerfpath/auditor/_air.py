@@ -12,15 +12,14 @@ from kerfpath.auditor._chain import chain_of
 from kerfpath.auditor._collision import collision_along
 from kerfpath.auditor._table import Check, Unit
 from kerfpath.cell import Cell
-from kerfpath.errors import InputError
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, require_axes
 
 __all__ = ["transfer_checks"]
 
 STEP = np.radians(0.5)
-"""Largest joint step between two samples of a move."""
+"""rad, or m: largest joint step between two samples of a move."""
 SLACK = 1e-6
-"""Relative slack on the time, and rad on joint limits, for rounding."""
+"""Relative slack on the time, and rad or m on joint limits, for rounding."""
 
 
 def transfer_checks(
@@ -51,9 +50,8 @@ def transfer_checks(
     list of Check
         Their node is the corner that a motion starts from.
     """
-    if robot.externals and cell is not None:
-        name = robot.externals[0].name
-        raise InputError(f"air move: the cell does not know how {name} moves in it")
+    if cell is not None:
+        require_axes(cell.chain, robot)
     corners = floats(q, "q", (None, robot.joints))
     duration = np.diff(floats(time, "time", (len(corners),)))
     needed = _least_times(robot, np.abs(np.diff(corners, axis=0)), eta_v, eta_a)

@@ -11,7 +11,7 @@ from kerfpath._arrays import Array, floats, freeze
 from kerfpath._repr import short_repr
 from kerfpath.cell import Cell
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, require_axes
 from kerfpath.transfer._around import find_way_around
 from kerfpath.transfer._near_miss import explain_collision
 
@@ -91,6 +91,8 @@ def transfer_move(
 ) -> TransferMove:
     """Return a move from q0 to q1 (n,) rad, clear in the cell and within the limits.
 
+    External axes move with the arm, straight from the one value to the other.
+
     The straight joint motion if it is clear; else a way around it by RRT-Connect, shortened. The
     same arguments give the same move.
 
@@ -112,11 +114,10 @@ def transfer_move(
     NoFeasiblePath
         An end that is not clear (proved), or no way found in time (not proved).
     InputError
-        Limits that are not known, joints beyond them, an external axis.
+        Limits that are not known, joints beyond them, a cell of other external axes.
     """
-    if robot.externals:
-        name = robot.externals[0].name
-        raise InputError(f"air move: it is not known yet how {name} moves in it")
+    if cell is not None:
+        require_axes(cell.chain, robot)
     n = robot.joints
     ends = np.array([floats(q0, "q0", (n,)), floats(q1, "q1", (n,))])
     velocity, acceleration = robot.speed_limits()
@@ -154,7 +155,8 @@ def _bounds(robot: Robot, ends: Array) -> tuple[Array, Array]:
     beyond = (ends < low - 1e-9) | (ends > high + 1e-9)
     if beyond.any():
         joint = int(np.flatnonzero(beyond.any(axis=0))[0])
-        raise InputError(f"air move: joint {joint + 1} of an end is beyond its limits")
+        name = robot.joint_names[joint]
+        raise InputError(f"air move: {name} of an end is beyond its limits")
     return np.minimum(low, ends.min(axis=0)), np.maximum(high, ends.max(axis=0))
 
 

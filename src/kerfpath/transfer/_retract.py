@@ -52,4 +52,5 @@ def back_off(plan: Plan, end: End, retract: float) -> Array:
             f"in posture {posture_name(int(plan.posture[node]))} within the joint limits; lower "
             "the retract"
         )
-    return freeze(q_found[int(np.argmin(np.abs(q_found - q).max(axis=1)))])
+    nearest = q_found[int(np.argmin(np.abs(q_found - q).max(axis=1)))]
+    return freeze(nearest)

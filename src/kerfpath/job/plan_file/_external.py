@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath.errors import InputError
 from kerfpath.job.plan_file._layout import ExternalData
 from kerfpath.robots import ExternalAxis, Robot
 
@@ -24,11 +25,23 @@ def apart(name: str, values: Array, robot: Robot) -> dict[str, object]:
 
 
 def joints(entry: Mapping[str, Any], name: str, robot: Robot) -> Array:
-    """Return values (..., n) of the joints as `apart` has them."""
+    """Return values (..., n) of the joints as `apart` has them.
+
+    Raises
+    ------
+    InputError
+        Values of external axes missing, or too many.
+    """
     own = np.array(entry[f"{name}_rad"], dtype=float)
     if not robot.externals:
         return own
-    return np.concatenate([own, np.array(entry[f"external_{name}"], dtype=float)], axis=-1)
+    others = np.array(entry.get(f"external_{name}", ()), dtype=float)
+    if others.shape != (*own.shape[:-1], len(robot.externals)):
+        raise InputError(
+            f"external_{name}: expected {len(robot.externals)} numbers for each of {name}_rad, got "
+            f"the shape {others.shape}"
+        )
+    return np.concatenate([own, others], axis=-1)
 
 
 def external_entries(robot: Robot) -> list[ExternalData]:

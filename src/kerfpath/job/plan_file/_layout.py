@@ -261,6 +261,7 @@ class MoveData(TypedDict):
     clear: bool
     time_s: Row
     q_rad: Rows
+    external_q: NotRequired[Rows]
 
 
 class SequenceData(TypedDict):

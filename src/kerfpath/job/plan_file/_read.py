@@ -110,7 +110,7 @@ def read_plan_file(path: str | Path) -> PlanFile:
             contours={e["name"]: e["contour"] for e in entries},
             missing=tuple(e["name"] for e in data["contours"] if not e["feasible"]),
             failed=tuple(e["name"] for e in entries if not e["audit"]["passed"]),
-            moves=read_moves(data["sequence"]),
+            moves=read_moves(data["sequence"], robot),
             in_cell=data["cell"] is not None,
             picked=frozenset(e["name"] for e in entries if e.get("picked", False)),
             data=data,

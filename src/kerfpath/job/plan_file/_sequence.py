@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from kerfpath._arrays import floats
-from kerfpath.job.plan_file._layout import SequenceData
+from kerfpath.job.plan_file._external import joints
+from kerfpath.job.plan_file._layout import MoveData, SequenceData
+from kerfpath.robots import Robot
 from kerfpath.sequence import PartPlan
 from kerfpath.transfer import TransferMove
 
@@ -12,6 +14,7 @@ __all__ = ["read_moves", "sequence_entry"]
 
 def sequence_entry(part: PartPlan) -> SequenceData:
     """Return what plan.json says of a part's order, its times and its moves."""
+    robot = part.plans[0].robot
     return {
         "optimal": part.order.optimal,
         "duration_s": part.order.duration,
@@ -21,22 +24,37 @@ def sequence_entry(part: PartPlan) -> SequenceData:
         "air_s": part.air_time,
         "piercing_s": part.piercing_time,
         "retract_m": part.retract,
-        "moves": [
-            {"clear": move.clear, "time_s": move.time.tolist(), "q_rad": move.q.tolist()}
-            for move in part.moves
-        ],
+        "moves": [_move_entry(move, robot) for move in part.moves],
     }
 
 
-def read_moves(entry: SequenceData | None) -> tuple[TransferMove, ...]:
-    """Return the moves of such an entry."""
+def read_moves(entry: SequenceData | None, robot: Robot) -> tuple[TransferMove, ...]:
+    """Return the moves of such an entry.
+
+    Raises
+    ------
+    InputError
+        Joints or times that do not go together, external axes missing.
+    """
     if entry is None:
         return ()
     return tuple(
         TransferMove(
-            q=floats(move["q_rad"], "q_rad of a move", (None, None)),
+            q=floats(joints(move, "q", robot), "corners of a move", (None, None)),
             time=floats(move["time_s"], "time_s of a move", (len(move["q_rad"]),)),
             clear=bool(move["clear"]),
         )
         for move in entry["moves"]
     )
+
+
+def _move_entry(move: TransferMove, robot: Robot) -> MoveData:
+    n = robot.family.joints
+    entry: MoveData = {
+        "clear": move.clear,
+        "time_s": move.time.tolist(),
+        "q_rad": move.q[:, :n].tolist(),
+    }
+    if robot.externals:
+        entry["external_q"] = move.q[:, n:].tolist()
+    return entry
