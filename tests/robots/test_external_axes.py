@@ -19,7 +19,6 @@ from kerfpath.job import read_plan_file
 from kerfpath.job.plan_file._write import plan_document, plan_entry, plan_text
 from kerfpath.planner import layered_graph
 from kerfpath.post import build_program
-from kerfpath.report import ContourSection
 from kerfpath.robots import Robot
 from kerfpath.urdf import KinematicChain
 
@@ -272,8 +271,6 @@ def test_what_does_not_go_with_an_extra_joint_is_refused_in_one_line(
         build_program([made], arc_tolerance=1e-4)
     space = {name: options[name] for name in ("tool", "placement", "gamma_step")}
     graph = layered_graph(short, railed, **space)
-    with pytest.raises(InputError, match="does not show rail"):
-        ContourSection(name="short", graph=graph, path=short, plan=made)
     with pytest.raises(InputError, match="graph: its vertices have 7 joints"):
         plan(short, arm, graph=graph, **options)
 

@@ -315,10 +315,8 @@ def _named(name: str, robot: Robot) -> Criterion:
     kind, _, number = str(name).rpartition("_")
     if kind in JOINT_CRITERIA and number in map(str, range(1, robot.joints + 1)):
         joint, each = int(number) - 1, JOINT_CRITERIA[kind]
-        unit = robot.units[joint]
-        return replace(
-            each, name=name, words=f"{each.words}, joint {number}", unit=unit, joint=joint
-        )
+        words = f"{each.words}, {robot.joint_names[joint]}"
+        return replace(each, name=name, words=words, unit=robot.units[joint], joint=joint)
     if name in CRITERIA:
         return CRITERIA[name]
     raise InputError(

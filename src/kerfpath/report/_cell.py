@@ -38,19 +38,21 @@ def add_cell(
 ) -> None:
     """Draw a cell into a figure in the part's frame, mm, and a slider over the poses.
 
-    The part itself is left to the figure; without poses, so are robot and head.
+    The part itself is left to the figure; without poses, so are robot and head. Where external axes
+    carry the part it stays where it is drawn, and what they do not carry moves about it.
     """
     T_part_base = np.asarray(np.linalg.inv(T_base_part), dtype=np.float64)
     before = len(figure.data)
-    still = [b for b in cell.bodies if b.frame == 0 and b.kind not in ("part", "floor")]
-    moving = [b for b in cell.bodies if b.frame != 0]
+    drawn_here = [body for body in cell.bodies if body.kind not in ("part", "floor")]
+    still = [body for body in drawn_here if body.frame == 0]
+    moving = [body for body in drawn_here if body.frame != 0]
     for body in still:
         _add_body(figure, body.name, body.kind, surface(body.shape), T_part_base, shown=True)
     drawn = {body.name: surface(body.shape) for body in moving}
     for i, (_, q) in enumerate(poses):
         frames = cell.frames(q[None])[0]
         for body in moving:
-            T = T_part_base @ frames[body.frame]
+            T = T_part_base @ np.linalg.inv(frames[0]) @ frames[body.frame]
             _add_body(figure, body.name, body.kind, drawn[body.name], T, shown=i == 0)
     if not poses:
         return

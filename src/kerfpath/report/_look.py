@@ -9,6 +9,7 @@ from typing import Any
 import plotly.graph_objects as go
 
 from kerfpath.losses import Loss, Reason
+from kerfpath.robots import Robot
 
 __all__ = [
     "ACCENT",
@@ -22,6 +23,7 @@ __all__ = [
     "SCALE",
     "band",
     "base_layout",
+    "joint_colours",
     "reason_colours",
 ]
 
@@ -33,6 +35,8 @@ SCALE = ("#440154", "#414487", "#2a788e", "#22a884", "#7ad151")
 # Six hues, and a light and a dark shade of each, found by a search that keeps all pairs apart
 # for normal, protan and deutan sight (Machado, Oliveira, Fernandes 2009; CIELAB distance 12).
 JOINT_COLOURS = ("#0061cc", "#f4a918", "#0ea069", "#df5ac2", "#f05d16", "#55bdff")
+EXTERNAL_COLOURS = ("#6b4fbb", "#7a5c3e", "#5b6675")
+"""Of external axes, which have their names beside their lines."""
 _LOW = ("#4089d9", "#fce3b4", "#6bc5a3", "#f6ceed", "#f6a076", "#86d0ff")
 _HIGH = ("#003875", "#be8313", "#09603f", "#c34fa9", "#742d0b", "#2f688d")
 _REASONS = {
@@ -61,6 +65,11 @@ def reason_colours(reasons: Sequence[Reason]) -> tuple[str, ...]:
         _REASONS[why] if why in _REASONS else next(spare if why.loss is Loss.SPARE else greys)
         for why in reasons
     )
+
+
+def joint_colours(robot: Robot) -> tuple[str, ...]:
+    """Return a colour for each joint of a robot, external axes last."""
+    return JOINT_COLOURS[: robot.family.joints] + EXTERNAL_COLOURS[: len(robot.externals)]
 
 
 def base_layout(height: int, **more: Any) -> go.Layout:

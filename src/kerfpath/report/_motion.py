@@ -16,12 +16,12 @@ from kerfpath.plans import Plan
 from kerfpath.report._look import (
     FAINT,
     INK,
-    JOINT_COLOURS,
     QUIET,
     axis,
     axis_title,
     band,
     base_layout,
+    joint_colours,
 )
 from kerfpath.robots import posture_name
 
@@ -30,8 +30,10 @@ __all__ = ["cutting_speed", "joint_positions", "limit_shares", "posture_runs"]
 ROW, GAP, TOP, BOTTOM = 130, 36, 48, 48
 SHARE_ROW, SHARE_TOP = 210, 74
 SPEED_HEIGHT = 220
-LEAST_SPAN = 1.0
-"""Least height of a panel, deg: a joint that hardly moves looks so."""
+LEAST_SPAN = {"rad": 1.0, "m": 10.0}
+"""Least height of a panel, deg or mm: a joint that hardly moves looks so."""
+SHOWN = {"rad": (180 / np.pi, "°"), "m": (1e3, " mm")}
+"""By what a joint's values are multiplied to be shown, and their unit."""
 
 
 def posture_runs(plan: Plan) -> list[tuple[int, int, int]]:
@@ -43,37 +45,39 @@ def posture_runs(plan: Plan) -> list[tuple[int, int, int]]:
 
 
 def joint_positions(plan: Plan) -> go.Figure:
-    """Return a panel per joint: position over time, deg, to the scale of its motion.
+    """Return a panel per joint: position over time, deg or mm, to the scale of its motion.
 
     Endless joints are not wrapped. The title of a panel has the distance to the joint limits.
     """
-    height = TOP + BOTTOM + 3 * ROW + 2 * GAP
+    robot = plan.robot
+    rows = (robot.joints + 1) // 2
+    height = TOP + BOTTOM + rows * ROW + (rows - 1) * GAP
     figure = go.Figure(layout=base_layout(height, hovermode="x unified", showlegend=False))
     figure.update_layout(margin={"l": 54, "r": 16, "t": TOP, "b": BOTTOM})
-    shapes, annotations = _posture_bands(plan, panels=plan.robot.joints, labelled=range(2))
+    shapes, annotations = _posture_bands(plan, panels=robot.joints, labelled=range(2))
     axes: dict[str, object] = {}
-    limits = plan.robot.joint_limits()
-    continuous = np.degrees(plan.unwrapped)
-    for joint in range(plan.robot.joints):
+    limits = robot.joint_limits()
+    for joint, (name, unit) in enumerate(zip(robot.joint_names, robot.units, strict=True)):
+        scale, suffix = SHOWN[unit]
         row, column = divmod(joint, 2)
         x, y = _axis("x", joint), _axis("y", joint)
         top = 1 - row * (ROW + GAP) / (height - TOP - BOTTOM)
-        low, high = np.degrees(limits.lower[joint]), np.degrees(limits.upper[joint])
-        q, endless = continuous[:, joint], bool(limits.endless[joint])
-        middle, half = (q.max() + q.min()) / 2, 0.58 * max(float(np.ptp(q)), LEAST_SPAN)
+        low, high = scale * limits.lower[joint], scale * limits.upper[joint]
+        q, endless = scale * plan.unwrapped[:, joint], bool(limits.endless[joint])
+        middle, half = (q.max() + q.min()) / 2, 0.58 * max(float(np.ptp(q)), LEAST_SPAN[unit])
         axes |= {
             _axis("xaxis", joint): axis(
                 anchor=y,
                 domain=[0, 0.46] if column == 0 else [0.54, 1],
                 matches=None if joint == 0 else "x",
-                showticklabels=row == 2,
-                title=axis_title("time, s") if row == 2 else None,
+                showticklabels=row == rows - 1,
+                title=axis_title("time, s") if row == rows - 1 else None,
                 unifiedhovertitle={"text": "%{x:.3f} s"},
             ),
             _axis("yaxis", joint): axis(
                 anchor=x,
                 domain=[max(0.0, top - ROW / (height - TOP - BOTTOM)), min(1.0, top)],
-                ticksuffix="°",
+                ticksuffix=suffix,
                 range=[float(middle - half), float(middle + half)],
                 nticks=6,
             ),
@@ -82,19 +86,20 @@ def joint_positions(plan: Plan) -> go.Figure:
             x=_short(plan.time),
             y=_short(q),
             mode="lines",
-            line={"color": JOINT_COLOURS[joint], "width": 2},
-            name=f"joint {joint + 1}",
-            hovertemplate="%{y:.2f}°",
+            line={"color": joint_colours(robot)[joint], "width": 2},
+            name=name,
+            hovertemplate=f"%{{y:.2f}}{suffix}",
             xaxis=x,
             yaxis=y,
         )
         span = "endless"
         if not endless:
             spare = min(float(q.min()) - low, high - float(q.max()))
-            span = f"limits {_deg(low)} to {_deg(high)}, {_deg(spare)} to spare"
+            ends, room = [_rounded(value, suffix) for value in (low, high)], _rounded(spare, suffix)
+            span = f"limits {ends[0]} to {ends[1]}, {room} to spare"
         annotations.append(
             {
-                "text": f"joint {joint + 1} <span style='color:{QUIET}'>· {span}</span>",
+                "text": f"{name} <span style='color:{QUIET}'>· {span}</span>",
                 "font": {"size": 12, "color": INK},
                 "x": 0,
                 "xref": f"{x} domain",
@@ -166,14 +171,14 @@ def limit_shares(plan: Plan) -> go.Figure:
                 range=_share_range(share),
             ),
         }
-        for joint in range(plan.robot.joints):
+        for joint, name in enumerate(plan.robot.joint_names):
             figure.add_scatter(
                 x=_short(time),
                 y=_short(share[:, joint] * 100),
                 mode="lines",
-                line={"color": JOINT_COLOURS[joint], "width": 1.6},
-                name=f"joint {joint + 1}",
-                legendgroup=f"joint {joint + 1}",
+                line={"color": joint_colours(plan.robot)[joint], "width": 1.6},
+                name=name,
+                legendgroup=name,
                 showlegend=row == 0,
                 hovertemplate="%{y:.1f} %",
                 xaxis=x,
@@ -277,5 +282,5 @@ def _axis(kind: str, panel: int) -> str:
     return kind if panel == 0 else f"{kind}{panel + 1}"
 
 
-def _deg(value: float) -> str:
-    return f"{round(float(value), 2):g}°".replace("-", "\N{MINUS SIGN}")
+def _rounded(value: float, unit: str) -> str:
+    return f"{round(float(value), 2):.6g}{unit}".replace("-", "\N{MINUS SIGN}")

@@ -102,8 +102,6 @@ class ContourSection:
         nodes = {"graph": len(self.graph.reason), "path": len(self.path)}
         if self.plan is not None:
             nodes["plan"] = len(self.plan.q)
-            for axis in self.plan.robot.externals:
-                raise InputError(f"section {self.name!r}: a report does not show {axis.name} yet")
         intervals = {count - 1 for count in nodes.values()}
         if any(count % min(intervals) for count in intervals) or len(self.path) != nodes["graph"]:
             counts = ", ".join(f"{name} {count}" for name, count in nodes.items())

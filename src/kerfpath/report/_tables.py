@@ -12,7 +12,7 @@ from kerfpath.auditor import Check
 from kerfpath.comfort import MEASURES
 from kerfpath.graph import LayeredGraph
 from kerfpath.plans import Plan
-from kerfpath.report._look import JOINT_COLOURS, reason_colours
+from kerfpath.report._look import joint_colours, reason_colours
 from kerfpath.report._section import ContourSection
 
 __all__ = [
@@ -98,24 +98,29 @@ def _proof(plan: Plan) -> str:
 
 def criteria_table(plan: Plan) -> str:
     """Return the criteria (7) to (9) and the peak shares, joint by joint."""
+    robot = plan.robot
+    unit = "deg or mm" if "m" in robot.units else "deg"
     heads = (
         ("Joint", ""),
-        ("Displacement", "deg"),
-        ("Largest increment", "deg per node"),
-        ("Range", "deg"),
+        ("Displacement", unit),
+        ("Largest increment", f"{unit} per node"),
+        ("Range", unit),
         ("Peak velocity", "% of limit"),
         ("Peak acceleration", "% of limit"),
     )
     c, rows = plan.criteria, []
-    for i in range(plan.robot.joints):
+    for i, name in enumerate(robot.joint_names):
+        linear = robot.units[i] == "m"
+        scale = 1e3 if linear else 180 / math.pi
         values = (
-            number(math.degrees(c.displacement[i]), 1),
-            number(math.degrees(c.largest_increment[i]), 3),
-            number(math.degrees(c.range[i]), 1),
+            number(scale * c.displacement[i], 1),
+            number(scale * c.largest_increment[i], 3),
+            number(scale * c.range[i], 1),
             number(c.peak_velocity[i] * 100, 1),
             number(c.peak_acceleration[i] * 100, 1),
         )
-        head = f'<th scope="row">{_chip(JOINT_COLOURS[i])}joint {i + 1}</th>'
+        said = f"{escape(name)}, mm" if linear else escape(name)
+        head = f'<th scope="row">{_chip(joint_colours(robot)[i])}{said}</th>'
         rows.append(f"<tr>{head}{''.join(map(td, values))}</tr>")
     return table(heads, rows)
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array
 from kerfpath.cell import Body, CuttingHead, link_bodies, surface
+from kerfpath.errors import InputError
 from kerfpath.job import CutRequest, Job, PreparedJob
 from kerfpath.robots import chain_of
 from kerfpath.studio._messages import (
@@ -48,9 +49,10 @@ def scene_of(prepared: PreparedJob, revision: int) -> tuple[SceneMessage, Meshes
     Raises
     ------
     InputError
-        A robot whose joints nothing says the places of.
+        A robot whose joints nothing says the places of, or with external axes.
     """
     job, meshes = prepared.job, Meshes()
+    _require_shown(job)
     if prepared.cell is None:
         bodies = _own_bodies(job)
     else:  # the part is drawn as the drawing has it
@@ -75,9 +77,20 @@ def scene_of_robot(job: Job, revision: int) -> tuple[SceneMessage, Meshes]:
     InputError
         As `scene_of`.
     """
+    _require_shown(job)
     meshes = Meshes()
     entries = [_body(body, meshes) for body in _own_bodies(job)]
     return _scene(job, revision, entries, []), meshes
+
+
+def _require_shown(job: Job) -> None:
+    """Raise InputError for external axes: the page would show what they carry in a wrong place."""
+    if job.robot.externals:
+        names = ", ".join(axis.name for axis in job.robot.externals)
+        raise InputError(
+            f"{job.path}: the studio does not show external axes ({names}); plan the job with "
+            "kerfpath plan, whose report shows them"
+        )
 
 
 def _scene(

@@ -149,7 +149,7 @@ def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:
         if np.isfinite(high - low):
             factor, unit = (1e3, "mm") if robot.units[joint] == "m" else (180 / np.pi, "deg")
             span = f"{low * factor:.1f} to {high * factor:.1f} {unit}"
-            rows.append((f"window of joint {joint + 1}", span))
+            rows.append((f"window of {robot.joint_names[joint]}", span))
     if run.clearance:
         rows.append(("clearance", f"{run.clearance * 1e3:.1f} mm"))
     return rows

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job.format import Job, ProgramOptions, refusal_at
@@ -299,10 +300,15 @@ def require_language(job: Job) -> None:
 def trajectory_text(plans: Sequence[Plan], moves: Sequence[TransferMove] = ()) -> str:
     """Return the text of trajectory.csv: one row per node, in mm and degrees, base frame.
 
+    External axes stand after the arm's joints, by their names and units; points and axes of the
+    tool are those of part and base with each at zero.
+
     Transfer moves stand where they are made, a row per corner; each has a time of its own.
     """
-    joints = range(1, (plans[0].robot.joints if plans else 6) + 1)
-    header = ["contour", "node", "kind", "t_s", *(f"q{i}_deg" for i in joints)]
+    arm = range(1, (plans[0].robot.family.joints if plans else 6) + 1)
+    header = ["contour", "node", "kind", "t_s", *(f"q{i}_deg" for i in arm)]
+    for axis in plans[0].robot.externals if plans else ():
+        header.append(f"{axis.name}_{'mm' if axis.kind == 'linear' else 'deg'}")
     header += ["x_mm", "y_mm", "z_mm", "axis_x", "axis_y", "axis_z", "gamma_deg", "posture"]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -314,7 +320,7 @@ def trajectory_text(plans: Sequence[Plan], moves: Sequence[TransferMove] = ()) -
         numbers = np.column_stack(
             [
                 plan.time,
-                np.degrees(plan.q),
+                plan.q * _shown(plan),
                 plan.points * 1000,
                 plan.axes,
                 np.degrees(plan.gamma),
@@ -332,5 +338,10 @@ def _write_air(writer: Any, move: TransferMove, plan: Plan) -> None:
     """Write the corners of a move; gamma and posture are those of contours alone."""
     T = plan.robot.forward(move.q) @ plan.T_flange_tip
     for k, (time, q, tip) in enumerate(zip(move.time, move.q, T, strict=True)):
-        row = [time, *np.degrees(q), *tip[:3, 3] * 1000, *tip[:3, 2]]
+        row = [time, *q * _shown(plan), *tip[:3, 3] * 1000, *tip[:3, 2]]
         writer.writerow(["air", k, "air", *(float(v) for v in row), "", ""])
+
+
+def _shown(plan: Plan) -> Array:
+    """Return by what joints (n,) are multiplied to be in degrees, linear axes in mm."""
+    return np.array([1e3 if unit == "m" else 180 / np.pi for unit in plan.robot.units])

@@ -40,7 +40,8 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
     ]
     speeds = sorted({task.speed * 60 for task in job.contours})
     robot, options = job.robot, job.options
-    velocity, acceleration = (np.degrees(v).round(1) for v in robot.speed_limits())
+    arm = robot.family.joints
+    velocity, acceleration = (np.degrees(v[:arm]).round(1) for v in robot.speed_limits())
     facts = [
         ("Job", job.path.name),
         ("Part", job.part_file.name),
@@ -56,7 +57,8 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
             f"{_row(acceleration)} deg/s^2 ({robot.acceleration_source})",
         ),
         *_more_limits(robot),
-        ("Endless axes", _row(np.flatnonzero(robot.endless) + 1) or "none"),
+        ("Endless axes", _row(np.flatnonzero(robot.endless[:arm]) + 1) or "none"),
+        *_external_facts(robot),
     ]
     # From home and back to it the way is long, and would make the part small.
     moves = outcome.moves
@@ -81,6 +83,23 @@ def _more_limits(robot: Robot) -> Iterator[tuple[str, str]]:
     if robot.load is not None:
         load = f"load {robot.load.mass:g} kg, without friction and rotors"
         yield "Joint torque limits", f"{_row(robot.torque)} N m ({load})"
+
+
+def _external_facts(robot: Robot) -> list[tuple[str, str]]:
+    """Return what each external axis moves, and its limits, in rows of words."""
+    limits, arm = robot.joint_limits(), robot.family.joints
+    facts = []
+    for i, axis in enumerate(robot.externals, arm):
+        scale, unit = (1e3, "mm") if axis.unit == "m" else (180 / np.pi, "deg")
+        low, high, velocity, acceleration = (
+            f"{scale * values[i]:.6g}"
+            for values in (limits.lower, limits.upper, *robot.speed_limits())
+        )
+        travel = "endless" if robot.endless[i] else f"{low} to {high} {unit}"
+        said = f"{axis.kind}, carries the {axis.carries}; {travel}"
+        said += f", {velocity} {unit}/s, {acceleration} {unit}/s^2"
+        facts.append((f"External axis {axis.name}", said))
+    return facts
 
 
 def _sampling(found: Departure) -> list[tuple[str, str]]:
