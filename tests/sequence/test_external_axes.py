@@ -65,7 +65,13 @@ def test_a_move_along_the_rail_goes_around_what_stands_there(robot, walled):
                       for a, b in zip(move.q, move.q[1:], strict=False)])  # fmt: skip
     assert walled.clear(fine).all()
     rows = {row.code: row for row in transfer_checks(robot, move.q, move.time, cell=walled)}
-    assert set(rows) >= {"air-time", "air-limits", "air-external-limits", "collision", "collision-open"}
+    assert set(rows) >= {
+        "air-time",
+        "air-limits",
+        "air-external-limits",
+        "collision",
+        "collision-open",
+    }
     assert all(row.ok for row in rows.values())
 
 
