@@ -88,7 +88,7 @@ def test_the_trajectory_is_the_plan_in_degrees_and_millimetres(planned, folder):
 
 def test_plan_json_carries_everything_and_round_trips(planned, folder):
     data = json.loads((folder / "small-plan" / "plan.json").read_text())
-    assert data["schema"] == 8
+    assert data["schema"] == 9
     assert data["robot"]["id"] == "abb_irb4600_60_205"
     assert data["job"]["tool"]["head"] == "laser-head-45"
     assert np.array(data["T_flange_tip"]).shape == (4, 4)
