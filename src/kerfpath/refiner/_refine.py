@@ -14,7 +14,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.kernels.metric import wrap
 from kerfpath.losses import Loss, Reason
-from kerfpath.plans import Plan, Proof, on_turns, path_cost
+from kerfpath.plans import Plan, Proof, has_room, on_turns, path_cost
 from kerfpath.refiner._curves import JointCurves
 from kerfpath.refiner._descent import Descent, MotionState
 from kerfpath.refiner._rates import KeptShares, RateLimits
@@ -146,11 +146,12 @@ def refine(
         low, high = np.maximum(low, within[0]), np.minimum(high, within[1])
     descent = replace(descent, first=first, low=low, high=high)
     descent = descent if most is None else replace(descent, most=most)
-    begun, before = descent.admitted(start)
-    if not begun.admitted:
-        return _unrefined(plan, _closest(descent, begun))
-    close = begun.cost <= (1 + CLOSE) * least
-    found, programs = (begun, 0) if close else descent.best(begun)
+    found, programs = _lowest(descent, start, least)
+    if found.admitted and not _room_kept(asked, found):
+        descent = _ends_held(descent, start)
+        found, programs = _lowest(descent, start, least)
+    if not found.admitted:
+        return _unrefined(plan, _closest(descent, found))
     refined = _plan_with_motion(asked, found)
     broken = [] if comfort is None else [*comfort.broken(plan.robot, refined.q, plan.T_flange_tip)]
     if settings.floor is not None and (lowest_joint(plan.robot, refined.q) < settings.floor).any():
@@ -170,9 +171,35 @@ def refine(
         done=True,
         cost_before=start.cost,
         cost_after=refined.cost,
-        programs=before + programs,
+        programs=programs,
         statement=proof.statement,
     )
+
+
+def _lowest(descent: Descent, start: MotionState, least: float) -> tuple[MotionState, int]:
+    """Return the best motion found, or the one that breaks the limits least; and its programs."""
+    begun, programs = descent.admitted(start)
+    if not begun.admitted or begun.cost <= (1 + CLOSE) * least:
+        return begun, programs
+    found, more = descent.best(begun)
+    return found, programs + more
+
+
+def _room_kept(plan: Plan, found: MotionState) -> bool:
+    """Return whether the tool can still back off at both ends where external axes have moved."""
+    if plan.settings.retract is None or not plan.robot.externals:
+        return True  # gamma is held where it can
+    ends = [0, -1]
+    q, _ = on_turns(plan.robot, found.q)
+    room = has_room(plan.settings, plan.robot, q[ends], plan.posture[ends], plan.T_flange_tip)
+    return bool(room.all())
+
+
+def _ends_held(descent: Descent, start: MotionState) -> Descent:
+    """Return the descent with the external axes held at both ends where they start from."""
+    low, high = descent.low.copy(), descent.high.copy()
+    low[[0, -1], 1:] = high[[0, -1], 1:] = start.free[[0, -1], 1:]
+    return replace(descent, low=low, high=high)
 
 
 def promise(plan: Plan) -> float:
