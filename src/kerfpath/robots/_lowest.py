@@ -12,6 +12,8 @@ __all__ = ["lowest_joint"]
 
 FIRST = 3
 """The elbow is at axis 3; what comes before is as high as the robot stands."""
+AT_ONCE = 50_000
+"""Joint vectors whose frames are held at once: 50 MB of them."""
 
 
 def lowest_joint(robot: Robot, q: Array) -> Array:
@@ -25,8 +27,11 @@ def lowest_joint(robot: Robot, q: Array) -> Array:
     InputError
         As `chain_of`.
     """
-    chain = chain_of(robot)
-    frames = chain.frames(q)
-    flange = frames[:, -1] @ chain.end
-    joints = frames[:, chain.base + FIRST :, 2, 3]
-    return np.asarray(np.minimum(joints.min(axis=1), flange[:, 2, 3]))
+    chain, found = chain_of(robot), np.empty(len(q))
+    for first in range(0, len(q), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        frames = chain.frames(q[some])
+        flange = frames[:, -1] @ chain.end
+        joints = frames[:, chain.base + FIRST :, 2, 3]
+        found[some] = np.minimum(joints.min(axis=1), flange[:, 2, 3])
+    return found

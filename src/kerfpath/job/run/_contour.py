@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.front import Subproblem, plan_run
@@ -60,17 +61,10 @@ def cut_candidate(
         progress(f"{name}: {what}", 0, 0)
 
     progress(name, 0, total)
-    courses = bool(job.robot.externals) and options.method == "continuous"
-    try:
-        graph = graph_of(job, candidate.nodes, solved)
-    except NoFeasiblePath as closed:  # no course of the external axes: shown where they are at zero
-        graph = job.graph(candidate.nodes, external=_at_rest(job, candidate))
-        return (CutResult(request=request, candidate=candidate, graph=graph, broken=closed),)
-    clearance = None
-    if cell is not None and job.cell is not None and job.cell.map:
-        begin("map of the cell")
-        clearance = clearance_map(graph, cell)
-    whole = CutResult(request=request, candidate=candidate, graph=graph, clearance=clearance)
+    if job.robot.externals and options.method == "continuous" and request.run is None:
+        return _cut_along_courses(replace(prepared, job=job), request, candidate, solved, begin)
+    graph = graph_of(job, candidate.nodes, solved)
+    whole = _whole(job, request, candidate, graph, cell, begin)
     run, every, kept = request.run, graph, cell
     if run is not None:
         graph, kept = run.graph(graph, job.robot.endless), run.cell(cell)
@@ -78,8 +72,7 @@ def cut_candidate(
     def planned(by: Callable[..., _T]) -> _T:
         return by(
             candidate.nodes, job.robot, tool=job.tool, placement=job.placement,
-            speed=candidate.speed, options=job.options, cell=kept, phase=begin,
-            graph=None if courses else graph,
+            speed=candidate.speed, options=job.options, cell=kept, graph=graph, phase=begin,
         )  # fmt: skip
 
     def follow(run: Subproblem) -> Plan:
@@ -97,6 +90,58 @@ def cut_candidate(
             plans = planned(plan_in_pieces)
     except NoFeasiblePath as broken:
         return (replace(whole, broken=broken),)
+    begin("audit")
+    return tuple(_audited(prepared, whole, made) for made in plans)
+
+
+def _whole(
+    job: Job, request: CutRequest, candidate: Candidate, graph: LayeredGraph, cell: Cell | None,
+    begin: Callable[[str], None],
+) -> CutResult:  # fmt: skip
+    """Return the cut of a candidate that has no plan yet, with the map of its cell if asked for."""
+    clearance = None
+    if cell is not None and job.cell is not None and job.cell.map:
+        begin("map of the cell")
+        clearance = clearance_map(graph, cell)
+    return CutResult(request=request, candidate=candidate, graph=graph, clearance=clearance)
+
+
+def _cut_along_courses(
+    prepared: PreparedJob,
+    request: CutRequest,
+    candidate: Candidate,
+    solved: Callable[[int], None],
+    begin: Callable[[str], None],
+) -> tuple[CutResult, ...]:
+    """Return what came of a candidate with external axes; its graph is along the course found."""
+    job, cell, nodes = prepared.job, prepared.cell, candidate.nodes
+
+    def planned(by: Callable[..., _T]) -> _T:
+        return by(
+            nodes, job.robot, tool=job.tool, placement=job.placement, speed=candidate.speed,
+            options=job.options, cell=cell, phase=begin,
+        )  # fmt: skip
+
+    try:
+        try:
+            plans: tuple[Plan, ...] = (planned(plan),)
+        except NoFeasiblePath:
+            if job.options.interruptions == "none":
+                raise
+            plans = planned(plan_in_pieces)
+    except NoFeasiblePath as broken:
+        try:
+            graph = job.graph(nodes, progress=solved)
+        except NoFeasiblePath:  # shown with the axes at rest
+            graph = job.graph(nodes, external=_at_rest(job, candidate), progress=solved)
+        whole = CutResult(request=request, candidate=candidate, graph=graph)
+        return (replace(whole, broken=broken),)
+    x = np.array(_at_rest(job, candidate))
+    for made in plans:
+        first = int(np.searchsorted(nodes.s, made.contour.s[0]))
+        x[first : first + len(made.q)] = made.external
+    graph = job.graph(nodes, external=x, progress=solved)
+    whole = _whole(job, request, candidate, graph, cell, begin)
     begin("audit")
     return tuple(_audited(prepared, whole, made) for made in plans)
 
@@ -171,8 +216,6 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
         made = _divided(made, candidate.path, job.options.refine_parts)
     kept = None if whole.picked else kept_between_nodes(job, made)
     made = made if kept is None else kept.plan
-    if made.external is not None and len(made.q) == len(candidate.nodes):
-        graph = job.graph(made.contour, external=made.external)
     checks = job.tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
     checks += whole.request.drawing_checks(candidate, made.contour, job.tolerances.path)
     cut = replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))
