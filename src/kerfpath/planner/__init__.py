@@ -4,6 +4,7 @@ from kerfpath.planner._best import best_motion as best_motion
 from kerfpath.planner._certified import with_bound as with_bound
 from kerfpath.planner._courses import coarse_places as coarse_places
 from kerfpath.planner._courses import external_course as external_course
+from kerfpath.planner._courses import require_arm_alone as require_arm_alone
 from kerfpath.planner._draft import draft as draft
 from kerfpath.planner._fastest import FastestSpeed as FastestSpeed
 from kerfpath.planner._fastest import fastest_speed as fastest_speed

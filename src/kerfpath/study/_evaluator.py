@@ -19,7 +19,13 @@ from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, cell_of_job, fastest_along
-from kerfpath.planner import FastestSpeed, longest_step, node_interval, require_rates_alone
+from kerfpath.planner import (
+    FastestSpeed,
+    longest_step,
+    node_interval,
+    require_arm_alone,
+    require_rates_alone,
+)
 
 __all__ = ["EVERY", "Evaluator", "SampledContour", "sample_contours"]
 
@@ -93,6 +99,7 @@ class Evaluator:
 
     def __post_init__(self) -> None:
         require_rates_alone(self.job.robot, "a study of places or robots")
+        require_arm_alone(self.job.robot, "a study of places or robots")
 
     @cached_property
     def cell(self) -> Cell | None:

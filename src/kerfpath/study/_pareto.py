@@ -28,6 +28,7 @@ from kerfpath.front import (
     criteria_named,
 )
 from kerfpath.job import Job, cell_of_job
+from kerfpath.planner import require_arm_alone
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
 from kerfpath.study._job import LoadedJob, digest, load_job
@@ -205,6 +206,8 @@ def problem_of_job(
     drawn = task.candidates(part)[0]
     nodes = task.sample(drawn)
     asked = task.asked(job.options)
+    if asked.method == "continuous":
+        require_arm_alone(job.robot, "a Pareto set off the grid")
     options = replace(asked, feed="constant", refine=False, certify=None)
     return ParetoProblem(
         contour=nodes,

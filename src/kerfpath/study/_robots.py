@@ -14,6 +14,7 @@ from kerfpath.cad import Part
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, read_job
+from kerfpath.planner import require_arm_alone
 from kerfpath.progress import Progress, no_progress
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
 from kerfpath.study._evaluator import (
@@ -212,6 +213,7 @@ def with_robot(job: Job, candidate: Robot) -> Job:
         A posture that its family has not; a cell that asks for the links of a description; a job
         with a load or jerk limits.
     """
+    require_arm_alone(job.robot, "a list of robots")
     if job.robot.load is not None or job.robot.jerk is not None:
         raise InputError(
             "its limits on torque and jerk are not known: remove mass_kg and jerk_deg_s3 to "
