@@ -21,7 +21,7 @@ from scipy.optimize import lsq_linear
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
 from kerfpath.contour import Contour
-from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.courses import CoarseLayer, Nearby, best_steps
 from kerfpath.kernels.metric import increments, wrap
@@ -30,7 +30,7 @@ from kerfpath.planner._graph import layered_graph
 from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.robots import Robot
 
-__all__ = ["along_a_course", "coarse_places", "courses", "external_course", "require_arm_alone"]
+__all__ = ["along_a_course", "coarse_places", "courses", "external_course"]
 
 FEW_NODES, NODES = 9, 41
 """Nodes at which the axes are sampled: as many as leave them time for a step, within these."""
@@ -120,13 +120,6 @@ def external_course(
         contour, robot, asked, tool=tool, placement=placement, speed=SLOW if free else speed
     )
     return next(courses(task, (GENTLE,) if free else STYLES))
-
-
-def require_arm_alone(robot: Robot, what: str) -> None:
-    """Raise InputError where a robot has external axes, of what does not know how they move."""
-    if robot.externals:
-        names = ", ".join(axis.name for axis in robot.externals)
-        raise InputError(f"{what}: it does not know yet how external axes move ({names})")
 
 
 def along_a_course(

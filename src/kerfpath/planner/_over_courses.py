@@ -8,14 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.errors import NoFeasiblePath
+from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._continuous import claimed, clear_motion, plan_continuous
 from kerfpath.planner._courses import courses
 from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan
+from kerfpath.robots import Robot
 
-__all__ = ["plan_over_courses"]
+__all__ = ["plan_over_courses", "require_arm_alone"]
 
 GAMMA_STEP = np.radians(3)
 """rad: the refinement moves gamma and axes together, so that few samples lead to it."""
@@ -62,6 +63,13 @@ def plan_over_courses(
         except NoFeasiblePath as broken:
             failed.append(broken)
     raise _unproved(task, max(failed, key=lambda broken: broken.node))
+
+
+def require_arm_alone(robot: Robot, what: str) -> None:
+    """Raise InputError where a robot has external axes, of what does not know how they move."""
+    if robot.externals:
+        names = ", ".join(axis.name for axis in robot.externals)
+        raise InputError(f"{what}: it does not know yet how external axes move ({names})")
 
 
 def _unproved(task: PlanningTask, broken: NoFeasiblePath) -> NoFeasiblePath:
