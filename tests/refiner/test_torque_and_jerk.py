@@ -257,9 +257,10 @@ def test_plans_off_the_grid_keep_both(circle, made, arm, tool, placement, method
     rows = rows_of(found)
     assert rows["torque"].value > 0.9
     assert rows["jerk"].value > 0.9
-    # The motion without them costs less, but for the gain below which a refinement ends.
-    # Two local optima: with limits more the search may end in a better valley, not far below.
-    assert found.cost >= made.cost * (1 - 1e-1)
+    # The motion without them, found in the same way, costs less, but for the gain below which a
+    # refinement ends.
+    free = plan(circle, arm, method=method, refine=True, **here)
+    assert found.cost >= free.cost * (1 - 1e-2)
 
 
 def test_where_no_motion_keeps_them_that_is_the_answer(circle, made, arm, tool, placement):
