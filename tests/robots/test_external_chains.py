@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kerfpath import Contour, InputError, NoFeasiblePath, audit, plan
+from kerfpath import Contour, InputError, NoFeasiblePath, Tilt, audit, fastest_speed, plan
 from kerfpath.auditor import chain_of
 from kerfpath.auditor._between import bound_between_nodes
 from kerfpath.auditor._motion import motion_of
+from kerfpath.planner import external_course
 from kerfpath.robots import ExternalAxis
 
 SLOW = {"velocity": 1.0, "acceleration": 2.0}
@@ -87,6 +88,12 @@ def at_point():
     return T
 
 
+def errors(made):
+    """What is wrong at the nodes, which are too far apart for what is between them."""
+    found = audit(made, path_tolerance=1e-2)
+    return [each for each in found if each.level == "error" and "-between" not in each.code]
+
+
 def chuck(arm, **change):
     """A chuck that turns the tube without end."""
     travel = {"lower": -np.pi, "upper": np.pi, "endless": True, **SLOW, **change}
@@ -143,6 +150,32 @@ def test_a_course_may_be_given_and_is_checked(arm, tool):
         plan(contour, bound, external=rule, **options)
     with pytest.raises(InputError, match=r"chuck: the exact search .* needs their step"):
         plan(contour, robot, method="exact", **options)
+
+
+def test_a_tilt_costs_no_more_than_the_nominal_axis(arm, tool):
+    options = {"tool": tool, "placement": at_point(), "speed": 0.04, "gamma_step": np.radians(12)}
+    contour, robot = ring(41), chuck(arm)
+    rigid = plan(contour, robot, **options)
+    made = plan(contour, robot, tilt=Tilt(cone=np.radians(4), steps=1, cost=0.01), **options)
+    assert made.cost < rigid.cost
+    assert made.tilt.any()
+    assert not errors(made)
+
+
+@pytest.mark.slow
+def test_other_courses_may_be_faster_than_the_gentlest(arm, tool):
+    options = {"tool": tool, "placement": at_point(), "gamma_step": np.radians(12)}
+    contour, robot = ring(41), chuck(arm)
+    gentlest = external_course(contour, robot, tool=tool, placement=at_point())
+    along = fastest_speed(contour, robot, external=gentlest, refine=True, **options)
+    found = fastest_speed(contour, robot, refine=True, **options)
+    assert found.speed >= along.speed
+    # There is a plan at the speed that is named.
+    made = plan(contour, robot, speed=found.speed * 0.999, **options)
+    assert not errors(made)
+    too_fast = r"no admissible .*nothing of others(; joint \d is chuck)?$"
+    with pytest.raises(NoFeasiblePath, match=too_fast):
+        plan(contour, robot, speed=found.speed * 3, **options)
 
 
 def test_axes_that_do_not_go_together_are_refused(arm, three):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Literal, Unpack
 
 import numpy as np
@@ -20,6 +21,7 @@ from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._closed import binding_nodes, impossible_share
 from kerfpath.planner._courses import along_a_course
 from kerfpath.planner._graph import longest_step, node_interval, require_even
+from kerfpath.planner._over_courses import faster_motions
 from kerfpath.planner._quickest import QuickMotion, quick_motions
 from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.robots import Robot
@@ -99,7 +101,8 @@ def fastest_speed(
     the acceleration: `refine` moves gamma off it, from the fastest path and from others, to what is
     faster still (the best found, which is not proved to be the best there is), where that is clear
     and keeps the margins of `comfort`, which may have no costs here. `plan` finds a motion at the
-    speed returned, too. External axes begin from the gentlest course, or from `external`. With
+    speed returned, too. External axes follow the gentlest course, or `external`; `refine` moves
+    them, too, and looks for courses that are faster. With
     `ceiling` it is also proved, as far as a limited amount of work does, above which speed there is
     no motion at all, on the grid or off it, see `FastestSpeed.ceiling`. Off the grid a speed that
     is `enough`, m/s, may be returned although there are faster ones.
@@ -131,12 +134,13 @@ def fastest_speed(
         external=external,
         progress=progress,
     )
-    task = along_a_course(task, ClearSearch(task, cell).clear, at_any_speed=True).whole()
-    found, nodes = _fastest(task, ClearSearch(task, cell), enough)
+    finder = ClearSearch(task, cell)
+    along = along_a_course(task, finder.clear, at_any_speed=True)
+    found, nodes = _fastest(task, along.whole(), finder, enough)
     if not ceiling:
         return found
     interval = longest_step(contour) / found.speed
-    share = impossible_share(task, interval, nodes)
+    share = impossible_share(along, interval, nodes)
     return found if share is None else replace(found, ceiling=found.speed / share)
 
 
@@ -151,17 +155,22 @@ def require_rates_alone(robot: Robot, what: str) -> None:
 
 
 def _fastest(
-    task: PlanningTask, finder: ClearSearch, enough: float | None
+    task: PlanningTask, along: PlanningTask, finder: ClearSearch, enough: float | None
 ) -> tuple[FastestSpeed, list[int]]:
     """Return the largest speed reached, on the grid or, where that is asked for, off it.
 
-    And the nodes where a limit binds, the first that of the speed.
+    And the nodes where a limit binds, the first that of the speed. `along` is the task along the
+    first course of its external axes.
     """
+    there = finder.of(along)
     if not (task.settings.refine and task.robot.family.free_rotation):
-        found = FastestSpeed.of(task.contour, finder.find(find_least_interval, task.problem.free()))
+        least = there.find(find_least_interval, along.problem.free())
+        found = FastestSpeed.of(task.contour, least)
         return found, [found.node]
     motions, step = list[QuickMotion](), longest_step(task.contour)
-    for quick in quick_motions(task, finder):
+    fixed = task.placed or not task.robot.externals or task.settings.method != "continuous"
+    ways = quick_motions(along, there)
+    for quick in ways if fixed else _over_courses(task, finder, ways):
         motions.append(quick)
         if enough is not None and step / quick.dt >= enough:
             break
@@ -173,6 +182,15 @@ def _fastest(
         on_grid=step / quick.on_grid if quick.dt < quick.on_grid else None,
     )
     return found, binding_nodes(motions)
+
+
+def _over_courses(
+    task: PlanningTask, finder: ClearSearch, ways: Iterator[QuickMotion]
+) -> Iterator[QuickMotion]:
+    """Yield ever quicker motions: the first two along one course, then those along others."""
+    for best in islice(ways, 2):
+        yield best
+    yield from faster_motions(task, finder, best)
 
 
 def relaxations(

@@ -15,7 +15,7 @@ from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Binding, quicken
 from kerfpath.search import ContinuousPath, ContinuousSearch, Effort, find_least_interval
 
-__all__ = ["QuickMotion", "alike", "clear_paths", "quick_motions", "wide"]
+__all__ = ["QuickMotion", "alike", "clear_paths", "quick_motions", "quicker", "wide"]
 
 RUNGS = (1.06, 1.0, 1.1)
 """Multiples of the speed reached at which beams look for a motion that is quicker still. Where no
@@ -85,19 +85,19 @@ def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMoti
     yield best
     if not task.robot.family.free_rotation:
         return
-    best = _quicker(task, finder, path, best)
+    best = quicker(task, finder, path, best)
     yield best
     rung, tried = 0, [path]
     while rung < len(RUNGS):
-        before, faster = best.dt, _at(task, best.dt / RUNGS[rung])
-        found = clear_paths(faster, finder, (wide(task),))
+        before, ahead = best.dt, _at(task, best.dt / RUNGS[rung])
+        found = clear_paths(ahead, finder, (wide(task),))
         for between in () if found is None else found[1]:
-            made = faster.plan_between(between, _claim())
+            made = ahead.plan_between(between, _claim())
             if not any(alike(made, other) for other in tried):
                 tried.append(made)
-                quicker = _quicker(task, finder, made, best)
-                if quicker is not best:
-                    best = quicker
+                faster = quicker(task, finder, made, best)
+                if faster is not best:
+                    best = faster
                     yield best
         rung = 0 if best.dt < (1 - GAIN) * before else rung + 1
 
@@ -127,9 +127,7 @@ def _claim() -> Proof:
     return Proof(optimal=False, statement="the quickest motion found")
 
 
-def _quicker(
-    task: PlanningTask, finder: ClearSearch, start: Plan, best: QuickMotion
-) -> QuickMotion:
+def quicker(task: PlanningTask, finder: ClearSearch, start: Plan, best: QuickMotion) -> QuickMotion:
     """Return the better of the best motion so far and the one that a start is quickened to."""
     quickened = quicken(start)
     if quickened is None:

@@ -149,7 +149,11 @@ class PlanningTask:
 
     def sampled(self, step: float) -> PlanningTask:
         """Return the task with gamma sampled in other steps, rad; its graph is not built yet."""
-        return replace(self, settings=replace(self.settings, gamma_step=step), layers=_layers)
+        return self.with_settings(replace(self.settings, gamma_step=step))
+
+    def with_settings(self, settings: PlanOptions) -> PlanningTask:
+        """Return the task with other settings; its graph is not built yet."""
+        return replace(self, settings=settings, layers=_layers)
 
     def along(self, external: Array) -> PlanningTask:
         """Return the task with another course (K, E) of the external axes, not built."""
