@@ -6,14 +6,13 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.robots._chain import chain_of
+from kerfpath.robots._external import carried
 from kerfpath.robots._robot import Robot
 
 __all__ = ["lowest_joint"]
 
 FIRST = 3
 """The elbow is at axis 3; what comes before is as high as the robot stands."""
-AT_ONCE = 50_000
-"""Joint vectors whose frames are held at once: 50 MB of them."""
 
 
 def lowest_joint(robot: Robot, q: Array) -> Array:
@@ -27,11 +26,14 @@ def lowest_joint(robot: Robot, q: Array) -> Array:
     InputError
         As `chain_of`.
     """
-    chain, found = chain_of(robot), np.empty(len(q))
-    for first in range(0, len(q), AT_ONCE):
-        some = slice(first, first + AT_ONCE)
-        frames = chain.frames(q[some])
-        flange = frames[:, -1] @ chain.end
-        joints = frames[:, chain.base + FIRST :, 2, 3]
-        found[some] = np.minimum(joints.min(axis=1), flange[:, 2, 3])
-    return found
+    chain, arm = chain_of(robot), robot.family.joints
+    # The third row of the pose of each frame in turn: its last entry is the height.
+    row = np.array(carried(robot.externals, q[:, arm:], "robot")[:, 2])
+    lowest = np.full(len(q), np.inf)
+    for i, axis in enumerate(chain.axes):
+        row = row @ chain.origins[i]
+        up, s, c = row[:, :3], np.sin(q[:, i])[:, None], np.cos(q[:, i])[:, None]
+        row[:, :3] = up * c + np.cross(up, axis) * s + (up @ axis)[:, None] * axis * (1 - c)
+        if i + 1 >= FIRST:
+            lowest = np.minimum(lowest, row[:, 3])
+    return np.asarray(np.minimum(lowest, (row @ chain.end)[:, 3]))
