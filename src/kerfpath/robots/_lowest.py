@@ -8,11 +8,14 @@ from kerfpath._arrays import Array
 from kerfpath.robots._chain import chain_of
 from kerfpath.robots._external import carried
 from kerfpath.robots._robot import Robot
+from kerfpath.urdf import KinematicChain
 
 __all__ = ["lowest_joint"]
 
 FIRST = 3
 """The elbow is at axis 3; what comes before is as high as the robot stands."""
+AT_ONCE = 10_000
+"""Joint vectors whose rows are held at once: they stay in the cache."""
 
 
 def lowest_joint(robot: Robot, q: Array) -> Array:
@@ -26,9 +29,16 @@ def lowest_joint(robot: Robot, q: Array) -> Array:
     InputError
         As `chain_of`.
     """
-    chain, arm = chain_of(robot), robot.family.joints
+    chain, found = chain_of(robot), np.empty(len(q))
+    for first in range(0, len(q), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        found[some] = _lowest(chain, robot, q[some])
+    return found
+
+
+def _lowest(chain: KinematicChain, robot: Robot, q: Array) -> Array:
     # The third row of the pose of each frame in turn: its last entry is the height.
-    row = np.array(carried(robot.externals, q[:, arm:], "robot")[:, 2])
+    row = np.array(carried(robot.externals, q[:, robot.family.joints :], "robot")[:, 2])
     lowest = np.full(len(q), np.inf)
     for i, axis in enumerate(chain.axes):
         row = row @ chain.origins[i]
