@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 DEMO_OUT ?= demo-out
 
-.PHONY: demo test test-slow check bench figures lock clean
+.PHONY: demo test test-slow check package bench figures lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/kerfpath demo --out $(DEMO_OUT)
@@ -20,6 +20,17 @@ check: .venv/dev.stamp
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The wheel as a stranger installs it: by itself, without any extra.
+PACKAGE := build/package
+package: .venv/dev.stamp
+	rm -rf dist $(PACKAGE)
+	$(BIN)/uv build --quiet --no-build-isolation --python $(BIN)/python --out-dir dist
+	$(BIN)/uv venv --quiet $(PACKAGE)
+	grep -v '^ *--hash' requirements/run.txt | tr -d '\\' > $(PACKAGE)/pinned.txt
+	VIRTUAL_ENV=$(PACKAGE) $(BIN)/uv pip install --quiet -c $(PACKAGE)/pinned.txt dist/*.whl
+	$(PACKAGE)/bin/python -I tests/core_alone.py
+	$(PACKAGE)/bin/kerfpath --help 2>&1 | grep "run pip install 'kerfpath\[programs\]'"
 
 bench: .venv/bench.stamp
 	$(BIN)/python -m benchmarks
@@ -55,7 +66,7 @@ lock: .venv/tools.stamp
 	$(LOCK) requirements/build.in -o requirements/build.txt
 	$(LOCK) requirements/outside.in -o requirements/outside.txt
 	$(LOCK) --extra dev pyproject.toml -c requirements/build.txt -o requirements/dev.txt
-	$(LOCK) --extra studio pyproject.toml -c requirements/dev.txt -o requirements/run.txt
+	$(LOCK) --extra cad --extra cells --extra programs --extra report --extra studio pyproject.toml -c requirements/dev.txt -o requirements/run.txt
 	$(LOCK) --extra bench pyproject.toml -c requirements/dev.txt -o requirements/bench.txt
 
 clean:

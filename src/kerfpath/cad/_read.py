@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import floats, scalar
+from kerfpath._extras import require_extra
 from kerfpath._repr import short_repr
 from kerfpath.apart import call_apart, stand_by
 from kerfpath.cad._left_out import nothing_drawn
@@ -141,6 +142,7 @@ def _drawn(kind: str, path: Path, content: bytes, asked: _Asked, progress: Progr
         from kerfpath.cad._table import read_table
 
         return read_table(path, content, unit, gap, axis=axis, columns=asked.columns)
+    require_extra("cad", f"{path}: reading {kind}")
     if kind == "DXF":
         from kerfpath.cad._dxf import read_dxf
 

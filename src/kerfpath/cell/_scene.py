@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import coal
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
+from kerfpath._extras import imported
 from kerfpath.cell._bodies import Body
 from kerfpath.cell._lines import CapsuleLines, lines_apart
 from kerfpath.cell._mesh import Mesh
@@ -22,6 +22,8 @@ from kerfpath.cell._shapes import Capsule, Hull, Shape, box_between
 from kerfpath.errors import InputError
 
 __all__ = ["ACCURACY", "Scene"]
+
+coal = imported("coal", "cells", "cells and their distances")
 
 ACCURACY = 1e-6
 """m: coal stops refining a distance here; every bound made from distances leaves it off."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
+from kerfpath._extras import imported
 from kerfpath.apart import call_apart
 from kerfpath.cell._mesh import SAME, Mesh, size_of, weld
 from kerfpath.errors import InputError
@@ -102,8 +103,7 @@ def _load_with_coal(path: Path, name: str) -> tuple[Array, Ints]:
 
 def load_mesh(path: str, scale: float) -> tuple[Array, Ints]:
     """Return the vertices (V, 3), scaled, and triangles (F, 3) of a mesh file; may crash."""
-    import coal
-
+    coal = imported("coal", "cells", "meshes of bodies")
     mesh = coal.MeshLoader().load(path, np.full(3, scale))
     found = [[mesh.tri_indices(i)[k] for k in range(3)] for i in range(mesh.num_tris)]
     return np.array(mesh.vertices()), np.array(found, np.int64).reshape(-1, 3)

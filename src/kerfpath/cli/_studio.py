@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from importlib.resources import as_file, files
-from importlib.util import find_spec
 from pathlib import Path
 
 from rich.markup import escape
 
+from kerfpath._extras import require_extra
 from kerfpath._writing import write_whole
 from kerfpath.cli._show import out
 from kerfpath.errors import InputError
 
 __all__ = ["open_studio"]
 
-NEEDED = ("starlette", "uvicorn", "websockets")
 SHIPPED = ("b_pillar.toml", "b_pillar.step")
 """The demo job and its part, which are copied so that they can be changed."""
 DRAWINGS = (".step", ".stp", ".iges", ".igs", ".dxf", ".csv", ".tsv", ".txt")
@@ -30,12 +29,7 @@ def open_studio(job: Path | None, *, host: str, port: int, browser: bool) -> Non
     InputError
         What the studio needs is not installed; no job; a port in use.
     """
-    missing = [name for name in NEEDED if find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"studio: needs {', '.join(missing)}, which are not installed; "
-            "run pip install 'kerfpath[studio]'"
-        )
+    require_extra("studio", "the studio")
     if job is None:
         path = _copy_of_demo()
     elif job.suffix.lower() in DRAWINGS:

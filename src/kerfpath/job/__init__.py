@@ -1,5 +1,9 @@
 """The job: one file that says what to cut and how, its run, and the files the run leaves."""
 
+from kerfpath._extras import require_extra
+
+require_extra("programs", "jobs")
+
 from kerfpath.job.as_run import AsRun as AsRun
 from kerfpath.job.format import VARIABLES as VARIABLES
 from kerfpath.job.format import Candidate as Candidate

@@ -1,5 +1,9 @@
 """Robot programs: one neutral program, one preflight that refuses, one formatter per language."""
 
+from kerfpath._extras import require_extra
+
+require_extra("programs", "robot programs")
+
 from kerfpath.post._arcs import circle_through as circle_through
 from kerfpath.post._arcs import with_arcs as with_arcs
 from kerfpath.post._build import build_program as build_program

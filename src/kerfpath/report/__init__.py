@@ -1,5 +1,9 @@
 """Self-contained HTML pages: on a job, a drawing, a Pareto set, a layout; or a table alone."""
 
+from kerfpath._extras import require_extra
+
+require_extra("report", "reports")
+
 from kerfpath.report._drawing import DrawnLoop, render_drawing
 from kerfpath.report._front import FrontAxis, FrontPlan
 from kerfpath.report._front_page import render_front

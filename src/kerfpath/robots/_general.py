@@ -7,12 +7,12 @@ they do, and whether it solves an arm is tried before it is used.
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from threading import Lock
 
 import numpy as np
 
 from kerfpath._arrays import Array, Bools
+from kerfpath._extras import require_extra
 from kerfpath.errors import InputError
 from kerfpath.kernels import general
 from kerfpath.robots._ssik import SsikArm, prepare, solve
@@ -31,11 +31,7 @@ follow_all, forward_all = general.follow_all, general.forward_all
 
 def require_solver() -> None:
     """Raise InputError unless the solver is installed."""
-    if find_spec("ssik") is None:
-        raise InputError(
-            "a six-axis arm of no other family is solved by ssik, which is not installed: "
-            "pip install 'kerfpath[general]'"
-        )
+    require_extra("general", "a six-axis arm of no other family")
 
 
 def model(*, chain: KinematicChain | None, sign: Array, offset: Array) -> general.GeneralArm:

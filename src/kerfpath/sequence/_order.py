@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, floats, integers
+from kerfpath._extras import require_extra
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError, NoFeasiblePath
 
@@ -108,6 +109,7 @@ def _solve(
     group: Ints, own: Array, move: Array, enter: Array, leave: Array,
     before: Sequence[tuple[int, int]], seconds: float,
 ) -> Order:  # fmt: skip
+    require_extra("programs", "the order of cuts")
     from ortools.sat.python import cp_model  # loaded where it is needed: half a second
 
     C, G = len(group), int(group.max()) + 1

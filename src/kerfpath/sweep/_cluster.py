@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 from kerfpath import __version__
+from kerfpath._extras import require_extra
 from kerfpath.errors import InputError
 from kerfpath.sweep._task import Failure, Task, TaskOutcome, attempt
 
@@ -40,12 +41,9 @@ def on_cluster(
         Where Dask is not installed, the scheduler is not there or goes away, or a worker has
         another version of kerfpath.
     """
-    try:
-        import distributed
-    except ImportError as error:
-        raise InputError(
-            "a scheduler needs Dask, which is not installed: pip install 'kerfpath[cluster]'"
-        ) from error
+    require_extra("cluster", "a scheduler")
+    import distributed
+
     try:
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._extras import require_extra
 
 __all__ = ["find_way_around"]
 
@@ -44,6 +45,7 @@ def find_way_around(
         Whether straight motions through joint vectors (2, n) are.
     seconds : float s
     """
+    require_extra("cells", "ways around obstacles")
     from ompl import base, geometric, util  # loaded where it is needed: half a second
 
     util.setLogLevel(util.LogLevel.LOG_NONE)
