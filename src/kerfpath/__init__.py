@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from kerfpath.refiner import Refinement as Refinement
     from kerfpath.refiner import refine as refine
     from kerfpath.robots import Robot as Robot
+    from kerfpath.robots import external as external
     from kerfpath.robots import robot as robot
     from kerfpath.search import LayeredPath as LayeredPath
     from kerfpath.search import shortest_path as shortest_path
@@ -60,6 +61,7 @@ _HOME = {
     "Robot": "robots",
     "Tilt": "tilt",
     "audit": "auditor",
+    "external": "robots",
     "fastest_speed": "planner",
     "join": "contour",
     "keep_limits": "execution",

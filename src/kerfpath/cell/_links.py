@@ -13,7 +13,7 @@ from kerfpath.cell._mesh import size_of
 from kerfpath.cell._shapes import Capsule, Hull, Shape, box, frustum
 from kerfpath.cell._stl import close_surface, read_surface
 from kerfpath.errors import InputError
-from kerfpath.robots import Robot, chain_of, model_chain
+from kerfpath.robots import CarriedChain, Robot, chain_of, model_chain
 from kerfpath.urdf import LinkBody as Described
 
 __all__ = ["link_bodies", "link_capsules"]
@@ -47,7 +47,6 @@ def link_bodies(robot: Robot, *, hulls: bool = True) -> tuple[Body, ...]:
     """
     found: list[Body] = []
     count: Counter[str] = Counter()
-    base = len(robot.externals)
     for described in robot.bodies:
         count[described.link] += 1
         number = count[described.link]
@@ -55,7 +54,7 @@ def link_bodies(robot: Robot, *, hulls: bool = True) -> tuple[Body, ...]:
             Body(
                 name=described.link if number == 1 else f"{described.link} {number}",
                 shape=_shape(described, hulls),
-                frame=base + described.joint,
+                frame=_frame(robot, described),
                 kind="robot",
                 approximate=described.kind == "mesh" and hulls,
             )
@@ -146,6 +145,22 @@ _LINES: dict[str, Callable[[Mapping[str, float]], list[Line]]] = {
     "five": _opw,
     "ur": _ur,
 }
+
+
+def _frame(robot: Robot, body: Described) -> int:
+    """Return the frame of a body of a description: on the arm, on an external axis, the ground."""
+    if body.on is None:
+        return len(robot.externals) + body.joint
+    chain = chain_of(robot)
+    if not body.on:
+        return chain.still
+    for axis in robot.externals:
+        if axis.joint == body.on and isinstance(chain, CarriedChain):
+            return chain.frame_on(axis.name)
+    raise InputError(
+        f"robot {robot.id!r}: link {body.link!r} moves with joint {body.on!r}, which is none of "
+        "its external axes; read the description with them, or take Robot.alone()"
+    )
 
 
 def _shape(body: Described, hulls: bool) -> Shape:

@@ -19,9 +19,16 @@ from kerfpath.robots._families import FAMILIES as FAMILIES
 from kerfpath.robots._families import Family as Family
 from kerfpath.robots._families import posture_name as posture_name
 from kerfpath.robots._families import postures_named as postures_named
+from kerfpath.robots._known_axis import Given as Given
+from kerfpath.robots._known_axis import KnownAxis as KnownAxis
+from kerfpath.robots._known_axis import described_axes as described_axes
 from kerfpath.robots._library import acceleration_ratios as acceleration_ratios
 from kerfpath.robots._library import robot_ids as robot_ids
 from kerfpath.robots._lowest import lowest_joint as lowest_joint
+from kerfpath.robots._products import ExternalProduct as ExternalProduct
+from kerfpath.robots._products import external as external
+from kerfpath.robots._products import external_axes as external_axes
+from kerfpath.robots._products import external_ids as external_ids
 from kerfpath.robots._robot import Robot as Robot
 from kerfpath.robots._robot import robot as robot
 from kerfpath.robots._solutions import Solutions as Solutions

@@ -32,6 +32,8 @@ def read_description(
     *,
     base: str | None,
     tip: str | None,
+    mount: str | None,
+    part: str | None,
     packages: Mapping[str, str | Path] | None,
     meshes: bool,
 ) -> Description:
@@ -47,6 +49,8 @@ def read_description(
         path,
         base=base,
         tip=tip,
+        mount=mount,
+        part=part,
         packages=packages,
         meshes=meshes,
         snap=0.0 if snap is None else snap,
@@ -54,7 +58,8 @@ def read_description(
     if snap is not None or len(found.joints) != 6 or in_closed_form(found.chain):
         return found
     meant = {
-        snap: read_urdf(path, base=base, tip=tip, meshes=False, snap=snap).chain for snap in SNAPS
+        snap: read_urdf(path, base=base, tip=tip, mount=mount, meshes=False, snap=snap).chain
+        for snap in SNAPS
     }
     whole = meant[SNAPS[-1]]
     if not in_closed_form(whole):

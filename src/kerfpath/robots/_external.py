@@ -51,6 +51,8 @@ class ExternalAxis:
         Where the axis of a rotary one passes, in the robot base.
     step : float m or rad, optional
         Largest step of its samples where the exact search takes it on a grid.
+    joint : str
+        The joint of the robot's description that it is; "" where it comes from none.
 
     Raises
     ------
@@ -64,6 +66,7 @@ class ExternalAxis:
     axis: Array
     point: Array = field(default_factory=lambda: np.zeros(3))
     step: float | None = None
+    joint: str = ""
 
     __repr__ = short_repr
 

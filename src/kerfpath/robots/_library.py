@@ -16,7 +16,7 @@ from kerfpath.errors import InputError
 from kerfpath.robots._coupling import Coupling
 from kerfpath.robots._manipulator import Manipulator
 
-__all__ = ["acceleration_ratios", "read_robot", "robot_ids"]
+__all__ = ["acceleration_ratios", "nearest", "read_robot", "robot_ids"]
 
 A = TypeVar("A", bound=Manipulator)
 
@@ -45,7 +45,7 @@ def read_robot(kind: type[A], name: str, acceleration_ratio: str | None = None) 
     if name not in robot_ids():
         raise InputError(
             f"robot {name!r} is not in the library of {len(robot_ids())}; "
-            f"{_nearest(name, robot_ids())}; 'kerfpath robots' lists all"
+            f"{nearest(name, robot_ids())}; 'kerfpath robots' lists all"
         )
     data = tomllib.loads((_HERE / "library" / f"{name}.toml").read_text(encoding="utf-8"))
     joints = data["joints"]
@@ -101,6 +101,7 @@ def _radians(values: list[float] | None) -> Array | None:
     return None if values is None else np.radians(values)
 
 
-def _nearest(name: str, known: tuple[str, ...]) -> str:
+def nearest(name: str, known: tuple[str, ...]) -> str:
+    """Say which of the names that are known are most like one."""
     near = get_close_matches(name, known, n=3, cutoff=0.4)
     return f"nearest: {', '.join(near)}" if near else "nothing there is called like it"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Unpack
 
 import numpy as np
@@ -15,11 +16,20 @@ from kerfpath.dynamics import STANDARD_GRAVITY, ArmDynamics, Load
 from kerfpath.errors import InputError
 from kerfpath.limits import JerkLimit, TorqueLimit
 from kerfpath.robots._described import build_robot, read_description
-from kerfpath.robots._external import ExternalAxis, Travel, base_in_part
+from kerfpath.robots._external import (
+    ExternalAxis,
+    Travel,
+    base_in_part,
+    require_distinct_axes,
+)
+from kerfpath.robots._known_axis import Given, KnownAxis, described_axes, require_known
 from kerfpath.robots._library import read_robot
 from kerfpath.robots._manipulator import Manipulator
+from kerfpath.robots._products import ExternalProduct
 
 __all__ = ["Robot", "robot"]
+
+NOTHING_GIVEN: Mapping[str, Given] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -90,6 +100,9 @@ class Robot(Manipulator):
         *,
         base: str | None = None,
         tip: str | None = None,
+        mount: str | None = None,
+        part: str | None = None,
+        externals: Mapping[str, Given] | None = NOTHING_GIVEN,
         packages: Mapping[str, str | Path] | None = None,
         meshes: bool = True,
         snap: float | None = None,
@@ -104,9 +117,13 @@ class Robot(Manipulator):
 
         Parameters
         ----------
-        path, base, tip, packages, meshes, snap
-            As in `kerfpath.urdf.read_urdf`. Poses of the robot are of link `tip` in link `base`.
-            Without snap, an arm that has a family by its angles rounded is refused; 0 keeps it.
+        path, base, tip, mount, part, packages, meshes, snap
+            As in `kerfpath.urdf.read_urdf`. Poses of the robot are of link `tip` in link `base`,
+            with all external axes at zero, those before `mount` and under `part`. Without snap, an
+            arm that has a family by its angles rounded is refused; 0 keeps it.
+        externals : mapping of joint to Given
+            Of external axes: lower, upper, velocity, acceleration (m, rad, s), endless, instead of
+            what is written there, name instead of the joint's, and step. None: the arm alone.
         manufacturer, axis_3, axis_3_limits : str, str, (2,) rad
             Whose controller moves it; what its axis 3 measures and, if "horizontal", its limits as
             shown there; default: as a robot of the library with the same lengths has it.
@@ -119,15 +136,28 @@ class Robot(Manipulator):
         InputError
             A bad description; a chain of no family; limits that are missing or zero, and not given.
         """
-        return build_robot(
+        description = read_description(
+            path,
+            snap,
+            base=base,
+            tip=tip,
+            mount=mount,
+            part=part,
+            packages=packages,
+            meshes=meshes,
+        )
+        arm = build_robot(
             cls,
-            read_description(path, snap, base=base, tip=tip, packages=packages, meshes=meshes),
+            description,
             as_written=snap == 0,
             manufacturer=manufacturer,
             axis_3=axis_3,
             axis_3_limits=axis_3_limits,
             **limits,
         )
+        if externals is None:
+            return arm
+        return arm._with_known(described_axes(description), externals, f"{description.path}")
 
     def with_limits(
         self,
@@ -257,6 +287,42 @@ class Robot(Manipulator):
             couplings=tuple(replace(c, row=np.append(c.row, 0.0)) for c in self.couplings),
         )
 
+    def with_product(
+        self, product: ExternalProduct, place: ArrayLike, given: Mapping[str, Given] = NOTHING_GIVEN
+    ) -> Robot:
+        """Return this robot with all axes of a rail or positioner of the library.
+
+        Parameters
+        ----------
+        product : ExternalProduct
+            As `kerfpath.external` has it.
+        place : (4, 4) m
+            Where it stands in the robot base, with all external axes at zero.
+        given : mapping of axis to Given
+            What the library does not know, or knows otherwise: lower, upper, velocity, acceleration
+            (m, rad, s), endless; name, step.
+
+        Raises
+        ------
+        InputError
+            A limit that is neither known nor given; an axis that it does not have; as
+            `with_external`.
+        """
+        placed = [known.placed(np.asarray(place)) for known in product.axes]
+        return self._with_known(placed, given, product.id)
+
+    def _with_known(
+        self, known: Sequence[KnownAxis], given: Mapping[str, Given], what: str
+    ) -> Robot:
+        """Return this robot with external axes of which something is known, and more is given."""
+        require_known(given, known, what)
+        more = [each.completed(**given.get(each.axis.name, {})) for each in known]
+        require_distinct_axes(self.id, [*self.externals, *(axis for axis, _ in more)])
+        robot = self
+        for axis, travel in more:
+            robot = robot.with_external(axis, **travel)
+        return robot
+
     def alone(self) -> Robot:
         """Return the arm without its external axes, standing where it does at zero."""
         if not self.externals:
@@ -271,6 +337,7 @@ class Robot(Manipulator):
             acceleration=_first(self.acceleration, n),
             endless=self.endless[:n],
             couplings=tuple(replace(c, row=c.row[:n]) for c in self.couplings),
+            bodies=tuple(replace(body, on=None) for body in self.bodies),
         )
 
     def held(self, x: ArrayLike) -> Robot:

@@ -5,6 +5,7 @@ this package lies below `robots` and imports nothing of it.
 """
 
 from kerfpath.urdf._bodies import LinkBody as LinkBody
+from kerfpath.urdf._carriers import ExternalJoint as ExternalJoint
 from kerfpath.urdf._chain import KinematicChain as KinematicChain
 from kerfpath.urdf._chain import turns as turns
 from kerfpath.urdf._description import Description as Description

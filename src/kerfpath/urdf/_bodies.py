@@ -12,6 +12,7 @@ import numpy as np
 from kerfpath._arrays import Array, freeze
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
+from kerfpath.urdf._carriers import Place
 from kerfpath.urdf._xml import Tree, child, numbers, pose_of
 
 __all__ = ["LinkBody", "bodies_of"]
@@ -21,20 +22,24 @@ SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radiu
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinkBody:
-    """A collision body of a link, rigid on one joint of the chain.
+    """A collision body of a link, rigid on one joint of the arm, or on what carries arm or part.
 
     Parameters
     ----------
     link : str
     joint : int
-        Number of joints of the chain that move it: 0 for the base.
+        Number of joints of the arm that move it: 0 for what the arm stands on.
     pose : (4, 4)
-        In the (turned) frame of that joint, m; in the base frame for joint 0.
+        In the (turned) frame of that joint, m; for joint 0 in the base frame, with all external
+        axes at zero.
     kind : {"mesh", "box", "cylinder", "sphere"}
     size : (k,) m
         Edges of a box; radius and length of a cylinder; radius of a sphere; scale (3,) of a mesh.
     path : Path or None
         File of the mesh.
+    on : str or None
+        The external joint that carries it, "" the ground; None: what the arm stands on, or a link
+        of the arm.
     """
 
     link: str
@@ -43,13 +48,12 @@ class LinkBody:
     kind: str
     size: Array
     path: Path | None = None
+    on: str | None = None
 
     __repr__ = short_repr
 
 
-def bodies_of(
-    tree: Tree, link: str, joint: int, T_joint_link: Array, packages: Mapping[str, Path]
-) -> list[LinkBody]:
+def bodies_of(tree: Tree, link: str, place: Place, packages: Mapping[str, Path]) -> list[LinkBody]:
     """Return the collision bodies of one link."""
     found = []
     for collision in tree.links[link].findall("collision"):
@@ -64,8 +68,9 @@ def bodies_of(
         found.append(
             LinkBody(
                 link=link,
-                joint=joint,
-                pose=freeze(T_joint_link @ pose_of(collision, where)),
+                joint=place.joint,
+                on=place.on,
+                pose=freeze(place.pose @ pose_of(collision, where)),
                 kind=shape.tag,
                 size=freeze(_size(shape, where)),
                 path=path,

@@ -8,10 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from kerfpath._arrays import Array, freeze
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 from kerfpath.urdf._bodies import LinkBody, bodies_of
+from kerfpath.urdf._carriers import (
+    ExternalJoint,
+    Place,
+    carriers_before,
+    external_joints,
+    places,
+    under_part,
+)
 from kerfpath.urdf._chain import KinematicChain
 from kerfpath.urdf._inertia import ChainInertia, inertia_of
 from kerfpath.urdf._xml import Joint, Tree, read_tree
@@ -24,7 +31,7 @@ SAME_LINE = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Description:
-    """The chain from `base` to `tip` as a description has it.
+    """The arm between `base` and `tip` as a description has it, and what carries it and the part.
 
     Parameters
     ----------
@@ -34,14 +41,17 @@ class Description:
     base, tip : str
         Links.
     joints : tuple of Joint
-        The joints that move, in order, as they are written.
+        The joints of the arm that move, in order, as they are written.
     chain : KinematicChain
-        Their frames, fixed joints merged.
+        Their frames, fixed joints merged, all external joints at zero.
+    externals : tuple of ExternalJoint
+        The joints that carry the arm, then those that carry the part, each carried by those of its
+        side before it.
     bodies : tuple of LinkBody
-        Collision bodies of every link that the chain carries.
+        Collision bodies of every link on the ground, on external joints and on the arm.
     left_out : tuple of str
-        Links on moving joints outside the chain: where they are is not known, and no body of
-        theirs is in `bodies`.
+        Links on other moving joints: where they are is not known, and no body of theirs is in
+        `bodies`.
     inertia : ChainInertia or None
         What the joints carry; None where it is not known.
     inertia_missing : str
@@ -54,6 +64,7 @@ class Description:
     tip: str
     joints: tuple[Joint, ...]
     chain: KinematicChain
+    externals: tuple[ExternalJoint, ...]
     bodies: tuple[LinkBody, ...]
     left_out: tuple[str, ...]
     inertia: ChainInertia | None = None
@@ -67,17 +78,27 @@ def read_urdf(
     *,
     base: str | None = None,
     tip: str | None = None,
+    mount: str | None = None,
+    part: str | None = None,
     packages: Mapping[str, str | Path] | None = None,
     meshes: bool = True,
     snap: float = 0.0,
 ) -> Description:
     """Read the chain from link `base` (default: the root) to `tip` (default: the only leaf).
 
+    Joints of it that come before the arm carry the arm: external axes, as those between what the
+    base is fixed to and the link `part`, which carry the part.
+
     Parameters
     ----------
     path : path
         A URDF file.
     base, tip : str, optional
+    mount : str, optional
+        The link that the arm stands on: joints between base and it are external. Default: below
+        the last joint that slides, if at least six joints follow it, else the base.
+    part : str, optional
+        The link that carries the part; default: the part stands still.
     packages : mapping, optional
         Folder of each package that mesh names begin with; one that is not named is looked for in
         the folders above the file.
@@ -90,35 +111,41 @@ def read_urdf(
     Raises
     ------
     InputError
-        Not a description, no such link, no chain from base to tip; in the chain a joint that
-        slides, floats or mimics, or two neighbours about the same line; a missing mesh.
+        Not a description, no such link, no chain from base to tip; in the arm a joint that slides,
+        floats or mimics, or two neighbours about the same line; an external joint that floats or
+        mimics; a part that no external joint moves; a missing mesh.
     """
     tree = read_tree(Path(path), snap)
     base, tip = _ends(tree, base, tip)
     written = _between(tree, base, tip)
-    moving = [joint for joint in written if joint.kind != "fixed"]
+    before = carriers_before(tree, written, mount)
+    driven = [joint for joint in written if joint.kind != "fixed"]
+    moving = driven[before:]
     for joint in moving:
         _require_revolute(tree, joint)
     if not moving:
-        raise InputError(f"{tree.path}: no joint moves between {base!r} and {tip!r}")
+        raise InputError(f"{tree.path}: no joint moves between {mount or base!r} and {tip!r}")
+    externals = external_joints(
+        tree, base, written[: written.index(moving[0])], under_part(tree, base, part, written)
+    )
     origins, T = [], np.eye(4)
     for joint in written:
         T = T @ joint.origin
-        if joint.kind != "fixed":
+        if joint in moving:
             origins.append(T)
             T = np.eye(4)
     chain = KinematicChain(
         origins=np.array(origins), axes=np.array([j.axis for j in moving]), end=T
     )
     _require_lengths(tree, chain, moving)
-    carried = _carrier_joints(tree, base, written)
+    stand = places(tree, base, written, externals)
     folders = {name: Path(folder) for name, folder in (packages or {}).items()}
     bodies = (
-        [b for link, (i, T) in carried.items() for b in bodies_of(tree, link, i, T, folders)]
+        [b for link, place in stand.items() for b in bodies_of(tree, link, place, folders)]
         if meshes
         else []
     )
-    inertia, inertia_missing = _inertia(tree, carried, moving)
+    inertia, inertia_missing = _inertia(tree, stand, moving)
     return Description(
         path=tree.path,
         name=tree.name,
@@ -126,19 +153,20 @@ def read_urdf(
         tip=tip,
         joints=tuple(moving),
         chain=chain,
+        externals=externals,
         bodies=tuple(bodies),
-        left_out=tuple(link for link in tree.links if link not in carried),
+        left_out=tuple(link for link in tree.links if link not in stand),
         inertia=inertia,
         inertia_missing=inertia_missing,
     )
 
 
 def _inertia(
-    tree: Tree, carried: dict[str, tuple[int, Array]], joints: list[Joint]
+    tree: Tree, stand: dict[str, Place], joints: list[Joint]
 ) -> tuple[ChainInertia | None, str]:
     """Return what the joints carry, or why that is not known: only torques need it."""
     try:
-        return inertia_of(tree, carried, joints), ""
+        return inertia_of(tree, stand, joints), ""
     except InputError as fault:
         return None, str(fault)
 
@@ -204,36 +232,3 @@ def _require_lengths(tree: Tree, chain: KinematicChain, joints: list[Joint]) -> 
                 f"{tree.path}: joints {joints[i - 1].name!r} and {joints[i].name!r} turn about "
                 f"the same line: link {joints[i].parent!r} between them has no length"
             )
-
-
-def _carrier_joints(tree: Tree, base: str, written: list[Joint]) -> dict[str, tuple[int, Array]]:
-    """Return each link that is rigid on a joint of the chain: how many joints move it, and where.
-
-    The second is its pose (4, 4) in the frame of the last of these joints.
-    """
-    in_chain = {joint.name for joint in written}
-    below: dict[str, list[Joint]] = {}
-    for joint in tree.joints:
-        below.setdefault(joint.parent, []).append(joint)
-    found = {base: (0, freeze(np.eye(4)))}
-    link = base
-    while link in tree.parent and tree.parent[link].kind == "fixed":
-        joint = tree.parent[link]
-        above = found[link][1] @ np.linalg.inv(joint.origin)
-        link = joint.parent
-        found[link] = 0, freeze(above)
-    open_ = list(found)
-    while open_:
-        link = open_.pop()
-        number, T = found[link]
-        for joint in below.get(link, []):
-            if joint.child in found:
-                continue
-            if joint.kind == "fixed":
-                found[joint.child] = number, freeze(T @ joint.origin)
-            elif joint.name in in_chain:
-                found[joint.child] = number + 1, freeze(np.eye(4))
-            else:
-                continue
-            open_.append(joint.child)
-    return found

@@ -10,6 +10,7 @@ import numpy as np
 from kerfpath._arrays import Array, floats, freeze, positive
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
+from kerfpath.urdf._carriers import Place
 from kerfpath.urdf._xml import Joint, Tree, child, numbers, pose_of
 
 __all__ = ["ChainInertia", "inertia_of", "joined", "require_tensor"]
@@ -51,18 +52,16 @@ class ChainInertia:
             require_tensor((tensor + tensor.T) / 2, f"body {i + 1}")
 
 
-def inertia_of(
-    tree: Tree, carried: Mapping[str, tuple[int, Array]], joints: list[Joint]
-) -> ChainInertia:
-    """Return the rigid bodies on the joints of the chain, links that are fixed together as one.
+def inertia_of(tree: Tree, stand: Mapping[str, Place], joints: list[Joint]) -> ChainInertia:
+    """Return the rigid bodies on the joints of the arm, links that are fixed together as one.
 
     Parameters
     ----------
     tree : Tree
-    carried : mapping of str to (int, (4, 4))
-        Number of joints that move each link, and its pose in the frame of the last of them, m.
+    stand : mapping of str to Place
+        What moves each link, and where it is.
     joints : list of Joint
-        The joints of the chain.
+        The joints of the arm.
 
     Raises
     ------
@@ -72,13 +71,13 @@ def inertia_of(
         by a joint outside it. The message names the link.
     """
     found: list[list[tuple[float, Array, Array]]] = [[] for _ in joints]
-    for link, (number, T) in carried.items():
+    for link, (number, _, T) in stand.items():
         body = _body(tree, link) if number else None
         if body is not None:
             mass, centre, tensor = body
             R = T[:3, :3]
             found[number - 1].append((mass, T[:3, 3] + R @ centre, R @ tensor @ R.T))
-    for link in _hanging(tree, carried):
+    for link in _hanging(tree, stand):
         raise InputError(
             f"{tree.path}: link {link!r} hangs on the chain by a joint outside it, so that where "
             f"its mass is is not known; make joint {tree.parent[link].name!r} fixed"
@@ -142,8 +141,8 @@ def _body(tree: Tree, link: str) -> tuple[float, Array, Array] | None:
     return mass, pose[:3, 3], R @ tensor @ R.T
 
 
-def _hanging(tree: Tree, carried: Mapping[str, tuple[int, Array]]) -> Iterator[str]:
+def _hanging(tree: Tree, stand: Mapping[str, Place]) -> Iterator[str]:
     """Yield the links that moving joints outside the chain hang on links that it moves."""
     for link, joint in tree.parent.items():
-        if link not in carried and joint.parent in carried and carried[joint.parent][0]:
+        if link not in stand and joint.parent in stand and stand[joint.parent].joint:
             yield link

@@ -1,0 +1,160 @@
+"""An external axis of which something is known: by a description, or by the library."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import TypedDict
+
+import numpy as np
+
+from kerfpath._arrays import Array, as_pose
+from kerfpath._repr import short_repr
+from kerfpath.errors import InputError
+from kerfpath.robots._external import ExternalAxis, Travel
+from kerfpath.urdf import Description
+
+__all__ = ["Given", "KnownAxis", "described_axes", "require_known"]
+
+_LIMITS = {"lower": "", "upper": "", "velocity": "/s", "acceleration": "/s^2"}
+"""What bounds an axis, and what follows the unit of its values there."""
+
+
+class Given(TypedDict, total=False):
+    """What is said of an external axis in place of what is known, or beside it; as in `Travel`."""
+
+    name: str
+    lower: float
+    upper: float
+    velocity: float
+    acceleration: float
+    endless: bool
+    step: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class KnownAxis:
+    """An external axis with those of its limits that are known.
+
+    Parameters
+    ----------
+    axis : ExternalAxis
+    lower, upper : float m or rad, or None
+        Its range; None where it is not known.
+    velocity : float m/s or rad/s, or None
+    acceleration : float m/s^2 or rad/s^2, or None
+    endless : bool
+        Whether it turns without end; then its range does not apply.
+    source : str
+        Who says so, for messages.
+    """
+
+    axis: ExternalAxis
+    lower: float | None = None
+    upper: float | None = None
+    velocity: float | None = None
+    acceleration: float | None = None
+    endless: bool = False
+    source: str
+
+    __repr__ = short_repr
+
+    def placed(self, T: Array) -> KnownAxis:
+        """Return it where what it belongs to stands at T (4, 4), m."""
+        T = as_pose(T, "place")
+        axis = replace(
+            self.axis,
+            axis=T[:3, :3] @ self.axis.axis,
+            point=T[:3, :3] @ self.axis.point + T[:3, 3],
+        )
+        return replace(self, axis=axis)
+
+    def completed(
+        self,
+        *,
+        name: str | None = None,
+        lower: float | None = None,
+        upper: float | None = None,
+        velocity: float | None = None,
+        acceleration: float | None = None,
+        endless: bool | None = None,
+        step: float | None = None,
+    ) -> tuple[ExternalAxis, Travel]:
+        """Return the axis and its travel: what is given, else what is known.
+
+        Raises
+        ------
+        InputError
+            A limit that is neither, or by what is known does not let it move; a range of an axis
+            that turns without end.
+        """
+        axis = replace(self.axis, name=name or self.axis.name, step=step)
+        given = {"lower": lower, "upper": upper, "velocity": velocity, "acceleration": acceleration}
+        free = self.endless if endless is None else endless
+        if free:
+            for key in ("lower", "upper"):
+                if given[key] is not None:
+                    raise InputError(
+                        f"{axis.name}: it turns without end, got {key}=; give endless=False, too"
+                    )
+            given |= {"lower": -np.pi, "upper": np.pi}
+        values: dict[str, float] = {}
+        for key, per in _LIMITS.items():
+            value, known = given[key], getattr(self, key)
+            if value is None and known is None:
+                what = f"its {key} is not known from {self.source}"
+                raise InputError(f"{axis.name}: {what}; give {key}= ({axis.unit}{per})")
+            if value is None and per and not known > 0:
+                what = f"its {key} is {known:g} {axis.unit}{per} in {self.source}"
+                raise InputError(
+                    f"{axis.name}: {what}, so that it cannot move; give {key}= ({axis.unit}{per})"
+                )
+            values[key] = known if value is None else value
+        if values["lower"] == values["upper"] and (
+            given["lower"] is None or given["upper"] is None
+        ):
+            raise InputError(
+                f"{axis.name}: it may only be at {values['lower']:g} {axis.unit} in {self.source}, "
+                f"so that it cannot move; give lower= and upper= ({axis.unit})"
+            )
+        return axis, {
+            "lower": values["lower"],
+            "upper": values["upper"],
+            "velocity": values["velocity"],
+            "acceleration": values["acceleration"],
+            "endless": free,
+        }
+
+
+def described_axes(description: Description) -> tuple[KnownAxis, ...]:
+    """Return the external axes of a description, in its base, with the limits written there."""
+    return tuple(
+        KnownAxis(
+            axis=ExternalAxis(
+                name=joint.name,
+                kind="linear" if joint.kind == "prismatic" else "rotary",
+                carries=external.carries,
+                axis=external.pose[:3, :3] @ joint.axis,
+                point=external.pose[:3, 3],
+                joint=joint.name,
+            ),
+            lower=joint.lower,
+            upper=joint.upper,
+            velocity=joint.velocity,
+            acceleration=joint.acceleration,
+            endless=joint.kind == "continuous",
+            source=description.path.name,
+        )
+        for external in description.externals
+        for joint in [external.joint]
+    )
+
+
+def require_known(given: Mapping[str, Given], known: Iterable[KnownAxis], what: str) -> None:
+    """Raise InputError where something is given of an axis that is not there."""
+    names = [each.axis.name for each in known]
+    for name in given:
+        if name not in names:
+            raise InputError(
+                f"{what}: it has no external axis {name!r}; there are {', '.join(names) or 'none'}"
+            )

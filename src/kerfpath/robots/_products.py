@@ -1,0 +1,125 @@
+"""The rails and positioners that kerfpath knows, one TOML file each, with their sources."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from kerfpath._repr import short_repr
+from kerfpath.errors import InputError
+from kerfpath.robots._external import ExternalAxis
+from kerfpath.robots._known_axis import KnownAxis
+from kerfpath.robots._library import nearest
+
+__all__ = ["ExternalProduct", "external", "external_axes", "external_ids"]
+
+_HERE = files("kerfpath.robots") / "externals"
+_KEYS = {
+    "linear": ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2"),
+    "rotary": ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ExternalProduct:
+    """A rail or a positioner of the library.
+
+    Parameters
+    ----------
+    id, manufacturer, model : str
+    payload : float kg
+    axes : tuple of KnownAxis
+        In its own frame, z up: a rail runs along x; of a positioner the origin is on its floor,
+        and its tilt turns about x. Each carries the next. What no source says is None.
+    notes : tuple of str
+    sources : mapping of str to str
+    """
+
+    id: str
+    manufacturer: str
+    model: str
+    payload: float
+    axes: tuple[KnownAxis, ...]
+    notes: tuple[str, ...]
+    sources: Mapping[str, str]
+
+    __repr__ = short_repr
+
+
+@cache
+def external_ids() -> tuple[str, ...]:
+    """Return the ids of all rails and positioners of the library, sorted."""
+    names = (f.name for f in _HERE.iterdir())
+    return tuple(sorted(n.removesuffix(".toml") for n in names if n.endswith(".toml")))
+
+
+def external(name: str) -> ExternalProduct:
+    """Return a rail or positioner of the library by its id.
+
+    Parameters
+    ----------
+    name : str
+        One of `external_ids()`.
+
+    Raises
+    ------
+    InputError
+        An unknown one; the message names the nearest.
+    """
+    if name not in external_ids():
+        raise InputError(
+            f"rail or positioner {name!r} is not in the library of {len(external_ids())}; "
+            f"{nearest(name, external_ids())}; 'kerfpath robots' lists all"
+        )
+    data = tomllib.loads((_HERE / f"{name}.toml").read_text(encoding="utf-8"))
+    axes = []
+    for said in data["axis"]:
+        factor = 1e-3 if said["kind"] == "linear" else np.pi / 180
+        lower, upper, velocity, acceleration = (
+            None if key not in said else factor * said[key] for key in _KEYS[said["kind"]]
+        )
+        axes.append(
+            KnownAxis(
+                axis=ExternalAxis(
+                    name=said["name"],
+                    kind=said["kind"],
+                    carries=said["carries"],
+                    axis=np.array(said["axis"], dtype=float),
+                    point=np.array(said.get("point_mm", (0, 0, 0)), dtype=float) / 1000,
+                ),
+                lower=lower,
+                upper=upper,
+                velocity=velocity,
+                acceleration=acceleration,
+                endless=said.get("endless", False),
+                source=f"the library ({name})",
+            )
+        )
+    return ExternalProduct(
+        id=data["id"],
+        manufacturer=data["manufacturer"],
+        model=data["model"],
+        payload=data["payload_kg"],
+        axes=tuple(axes),
+        notes=tuple(data.get("notes", ())),
+        sources=data["source"],
+    )
+
+
+@cache
+def external_axes() -> dict[str, KnownAxis]:
+    """Return every axis of the library by what a job calls it: "kuka_dkp400.tilt".
+
+    Of a product with one axis that is its id alone.
+    """
+    products = [external(name) for name in external_ids()]
+    return {
+        product.id + (f".{known.axis.name}" if len(product.axes) > 1 else ""): known
+        for product in products
+        for known in product.axes
+    }

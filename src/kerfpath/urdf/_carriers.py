@@ -1,0 +1,188 @@
+"""The joints of a description that carry the arm or the part, and where every link stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from kerfpath._arrays import Array, freeze
+from kerfpath._repr import short_repr
+from kerfpath.errors import InputError
+from kerfpath.urdf._xml import Joint, Tree
+
+__all__ = ["ExternalJoint", "Place", "carriers_before", "external_joints", "places", "under_part"]
+
+FEWEST = 6
+"""Joints of the smallest arm that is read from a description."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ExternalJoint:
+    """A joint that carries the arm or the part.
+
+    Parameters
+    ----------
+    joint : Joint
+        As it is written.
+    pose : (4, 4)
+        Of its frame in the base with all such joints at zero, m.
+    carries : {"robot", "part"}
+    """
+
+    joint: Joint
+    pose: Array
+    carries: Literal["robot", "part"]
+
+    __repr__ = short_repr
+
+
+class Place(NamedTuple):
+    """What moves a link, and where it is."""
+
+    joint: int
+    """Number of joints of the arm that move it: 0 for what the arm stands on."""
+    on: str | None
+    """The external joint that carries it, "" the ground; None: what the arm stands on, or a link
+    of it."""
+    pose: Array
+    """(4, 4) m: in the frame of the last joint of the arm that moves it, else in the base with all
+    external joints at zero."""
+
+
+def carriers_before(tree: Tree, written: Sequence[Joint], mount: str | None) -> int:
+    """Return how many of the moving joints of a chain carry the arm.
+
+    Those above link `mount`; without it all up to the last one that slides, if an arm follows.
+
+    Raises
+    ------
+    InputError
+        The link is not in the chain.
+    """
+    moving = [joint for joint in written if joint.kind != "fixed"]
+    if mount is None:
+        slides = [i for i, joint in enumerate(moving, 1) if joint.kind == "prismatic"]
+        return slides[-1] if slides and len(moving) - slides[-1] >= FEWEST else 0
+    links = [joint.parent for joint in written]
+    if mount not in links:
+        raise InputError(
+            f"{tree.path}: mount: expected a link between base and tip, got {mount!r}; there are "
+            f"{', '.join(links)}"
+        )
+    return sum(joint.kind != "fixed" for joint in written[: links.index(mount)])
+
+
+def under_part(tree: Tree, base: str, part: str | None, chain: Sequence[Joint]) -> list[Joint]:
+    """Return the joints from what the base stands on to the link that carries the part, in order.
+
+    Raises
+    ------
+    InputError
+        No such link; one that is part of the robot, stands still, or against which the base moves.
+    """
+    if part is None:
+        return []
+    if part not in tree.links:
+        raise InputError(
+            f"{tree.path}: part: there is no link {part!r}; there are "
+            f"{', '.join(list(tree.links)[:30])}"
+        )
+    ground = _fixed_above(tree, base)
+    joints: list[Joint] = []
+    link = part
+    while link not in ground and link in tree.parent:
+        joints.append(tree.parent[link])
+        link = joints[-1].parent
+    own = {joint.name for joint in chain if joint.kind != "fixed"}
+    for joint in joints:
+        if joint.name in own:
+            raise InputError(
+                f"{tree.path}: part: expected a link that the robot does not move, got {part!r}, "
+                f"which moves with {joint.name!r}; choose the link of the positioner"
+            )
+    if link not in ground:
+        raise InputError(
+            f"{tree.path}: part: link {part!r} does not hang on what base {base!r} is fixed to; "
+            "choose base= above both of them"
+        )
+    if all(joint.kind == "fixed" for joint in joints):
+        raise InputError(
+            f"{tree.path}: part: no joint moves {part!r}; leave it out where the part stands still"
+        )
+    return joints[::-1]
+
+
+def external_joints(
+    tree: Tree, base: str, before: Sequence[Joint], under: Sequence[Joint]
+) -> tuple[ExternalJoint, ...]:
+    """Return the moving joints of two branches: before the arm, and under the part.
+
+    Raises
+    ------
+    InputError
+        One that floats, is planar, or mimics another.
+    """
+    found = []
+    for joints, carries in ((before, "robot"), (under, "part")):
+        # The first link of a branch is the base or fixed to it.
+        T = _fixed_above(tree, base)[joints[0].parent] if joints else np.eye(4)
+        for joint in joints:
+            T = T @ joint.origin
+            if joint.kind == "fixed":
+                continue
+            if joint.kind not in ("prismatic", "revolute", "continuous") or joint.mimics:
+                how = f"mimics {joint.mimics!r}" if joint.mimics else f"is {joint.kind}"
+                raise InputError(
+                    f"{tree.path}: joint {joint.name!r} {how}; an external axis slides or turns on "
+                    "its own"
+                )
+            found.append(ExternalJoint(joint=joint, pose=freeze(T), carries=carries))  # type: ignore[arg-type]  # a literal
+    return tuple(found)
+
+
+def places(
+    tree: Tree, base: str, written: Sequence[Joint], externals: Sequence[ExternalJoint]
+) -> dict[str, Place]:
+    """Return every link whose place is known: on the ground, on external joints, on the arm."""
+    carried = {external.joint.name: external.carries for external in externals}
+    mounts = [name for name, carries in carried.items() if carries == "robot"]
+    in_chain = {joint.name for joint in written}
+    below: dict[str, list[Joint]] = {}
+    for joint in tree.joints:
+        below.setdefault(joint.parent, []).append(joint)
+    ground = "" if mounts else None
+    found = {link: Place(0, ground, T) for link, T in _fixed_above(tree, base).items()}
+    open_ = list(found)
+    while open_:
+        link = open_.pop()
+        number, on, T = found[link]
+        for joint in below.get(link, []):
+            if joint.child in found:
+                continue
+            if joint.kind == "fixed":
+                found[joint.child] = Place(number, on, freeze(T @ joint.origin))
+            elif joint.name in carried:
+                # What the last joint before the arm carries is what the arm stands on.
+                here = None if mounts and joint.name == mounts[-1] else joint.name
+                found[joint.child] = Place(0, here, freeze(T @ joint.origin))
+            elif joint.name in in_chain:
+                found[joint.child] = Place(number + 1, None, freeze(np.eye(4)))
+            else:
+                continue
+            open_.append(joint.child)
+    return found
+
+
+def _fixed_above(tree: Tree, base: str) -> dict[str, Array]:
+    """Return the base and the links above it that it is fixed to: their poses (4, 4) in it, m."""
+    found = {base: freeze(np.eye(4))}
+    link = base
+    while link in tree.parent and tree.parent[link].kind == "fixed":
+        joint = tree.parent[link]
+        above = found[link] @ np.linalg.inv(joint.origin)
+        link = joint.parent
+        found[link] = freeze(above)
+    return found
