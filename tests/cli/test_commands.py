@@ -422,6 +422,29 @@ def test_robots_lists_the_library_and_shows_sources():
     assert len(json.loads(run("robots", "--json").stdout)["robots"]) == 68
 
 
+def test_robots_lists_rails_and_positioners_too():
+    listed = run("robots").stdout
+    row = next(line for line in listed.splitlines() if line.startswith("kuka_dkp400.tilt"))
+    said = ["-90 to 90 deg", "94.5 deg/s", "give it"]
+    assert re.split(r"  +", row.strip())[1:] == ["KUKA DKP-400", "400", *said]
+    assert "4 rails and positioners" in listed
+    shown = run("robots", "kuka_dkp400").stdout
+    assert "payload 400 kg" in shown
+    assert "source of velocity: secondary: visose/Robots" in shown
+    tilt, table = json.loads(run("robots", "kuka_dkp400", "--json").stdout)["axes"]
+    assert (tilt["model"], tilt["upper_deg"], tilt["velocity_deg_s"]) == (
+        "kuka_dkp400.tilt",
+        90,
+        94.5,
+    )
+    assert tilt["acceleration_deg_s2"] is None
+    assert table["endless"]
+    assert table["point_mm"] == [0, 0, 510]
+    products = json.loads(run("robots", "--json").stdout)["externals"]
+    assert [product["id"] for product in products][1:3] == ["kuka_kl1000_2", "kuka_kl4000"]
+    assert products[1]["axes"][0]["velocity_mm_s"] == 1890
+
+
 def test_help_teaches():
     for command in ("demo", "plan", "speed", "post", "audit", "script", "contours", "robots"):
         result = run(command, "--help")

@@ -232,19 +232,23 @@ def contours(
 @app.command()
 def robots(
     name: Annotated[
-        str | None, typer.Argument(help="Id of one robot; default: all robots.")
+        str | None, typer.Argument(help="Id of one robot, rail or positioner; default: all.")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """List the robots of the library, or show one with its limits and their sources.
+    """List the library, or show a robot, rail or positioner of it with limits and their sources.
 
-    A job takes a robot by model = "ID" in its table [robot].
+    A job takes a robot by model = "ID" in its table [robot], an axis of a rail or positioner by
+    model = "ID" in a table [[robot.external]].
 
     Example: kerfpath robots abb_irb4600_60_205
     """
-    from kerfpath.cli._robots import list_robots, show_robot
+    from kerfpath.cli._robots import list_robots, show_external, show_robot
+    from kerfpath.robots import external_ids
 
     if name is None:
         list_robots(as_json=as_json)
+    elif name in external_ids():
+        show_external(name, as_json=as_json)
     else:
         show_robot(name, as_json=as_json)

@@ -1,4 +1,4 @@
-"""`kerfpath robots`: print the library as a table, or one robot with its sources."""
+"""`kerfpath robots`: print the library as tables, or one robot or product with its sources."""
 
 from __future__ import annotations
 
@@ -7,14 +7,21 @@ from rich.markup import escape
 
 from kerfpath._arrays import Array
 from kerfpath.cli._show import out, print_json, table
-from kerfpath.robots import robot, robot_ids
+from kerfpath.robots import ExternalProduct, KnownAxis, external, external_ids, robot, robot_ids
 
-__all__ = ["list_robots", "show_robot"]
+__all__ = ["list_robots", "show_external", "show_robot"]
+
+UNITS = {"lower": "", "upper": "", "velocity": "/s", "acceleration": "/s^2"}
+"""Limits of external axes, and what follows mm or deg in their units."""
 
 
 def list_robots(*, as_json: bool) -> None:
-    """Print id, maker, model, payload and reach of every robot, and which limits are known."""
+    """Print id, maker, model, payload and reach of every robot, and which limits are known.
+
+    Then the axes of every rail and positioner, and their limits.
+    """
     known = [robot(name) for name in robot_ids()]
+    products = [external(name) for name in external_ids()]
     if as_json:
         print_json(
             {
@@ -29,7 +36,8 @@ def list_robots(*, as_json: bool) -> None:
                         "acceleration_known": r.acceleration is not None,
                     }
                     for r in known
-                ]
+                ],
+                "externals": [_entry(product) for product in products],
             }
         )
         return
@@ -50,6 +58,103 @@ def list_robots(*, as_json: bool) -> None:
         f"{len(known)} robots. Where it says 'name it' the maker publishes no accelerations: give "
         "acceleration_deg_s2 or acceleration_ratio in the job."
     )
+    heads = ["rail or positioner", "model", "payload kg", "range", "velocity", "acceleration"]
+    rows = [
+        [
+            axis,
+            escape(f"{product.manufacturer} {product.model}"),
+            f"{product.payload:g}",
+            _range(each),
+            *(_said(each, limit) for limit in ("velocity", "acceleration")),
+        ]
+        for product in products
+        for axis, each in zip(product.axis_ids, product.axes, strict=True)
+    ]
+    table(heads, rows, numbers=["payload kg"])
+    out.print(
+        f"{len(products)} rails and positioners, by their axes. Where it says 'give it' no source "
+        "is known, or it is chosen with the order: say it in the job."
+    )
+
+
+def show_external(name: str, *, as_json: bool) -> None:
+    """Print the axes, limits, notes and sources of one rail or positioner."""
+    product = external(name)
+    if as_json:
+        print_json(_entry(product))
+        return
+    out.print(f"[bold]{escape(product.manufacturer)} {escape(product.model)}[/] ({product.id})")
+    out.print(f"payload {product.payload:g} kg")
+    heads = ["axis", "carries", "range", "velocity", "acceleration", "direction", "through mm"]
+    rows = [
+        [
+            axis,
+            f"the {each.axis.carries}",
+            _range(each),
+            *(_said(each, limit) for limit in ("velocity", "acceleration")),
+            _numbers(each.axis.axis),
+            _numbers(1000 * each.axis.point) if each.axis.kind == "rotary" else "",
+        ]
+        for axis, each in zip(product.axis_ids, product.axes, strict=True)
+    ]
+    table(heads, rows)
+    for note in product.notes:
+        out.print(f"note: {escape(note)}")
+    for what, source in product.sources.items():
+        out.print(f"source of {what.replace('_', ' ')}: {escape(source)}")
+
+
+def _in_unit(each: KnownAxis, limit: str) -> tuple[float | None, str]:
+    """Return a limit in mm or deg, None where it is not known, and its unit."""
+    value: float | None = getattr(each, limit)
+    unit, factor = ("mm", 1e3) if each.axis.kind == "linear" else ("deg", 180 / np.pi)
+    # Data sheets are in these units; m, rad and back leave digits that nobody wrote.
+    return None if value is None else round(factor * value, 9), unit + UNITS[limit]
+
+
+def _said(each: KnownAxis, limit: str) -> str:
+    value, unit = _in_unit(each, limit)
+    return "give it" if value is None else f"{value:g} {unit}"
+
+
+def _range(each: KnownAxis) -> str:
+    if each.endless:
+        return "endless"
+    ends = [_said(each, limit) for limit in ("lower", "upper")]
+    return ends[0] if ends[0] == ends[1] else f"{ends[0].split()[0]} to {ends[1]}"
+
+
+def _numbers(values: Array) -> str:
+    return ", ".join(f"{value:g}" for value in values.round(9) + 0.0)
+
+
+def _entry(product: ExternalProduct) -> dict[str, object]:
+    """Return all that is known of a product."""
+    return {
+        "id": product.id,
+        "manufacturer": product.manufacturer,
+        "model": product.model,
+        "payload_kg": product.payload,
+        "axes": [
+            {
+                "model": name,
+                "name": each.axis.name,
+                "kind": each.axis.kind,
+                "carries": each.axis.carries,
+                "axis": each.axis.axis.tolist(),
+                "point_mm": (1000 * each.axis.point).round(9).tolist(),
+                "endless": each.endless,
+                **{
+                    _key(f"{limit} {unit}"): value
+                    for limit in UNITS
+                    for value, unit in [_in_unit(each, limit)]
+                },
+            }
+            for name, each in zip(product.axis_ids, product.axes, strict=True)
+        ],
+        "notes": list(product.notes),
+        "sources": dict(product.sources),
+    }
 
 
 def show_robot(name: str, *, as_json: bool) -> None:
@@ -82,10 +187,7 @@ def show_robot(name: str, *, as_json: bool) -> None:
                 "geometry_m": dict(r.geometry),
                 "sign": r.sign.tolist(),
                 "offset_deg": _degrees(r.offset),
-                **{
-                    k.replace(" ", "_").replace("/", "_").replace("^", ""): v
-                    for k, v in limits.items()
-                },
+                **{_key(k): v for k, v in limits.items()},
                 "axis_3": r.axis_3,
                 "couplings": couplings,
                 "endless": (np.flatnonzero(r.endless) + 1).tolist(),
@@ -122,6 +224,11 @@ def show_robot(name: str, *, as_json: bool) -> None:
         out.print(f"note: {escape(note)}")
     for what, source in r.sources.items():
         out.print(f"source of {what.replace('_', ' ')}: {escape(source)}")
+
+
+def _key(said: str) -> str:
+    """Return a limit and its unit as a key: "velocity_deg_s"."""
+    return said.replace(" ", "_").replace("/", "_").replace("^", "")
 
 
 def _degrees(values: Array | None) -> list[float] | None:

@@ -50,6 +50,13 @@ class ExternalProduct:
 
     __repr__ = short_repr
 
+    @property
+    def axis_ids(self) -> tuple[str, ...]:
+        """What a job calls its axes: "kuka_dkp400.tilt"; the only one of a product by its id."""
+        if len(self.axes) == 1:
+            return (self.id,)
+        return tuple(f"{self.id}.{known.axis.name}" for known in self.axes)
+
 
 @cache
 def external_ids() -> tuple[str, ...]:
@@ -113,13 +120,10 @@ def external(name: str) -> ExternalProduct:
 
 @cache
 def external_axes() -> dict[str, KnownAxis]:
-    """Return every axis of the library by what a job calls it: "kuka_dkp400.tilt".
-
-    Of a product with one axis that is its id alone.
-    """
+    """Return every axis of the library by what a job calls it."""
     products = [external(name) for name in external_ids()]
     return {
-        product.id + (f".{known.axis.name}" if len(product.axes) > 1 else ""): known
+        name: known
         for product in products
-        for known in product.axes
+        for name, known in zip(product.axis_ids, product.axes, strict=True)
     }

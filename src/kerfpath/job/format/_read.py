@@ -245,7 +245,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         contours=tuple(task_of(table) for table in file.contour),
         options=options,
         cell=file.cell,
-        home=home_of(file.sequence, file.robot.external),
+        home=home_of(file.sequence, file.robot.external, robot),
         sequence=file.sequence,
         layout=file.layout,
         tolerances=tolerances_of(file.audit),
@@ -263,11 +263,23 @@ def places_of(job: Job, nodes: Contour) -> Array | None:
     return np.broadcast_to(places, (len(nodes), *places.shape))
 
 
-def home_of(sequence: SequenceTable | None, external: Sequence[ExternalTable]) -> Array | None:
-    """Return the joints (n,) at home, external axes last; None where a job has no home."""
+def home_of(
+    sequence: SequenceTable | None, external: Sequence[ExternalTable], robot: Robot
+) -> Array | None:
+    """Return the joints (n,) at home, external axes last; None where a job has no home.
+
+    An axis of which no table says where that is stands at zero, or nearest to it.
+    """
     if sequence is None or sequence.home_deg is None:
         return None
-    return freeze(np.append(np.radians(sequence.home_deg), [table.home for table in external]))
+    said = {table.called: table.home for table in external if table.home is not None}
+    limits = robot.joint_limits()
+    nearest = np.clip(0.0, limits.lower, limits.upper)
+    more = [
+        said.get(axis.name, nearest[i])
+        for i, axis in enumerate(robot.externals, robot.family.joints)
+    ]
+    return freeze(np.append(np.radians(sequence.home_deg), more))
 
 
 def _loaded(path: Path, file: JobFile, robot: Robot) -> Robot:

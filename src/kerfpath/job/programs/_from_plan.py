@@ -177,7 +177,7 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
         contours=(),
         options=replace(first.settings, refine_parts=1, interruptions="none", least_piece=None),
         cell=None,
-        home=home_of(sequence, external),
+        home=home_of(sequence, external, first.robot),
         sequence=sequence,
         layout=LayoutTable(),
         tolerances=table_of(file, "audit", AuditTable, tolerances_of),

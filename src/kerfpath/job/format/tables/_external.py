@@ -1,17 +1,38 @@
-"""The [[robot.external]] tables: rails, tables and tilts that move with the robot."""
+"""The [[robot.external]] tables: rails, tables and tilts that move with the robot.
+
+A table says all of its axis, or what is not known of one of the library or of a description.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
 
-from kerfpath.job.format._values import Number, Positive, Three, fault, key
+from kerfpath._arrays import Array
+from kerfpath.errors import InputError
+from kerfpath.job.format._poses import pose
+from kerfpath.job.format._values import (
+    FAULT,
+    Number,
+    Positive,
+    Text,
+    Three,
+    fault,
+    fault_in_words,
+    key,
+    one_of,
+)
+from kerfpath.job.format.tables._in_keys import in_keys
 from kerfpath.job.format.tables._table import Table, given
-from kerfpath.robots import ExternalAxis, Robot
+from kerfpath.robots import ExternalAxis, KnownAxis, Travel, external_axes
 
-__all__ = ["External", "ExternalTable"]
+__all__ = ["External", "ExternalTable", "axes_of", "require_in_order"]
 
 KEYS = {
     "linear": ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "step_mm", "home_mm"),
@@ -20,6 +41,11 @@ KEYS = {
     ),
 }  # fmt: skip
 """Keys of each kind: range, speed, acceleration, step of a grid, home."""
+WORDS = ("lower=", "upper=", "velocity=", "acceleration=")
+"""What messages call the first of them."""
+NAME = r"^[A-Za-z][A-Za-z0-9_]{0,15}$"
+WHOLE = ("kind", "carries", "axis", "point_mm", "xyz_mm", "rpy_deg")
+"""Keys that say what an axis is and where; a joint of the description has all of them."""
 EXAMPLES = {
     "lower_mm": "-2000", "upper_mm": "2000", "velocity_mm_s": "1000", "acceleration_mm_s2": "1500",
     "lower_deg": "-180", "upper_deg": "180", "velocity_deg_s": "120", "acceleration_deg_s2": "200",
@@ -29,22 +55,38 @@ EXAMPLES = {
 class ExternalTable(Table):
     """[[robot.external]]: one external axis; of those of one side the first carries the next."""
 
+    model: Annotated[
+        str | None,
+        one_of("an axis of the library", external_axes, "; 'kerfpath robots' lists all"),
+        key("an axis of the library", '"kuka_dkp400.tilt"'),
+    ] = None
+    joint: Annotated[Text | None, key("a joint of the description", '"rail_joint"')] = None
     name: Annotated[
-        str,
+        str | None,
         key(
             "a name of letters, digits and _, a letter first, at most 16 characters",
             '"rail"',
-            pattern=r"^[A-Za-z][A-Za-z0-9_]{0,15}$",
+            pattern=NAME,
         ),
-    ]
-    kind: Annotated[Literal["linear", "rotary"], key("a kind of axis", '"linear"')]
-    carries: Annotated[Literal["robot", "part"], key("what it moves", '"robot"')]
-    axis: Annotated[Three, key("its direction in the robot base, three numbers", "[0, 1, 0]")]
+    ] = None
+    kind: Annotated[Literal["linear", "rotary"] | None, key("a kind of axis", '"linear"')] = None
+    carries: Annotated[Literal["robot", "part"] | None, key("what it moves", '"robot"')] = None
+    axis: Annotated[
+        Three | None, key("its direction in the robot base, three numbers", "[0, 1, 0]")
+    ] = None
     point_mm: Annotated[
         Three | None,
         key("a point of its axis in the robot base, three numbers in mm", "[1200, 0, 500]"),
     ] = None
-    endless: Annotated[bool, key("true or false", "true")] = False
+    xyz_mm: Annotated[
+        Three | None,
+        key("where the product stands in the robot base, three numbers in mm", "[1600, 0, 0]"),
+    ] = None
+    rpy_deg: Annotated[
+        Three | None,
+        key("roll, pitch and yaw of the product in the robot base, in deg", "[0, 0, 90]"),
+    ] = None
+    endless: Annotated[bool | None, key("true or false", "true")] = None
     lower_mm: Annotated[Number | None, key("a number, in mm", "-2000")] = None
     upper_mm: Annotated[Number | None, key("a number, in mm", "2000")] = None
     lower_deg: Annotated[Number | None, key("a number, in deg", "-180")] = None
@@ -64,74 +106,209 @@ class ExternalTable(Table):
 
     @model_validator(mode="after")
     def _whole(self) -> ExternalTable:
-        """Require every limit, in the unit of the kind, and no key of the other kind."""
-        other = "rotary" if self.kind == "linear" else "linear"
-        for name in given(self, *KEYS[other]):
-            own = KEYS[self.kind][KEYS[other].index(name)]
-            raise fault(f"{own} of a {self.kind} axis", "it", f"write {own}", (name,))
-        if not any(self.axis):
-            raise fault("a direction", "[0, 0, 0]", "give the one it moves along", ("axis",))
-        if self.kind == "linear" and self.point_mm is not None:
-            raise fault("point_mm only of a rotary axis", "it", "remove it", ("point_mm",))
-        if self.kind == "rotary" and self.point_mm is None:
-            said = "a point of its axis in the robot base"
-            raise fault(said, "none", "add, for example, point_mm = [1200, 0, 500]", ("point_mm",))
-        if self.endless and self.kind == "linear":
-            raise fault("false of a linear axis", "true", "remove it", ("endless",))
-        lower, upper, *_ = KEYS[self.kind]
-        for name in KEYS[self.kind][:4]:
-            free = self.endless and name in (lower, upper)
-            if free and getattr(self, name) is not None:
-                raise fault(f"no {name} of an endless axis", "it", "remove one", (name,))
-            if not free and getattr(self, name) is None:
-                hint = f"add, for example, {name} = {EXAMPLES[name]}"
-                raise fault("every limit of the axis", f"no {name}", hint, (name,))
-        low, high, home = self._value(0), self._value(1), self._value(5)
-        if low is not None and high is not None and not low <= high:
-            said = f"{high:g} below {low:g}"
-            raise fault(f"{upper} not below {lower}", said, "swap them", (upper,))
-        if home is not None and low is not None and high is not None and not low <= home <= high:
-            name = KEYS[self.kind][5]
-            raise fault(f"a home from {low:g} to {high:g}", f"{home:g}", "move it", (name,))
+        """Require all that is not known of the axis; what a description knows is seen later."""
+        if self.joint is None:
+            self.resolve()
+            return self
+        for name in given(self, "model", *WHOLE):
+            expected = f"no {name} of a joint of the description"
+            raise fault(expected, "it", f"remove {name} or joint", (name,))
         return self
 
-    def _value(self, number: int) -> float | None:
-        """Return the number at one of the keys of its kind."""
-        value: float | None = getattr(self, KEYS[self.kind][number])
-        return value
+    @property
+    def called(self) -> str | None:
+        """Its name: that given, or its own in library or description."""
+        if self.name is None and self.model is not None:
+            return external_axes()[self.model].axis.name
+        return self.name or self.joint
 
     @property
-    def factor(self) -> float:
-        """What a number of its keys times is, in m or rad."""
-        return 1e-3 if self.kind == "linear" else float(np.pi / 180)
+    def home(self) -> float | None:
+        """Where it stands when the robot is at home, m or rad; None where nothing is said."""
+        if self.home_mm is not None:
+            return self.home_mm / 1000
+        return None if self.home_deg is None else float(np.radians(self.home_deg))
 
-    @property
-    def home(self) -> float:
-        """Where it stands when the robot is at home, m or rad: at zero, or nearest to it."""
-        if self._value(5) is not None:
-            return self.factor * (self._value(5) or 0.0)
-        low, high = self._value(0), self._value(1)
-        nearest = 0.0 if low is None or high is None else min(max(0.0, low), high)
-        return self.factor * nearest
+    def resolve(self, described: KnownAxis | None = None) -> tuple[ExternalAxis, Travel]:
+        """Return the axis and its travel, m and rad; `described`: the joint that it is.
 
-    def on(self, robot: Robot) -> Robot:
-        """Return the robot with this axis more."""
-        lower, upper, velocity, acceleration, step = (
-            None if (value := self._value(i)) is None else self.factor * value for i in range(5)
+        Raises
+        ------
+        PydanticCustomError
+            At the key: one that is missing, or that is not of such an axis; a range reversed.
+        """
+        known = described or (self._own() if self.model is None else self._placed())
+        kind, free = known.axis.kind, known.endless if self.endless is None else self.endless
+        self._require_kind(kind, free)
+        factor = 1e-3 if kind == "linear" else np.pi / 180
+        lower, upper, *_ = KEYS[kind]
+        limits = (known.lower, known.upper, known.velocity, known.acceleration)
+        values: list[float | None] = [getattr(self, name) for name in KEYS[kind][:5]]
+        for name, value, there in zip(KEYS[kind], values, limits, strict=False):
+            if value is None and there is None and not (free and name in (lower, upper)):
+                hint = f"add, for example, {name} = {EXAMPLES[name]}"
+                raise fault("every limit of the axis", f"no {name}", hint, (name,))
+        low, high, velocity, acceleration, step = (
+            None if value is None else factor * value for value in values
         )
-        axis: dict[str, Any] = {"axis": self.axis}
-        if self.point_mm is not None:
-            axis["point"] = np.array(self.point_mm) / 1000
-        assert velocity is not None
-        assert acceleration is not None
-        return robot.with_external(
-            ExternalAxis(name=self.name, kind=self.kind, carries=self.carries, step=step, **axis),
-            lower=-np.pi if lower is None else lower,
-            upper=np.pi if upper is None else upper,
-            velocity=velocity,
-            acceleration=acceleration,
-            endless=self.endless,
+        if not re.match(NAME, str(self.called)):
+            expected = "a name of letters, digits and _, a letter first, at most 16 characters"
+            raise fault(expected, f'"{self.called}"', 'add, for example, name = "rail"', ("joint",))
+        try:
+            axis, travel = known.completed(
+                name=self.name,
+                lower=low,
+                upper=high,
+                velocity=velocity,
+                acceleration=acceleration,
+                endless=self.endless,
+                step=step,
+            )
+        except InputError as error:
+            words = dict(zip(WORDS, KEYS[kind], strict=False))
+            said = re.sub(r" \(\S+\)$", "", in_keys(f"{error}", words))  # the unit is in the key
+            raise fault_in_words(said, ("joint",)) from None
+        low, high, home = travel["lower"] / factor, travel["upper"] / factor, self.home
+        if not low <= high:
+            raise fault(
+                f"{upper} not below {lower}", f"{high:g} below {low:g}", "swap them", (upper,)
+            )
+        if home is not None and not free and not low <= home / factor <= high:
+            said = f"a home from {low:g} to {high:g}"
+            raise fault(said, f"{home / factor:g}", "move it", (KEYS[kind][5],))
+        return axis, travel
+
+    def _own(self) -> KnownAxis:
+        """Return the axis of a table that says all of it, without its limits."""
+        for name in ("name", "kind", "carries", "axis"):
+            if getattr(self, name) is None:
+                field = type(self).model_fields[name]
+                example = f"add, for example, {name} = {(field.examples or [''])[0]}"
+                raise fault(f"{field.description}", "nothing", example, (name,))
+        for name in given(self, "xyz_mm", "rpy_deg"):
+            raise fault(f"{name} only with model", "it", "remove it", (name,))
+        assert self.name is not None
+        assert self.kind is not None
+        assert self.carries is not None
+        axis = ExternalAxis(
+            name=self.name,
+            kind=self.kind,
+            carries=self.carries,
+            axis=self._direction(),
+            point=self._point(self.kind),
         )
+        return KnownAxis(axis=axis, source="the job")
+
+    def _placed(self) -> KnownAxis:
+        """Return the axis of the library where the product stands, or as it was measured."""
+        known = external_axes()[self.model or ""]
+        kind = known.axis.kind
+        for name in given(self, "kind", "carries"):
+            raise fault(f"no {name} with model", "it", "remove it", (name,))
+        measured, placed = given(self, "axis", "point_mm"), given(self, "xyz_mm", "rpy_deg")
+        if kind == "linear" and self.xyz_mm is not None:
+            raise fault("xyz_mm only of a rotary axis", "it", "remove it", ("xyz_mm",))
+        if measured and placed:
+            ways = "axis and point_mm, or xyz_mm and rpy_deg"
+            raise fault(ways, "both", "remove the one or the other", (placed[0],))
+        if measured:
+            axis = replace(known.axis, axis=self._direction(), point=self._point(kind))
+            return replace(known, axis=axis)
+        for name, example in (("xyz_mm", "[1600, 0, 0]"), ("rpy_deg", "[0, 0, 90]")):
+            if getattr(self, name) is None and not (kind == "linear" and name == "xyz_mm"):
+                expected = "where the product stands, or its axis as measured"
+                raise fault(expected, "neither", f"add, for example, {name} = {example}", (name,))
+        return known.placed(pose(self.xyz_mm or (0, 0, 0), self.rpy_deg or (0, 0, 0)))
+
+    def _direction(self) -> Array:
+        if self.axis is None or not any(self.axis):
+            got = "none" if self.axis is None else "[0, 0, 0]"
+            raise fault("a direction", got, "give the one it moves along", ("axis",))
+        return np.array(self.axis)
+
+    def _point(self, kind: str) -> Array:
+        if kind == "rotary" and self.point_mm is None:
+            said = "a point of its axis in the robot base"
+            raise fault(said, "none", "add, for example, point_mm = [1200, 0, 500]", ("point_mm",))
+        return np.array(self.point_mm or (0, 0, 0)) / 1000
+
+    def _require_kind(self, kind: str, free: bool) -> None:
+        """Require no key of the other kind, and no range of an axis that has none."""
+        other = "rotary" if kind == "linear" else "linear"
+        for name in given(self, *KEYS[other]):
+            own = KEYS[kind][KEYS[other].index(name)]
+            raise fault(f"{own} of a {kind} axis", "it", f"write {own}", (name,))
+        if kind == "linear" and self.point_mm is not None:
+            raise fault("point_mm only of a rotary axis", "it", "remove it", ("point_mm",))
+        if kind == "linear" and self.endless:
+            raise fault("false of a linear axis", "true", "remove it", ("endless",))
+        for name in given(self, *KEYS[kind][:2]) if free else ():
+            remedy = "remove one" if self.endless else "write endless = false, too"
+            raise fault(f"no {name} of an endless axis", "it", remedy, (name,))
+
+
+def axes_of(
+    tables: Sequence[ExternalTable], described: Sequence[KnownAxis]
+) -> list[tuple[ExternalAxis, Travel]]:
+    """Return all axes of a job and their travel: those of its description first, in their order.
+
+    Raises
+    ------
+    PydanticCustomError
+        A joint that is none of the description's, or is there twice; as `ExternalTable.resolve`.
+    """
+    rows = {table.joint: i for i, table in enumerate(tables) if table.joint is not None}
+    joints = [known.axis.name for known in described]
+    for i, table in enumerate(tables):
+        if table.joint is not None and (table.joint not in joints or rows[table.joint] != i):
+            there = f"there are {', '.join(joints)}" if joints else "it has none"
+            expected = "a joint of the description that carries robot or part, once"
+            raise fault(expected, f'"{table.joint}"', there, ("external", i, "joint"))
+    found = []
+    for known in described:
+        at = rows.get(known.axis.name)
+        table = ExternalTable(joint=known.axis.name) if at is None else tables[at]
+        try:
+            found.append(table.resolve(known))
+        except PydanticCustomError as error:
+            raise _inside(error, known.axis.name, at) from None
+    return found + [table.resolve() for table in tables if table.joint is None]
+
+
+def require_in_order(tables: Sequence[ExternalTable]) -> None:
+    """Require that axes of one product come in its order, and stand in one place.
+
+    Raises
+    ------
+    PydanticCustomError
+        At the second of two that do not.
+    """
+    order = list(external_axes())
+    for i, table in enumerate(tables):
+        for first in tables[:i]:
+            if table.model is None or first.model is None:
+                continue
+            one, two = (each.model.split(".")[0] for each in (first, table) if each.model)
+            if one != two:
+                continue
+            if order.index(first.model) > order.index(table.model):
+                expected = f'"{table.model}" before "{first.model}", which it carries'
+                raise fault(expected, "it after", "swap the tables", ("external", i, "model"))
+            for name in ("xyz_mm", "rpy_deg"):
+                there, here = getattr(first, name), getattr(table, name)
+                if None not in (there, here) and there != here:
+                    expected = f'{list(there)}, where "{first.model}" of the same product stands'
+                    raise fault(expected, f"{list(here)}", "correct one", ("external", i, name))
+
+
+def _inside(error: PydanticCustomError, joint: str, i: int | None) -> PydanticCustomError:
+    """Return what is wrong with the table of a joint at its key, or that there should be one."""
+    if i is None:
+        said = f'joint "{joint}": {error.message()}, in [[robot.external]] with joint = "{joint}"'
+        return fault_in_words(said, ("urdf",))
+    context = error.context or {}
+    where = ("external", i, *context["where"])
+    return PydanticCustomError(FAULT, error.message_template, {**context, "where": where})
 
 
 External = Annotated[tuple[ExternalTable, ...], Field(strict=False, max_length=3)]

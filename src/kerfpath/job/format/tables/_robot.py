@@ -29,37 +29,32 @@ from kerfpath.job.format._values import (
     key,
     one_of,
 )
-from kerfpath.job.format.tables._external import External
+from kerfpath.job.format.tables._external import External, axes_of, require_in_order
+from kerfpath.job.format.tables._in_keys import in_keys
 from kerfpath.job.format.tables._table import Table, given, require_distinct
-from kerfpath.robots import FAMILIES, Robot, acceleration_ratios, robot, robot_ids, with_axis_3
-from kerfpath.urdf import read_urdf
+from kerfpath.robots import (
+    FAMILIES,
+    ExternalAxis,
+    Robot,
+    Travel,
+    acceleration_ratios,
+    described_axes,
+    robot,
+    robot_ids,
+    with_axis_3,
+)
+from kerfpath.urdf import Description, read_urdf
 
 __all__ = ["RobotTable"]
 
 CONTROLLER = ("manufacturer", "axis_3", "axis_3_deg")
 SOURCES = {
     "model": (),
-    "urdf": ("base", "tip", "packages", "snap_deg", *CONTROLLER),
+    "urdf": ("base", "tip", "mount", "part", "packages", "snap_deg", *CONTROLLER),
     "kinematics": ("geometry_mm", "sign", "offset_deg", *CONTROLLER),
 }
 """The three ways to say which robot, and the keys that belong to each."""
 LIMITS = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2")
-IN_KEYS = {
-    "lower= and upper=": "lower_deg and upper_deg",
-    "velocity=": "velocity_deg_s",
-    "(rad, rad/s)": "(deg, deg/s)",
-    "snap=5e-06": "snap_deg = 0.0003",
-    "snap=5e-05": "snap_deg = 0.003",
-    "snap=0.0005": "snap_deg = 0.03",
-    "snap=0.005": "snap_deg = 0.3",
-    "snap=0": "snap_deg = 0",
-    'packages={"NAME": "FOLDER"}, or read the kinematics alone with meshes=False': (
-        'packages = { NAME = "FOLDER" }'
-    ),
-    "choose base= or tip=": "choose base or tip",
-    "axis_3_limits=": "axis_3_deg",
-}
-"""What messages about descriptions tell to do in Python, and what that is in a job."""
 
 
 class RobotTable(Table):
@@ -77,6 +72,8 @@ class RobotTable(Table):
     ] = None
     base: Annotated[Text | None, key("a link of the description", '"base_link"')] = None
     tip: Annotated[Text | None, key("a link of the description", '"tool0"')] = None
+    mount: Annotated[Text | None, key("a link of the description", '"carriage"')] = None
+    part: Annotated[Text | None, key("a link of the description", '"table"')] = None
     packages: Annotated[
         dict[str, Text] | None,
         key("folders by the name of their package", '{ arm_description = "meshes" }'),
@@ -160,8 +157,12 @@ class RobotTable(Table):
 
     @model_validator(mode="after")
     def _axes_differ(self) -> RobotTable:
-        names = [table.name for table in self.external]
-        require_distinct(names, "external axis", "external", ["name"] * len(names))
+        names = [table.called for table in self.external]
+        keys = [
+            "name" if table.name else "model" if table.model else "joint" for table in self.external
+        ]
+        require_distinct(names, "external axis", "external", keys)
+        require_in_order(self.external)
         return self
 
     @model_validator(mode="after")
@@ -173,7 +174,7 @@ class RobotTable(Table):
             self._require_for_each_joint(self.joints(folder))
             known = self._known(folder)
         except InputError as error:
-            said = _in_keys(str(error))
+            said = in_keys(str(error))
             keys = "axis_3_deg", "axis_3", "urdf" if self.urdf else "geometry_mm"
             where = next((k for k in keys[:2] if said.startswith(f"{k}: ")), keys[2])
             raise fault_in_words(said.removeprefix(f"{where}: "), (where,)) from None
@@ -211,7 +212,7 @@ class RobotTable(Table):
                 ("acceleration_deg_s2",),
             )
         try:
-            self.resolve(folder)  # limits given may contradict those known
+            self._arm(folder)  # limits given may contradict those known
         except InputError as error:
             raise fault(
                 "lower_deg below upper_deg",
@@ -219,6 +220,11 @@ class RobotTable(Table):
                 "correct one of them",
                 ("upper_deg" if self.upper_deg else "lower_deg",),
             ) from None
+        try:
+            self.resolve(folder)
+        except InputError as error:
+            where = "external" if self.external else "urdf"
+            raise fault_in_words(f"{error}", (where,)) from None
         return self
 
     def _require_one_source(self) -> None:
@@ -279,6 +285,18 @@ class RobotTable(Table):
 
     def resolve(self, folder: Path, *, bodies: bool = False) -> Robot:
         """Return the robot with this table's limits; `bodies`: those of its description, too."""
+        found = self._arm(folder, bodies=bodies)
+        for axis, travel in self.axes(folder):
+            found = found.with_external(axis, **travel)
+        return found
+
+    def axes(self, folder: Path) -> list[tuple[ExternalAxis, Travel]]:
+        """Return its external axes, of the description and of tables, and their travel."""
+        read = None if self.urdf is None else self._description(folder)
+        return axes_of(self.external, () if read is None else described_axes(read))
+
+    def _arm(self, folder: Path, *, bodies: bool = False) -> Robot:
+        """Return the robot without its external axes."""
         changed = self._known(folder, bodies=bodies)
         changed = changed.with_limits(**self._limits(changed.joints))
         if self.acceleration_ratio is not None:
@@ -290,8 +308,6 @@ class RobotTable(Table):
                 ),
                 acceleration_source=f"assumed: ratio {self.acceleration_ratio} times the speeds",
             )
-        for table in self.external:
-            changed = table.on(changed)
         return changed
 
     def _known(self, folder: Path, *, bodies: bool = False) -> Robot:
@@ -304,6 +320,7 @@ class RobotTable(Table):
             return Robot.from_urdf(
                 folder / self.urdf,
                 **self._chain(folder),
+                externals=None,
                 meshes=bodies,
                 manufacturer=maker,
                 axis_3=self.axis_3 or "",
@@ -334,15 +351,22 @@ class RobotTable(Table):
     def joints(self, folder: Path) -> int:
         """Return how many joints the robot has without its external axes."""
         if self.urdf is not None:
-            chain = self._chain(folder) | {"meshes": False, "snap": 0.0}
-            return len(read_urdf(folder / self.urdf, **chain).joints)
+            return len(self._description(folder).joints)
         return robot(self.model).joints if self.model else FAMILIES[self.kinematics or ""].joints
+
+    def _description(self, folder: Path) -> Description:
+        """Return the description, its bodies left out, its angles as the arm has them."""
+        chain = self._chain(folder)
+        snap = chain.pop("snap") or 0.0
+        return read_urdf(folder / (self.urdf or ""), **chain, meshes=False, snap=snap)
 
     def _chain(self, folder: Path) -> dict[str, Any]:
         """Return which chain of the description it is, as its reader takes it."""
         return {
             "base": self.base,
             "tip": self.tip,
+            "mount": self.mount,
+            "part": self.part,
             "packages": {name: folder / place for name, place in (self.packages or {}).items()},
             "snap": None if self.snap_deg is None else float(np.radians(self.snap_deg)),
         }
@@ -362,10 +386,3 @@ class RobotTable(Table):
 
 def _radians(degrees: tuple[float, ...] | None) -> Array | None:
     return None if degrees is None else np.radians(degrees)
-
-
-def _in_keys(said: str) -> str:
-    """Return a message about a description in the words of a job file."""
-    for python, ours in IN_KEYS.items():
-        said = said.replace(python, ours)
-    return said

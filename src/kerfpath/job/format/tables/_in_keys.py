@@ -1,0 +1,31 @@
+"""What messages tell to do in Python, in the words of a job."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+__all__ = ["in_keys"]
+
+IN_KEYS = {
+    "lower= and upper=": "lower_deg and upper_deg",
+    "velocity=": "velocity_deg_s",
+    "(rad, rad/s)": "(deg, deg/s)",
+    "snap=5e-06": "snap_deg = 0.0003",
+    "snap=5e-05": "snap_deg = 0.003",
+    "snap=0.0005": "snap_deg = 0.03",
+    "snap=0.005": "snap_deg = 0.3",
+    "snap=0": "snap_deg = 0",
+    'packages={"NAME": "FOLDER"}, or read the kinematics alone with meshes=False': (
+        'packages = { NAME = "FOLDER" }'
+    ),
+    "choose base= or tip=": "choose base or tip",
+    "axis_3_limits=": "axis_3_deg",
+}
+"""What messages about descriptions tell to do, and what that is in a job."""
+
+
+def in_keys(said: str, words: Mapping[str, str] = IN_KEYS) -> str:
+    """Return a message in the words of a job file."""
+    for python, ours in words.items():
+        said = said.replace(python, ours)
+    return said
