@@ -169,6 +169,14 @@ def test_a_fault_of_a_product_is_said_in_one_line(old, new, message, tmp_path):
         read_job(job(tmp_path, tables.replace(old, new)))
 
 
+def test_two_rails_of_one_kind_are_a_gantry(tmp_path):
+    across = TRACK.replace("[0, 0, 90]", "[0, 0, 0]\nname = 'across'\nhome_mm = 5000")
+    robot = read_job(job(tmp_path, TRACK + across)).robot
+    assert [axis.name for axis in robot.externals] == ["rail", "across"]
+    ways = [[0, 1, 0], [1, 0, 0]]
+    np.testing.assert_allclose([axis.axis for axis in robot.externals], ways, atol=1e-12)
+
+
 def test_axes_of_a_product_come_in_its_order(tmp_path):
     first, second = POSITIONER.split("\n\n")
     with pytest.raises(InputError, match=r'"kuka_dkp400.tilt" before "kuka_dkp400.table", w'):

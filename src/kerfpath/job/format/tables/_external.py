@@ -41,8 +41,10 @@ KEYS = {
     ),
 }  # fmt: skip
 """Keys of each kind: range, speed, acceleration, step of a grid, home."""
+FACTORS = {"linear": 1e-3, "rotary": float(np.pi / 180)}
+"""What a number of these keys times is, in m or rad."""
 WORDS = ("lower=", "upper=", "velocity=", "acceleration=")
-"""What messages call the first of them."""
+"""What messages call the first of those keys."""
 NAME = r"^[A-Za-z][A-Za-z0-9_]{0,15}$"
 WHOLE = ("kind", "carries", "axis", "point_mm", "xyz_mm", "rpy_deg")
 """Keys that say what an axis is and where; a joint of the description has all of them."""
@@ -126,8 +128,8 @@ class ExternalTable(Table):
     def home(self) -> float | None:
         """Where it stands when the robot is at home, m or rad; None where nothing is said."""
         if self.home_mm is not None:
-            return self.home_mm / 1000
-        return None if self.home_deg is None else float(np.radians(self.home_deg))
+            return FACTORS["linear"] * self.home_mm
+        return None if self.home_deg is None else FACTORS["rotary"] * self.home_deg
 
     def resolve(self, described: KnownAxis | None = None) -> tuple[ExternalAxis, Travel]:
         """Return the axis and its travel, m and rad; `described`: the joint that it is.
@@ -140,8 +142,7 @@ class ExternalTable(Table):
         known = described or (self._own() if self.model is None else self._placed())
         kind, free = known.axis.kind, known.endless if self.endless is None else self.endless
         self._require_kind(kind, free)
-        factor = 1e-3 if kind == "linear" else np.pi / 180
-        lower, upper, *_ = KEYS[kind]
+        factor, (lower, upper, *_) = FACTORS[kind], KEYS[kind]
         limits = (known.lower, known.upper, known.velocity, known.acceleration)
         values: list[float | None] = [getattr(self, name) for name in KEYS[kind][:5]]
         for name, value, there in zip(KEYS[kind], values, limits, strict=False):
@@ -168,13 +169,12 @@ class ExternalTable(Table):
             words = dict(zip(WORDS, KEYS[kind], strict=False))
             said = re.sub(r" \(\S+\)$", "", in_keys(f"{error}", words))  # the unit is in the key
             raise fault_in_words(said, ("joint",)) from None
-        low, high, home = travel["lower"] / factor, travel["upper"] / factor, self.home
-        if not low <= high:
-            raise fault(
-                f"{upper} not below {lower}", f"{high:g} below {low:g}", "swap them", (upper,)
-            )
-        if home is not None and not free and not low <= home / factor <= high:
-            said = f"a home from {low:g} to {high:g}"
+        ends, home = (travel["lower"], travel["upper"]), self.home
+        low, high = (f"{end / factor:g}" for end in ends)
+        if not ends[0] <= ends[1]:
+            raise fault(f"{upper} not below {lower}", f"{high} below {low}", "swap them", (upper,))
+        if home is not None and not free and not ends[0] <= home <= ends[1]:
+            said = f"a home from {low} to {high}"
             raise fault(said, f"{home / factor:g}", "move it", (KEYS[kind][5],))
         return axis, travel
 
@@ -276,7 +276,7 @@ def axes_of(
 
 
 def require_in_order(tables: Sequence[ExternalTable]) -> None:
-    """Require that axes of one product come in its order, and stand in one place.
+    """Require that the axes of one product come in its order, and stand in one place.
 
     Raises
     ------
@@ -289,7 +289,7 @@ def require_in_order(tables: Sequence[ExternalTable]) -> None:
             if table.model is None or first.model is None:
                 continue
             one, two = (each.model.split(".")[0] for each in (first, table) if each.model)
-            if one != two:
+            if one != two or first.model == table.model:  # the same axis again is another product
                 continue
             if order.index(first.model) > order.index(table.model):
                 expected = f'"{table.model}" before "{first.model}", which it carries'
