@@ -170,11 +170,11 @@ class ExternalTable(Table):
             said = re.sub(r" \(\S+\)$", "", in_keys(f"{error}", words))  # the unit is in the key
             raise fault_in_words(said, ("joint",)) from None
         ends, home = (travel["lower"], travel["upper"]), self.home
-        low, high = (f"{end / factor:g}" for end in ends)
+        least, most = (f"{end / factor:g}" for end in ends)
         if not ends[0] <= ends[1]:
-            raise fault(f"{upper} not below {lower}", f"{high} below {low}", "swap them", (upper,))
+            raise fault(f"{upper} not below {lower}", f"{most} below {least}", "swap them", (upper,))
         if home is not None and not free and not ends[0] <= home <= ends[1]:
-            said = f"a home from {low} to {high}"
+            said = f"a home from {least} to {most}"
             raise fault(said, f"{home / factor:g}", "move it", (KEYS[kind][5],))
         return axis, travel
 
