@@ -210,4 +210,5 @@ class MoveTimes:
 
     def _shifted(self, candidate: int, shift: Array) -> Plan:
         made, turns = self._plans[candidate], np.round(shift / (2 * np.pi)).astype(np.int64)
-        return replace(made, q=made.q + 2 * np.pi * turns, turn=made.turn + turns)
+        own = np.arange(len(turns)) < self._robot.family.joints  # an external axis has no turns
+        return replace(made, q=made.q + 2 * np.pi * turns, turn=made.turn + own * turns)

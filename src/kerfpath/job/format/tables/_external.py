@@ -172,7 +172,9 @@ class ExternalTable(Table):
         ends, home = (travel["lower"], travel["upper"]), self.home
         least, most = (f"{end / factor:g}" for end in ends)
         if not ends[0] <= ends[1]:
-            raise fault(f"{upper} not below {lower}", f"{most} below {least}", "swap them", (upper,))
+            raise fault(
+                f"{upper} not below {lower}", f"{most} below {least}", "swap them", (upper,)
+            )
         if home is not None and not free and not ends[0] <= home <= ends[1]:
             said = f"a home from {least} to {most}"
             raise fault(said, f"{home / factor:g}", "move it", (KEYS[kind][5],))
