@@ -1,5 +1,7 @@
 """Bounds of joint rates along a course: above every sample, near the largest, or infinite."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -8,6 +10,7 @@ from kerfpath import InputError, robot
 from kerfpath.auditor import rates_along
 from kerfpath.execution import ToolCourse
 from kerfpath.post import CircularMove, Controller, LinearMove
+from kerfpath.robots import ExternalAxis, base_in_part
 
 ARMS = ("abb_irb4600_60_205", "ur_ur10e")
 TOOL = np.eye(4)
@@ -116,12 +119,74 @@ def test_at_a_singularity_nothing_is_known():
     assert np.isfinite(velocity[:, :3]).all()
 
 
-def test_arms_without_enclosures_are_refused():
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("name", ARMS)
+def test_bounds_hold_while_external_axes_move(name, law, seed):
+    """A gantry of a rail and a column under the arm, a table on a shuttle under the part."""
+    rng = np.random.default_rng(seed)
+    arm = robot(name).with_limits(acceleration=np.ones(6))
+    arm = replace(arm, T_base_foot=turned(rng) @ arm.T_base_foot)
+    course, q = random_course(arm, seed, False, law)
+    axes = [("rail", "linear", "robot"), ("column", "rotary", "robot"), ("table", "rotary", "part")]
+    picked = [axes[i] for i in rng.permutation(3)]
+    moved = arm
+    for axis, kind, carries in picked:
+        moved = moved.with_external(
+            ExternalAxis(
+                name=axis, kind=kind, carries=carries, axis=rng.normal(size=3),
+                point=rng.normal(size=3),
+            ),
+            lower=-1, upper=1, velocity=1, acceleration=1,
+        )  # fmt: skip
+    values = np.cumsum(rng.normal(scale=0.02, size=(len(course.T), 3)), axis=0)
+    base, start = base_in_part(moved.externals, values[0]), values[:1]
+
+    def joints(time, near):
+        x = course.blended(values, time)
+        # The arm stands at the first target where it would stand with all axes at zero.
+        seen = np.linalg.inv(base_in_part(moved.externals, x)) @ base @ course.poses(time)
+        return np.hstack([arm.nearest(seen, near[:, :6]), x])
+
+    borders = course.borders
+    near = np.hstack([q, start[0]])
+    near = joints((borders[1:] + borders[:-1]) / 2, np.tile(near, (len(borders) - 1, 1)))
+    bounds = rates_along(
+        moved, course.pieces(values), near, T_base_part=base, T_flange_tip=TOOL,
+        enough=(np.zeros(9), np.zeros(9)), deepest=7,
+    )  # fmt: skip
+    seen = np.zeros((2, *near.shape))
+    for share in np.linspace(0.02, 0.98, 49):
+        time = borders[:-1] + share * np.diff(borders)
+        d = 1e-2 * np.diff(borders)[:, None]
+        before, here, after = (joints(time + by * d[:, 0], near) for by in (-1, 0, 1))
+        seen[0] = np.maximum(seen[0], np.abs(after - before) / (2 * d))
+        seen[1] = np.maximum(seen[1], np.abs(after - 2 * here + before) / d**2)
+    assert np.isfinite(bounds[1]).all()
+    for order, (bound, found) in enumerate(zip(bounds, seen, strict=True), 1):
+        # As for the arm alone.
+        lost = 1e-12 / (1e-2 * np.diff(borders)[:, None]) ** order
+        assert (found <= bound * (1 + 1e-6) + lost).all()
+        # Half of the spans would bring it to 1 %, as for the arm alone.
+        assert bound.max() <= 1.02 * found.max()
+    # What axes do themselves is known exactly, up to rounding.
+    assert (bounds[0][:, 6:] <= 1.05 * seen[0][:, 6:].max(axis=0)).all()
+
+
+def turned(rng):
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec(rng.normal(scale=0.3, size=3)).as_matrix()
+    T[:3, 3] = rng.normal(size=3)
+    return T
+
+
+def test_values_of_other_axes_than_the_robots_are_refused():
     course, q = random_course(robot(ARMS[0]), 0, arcs=False)
+    near = middles(robot(ARMS[0]), course, q)
     arm = robot(ARMS[0], acceleration_ratio="iontec_20_to_70kg")
-    on_rail = arm.on_rail([0, 1, 0], lower=-1, upper=1, velocity=1, acceleration=1, step=0.1)
-    with pytest.raises(InputError, match="external"):
+    on_rail = arm.on_rail([0, 1, 0], lower=-1, upper=1, velocity=1, acceleration=1)
+    with pytest.raises(InputError, match=r"expected values of 1 external axes .* got 0"):
         rates_along(
-            on_rail, course.pieces(), middles(arm, course, q), T_base_part=np.eye(4),
-            T_flange_tip=TOOL, enough=(np.ones(6), np.ones(6)),
+            on_rail, course.pieces(), near, T_base_part=np.eye(4), T_flange_tip=TOOL,
+            enough=(np.ones(6), np.ones(6)),
         )  # fmt: skip

@@ -14,10 +14,12 @@ import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
+from kerfpath.auditor._carried import CarryingAxes, Column
 from kerfpath.auditor._enclosure import fixed_poses, joints_of, require_closed_form
 from kerfpath.auditor._intervals import Interval, exact
 from kerfpath.auditor._jets import Jet, angle_from, constant
 from kerfpath.auditor._postures import POSTURES_OF, Pose
+from kerfpath.errors import InputError
 from kerfpath.robots import Robot
 
 __all__ = ["ENCLOSED", "CoursePieces", "rates_along"]
@@ -52,6 +54,8 @@ class CoursePieces:
     x, y : (P, 3) m
         Of an arc; zero where there is none.
     rate : (P,) rad/s
+    external : (P, 3, E) rad or m, and per s and s^2
+        External axes are at external[0] + external[1] t + external[2] t^2 / 2.
     two_angles : bool
     """
 
@@ -63,6 +67,7 @@ class CoursePieces:
     x: Array
     y: Array
     rate: Array
+    external: Array
     two_angles: bool = False
 
     __repr__ = short_repr
@@ -83,7 +88,7 @@ def rates_along(
     Parameters
     ----------
     robot : Robot
-        Of family "opw" or "ur", without an external axis.
+        Of family "opw" or "ur"; its external axes move the base against the part.
     pieces : CoursePieces
     q : (P, n) rad
         Joints in the middle of each piece: they say which posture is meant.
@@ -101,9 +106,14 @@ def rates_along(
     Raises
     ------
     InputError
-        A robot of another family, or with an external axis.
+        A robot of another family, or pieces that say the values of other external axes.
     """
     require_closed_form(robot)
+    if pieces.external.shape[2] != len(robot.externals):
+        raise InputError(
+            f"pieces: expected values of {len(robot.externals)} external axes of robot "
+            f"{robot.id!r}, got {pieces.external.shape[2]}"
+        )
     task = _Task(robot, pieces, T_base_part, T_flange_tip)
     middle, half = (pieces.begin + pieces.end) / 2, (pieces.end - pieces.begin) / 2
     k = np.arange(len(middle))
@@ -133,24 +143,28 @@ class _Task:
     ) -> None:
         self._robot, self._pieces = robot, pieces
         self._before, self._after = fixed_poses(robot, T_base_part[None], T_flange_tip)
+        self._axes = CarryingAxes(robot)
 
     def joints(self, k: Ints, t: Array, half: Array) -> tuple[list[Jet], Bools]:
         """Return the joints over spans t +- half of pieces k (S,), and where there are none.
 
-        As `joints_of`.
+        As `joints_of`; external axes come last.
         """
         parts = []
         for i in range(0, len(k), AT_ONCE):
             rows = slice(i, i + AT_ONCE)
             with np.errstate(all="ignore"):
-                parts.append(joints_of(self._robot, self._pose(k[rows], t[rows], half[rows])))
+                time = angle_from(t[rows], half[rows])
+                coefficients = np.moveaxis(self._pieces.external[k[rows]], -1, 0)
+                values = [_polynomial(each, time) for each in coefficients]
+                arm, absent = joints_of(self._robot, self._pose(k[rows], time, values))
+                parts.append(([*arm, *values], absent))
         none = np.concatenate([np.broadcast_to(n, (2, 2, 2, n.shape[-1])) for _, n in parts], -1)
         return [_joined(each) for each in zip(*(joints for joints, _ in parts), strict=True)], none
 
-    def _pose(self, k: Ints, t: Array, half: Array) -> Pose:
-        """Return the pose of the model's end over spans, as jets of the time."""
+    def _pose(self, k: Ints, time: Jet, values: list[Jet]) -> Pose:
+        """Return the pose of the model's end over times, with external axes at values."""
         pieces, before, after = self._pieces, self._before[..., 0], self._after
-        time = angle_from(t, half)
         turn = [_polynomial(pieces.turn[k, :, i], time) for i in range(3)]
         E = _swung(turn) if pieces.two_angles else _rotation(turn)
         c, s = time.times(exact(pieces.rate[k])).cos_sin()
@@ -161,7 +175,7 @@ class _Task:
             for i in range(3)
         ]
         R = exact(np.moveaxis(pieces.R[k], 0, -1))
-        columns = []
+        columns: list[Column] = []
         for j in range(4):
             own = [after[i, j] for i in range(3)]
             turned = [_sum([E[i][m].times(own[m]) for m in range(3)]) for i in range(3)]
@@ -172,7 +186,8 @@ class _Task:
             if j == 3:
                 column = [each.plus(before[i, 3]) for i, each in enumerate(column)]
             columns.append((column[0], column[1], column[2]))
-        return Pose(x=columns[0], y=columns[1], z=columns[2], point=columns[3])
+        x, y, z, point = self._axes.moved(columns, values)
+        return Pose(x=x, y=y, z=z, point=point)
 
 
 def _nearest(joints: list[Jet], none: Bools, q: Array) -> Ints:

@@ -28,6 +28,7 @@ __all__ = [
     "joints_of",
     "linear_minimum",
     "require_closed_form",
+    "seen_from_foot",
 ]
 
 POSTURES = 8
@@ -110,6 +111,11 @@ def enclose(
         A robot of another family, or with an external axis.
     """
     require_closed_form(robot)
+    if robot.externals:
+        raise InputError(
+            f"robot {robot.id!r}: its solutions are enclosed without an external axis only, it "
+            f"has {robot.externals[0].name}; hold it with robot.held(x)"
+        )
     pieces = []
     before, after = fixed_poses(robot, frames, T_flange_tip)
     for i in range(0, max(len(node), 1), AT_ONCE):
@@ -158,11 +164,6 @@ def require_closed_form(robot: Robot) -> None:
             f"robot {robot.id!r}: its solutions are enclosed for the families "
             f"{', '.join(POSTURES_OF)} only, it is of {robot.kinematics!r}"
         )
-    if robot.externals:
-        raise InputError(
-            f"robot {robot.id!r}: its solutions are enclosed without an external axis only, it "
-            f"has {robot.externals[0].name}; hold it with robot.held(x)"
-        )
 
 
 def fixed_poses(robot: Robot, frames: Array, T_flange_tip: Array) -> tuple[Interval, Interval]:
@@ -171,8 +172,7 @@ def fixed_poses(robot: Robot, frames: Array, T_flange_tip: Array) -> tuple[Inter
     Task frames in the model's base (3, 4, K), and the wrist point and axes of the model's end in
     the tip's frame, as columns x, y, z, point (3, 4).
     """
-    foot = _inverse(_rigid(robot.T_base_foot[..., None]))
-    before = _product(foot, _rigid(np.moveaxis(frames, 0, -1)))
+    before = _product(_foot(robot), _rigid(np.moveaxis(frames, 0, -1)))
     flange = _inverse(_rigid(T_flange_tip[..., None]))
     after = _product(flange, _inverse(_rigid(robot.T_end_flange[..., None])))
     axis = after[:, 2]
@@ -180,6 +180,23 @@ def fixed_poses(robot: Robot, frames: Array, T_flange_tip: Array) -> tuple[Inter
     wrist = after[:, 3] + back
     columns = stack([after[:, 0], after[:, 1], axis, wrist])
     return before, Interval(np.swapaxes(columns.lo, 0, 1), np.swapaxes(columns.hi, 0, 1))
+
+
+def seen_from_foot(
+    robot: Robot, direction: list[Interval], point: Interval
+) -> tuple[list[Interval], list[Interval]]:
+    """Return a direction and a point of the robot base in the model's base, three numbers each."""
+    foot = _foot(robot)[..., 0]
+    ends = []
+    for x, y, z in (direction, [point[i] for i in range(3)]):
+        ends.append([foot[i, 0] * x + foot[i, 1] * y + foot[i, 2] * z for i in range(3)])
+    turned, placed = ends
+    return turned, [each + foot[i, 3] for i, each in enumerate(placed)]
+
+
+def _foot(robot: Robot) -> Interval:
+    """Return the robot base in the model's base, (3, 4, 1)."""
+    return _inverse(_rigid(robot.T_base_foot[..., None]))
 
 
 def _rigid(T: Array) -> Interval:

@@ -176,8 +176,12 @@ class ToolCourse:
         even = values[k] + (time - self.time[k])[:, None] * slope[k]
         return np.asarray(even + blend[:, None] * (slope[right] - slope[left]))
 
-    def pieces(self) -> CoursePieces:
-        """Return the course as closed formulas of the time, one between each two borders."""
+    def pieces(self, external: Array | None = None) -> CoursePieces:
+        """Return the course as closed formulas of the time, one between each two borders.
+
+        External axes go as `blended` has them between values (K, E) at the targets; default: none.
+        """
+        values = np.zeros((len(self.T), 0)) if external is None else external
         borders = self.borders
         middle = (borders[1:] + borders[:-1]) / 2
         k, near, blend = self._at(middle)
@@ -186,6 +190,7 @@ class ToolCourse:
         move = np.where(after, right, left)
         velocity = np.stack([self._velocity(left, ends=True), self._velocity(right, ends=False)])
         rates = np.stack([self._rate[1, left], self._rate[0, right]])
+        slope = np.diff(values, axis=0) / self.duration[:, None]
         bends = np.where((blend > 0) & (half > 0), 1 / np.maximum(4 * half, 1e-12), 0.0)
 
         def parts(own: Array, change: Array) -> Array:
@@ -199,6 +204,8 @@ class ToolCourse:
         point = parts(straight, velocity[1] - velocity[0])
         point[:, 0] += np.where(arc[:, None], self.centre[move], self.T[near, :3, 3])
         x = np.where(arc[:, None], self.T[near, :3, 3] - self.centre[move], 0.0)
+        even = parts(slope[move], slope[right] - slope[left])
+        even[:, 0] += values[near]
         return CoursePieces(
             begin=borders[:-1] - zero,
             end=borders[1:] - zero,
@@ -208,6 +215,7 @@ class ToolCourse:
             x=x,
             y=np.cross(self.normal[move], x),
             rate=np.where(arc, self.sweep[move] / self.duration[move], 0.0),
+            external=even,
             two_angles=self.orientation == "two-angle",
         )
 

@@ -11,11 +11,10 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.auditor import ENCLOSED, rates_along
-from kerfpath.errors import InputError
 from kerfpath.execution._course import ToolCourse
 from kerfpath.execution._wrist import joints_with_wrist, require_wrist
 from kerfpath.post import PLAIN, Controller, JointMove, LinearMove, Program
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, base_in_part
 
 __all__ = ["Executed", "Peak", "executed", "from_stop_to_stop", "run_along"]
 
@@ -137,8 +136,8 @@ def executed(program: Program, *, controller: Controller = PLAIN) -> tuple[Execu
     Raises
     ------
     InputError
-        A robot whose limits of velocity and acceleration are not known, or an external axis; of
-        orientation "wrist" one without a wrist of three joints.
+        A robot whose limits of velocity and acceleration are not known; of orientation "wrist" one
+        without a wrist of three joints.
     """
     return tuple(
         run_along(
@@ -194,8 +193,6 @@ def run_along(
     InputError
         As `executed`.
     """
-    if robot.externals:
-        raise InputError("executed: expected a robot without an external axis")
     course = ToolCourse.of(moves[0].T_part_tip, moves[1:], controller)
     borders = course.borders
     long = np.diff(borders)
@@ -237,7 +234,7 @@ def run_along(
     middles = (borders[1:] + borders[:-1]) / 2
     bounds = rates_along(
         robot,
-        course.pieces(),
+        course.pieces(targets[:, robot.family.joints :]),
         np.stack([np.interp(middles, time, joint) for joint in q.T], axis=1),
         T_base_part=T_base_part,
         T_flange_tip=T_flange_tip,
@@ -256,8 +253,10 @@ def _by_pose(
     T_flange_tip: Array,
 ) -> Array:  # fmt: skip
     """Return the joints (m, n) at times (m,), next to those at the targets (K, n)."""
+    arm, x, seen = _alone(robot, course, time, targets, T_base_part)
     near = np.stack([np.interp(time, course.time, joint) for joint in targets.T], axis=1)
-    return robot.nearest(T_base_part @ course.poses(time) @ np.linalg.inv(T_flange_tip), near)
+    q = arm.nearest(seen @ np.linalg.inv(T_flange_tip), near[:, : arm.joints])
+    return np.concatenate([q, x], axis=1)
 
 
 def _by_wrist(
@@ -265,10 +264,24 @@ def _by_wrist(
     T_flange_tip: Array,
 ) -> Array:  # fmt: skip
     """Return the joints (m, n) at times (m,), the wrist going evenly from target to target."""
-    require_wrist(robot)
-    near = course.blended(targets, time)
-    tip = T_base_part @ course.poses(time)
-    return joints_with_wrist(robot, tip[:, :3, 3], near, T_flange_tip)
+    arm, x, seen = _alone(robot, course, time, targets, T_base_part)
+    require_wrist(arm)
+    near = course.blended(targets[:, : arm.joints], time)
+    q = joints_with_wrist(arm, seen[:, :3, 3], near, T_flange_tip)
+    return np.concatenate([q, x], axis=1)
+
+
+def _alone(
+    robot: Robot, course: ToolCourse, time: Array, targets: Array, T_base_part: Array
+) -> tuple[Robot, Array, Array]:
+    """Return the arm, its external axes (m, E) at times, and the poses of the tip that it sees.
+
+    In the robot base as it stands there.
+    """
+    arm = robot.alone()
+    x = course.blended(targets[:, arm.joints :], time)
+    base = base_in_part(robot.externals, x)
+    return arm, x, np.linalg.inv(base) @ T_base_part @ course.poses(time)
 
 
 def _sampled(robot: Robot, controller: Controller) -> str:

@@ -166,10 +166,11 @@ def _need(plan: Plan, run: Executed, why: str) -> str:
     velocity, acceleration = run.peak_velocity, run.peak_acceleration
     fast = velocity.share > 1
     peak, what = (velocity, "velocity") if fast else (acceleration, "acceleration")
+    joint = plan.robot.joint_names[peak.joint]
     at = np.interp(peak.time, run.time, run.planned)
     s = np.interp(at, plan.time - plan.time[0], plan.contour.s)
     said = (
-        f"between the nodes joint {peak.joint + 1} needs {peak.share:.3g} of its {what} limit at "
+        f"between the nodes {joint} needs {peak.share:.3g} of its {what} limit at "
         f"s = {s * 1000:.1f} mm, and {why}"
     )
     if not np.isfinite(peak.share):

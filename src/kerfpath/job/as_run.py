@@ -27,7 +27,6 @@ from kerfpath.plans import Plan
 from kerfpath.post import Controller, Program, language
 
 __all__ = [
-    "EXTERNAL",
     "AsRun",
     "as_run",
     "checks_of_unknown",
@@ -37,8 +36,6 @@ __all__ = [
     "run_judged",
 ]
 
-EXTERNAL = "the motion of a program with an external axis is not modelled between its nodes"
-"""Why nothing is known of it there."""
 SLACK = 1e-3
 """Share of a limit that the steps of zones in a program take: they are rounded down."""
 
@@ -77,17 +74,25 @@ def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsR
         except InputError as fault:  # said when it is written
             unknown = str(fault)
     if unknown:
-        return AsRun(checks=checks_of_unknown(job, unknown, always=unknown == EXTERNAL))
+        return AsRun(checks=checks_of_unknown(job, unknown))
     return AsRun() if run is None else run_judged(job, run, plan, path)
 
 
-def checks_of_unknown(job: Job, why: str, *, always: bool = False) -> tuple[Check, ...]:
-    """Return that nothing is guaranteed between the nodes, where the job asks for it.
-
-    Otherwise nothing, or `always` a warning.
-    """
-    asked = job.options.between_nodes == "guaranteed"
-    return (_unknown(why, "error" if asked else "warning"),) if asked or always else ()
+def checks_of_unknown(job: Job, why: str) -> tuple[Check, ...]:
+    """Return that nothing is guaranteed between the nodes, where the job asks for it."""
+    if job.options.between_nodes != "guaranteed":
+        return ()
+    return (
+        Check(
+            code="between-nodes",
+            title="limits between the nodes that are not judged",
+            value=1.0,
+            limit=0.0,
+            unit="count",
+            node=0,
+            advice=f"cannot be guaranteed: {why}",
+        ),
+    )
 
 
 def run_judged(job: Job, run: Executed, plan: Plan, path: Contour, why: str = "") -> AsRun:
@@ -213,8 +218,6 @@ def controller_of(job: Job) -> Controller:
 
 def _not_modelled(job: Job) -> str:
     """Return why the motion of the job's programs is not known between the nodes; else empty."""
-    if job.robot.externals:
-        return EXTERNAL
     if job.program.language == "none":
         return "there is no program; name a language in [program]"
     if not language(job.program.language).zones:
@@ -222,19 +225,6 @@ def _not_modelled(job: Job) -> str:
     if job.program.zone == 0:
         return 'the robot stops at every node; write zone_mm = "auto" in [program]'
     return ""
-
-
-def _unknown(why: str, level: Level) -> Check:
-    return Check(
-        code="between-nodes",
-        title="limits between the nodes that are not judged",
-        value=1.0,
-        limit=0.0,
-        unit="count",
-        node=0,
-        level=level,
-        advice=f"cannot be guaranteed: {why}",
-    )
 
 
 def _check(what: str, peak: Peak, bound: float, run: Executed, plan: Plan) -> Check:
@@ -249,5 +239,5 @@ def _check(what: str, peak: Peak, bound: float, run: Executed, plan: Plan) -> Ch
         limit=1.0 + SLACK,
         unit="share",
         node=_node(run, plan, peak.time),
-        advice=f"joint {peak.joint + 1} needs it, and a controller slows down there",
+        advice=f"{plan.robot.joint_names[peak.joint]} needs it, and a controller slows down there",
     )

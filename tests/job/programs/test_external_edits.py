@@ -110,15 +110,37 @@ def test_a_trajectory_that_moves_one_axis_leaves_the_contour(subjects):
     assert (outcome, "velocities do not follow" in said) == ("refused", True)
 
 
-def test_what_is_not_known_between_the_nodes_is_said_in_words(subjects):
-    subject = subjects["rapid"]
-    found = subject.audit.audited(
-        subject.read(subject.files), subject.language, subject.settings, "job"
-    )
-    for name in ("hole (hole)", "slit (slit)"):
-        (row,) = (check for check in found.tables[name] if check.code == "between-nodes")
-        assert (row.ok, row.level) == (False, "warning")
-        assert "external axis is not modelled between its nodes" in row.advice
+def as_run(subject, files):
+    """The rows of the motion between the nodes, by contour and code."""
+    found = subject.audit.audited(subject.read(files), subject.language, subject.settings, "job")
+    return {
+        (name.partition("(")[2].rstrip(")"), check.code): check
+        for name, table in found.tables.items()
+        for check in table
+        if check.code.endswith("as-run")
+    }
+
+
+@pytest.mark.parametrize("language", ["rapid", "krl", "fanuc"])
+def test_the_motion_between_the_nodes_is_judged_by_the_values_of_the_text(subjects, language):
+    subject = subjects[language]
+    rows = as_run(subject, subject.files)
+    for name in ("hole", "slit"):
+        for code in ("velocity-as-run", "acceleration-as-run"):
+            row = rows[name, code]
+            assert row.ok
+            corners = ", corners assumed" if language == "fanuc" else ""
+            assert row.title.endswith(f"share as run, at every instant{corners}")
+    # 0.2 mm that a rail jumps and back, at one target and the next: it accelerates as sharply.
+    jumped = as_run(subject, edited(subject.files, RAIL[language], 10, 0.2))
+    worse = [key for key in rows if jumped[key].value > 1.5 * rows[key].value]
+    assert ("hole", "acceleration-as-run") in worse
+    assert "rail needs it" in jumped["hole", "acceleration-as-run"].advice
+
+
+@pytest.mark.parametrize("language", ["csv", "ros"])
+def test_of_joints_without_zones_nothing_is_said_between_the_nodes(subjects, language):
+    assert as_run(subjects[language], subjects[language].files) == {}
 
 
 def test_the_command_finds_a_value_that_is_edited_and_names_its_line(subjects, folder):

@@ -9,7 +9,7 @@ import numpy as np
 from kerfpath.auditor import MOST_ROUNDED, Check, Rounding
 from kerfpath.contour import Contour
 from kerfpath.execution import from_stop_to_stop, run_along
-from kerfpath.job.as_run import EXTERNAL, checks_of_unknown, run_judged
+from kerfpath.job.as_run import checks_of_unknown, run_judged
 from kerfpath.job.format import Job
 from kerfpath.job.programs._read import ReadCut
 from kerfpath.plans import Plan
@@ -31,8 +31,6 @@ def check_run(
 
     Digits of the text are allowed for: in a short interval they turn into acceleration.
     """
-    if job.robot.externals:
-        return [*checks_of_unknown(job, EXTERNAL, always=True)]
     if not chosen.zones:
         return [*checks_of_unknown(job, f"{chosen.name} has no zones")]
     controller = chosen.controller(settings)
