@@ -212,9 +212,11 @@ def planned_again(plan: Plan, T_base_part: ArrayLike) -> Plan:
             feed="constant" if plan.feed is None else "dip",
             refine=plan.settings.refine or plan.proof.grid_cost is not None,
             comfort=comfort,
+            between_nodes="reported",
         ),
     )
-    return replace(made, contour=plan.contour)
+    kept = replace(made.settings, between_nodes=plan.settings.between_nodes)
+    return replace(made, contour=plan.contour, settings=kept)
 
 
 def place_moves(

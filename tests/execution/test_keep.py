@@ -9,7 +9,7 @@ from benchmarks._random_contours import cut
 
 import kerfpath
 from conftest import ROOT
-from kerfpath import PlanOptions, plan
+from kerfpath import InputError, PlanOptions, plan, plan_in_pieces
 from kerfpath.execution import executed, keep_limits
 from kerfpath.post import build_program
 
@@ -127,6 +127,13 @@ def test_plan_itself_says_which_call_does_it(circle, arm, tool, placement):
     assert kerfpath.keep_limits is keep_limits
     with pytest.raises(TypeError, match=r"between_nodes.*kerfpath\.keep_limits\(plan\)"):
         plan(circle, arm, tool=tool, placement=placement, speed=0.1, between_nodes="kept")
+
+
+@pytest.mark.parametrize("by", [plan, plan_in_pieces])
+def test_a_guarantee_is_refused_by_what_cannot_give_it(by, circle, arm, tool, placement):
+    asked = PlanOptions(between_nodes="guaranteed")
+    with pytest.raises(InputError, match=rf"{by.__name__} holds .* kerfpath\.keep_limits\(plan\)"):
+        by(circle, arm, tool=tool, placement=placement, speed=0.1, options=asked)
 
 
 def test_the_example_of_the_page_runs(capsys):

@@ -18,6 +18,7 @@ from kerfpath.planner._certified import with_bound
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._continuous import clear_motion, grid_reason
 from kerfpath.planner._courses import along_a_course
+from kerfpath.planner._plan import require_nodes_alone
 from kerfpath.planner._refined import refine_plan
 from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.planner._words import limits_named
@@ -83,6 +84,7 @@ def plan_in_pieces(
         As `plan`; another method or closure, a rotation limit, a tilt.
     """
     asked = with_keywords(options, keywords, PieceKeywords, interruptions="fewest")
+    require_nodes_alone(asked, "plan_in_pieces")
     task = task_of(
         contour,
         robot,

@@ -11,7 +11,7 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
+from kerfpath.options import KEEPS, PlanKeywords, PlanOptions, with_keywords
 from kerfpath.planner._certified import with_bound
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._continuous import plan_continuous
@@ -22,7 +22,7 @@ from kerfpath.planner._words import with_windows_said
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 
-__all__ = ["plan"]
+__all__ = ["plan", "require_nodes_alone"]
 
 
 def plan(
@@ -110,9 +110,11 @@ def plan(
     NoFeasiblePath
         Says the first node where the path breaks, and what each test removed there.
     InputError
-        Limits that are not known, nodes unevenly spaced, values out of range.
+        Limits that are not known, nodes unevenly spaced, values out of range; what is to be
+        guaranteed between the nodes.
     """
     asked = with_keywords(options, keywords, PlanKeywords)
+    require_nodes_alone(asked, "plan")
     if cell is None and asked.comfort is not None and asked.comfort.clearance is not None:
         raise InputError("comfort clearance: is measured in a cell; give cell=")
     task = task_of(
@@ -138,3 +140,15 @@ def plan(
     except NoFeasiblePath as broken:
         raise with_windows_said(broken, asked) from None
     return with_bound(made, asked.certify, phase=phase)
+
+
+def require_nodes_alone(options: PlanOptions, what: str) -> None:
+    """Raise InputError where a guarantee is asked for that no plan by itself can give.
+
+    It is one of a program and its controller: `kerfpath.keep_limits` and jobs look at them.
+    """
+    if options.between_nodes == "guaranteed":
+        raise InputError(
+            f'between_nodes: expected "reported" or "kept", got "guaranteed"; {what} holds the '
+            f"limits at the nodes: leave it out, and {KEEPS}; or run a job"
+        )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -106,14 +106,16 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
         said = f"{job.path}: as Python: {refusal}; run the job itself with kerfpath.job.run_job"
         raise InputError(said)
     drawing = os.path.relpath(job.part_file.absolute(), folder or job.path.absolute().parent)
+    at_nodes = replace(job.options, between_nodes="reported")  # what else comes after each plan
     lines = [_robot(job), f"T_flange_tip = {_array(job.tool)}", ""]
     lines += [f"T_base_part = {_array(job.placement)}", "", _part(job, drawing), ""]
-    lines += ["# How every plan is asked for.", _options(job.options)]
+    lines += ["# How every plan is asked for.", _options(at_nodes)]
     if prepared.cell is not None:
         lines += ["", *cell_lines(job, prepared.cell)]
     within, cell = job.tolerances, "" if prepared.cell is None else ", cell=cell"
     keeps = keeps_between_nodes(job)
-    keep = KEEP.format(say=SAY) if keeps else ""
+    failing = "faults.append" if job.options.between_nodes == "guaranteed" else SAY
+    keep = KEEP.format(say=failing) if keeps else ""
     if job.program.language != "none":
         lines += _program(job)
     lines.append(CUT.format(path=within.path, axis=within.axis, say=SAY, keep=keep, cell=cell))

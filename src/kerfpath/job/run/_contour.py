@@ -18,6 +18,7 @@ from kerfpath.job.as_run import as_run, kept_between_nodes
 from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
 from kerfpath.job.run._remedy import Remedy, find_remedy, opens_without_windows
 from kerfpath.job.run._result import CutResult
+from kerfpath.options import PlanOptions
 from kerfpath.planner import clearance_map, plan, plan_in_pieces
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress
@@ -72,7 +73,7 @@ def cut_candidate(
     def planned(by: Callable[..., _T]) -> _T:
         return by(
             candidate.nodes, job.robot, tool=job.tool, placement=job.placement,
-            speed=candidate.speed, options=job.options, cell=kept, graph=graph, phase=begin,
+            speed=candidate.speed, options=_at_nodes(job), cell=kept, graph=graph, phase=begin,
         )  # fmt: skip
 
     def follow(run: Subproblem) -> Plan:
@@ -119,7 +120,7 @@ def _cut_along_courses(
     def planned(by: Callable[..., _T]) -> _T:
         return by(
             nodes, job.robot, tool=job.tool, placement=job.placement, speed=candidate.speed,
-            options=job.options, cell=cell, phase=begin,
+            options=_at_nodes(job), cell=cell, phase=begin,
         )  # fmt: skip
 
     try:
@@ -146,6 +147,11 @@ def _cut_along_courses(
     return tuple(_audited(prepared, whole, made) for made in plans)
 
 
+def _at_nodes(job: Job) -> PlanOptions:
+    """Return how plans of a job are asked for: what is to hold between the nodes comes after."""
+    return replace(job.options, between_nodes="reported")
+
+
 def _at_rest(job: Job, candidate: Candidate) -> Array:
     """Return where the external axes are nearest to zero, at every node (K, E) rad or m."""
     limits, arm = job.robot.joint_limits(), job.robot.family.joints
@@ -166,7 +172,7 @@ def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> 
     graph = job.graph(candidate.nodes)
     made = plan(
         candidate.nodes, job.robot, tool=job.tool, placement=job.placement, speed=candidate.speed,
-        options=job.options, cell=prepared.cell, graph=None if job.robot.externals else graph,
+        options=_at_nodes(job), cell=prepared.cell, graph=None if job.robot.externals else graph,
     )  # fmt: skip
     cut = _audited(prepared, CutResult(request=request, candidate=candidate, graph=graph), made)
     return cut if cut.passed else None
@@ -205,7 +211,9 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
     """Return the cut of one plan, at finer intervals if the job asks for them, and its audit."""
     job, candidate, graph = prepared.job, whole.candidate, whole.graph
     # The postures that the job allows, of which the search may have had only some.
-    made = replace(made, settings=replace(made.settings, postures=job.options.postures))
+    postures, between = job.options.postures, job.options.between_nodes
+    settings = replace(made.settings, postures=postures, between_nodes=between)
+    made = replace(made, settings=settings)
     s, nodes = made.contour.s, candidate.nodes
     if len(s) < len(nodes):
         first = int(np.searchsorted(nodes.s, s[0]))

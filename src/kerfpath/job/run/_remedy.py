@@ -121,7 +121,8 @@ class _Trial:
         try:
             plan(
                 nodes, self.job.robot, tool=self.job.tool, placement=self.job.placement,
-                speed=at, options=options, cell=self.cell, graph=graph,
+                speed=at, options=replace(options, between_nodes="reported"), cell=self.cell,
+                graph=graph,
             )  # fmt: skip
         except NoFeasiblePath:
             return False

@@ -70,7 +70,7 @@ def _kept(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Kept | N
     try:
         made = plan(
             nodes, job.robot, tool=job.tool, placement=job.placement, speed=speed,
-            options=replace(job.options, certify=None), cell=cell,
+            options=replace(job.options, certify=None, between_nodes="reported"), cell=cell,
         )  # fmt: skip
     except NoFeasiblePath:
         return None

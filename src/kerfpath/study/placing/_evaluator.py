@@ -196,7 +196,7 @@ class PlacementEvaluator(Evaluator):
         options = replace(
             self.job.options.without_penalties,
             method="continuous" if self.off_grid else "exact",
-            objective="sum", feed="constant", refine=False, certify=None,
+            objective="sum", feed="constant", refine=False, certify=None, between_nodes="reported",
         )  # fmt: skip
         if not contour.nodes.closed:
             options = replace(options, closure="free")  # a stretch of a loop that closes need not
