@@ -5,13 +5,20 @@ from functools import cache
 
 import numpy as np
 import pytest
-from tests.post.external_cells import CELLS, moving_plan, with_axes
+from tests.post.external_cells import CELLS, ExternalCase, moving_plan, with_axes
 
 from conftest import pose
 from kerfpath import robot
 from kerfpath.auditor import chain_of
-from kerfpath.execution import _keep, executed, keep_limits, timing_of
-from kerfpath.post import Controller, build_program
+from kerfpath.execution import (
+    _keep,
+    executed,
+    from_stop_to_stop,
+    keep_limits,
+    run_along,
+    timing_of,
+)
+from kerfpath.post import Controller, LinearMove, build_program, with_tips
 from programs import arc
 
 ARM = robot("abb_irb4600_60_205").with_limits(
@@ -222,3 +229,39 @@ def test_an_axis_that_needs_too_much_is_named(monkeypatch):
 
 def peak_of(run, name, robot):
     return np.abs(run.acceleration_share[:, robot.joint_names.index(name)]).max()
+
+
+@pytest.mark.parametrize("language", ["rapid", "krl"])
+@pytest.mark.parametrize("cell", ["turn-tilt", "rail+table"])
+def test_a_program_read_back_runs_as_the_one_that_was_written(cell, language):
+    case = ExternalCase(cell, language)
+    program = build_program([case.plan(COUNT)])
+    read = with_tips(
+        case.read(case.files(program)), program.robot, program.T_flange_tip, program.T_base_part
+    )
+    moves = [
+        replace(
+            ours,
+            T_part_tip=back.T_part_tip,
+            q=np.append(ours.q[:6], back.external_of(read.externals)),
+            speed=back.speed,
+            zone=back.zone,
+        )
+        for ours, back in zip(program.moves, read.moves, strict=True)
+        if isinstance(ours, LinearMove)
+    ]
+    (run,), (again,) = (
+        [
+            run_along(
+                part, program.robot, T_base_part=program.T_base_part,
+                T_flange_tip=program.T_flange_tip,
+            )
+            for part in from_stop_to_stop(each)
+        ]
+        for each in (program.sections[0].moves, moves)
+    )  # fmt: skip
+    # Speeds are said in um/s, positions to a tenth of a um: 0.2 um over an interval of 0.07 s.
+    assert again.course.time[-1] == pytest.approx(run.course.time[-1], rel=1e-4)
+    for name in ("peak_velocity", "peak_acceleration"):
+        assert getattr(again, name).share == pytest.approx(getattr(run, name).share, rel=0.01)
+    assert again.acceleration_bound == pytest.approx(run.acceleration_bound, rel=0.03)

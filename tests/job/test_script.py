@@ -118,6 +118,19 @@ def test_a_cell_is_that_of_the_job(tmp_path):
     assert made.distances(q) == pytest.approx(meant.distances(q), abs=1e-12)
 
 
+def test_a_script_fails_where_a_guarantee_of_its_job_is_not_kept(tmp_path):
+    asked = QUICK.replace("[plan]\n", '[plan]\nbetween_nodes = "guaranteed"\n')
+    assert "faults" not in scripted(tmp_path, QUICK)[1].read_text().partition("kept.done")[2][:80]
+    narrow = asked.replace("[program]\n", "[program]\nzone_mm = 0.05\n")
+    _, script = scripted(tmp_path, narrow)
+    with pytest.raises(SystemExit, match="between the nodes joint"):
+        runpy.run_path(str(script))
+    assert not list((tmp_path / "out").glob("*"))
+    stopping = asked.replace("[program]\n", "[program]\nzone_mm = 0\n")
+    with pytest.raises(InputError, match='"guaranteed" between_nodes that nothing proves'):
+        scripted(tmp_path, stopping)
+
+
 def test_solids_from_files_are_refused(tmp_path):
     fixture = """
 [cell]

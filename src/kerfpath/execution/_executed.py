@@ -122,10 +122,10 @@ def executed(program: Program, *, controller: Controller = PLAIN) -> tuple[Execu
     """Return every run of straight and circular moves of a program, as it is executed.
 
     The motion is that of `ToolCourse`, at the programmed speeds throughout: neither speeding up
-    from the stop nor slowing down for a limit is modelled. The joints follow it exactly. Their
-    velocities and accelerations are looked at three times in each stretch that is smooth; bounds
-    that hold everywhere come with them, see `kerfpath.auditor.rates_along`. Torques are those at
-    the samples.
+    from the stop nor slowing down for a limit is modelled. The joints follow it exactly; external
+    axes go evenly from target to target, in zones as the tip does. Velocities and accelerations are
+    looked at three times in each stretch that is smooth; bounds that hold everywhere come with
+    them, see `kerfpath.auditor.rates_along`. Torques are those at the samples.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ import numpy as np
 
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.job.as_run import keeps_between_nodes
+from kerfpath.job.as_run import controller_of, keeps_between_nodes
 from kerfpath.job.format import ContourSpec, CutRequest, Job, PreparedJob
 from kerfpath.job.output._script_cell import cell_lines, has_files
 from kerfpath.operations import Side
@@ -136,7 +136,10 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
 
 def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
     """Return what a job asks for that a script has no few lines for; empty where there is none."""
+    assumed = not keeps_between_nodes(job) or bool(controller_of(job).assumed)
     beyond = {
+        'a "guaranteed" between_nodes that nothing proves': assumed
+        and job.options.between_nodes == "guaranteed",
         "solids from files in [cell]": job.cell is not None and has_files(job.cell),
         "[[robot.external]]": bool(job.robot.externals),
         "[sequence]": job.sequence is not None,
