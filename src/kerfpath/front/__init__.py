@@ -7,6 +7,8 @@ from kerfpath.front._front import Front as Front
 from kerfpath.front._front import ParetoSet as ParetoSet
 from kerfpath.front._front import hypervolume as hypervolume
 from kerfpath.front._pareto import pareto as pareto
+from kerfpath.front._planned import follows_courses as follows_courses
+from kerfpath.front._planned import graph_of_runs as graph_of_runs
 from kerfpath.front._planned import plan_run as plan_run
 from kerfpath.front._problem import Criterion as Criterion
 from kerfpath.front._problem import Evaluation as Evaluation

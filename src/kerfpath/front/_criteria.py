@@ -105,7 +105,13 @@ class Range(PerJoint):
                 had, all_more = (float((w / velocity).sum()) for w in (widths[0], more))
                 width = widths[0] + min(1.0, (value - had) / max(all_more, ROOM)) * more
             else:
-                width = widths[1] * value / float((widths[1] / velocity).sum())
+                width, shares, some = (
+                    widths[1].copy(),
+                    widths[1] / velocity,
+                    problem.narrowed_joints,
+                )
+                left = max(0.0, value - float(shares[some:].sum()))
+                width[:some] = width[:some] * left / float(shares[:some].sum())
         else:
             joints = np.array([self.joint])
             width = np.full(len(window), value)

@@ -15,12 +15,12 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.front._criteria import criteria_named
 from kerfpath.front._front import Front, ParetoSet
+from kerfpath.front._planned import graph_of_runs
 from kerfpath.front._problem import Evaluation, ParetoProblem
 from kerfpath.front._search import AHEAD, FrontSearch, SearchKind, whole_number
 from kerfpath.front._subproblem import Subproblem
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import GraphKeywords, PlanMethod, PlanOptions, with_keywords
-from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 from kerfpath.search import Closure
@@ -66,7 +66,9 @@ def pareto(
     are the epsilon constraint for the range (9). Every second run is over continuous gamma, where
     it is looked for how the plans of the grid can be bettered in one criterion and as good in those
     that can be held, and then between the neighbours on the front. A plan of the grid is the proved
-    optimum of what its run asked for, one over continuous gamma the best motion found.
+    optimum of what its run asked for, one over continuous gamma the best motion found. External
+    axes follow the courses of the plans that `kerfpath.plan` finds on the grid, and leave them over
+    continuous gamma; with any other method they have a grid of their own.
 
     Parameters
     ----------
@@ -119,9 +121,10 @@ def pareto(
     workers = whole_number((os.cpu_count() or 1) if workers is None else workers, "workers")
     T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
     if graph is None:
-        graph = layered_graph(
-            contour, robot, tool=T_flange_tip, placement=T_base_part, options=asked
-        )
+        graph = graph_of_runs(
+            contour, robot, tool=T_flange_tip, placement=T_base_part, speed=speed, options=asked,
+            cell=cell,
+        )  # fmt: skip
     problem = ParetoProblem(
         contour=contour,
         robot=robot,

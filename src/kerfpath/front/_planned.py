@@ -1,4 +1,7 @@
-"""One run of the planner: on the grid of gamma, or over continuous gamma in the same windows."""
+"""One run of the planner: on the grid of gamma, or over continuous gamma in the same windows.
+
+External axes follow the courses of the best plans on the grid; off it they leave them.
+"""
 
 from __future__ import annotations
 
@@ -15,11 +18,49 @@ from kerfpath.front._subproblem import Subproblem
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import turns_of
 from kerfpath.options import PlanOptions
-from kerfpath.planner import best_motion, plan
+from kerfpath.planner import best_motion, graph_over_courses, layered_graph, plan
 from kerfpath.plans import Plan, on_turns
 from kerfpath.robots import Robot
 
-__all__ = ["plan_run"]
+__all__ = ["follows_courses", "graph_of_runs", "plan_run"]
+
+
+def follows_courses(robot: Robot, options: PlanOptions) -> bool:
+    """Return whether runs on the grid follow courses of external axes, not a grid of them."""
+    return bool(robot.externals) and options.method == "continuous"
+
+
+def graph_of_runs(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: Array,
+    placement: Array,
+    speed: float | None,
+    options: PlanOptions,
+    cell: Cell | None,
+    progress: Callable[[int], None] | None = None,
+) -> LayeredGraph:
+    """Return the layered graph that all runs of a set have in common.
+
+    Arguments as in `kerfpath.plan`; the options are those of the set, not of a run.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No course of the external axes leads to a plan.
+    InputError
+        As `kerfpath.plan`.
+    """
+    if not follows_courses(robot, options):
+        return layered_graph(
+            contour, robot, tool=tool, placement=placement, options=options, progress=progress
+        )
+    asked = replace(options, feed="constant", certify=None)
+    return graph_over_courses(
+        contour, robot, tool=tool, placement=placement, speed=speed, options=asked, cell=cell,
+        progress=progress,
+    )  # fmt: skip
 
 
 def plan_run(
@@ -38,7 +79,8 @@ def plan_run(
     """Return the plan of a run.
 
     On the grid its windows leave out vertices; over continuous gamma they are ranges of the joints,
-    too, so that nothing between the samples leaves them. Its shares of the limits are then what it
+    too, so that nothing between the samples leaves them, and where they leave a node nothing, a
+    course of the external axes is looked for within them. Its shares of the limits are then what it
     is held to; the plan says those of the options, which bound what else moves, and its proof.
 
     Parameters
@@ -65,9 +107,10 @@ def plan_run(
         _require_ranges(asked, windowed)
         arm, graph = _narrowed(robot, graph, run.window, windowed, asked)
         cell = cell and replace(cell, endless=arm.endless)
+    empty = run.continuous and robot.externals and not np.diff(graph.start).all()
     made = (best_motion if run.continuous else plan)(
         contour, arm, tool=tool, placement=placement, speed=speed, options=asked, cell=cell,
-        graph=graph, phase=phase,
+        graph=None if empty else graph, phase=phase,
     )  # fmt: skip
     if not run.continuous:
         return made

@@ -16,7 +16,7 @@ from kerfpath.auditor import audit as full_audit
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.front._planned import plan_run
+from kerfpath.front._planned import follows_courses, plan_run
 from kerfpath.front._subproblem import Subproblem
 from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss
@@ -195,6 +195,12 @@ class ParetoProblem:
     def continuous(self) -> bool:
         """Whether there are runs over continuous gamma, too."""
         return self.options.method == "continuous" and self.robot.family.free_rotation
+
+    @property
+    def narrowed_joints(self) -> int:
+        """How many joints, the first ones, windows narrow: on the grid not those with a course."""
+        along = follows_courses(self.robot, self.options)
+        return self.robot.family.joints if along else self.robot.joints
 
     def as_good(self, solution: Solution) -> Subproblem:
         """Return a run held to be as good as a plan in all criteria that can be held."""

@@ -15,7 +15,7 @@ from kerfpath.planner._graph import node_interval as node_interval
 from kerfpath.planner._graph import samples_of as samples_of
 from kerfpath.planner._map import ClearanceMap as ClearanceMap
 from kerfpath.planner._map import clearance_map as clearance_map
-from kerfpath.planner._over_courses import require_arm_alone as require_arm_alone
+from kerfpath.planner._over_courses import graph_over_courses as graph_over_courses
 from kerfpath.planner._pieces import plan_in_pieces as plan_in_pieces
 from kerfpath.planner._plan import plan as plan
 from kerfpath.planner._words import FINER as FINER

@@ -20,12 +20,14 @@ from scipy.optimize import lsq_linear
 
 from kerfpath._arrays import Array, Bools, Ints
 from kerfpath._repr import short_repr
+from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.courses import CoarseLayer, Nearby, best_steps
 from kerfpath.kernels.metric import increments, wrap
 from kerfpath.options import PlanOptions
+from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._graph import layered_graph
 from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.robots import Robot
@@ -104,6 +106,7 @@ def external_course(
     placement: ArrayLike,
     speed: float | None = None,
     options: PlanOptions | None = None,
+    cell: Cell | None = None,
 ) -> Array:
     """Return the course (K, E) rad or m of the external axes that promises most.
 
@@ -119,7 +122,7 @@ def external_course(
     task = task_of(
         contour, robot, asked, tool=tool, placement=placement, speed=SLOW if free else speed
     )
-    return next(courses(task, (GENTLE,) if free else STYLES))
+    return next(courses(task, (GENTLE,) if free else STYLES, ClearSearch(task, cell).clear))
 
 
 def along_a_course(
@@ -271,6 +274,9 @@ def _best_way(coarse: _Coarse, task: PlanningTask, style: _Style) -> Ints:
     robot, graph, count = task.robot, coarse.graph, len(coarse.nodes)
     before = _layer(coarse, robot, 0)
     value = np.where(before.ok, 0.0, np.inf)
+    if not before.ok.any():
+        why = _stuck(coarse, robot, 0)
+        raise NoFeasiblePath(why, node=-1, proved=False, counts=graph.counts(0))
     back = np.full((count, *value.shape), -1, np.int64)
     for k in range(1, count):
         here, reached = _layer(coarse, robot, k), np.empty(value.shape)
@@ -284,10 +290,6 @@ def _best_way(coarse: _Coarse, task: PlanningTask, style: _Style) -> Ints:
                 counts=graph.counts(k),
             )
         before, value = here, reached
-    if not np.isfinite(value).any():
-        raise NoFeasiblePath(
-            _stuck(coarse, robot, 0), node=-1, proved=False, counts=graph.counts(0)
-        )
     at = int(np.argmin(value))
     path = [at]
     for k in range(count - 1, 0, -1):

@@ -1,4 +1,4 @@
-"""A plan of arm and external axes: along the courses that promise most, the best one refined."""
+"""Plans of arm and external axes, along the courses that promise most, and the best of them."""
 
 from __future__ import annotations
 
@@ -7,23 +7,31 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array
-from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.options import PlanOptions
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._continuous import claimed, clear_motion, plan_continuous
-from kerfpath.planner._courses import courses
+from kerfpath.planner._courses import coarse_places, courses
+from kerfpath.planner._graph import layered_graph
 from kerfpath.planner._quickest import QuickMotion, quicker
-from kerfpath.planner._task import PlanningTask
+from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 
-__all__ = ["faster_motions", "plan_over_courses", "require_arm_alone"]
+__all__ = ["faster_motions", "graph_over_courses", "plan_over_courses"]
 
 GAMMA_STEP = np.radians(3)
 """rad: the refinement moves gamma and axes together, so that few samples lead to it."""
 SAME = 1e-3
 """Relative difference of costs up to which two motions count as the same optimum."""
+ALIKE = 1e-3
+"""rad or m: courses that are nowhere farther apart are one."""
 RUNGS = (1.25, 1.06)
 """Multiples of the speed reached at which courses are looked for that are quicker still."""
 
@@ -41,18 +49,72 @@ def plan_over_courses(
     NoFeasiblePath
         None was found; says where the best of the tries ended. It proves nothing of other courses.
     """
+    return min(_plans(task, finder, begin), key=lambda plan: plan.cost)
+
+
+def graph_over_courses(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    speed: float | None,
+    options: PlanOptions,
+    cell: Cell | None,
+    progress: Callable[[int], None] | None = None,
+) -> LayeredGraph:
+    """Return the layered graph along the courses of the external axes of the plans found.
+
+    Each is the course of a refined plan, that of the best one first; a path may change from one to
+    another where the limits of the axes let it. Arguments as in `kerfpath.plan`.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No plan is found, see `plan_over_courses`.
+    """
+    task = task_of(contour, robot, options, tool=tool, placement=placement, speed=speed)
+    plans = _plans(task, ClearSearch(task, cell), lambda what: None)
+    ways: list[Array] = []
+    for made in sorted(plans, key=lambda plan: plan.cost):
+        x = made.q[:, task.arm :]
+        if not any(np.allclose(x, other, atol=ALIKE) for other in ways):
+            ways.append(x)
+    return layered_graph(
+        contour,
+        robot,
+        tool=tool,
+        placement=placement,
+        options=options,
+        external=np.stack(ways, axis=1),
+        progress=progress,
+    )
+
+
+def _plans(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]) -> list[Plan]:
+    """Return the motions that the courses lead to, one at least.
+
+    Raises
+    ------
+    NoFeasiblePath
+        As `plan_over_courses`.
+    """
     begin("search for a course of the external axes")
+    places = coarse_places(task.robot)
+    if len(places) == 1:  # none moves
+        still = task.along(np.repeat(places, len(task.contour), axis=0))
+        return [plan_continuous(still, finder.of(still), begin)]
     nominal = _nominal(task, finder, begin)
     known = None if nominal is None else nominal.external
     ways = courses(task, clear=finder.clear) if known is None else iter([known])
     tried = _along(ways, task, finder, begin, nominal)
-    if tried.best is not None:
-        return tried.best
+    if tried.plans:
+        return tried.plans
     failed = tried.failed
     for course in tried.open[:1]:
         whole = task.along(course)
         try:
-            return plan_continuous(whole, finder.of(whole), begin)
+            return [plan_continuous(whole, finder.of(whole), begin)]
         except NoFeasiblePath as broken:
             failed.append(broken)
     raise _unproved(task, max(failed, key=lambda broken: broken.node))
@@ -77,11 +139,16 @@ def faster_motions(
 
 
 class _Tried(NamedTuple):
-    """What came of some courses: the best motion, why some have none, those with neither."""
+    """What came of some courses: their motions, why some have none, those with neither."""
 
-    best: Plan | None
+    plans: list[Plan]
     failed: list[NoFeasiblePath]
     open: list[Array]
+
+    @property
+    def best(self) -> Plan | None:
+        """The best of the motions; None where there is none."""
+        return min(self.plans, key=lambda plan: plan.cost, default=None)
 
 
 def _along(
@@ -89,10 +156,10 @@ def _along(
     task: PlanningTask,
     finder: ClearSearch,
     begin: Callable[[str], None],
-    best: Plan | None = None,
+    known: Plan | None = None,
 ) -> _Tried:
     """Return what the arm's motions along some courses come to, with axes and gamma refined."""
-    tried = _Tried(best, [], [])
+    tried = _Tried([] if known is None else [known], [], [])
     for course in ways:
         few = task.along(course).sampled(max(task.settings.gamma_step, GAMMA_STEP))
         there = finder.of(few)
@@ -105,8 +172,7 @@ def _along(
             tried.open.append(course)
             continue
         made, best = replace(claimed(found, there), settings=task.settings), tried.best
-        if best is None or made.cost < best.cost:
-            tried = tried._replace(best=made)
+        tried.plans.append(made)
         if best is not None and abs(made.cost - best.cost) <= SAME * best.cost:
             break  # two courses have led to one optimum
     return tried
@@ -123,13 +189,6 @@ def _nominal(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], Non
     except NoFeasiblePath:
         return None
     return None if made is None else replace(made, settings=task.settings)
-
-
-def require_arm_alone(robot: Robot, what: str) -> None:
-    """Raise InputError where a robot has external axes, of what does not know how they move."""
-    if robot.externals:
-        names = ", ".join(axis.name for axis in robot.externals)
-        raise InputError(f"{what}: it does not know yet how external axes move ({names})")
 
 
 def _unproved(task: PlanningTask, broken: NoFeasiblePath) -> NoFeasiblePath:

@@ -18,21 +18,25 @@ from kerfpath.cell import Cell, CollisionChecker
 from kerfpath.contour import Contour, FrameKind
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
-from kerfpath.job import Job, cell_of_job, fastest_along
+from kerfpath.job import Job, cell_of_job, fastest_along, places_of
+from kerfpath.options import PlanOptions
 from kerfpath.planner import (
     FastestSpeed,
     longest_step,
     node_interval,
-    require_arm_alone,
     require_rates_alone,
 )
 
-__all__ = ["EVERY", "Evaluator", "SampledContour", "sample_contours"]
+__all__ = ["EVERY", "Evaluator", "SampledContour", "out_of_reach", "sample_contours"]
 
 EVERY = 8
 """Nodes from one that is looked at for a clear pose to the next."""
 TRIED = 8
 """Poses of a node asked at once for a clear one."""
+STEPS = (np.radians(90.0), np.radians(15.0))
+"""Steps of gamma that are tried before the job's own: most nodes are reached at the first."""
+MOST_POSES = 2_000_000
+"""Poses of nodes that are looked at together."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -99,7 +103,6 @@ class Evaluator:
 
     def __post_init__(self) -> None:
         require_rates_alone(self.job.robot, "a study of places or robots")
-        require_arm_alone(self.job.robot, "a study of places or robots")
 
     @cached_property
     def cell(self) -> Cell | None:
@@ -132,14 +135,15 @@ class Evaluator:
     def fastest(
         self,
         nodes: Contour,
-        graph: LayeredGraph,
+        graph: LayeredGraph | None,
         *,
         off_grid: bool = False,
         enough: float | None = None,
     ) -> FastestSpeed:
         """Return the fastest constant speed on the grid or off it, clear in the cell.
 
-        Off the grid one that is `enough`, m/s, may be returned although there are faster ones.
+        Without a graph external axes begin from the gentlest course. Off the grid one that is
+        `enough`, m/s, may be returned although there are faster ones.
 
         Raises
         ------
@@ -149,3 +153,17 @@ class Evaluator:
         return fastest_along(
             self.job, nodes, self.cell, refine=off_grid, graph=graph, enough=enough
         )
+
+
+def out_of_reach(job: Job, nodes: Contour, options: PlanOptions) -> Ints:
+    """Return the nodes without a pose, external axes at any place of a coarse grid of them."""
+    places = places_of(job, nodes)
+    left = np.arange(len(nodes))
+    for step in (*(step for step in STEPS if step > options.gamma_step), options.gamma_step):
+        each = job.robot.postures * 2 * np.pi / step * (1 if places is None else places.shape[1])
+        parts = np.array_split(left, int(len(left) * each / MOST_POSES) + 1)
+        sampled = replace(options, gamma_step=step)
+        graphs = (job.graph(nodes, sampled, only=p, external=places) for p in parts if p.size)
+        empty = [np.diff(graph.start) == 0 for graph in graphs]
+        left = left[np.concatenate(empty)] if empty else left
+    return left

@@ -26,9 +26,9 @@ from kerfpath.front import (
     Subproblem,
     SubproblemData,
     criteria_named,
+    graph_of_runs,
 )
 from kerfpath.job import Job, cell_of_job
-from kerfpath.planner import require_arm_alone
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
 from kerfpath.study._job import LoadedJob, digest, load_job
@@ -201,23 +201,32 @@ def problem_of_job(
     ------
     InputError
         Criteria that are none, or for which something is missing.
+    NoFeasiblePath
+        No course of the external axes leads to a plan.
     """
     task = next(task for task in job.tasks(part) if task.name == contour)
     drawn = task.candidates(part)[0]
     nodes = task.sample(drawn)
     asked = task.asked(job.options)
-    if asked.method == "continuous":
-        require_arm_alone(job.robot, "a Pareto set off the grid")
+    speed = task.speed if nodes.time is None else None
     options = replace(asked, feed="constant", refine=False, certify=None)
     return ParetoProblem(
         contour=nodes,
         robot=job.robot,
         tool=job.tool,
         placement=job.placement,
-        speed=task.speed if nodes.time is None else None,
+        speed=speed,
         options=options,
         criteria=criteria_named(criteria, job.robot, options=options, cell=cell, home=job.home),
-        graph=job.graph(nodes, asked),
+        graph=graph_of_runs(
+            nodes,
+            job.robot,
+            tool=job.tool,
+            placement=job.placement,
+            speed=speed,
+            options=asked,
+            cell=cell,
+        ),
         cell=cell,
         home=job.home,
         audit=lambda made: _faults(job, drawn, made, cell),

@@ -9,18 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
+from kerfpath._arrays import Ints
 from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.front import follows_courses
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, read_job
-from kerfpath.planner import require_arm_alone
 from kerfpath.progress import Progress, no_progress
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
 from kerfpath.study._evaluator import (
     EVERY,
     Evaluator,
     SampledContour,
+    out_of_reach,
     sample_contours,
 )
 from kerfpath.study._job import digest, load_job
@@ -207,13 +209,14 @@ def evaluate_robot(
 def with_robot(job: Job, candidate: Robot) -> Job:
     """Return a job with another robot in its place, for `contour_speeds`.
 
+    Its external axes stay where they are, the base of the robot on those that carry it.
+
     Raises
     ------
     InputError
         A posture that its family has not; a cell that asks for the links of a description; a job
         with a load or jerk limits.
     """
-    require_arm_alone(job.robot, "a list of robots")
     if job.robot.load is not None or job.robot.jerk is not None:
         raise InputError(
             "its limits on torque and jerk are not known: remove mass_kg and jerk_deg_s3 to "
@@ -226,7 +229,37 @@ def with_robot(job: Job, candidate: Robot) -> Job:
             'its links are not known, as links = "description" in [cell] describes the job\'s own '
             'robot alone; write links = "capsules", which stand for those of any'
         )
+    candidate = _on_axes_of(job.robot, candidate)
     return replace(job, robot=candidate, options=replace(job.options, postures=postures))
+
+
+def _on_axes_of(own: Robot, candidate: Robot) -> Robot:
+    """Return a robot on the external axes of another.
+
+    Raises
+    ------
+    InputError
+        Its accelerations are not known: then nothing is known of how it moves with the axes.
+    """
+    if own.externals and candidate.acceleration is None:
+        names = ", ".join(axis.name for axis in own.externals)
+        raise InputError(
+            f"its accelerations are not known, and no course of {names} without them: give "
+            "--acceleration-ratio, or acceleration_ratio in [robot], to assume a typical ratio "
+            "to the speeds"
+        )
+    velocity, acceleration = own.speed_limits() if own.externals else ((), ())
+    limits = own.joint_limits()
+    for i, axis in enumerate(own.externals, own.family.joints):
+        candidate = candidate.with_external(
+            axis,
+            lower=float(limits.lower[i]),
+            upper=float(limits.upper[i]),
+            velocity=float(velocity[i]),
+            acceleration=float(acceleration[i]),
+            endless=bool(own.endless[i]),
+        )
+    return candidate
 
 
 def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
@@ -234,7 +267,9 @@ def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
 
     Reach is that of all poses on the job's grid, margins of [comfort] kept. Only where every node
     of every contour has a pose, and in a cell every `EVERY`-th a clear one, are speeds looked for:
-    exact on that grid, clear in the cell.
+    exact on that grid, clear in the cell. External axes are at any place of a coarse grid of them
+    for the reach, and speeds are along the gentlest course of theirs, unless the job's method takes
+    them on a grid.
 
     Raises
     ------
@@ -244,6 +279,8 @@ def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
     evaluator = Evaluator(job=job, part=part)
     _ = evaluator.cell  # what is wrong with it is said first
     contours = sample_contours(job, part)
+    if follows_courses(job.robot, job.options):
+        return _along_courses(evaluator, contours)
     graphs = [evaluator.graph(contour.nodes) for contour in contours]
     found = [
         _share_reached(contour, graph) for contour, graph in zip(contours, graphs, strict=True)
@@ -261,24 +298,54 @@ def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
             "to the speeds"
         )
     for i, graph in enumerate(graphs):
-        try:
-            best = evaluator.fastest(contours[i].nodes, graph)
-        except NoFeasiblePath as broken:
-            found[i] = replace(found[i], reason=str(broken))
-        else:
-            found[i] = replace(found[i], fastest=best.speed, joint=best.joint + 1, limit=best.limit)
+        found[i] = _with_speed(evaluator, contours[i], graph, found[i])
     return found
+
+
+def _along_courses(evaluator: Evaluator, contours: Sequence[SampledContour]) -> list[ContourSpeed]:
+    """Return what a robot can do of each contour along the gentlest course of external axes."""
+    job = evaluator.job
+    names = ", ".join(axis.name for axis in job.robot.externals)
+    found = [
+        _reached(
+            contour,
+            out_of_reach(job, contour.nodes, job.options.without_penalties),
+            f"at any sampled value of {names}",
+        )
+        for contour in contours
+    ]
+    if any(each.reason for each in found):
+        return found
+    return [
+        _with_speed(evaluator, contour, None, known)
+        for contour, known in zip(contours, found, strict=True)
+    ]
+
+
+def _with_speed(
+    evaluator: Evaluator, contour: SampledContour, graph: LayeredGraph | None, known: ContourSpeed
+) -> ContourSpeed:
+    """Return what is known of a contour with its fastest speed, or why there is none."""
+    try:
+        best = evaluator.fastest(contour.nodes, graph)
+    except NoFeasiblePath as broken:
+        return replace(known, reason=str(broken))
+    return replace(known, fastest=best.speed, joint=best.joint + 1, limit=best.limit)
 
 
 def _share_reached(contour: SampledContour, graph: LayeredGraph) -> ContourSpeed:
     """Return which share of the nodes has a pose, and what forbids the first that has none."""
-    empty, nodes = np.flatnonzero(np.diff(graph.start) == 0), len(contour.nodes)
-    reason = ""
-    if empty.size:
-        reason = (
-            f"no pose at {empty.size} of {nodes} nodes, at node {empty[0]} mostly: "
-            f"{graph.main_loss(int(empty[0]))}"
-        )
+    empty = np.flatnonzero(np.diff(graph.start) == 0)
+    first = f"at node {empty[0]} mostly: {graph.main_loss(int(empty[0]))}" if empty.size else ""
+    return _reached(contour, empty, first)
+
+
+def _reached(contour: SampledContour, empty: Ints, why: str) -> ContourSpeed:
+    """Return which share of the nodes has a pose, given those that have none, and why they have."""
+    nodes = len(contour.nodes)
     return ContourSpeed(
-        name=contour.name, asked=contour.speed, reached=1 - empty.size / nodes, reason=reason
+        name=contour.name,
+        asked=contour.speed,
+        reached=1 - empty.size / nodes,
+        reason=f"no pose at {empty.size} of {nodes} nodes, {why}" if empty.size else "",
     )

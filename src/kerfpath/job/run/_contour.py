@@ -12,7 +12,7 @@ from kerfpath._arrays import Array
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.front import Subproblem, plan_run
+from kerfpath.front import Subproblem, follows_courses, graph_of_runs, plan_run
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.as_run import as_run, kept_between_nodes
 from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
@@ -62,11 +62,18 @@ def cut_candidate(
         progress(f"{name}: {what}", 0, 0)
 
     progress(name, 0, total)
-    if job.robot.externals and options.method == "continuous" and request.run is None:
+    run, asked = request.run, request.task.asked(prepared.job.options)
+    if not follows_courses(job.robot, asked):
+        graph = graph_of(job, candidate.nodes, solved)
+    elif run is None:
         return _cut_along_courses(replace(prepared, job=job), request, candidate, solved, begin)
-    graph = graph_of(job, candidate.nodes, solved)
+    else:
+        graph = graph_of_runs(
+            candidate.nodes, job.robot, tool=job.tool, placement=job.placement,
+            speed=candidate.speed, options=asked, cell=cell, progress=solved,
+        )  # fmt: skip
     whole = _whole(job, request, candidate, graph, cell, begin)
-    run, every, kept = request.run, graph, cell
+    every, kept = graph, cell
     if run is not None:
         graph, kept = run.graph(graph, job.robot.endless), run.cell(cell)
 

@@ -164,12 +164,13 @@ class PlacementEvaluator(Evaluator):
         self,
         index: int,
         contour: SampledContour,
-        graph: LayeredGraph,
+        graph: LayeredGraph | None,
         enough: float | None = None,
     ) -> tuple[float, ContourValue]:
         """Return the value of a contour on a graph, alone and with what binds.
 
-        Off the grid a speed or margin that is `enough` may be returned although more is possible.
+        Without a graph it is planned as `kerfpath plan` does. Off the grid a speed or margin that
+        is `enough` may be returned although more is possible.
         """
         known = ContourValue(index=index, name=contour.name, nodes=len(contour.nodes))
         if self.goal == "motion":
@@ -192,7 +193,7 @@ class PlacementEvaluator(Evaluator):
         """Return the speed of a contour, m/s, that counts as one."""
         return contour.speed if self.goal == "margin" else 1 / 60
 
-    def _plan_cost(self, contour: SampledContour, graph: LayeredGraph) -> float:
+    def _plan_cost(self, contour: SampledContour, graph: LayeredGraph | None) -> float:
         options = replace(
             self.job.options.without_penalties,
             method="continuous" if self.off_grid else "exact",
@@ -296,11 +297,13 @@ class PlacementEvaluator(Evaluator):
         elif self.goal != "motion" or broken.lost_by(Loss.COLLISION):
             status = "collision"
         node = first + step * (broken.node + 1)
-        return self._why(status, progress, str(broken), index, node, searched=True)
+        sure = status != "speed" and not self.job.robot.externals
+        return self._why(status, progress, str(broken), index, node, searched=True, sure=sure)
 
     def _why(
-        self, status: Status, progress: float, reason: str, index: int, node: int, *, searched: bool
-    ) -> InfeasiblePlacement:
+        self, status: Status, progress: float, reason: str, index: int, node: int, *,
+        searched: bool, sure: bool = True,
+    ) -> InfeasiblePlacement:  # fmt: skip
         contour = self.contours[index]
         return InfeasiblePlacement(
             Infeasibility(
@@ -311,5 +314,6 @@ class PlacementEvaluator(Evaluator):
                 node=node,
                 nodes=len(contour.nodes),
                 index=index if searched else None,
+                sure=sure,
             )
         )

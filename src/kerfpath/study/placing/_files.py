@@ -68,9 +68,15 @@ def _best(found: Layout, best: PlacementTrial) -> dict[str, object]:
     if shipped is not None and value is not None:
         gain = shipped / value - 1 if found.goal == "motion" else value / shipped - 1
     cell = found.job.cell
-    fixtures = () if cell is None else cell.fixture
+    names = {
+        "fixture": [] if cell is None else [fixture.name for fixture in cell.fixture],
+        "external": [axis.name for axis in found.job.robot.externals],
+    }
     numbers = {
-        ".".join(fixtures[step].name if isinstance(step, int) else step for step in where): value
+        ".".join(
+            names[str(before)][step] if isinstance(step, int) else step
+            for before, step in zip(("", *where), where, strict=False)
+        ): value
         for where, value in found.numbers.items()
     }
     return {"offsets": dict(best.offsets), "value": value, "gain": gain, "numbers": numbers}

@@ -12,8 +12,9 @@ import numpy as np
 
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
+from kerfpath.front import follows_courses
 from kerfpath.job import Goal, Job, LayoutTable, cell_of_job
-from kerfpath.planner import require_arm_alone, require_rates_alone
+from kerfpath.planner import require_rates_alone
 from kerfpath.progress import Progress, no_progress
 from kerfpath.study._job import digest, load_job
 from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, nodes_of
@@ -237,7 +238,11 @@ def layout_as(
     path, then = str(Path(job).resolve()), digest(Path(job).resolve())
     at = load_job(path, then)
     require_rates_alone(at.job.robot, "a layout")
-    require_arm_alone(at.job.robot, "a layout")
+    if follows_courses(at.job.robot, at.job.options) and not leaves_grid(at.job):
+        raise InputError(
+            "a layout: the bounds of an arm that leaves no rotation free hold on a grid of its "
+            'external axes alone; write method = "exact" in [plan], and the step of each axis'
+        )
     cell_of_job(at.job, at.part)  # what is wrong with it is said once, not by every placement
     spans = dict(ranges or table.ranges or DEFAULT_RANGES)
     allowed = {"mm": table.tolerance_mm, "deg": table.tolerance_deg}

@@ -10,6 +10,9 @@
   along stretches that could not be cut elsewhere.
 - Proved: no motion passes the nodes about one that binds as fast as at another placement, at any
   gamma, posture and turn. It says of the placement that it is not better, and nothing else.
+- With external axes all of this is along the course of theirs that promises most, which plans
+  leave: reach is what the search for that course says, as it is what plans begin with, and no
+  estimate refuses a placement for sure. Nothing is proved.
 - Planned: the fastest speed as `kerfpath speed` finds it, or the cost as `kerfpath plan` does. A
   contour that is known to be as fast as the slowest one is left at that.
 """
@@ -17,24 +20,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
 
-from kerfpath._arrays import Ints
+from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
 from kerfpath.cell import CollisionChecker
 from kerfpath.certifier import MotionTest
+from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job
-from kerfpath.planner import best_motion, longest_step, samples_of
+from kerfpath.losses import Loss, Reason
+from kerfpath.planner import best_motion, external_course, longest_step, samples_of
 from kerfpath.search import ContinuousSearch, SearchProblem, find_shortest
 from kerfpath.study._evaluator import SampledContour
 from kerfpath.study.placing._beams import Beams
 from kerfpath.study.placing._evaluator import InfeasiblePlacement, PlacementEvaluator
-from kerfpath.study.placing._value import ContourValue, PlacementValue, Stage
+from kerfpath.study.placing._value import ContourValue, PlacementValue, Stage, Status
 
 __all__ = ["OffGridEvaluator", "leaves_grid"]
 
@@ -54,7 +59,41 @@ class OffGridEvaluator(PlacementEvaluator):
     off_grid: ClassVar[bool] = True
     last: ClassVar[Stage] = "planned"
 
+    courses: dict[Contour, Array] = field(default_factory=dict)
+
     __repr__ = short_repr
+
+    def graph(self, nodes: Contour, only: Ints | None = None) -> LayeredGraph:
+        """Return the layered graph of nodes along the course of external axes, if there are any."""
+        options = self.job.options.without_penalties
+        return self.job.graph(nodes, options, only=only, external=self.courses.get(nodes))
+
+    def _require_poses(self) -> None:
+        """Require a pose of every `EVERY`-th node, or a course of the external axes."""
+        if not self.job.robot.externals:
+            super()._require_poses()
+            return
+        done, total = 0, sum(len(contour.nodes) for contour in self.contours)
+        for index, contour in enumerate(self.contours):
+            try:
+                self.courses[contour.nodes] = self._course(contour)
+            except NoFeasiblePath as broken:
+                moves = self.goal == "motion" and Reason(Loss.ADMITTED) in broken.counts
+                status: Status = "speed" if moves else "unreachable"
+                progress, node = (done + broken.node + 1) / total, broken.node + 1
+                raise self._why(
+                    status, progress, str(broken), index, node, searched=False
+                ) from None
+            done += len(contour.nodes)
+
+    def _course(self, contour: SampledContour) -> Array:
+        """Return the course of the external axes that promises most, for the goal."""
+        job, timed = self.job, self.goal == "motion" and contour.nodes.time is None
+        return external_course(
+            contour.nodes, job.robot, tool=job.tool, placement=job.placement,
+            speed=contour.speed if timed else None, options=job.options.without_penalties,
+            cell=self.cell,
+        )  # fmt: skip
 
     def evaluate(
         self,
@@ -106,7 +145,8 @@ class OffGridEvaluator(PlacementEvaluator):
         self, index: int, graph: LayeredGraph, least: float | None
     ) -> tuple[float, ContourValue]:
         """Return the value of a contour, or one that is found to be reached and `least` or more."""
-        value, known = self._value(index, self.contours[index], graph, least)
+        whole = None if self.job.robot.externals else graph  # plans choose their own course
+        value, known = self._value(index, self.contours[index], whole, least)
         if least is None or value < least:
             return value, known
         return value, ContourValue(index=index, name=known.name, nodes=known.nodes, at_least=value)
@@ -148,15 +188,17 @@ class OffGridEvaluator(PlacementEvaluator):
         options = self.job.options.without_penalties
         if options.gamma_step < STEP:
             coarse = replace(options, gamma_step=STEP)
-            graph = self.job.graph(contour.nodes, coarse, only=nodes)
+            course = self.courses.get(contour.nodes)
+            graph = self.job.graph(contour.nodes, coarse, only=nodes, external=course)
             if np.diff(graph.start).all():
                 return graph
         return self.graph(contour.nodes, nodes)
 
     def _displacement(self, stretches: Sequence[Sequence[int]]) -> float:
         """Return the sum of the value functions; stretches must have a motion."""
-        comfort = self.job.options.without_penalties.comfort
-        if comfort is None or comfort.clearance is None:  # known on the grid only
+        comfort, axes = self.job.options.without_penalties.comfort, self.job.robot.externals
+        # Clearance is known on the grid only, and along another course there may be a motion.
+        if not axes and (comfort is None or comfort.clearance is None):
             for c, first, last in stretches:
                 self._require_motion(c, first, last)
         return sum(map(self._value_function, range(len(self.contours))))
@@ -187,7 +229,8 @@ class OffGridEvaluator(PlacementEvaluator):
         if empty.any():
             node = int(np.argmax(empty))
             reason = f"no pose, most often {graph.main_loss(node)}"
-            raise self._why("unreachable", 2.0, reason, index, node, searched=True)
+            sure = not robot.externals
+            raise self._why("unreachable", 2.0, reason, index, node, searched=True, sure=sure)
         problem = SearchProblem(
             q=graph.q,
             start=graph.start,

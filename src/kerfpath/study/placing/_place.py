@@ -1,4 +1,7 @@
-"""A placement: offsets of the part, the robot's base or the head, and the job that has them."""
+"""A placement: offsets of the part, the robot's base or the head, and the job that has them.
+
+The part is moved alone, or with an external axis that carries it.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job import VARIABLES, Job, pose
 from kerfpath.placement import xyz_rpy
+from kerfpath.robots import ExternalAxis
 
 __all__ = [
     "DEFAULT_RANGES",
@@ -89,10 +93,12 @@ def numbers_of(job: Job, offsets: Mapping[str, float], middle: Array) -> Numbers
     """Return what a job file has to say so that everything is where the offsets put it.
 
     The part is tilted about the base's x, then y, turned about its z, all through `middle`, and
-    then shifted; fixtures go with it but for the standing ones. A robot whose base moves by B sees
-    all else moved by inv(B). The head turns about the flange's z. Numbers are rounded as a file has
-    them, so that the job of the file is the very one that was evaluated. Offsets of zero change
-    nothing.
+    then shifted, with the external axis that [layout] says it is moved with and those that this
+    carries; fixtures go with it but for the standing ones, those on other axes, and those on the
+    ground where the part alone is moved on an axis. A robot whose base moves by B, with the axes
+    that carry it, sees all else moved by inv(B). The head turns about the flange's z. Numbers are
+    rounded as a file has them, so that the job of the file is the very one that was evaluated.
+    Offsets of zero change nothing.
 
     Parameters
     ----------
@@ -113,14 +119,47 @@ def numbers_of(job: Job, offsets: Mapping[str, float], middle: Array) -> Numbers
 
     put(("part",), job.placement, base @ part)
     put(("tool",), job.tool, turn)
+    of_axes = _of_axes(job, part, base)
+    for i, axis in enumerate(job.robot.externals):
+        numbers |= _axis_numbers(("robot", "external", i), axis, of_axes[axis.name])
     if job.cell is not None:
+        on_part = {axis.name: base @ part for axis in job.robot.externals if axis.carries == "part"}
+        alone = job.layout.move == "part"
+        of_loads = of_axes | on_part if alone else of_axes
+        of_ground = base if alone and on_part else base @ part
         for i, fixture in enumerate(job.cell.fixture):
-            stands = fixture.name in job.layout.standing
-            T = pose(fixture.xyz_mm, fixture.rpy_deg)
-            put(("cell", "fixture", i), T, base if stands else base @ part)
+            motion = of_ground if fixture.on is None else of_loads[fixture.on]
+            if fixture.name in job.layout.standing and (
+                fixture.on is None or fixture.on in on_part
+            ):
+                motion = base
+            put(("cell", "fixture", i), pose(fixture.xyz_mm, fixture.rpy_deg), motion)
         head = job.cell.head
         if head.file is not None:
             put(("cell", "head"), pose(head.xyz_mm or (0, 0, 0), head.rpy_deg or (0, 0, 0)), turn)
+    return numbers
+
+
+def _of_axes(job: Job, part: Array, base: Array) -> dict[str, Array]:
+    """Return how each external axis moves in the robot base, (4, 4) m, by its name."""
+    found, moves = {}, False
+    for axis in job.robot.externals:
+        if axis.carries == "robot":
+            found[axis.name] = np.eye(4)
+            continue
+        moves = moves or axis.name == job.layout.move
+        found[axis.name] = base @ part if moves else base
+    return found
+
+
+def _axis_numbers(where: tuple[str | int, ...], axis: ExternalAxis, motion: Array) -> Numbers:
+    """Return the direction of an axis that moves, and a point of it, as a job says them."""
+    numbers: Numbers = {}
+    if not np.array_equal(motion[:3, :3], np.eye(3)):
+        numbers[*where, "axis"] = [round(float(v), 9) + 0.0 for v in motion[:3, :3] @ axis.axis]
+    if axis.kind == "rotary" and not np.array_equal(motion, np.eye(4)):
+        moved = motion[:3, :3] @ axis.point + motion[:3, 3]
+        numbers[*where, "point_mm"] = [round(float(v), 4) + 0.0 for v in moved * 1e3]
     return numbers
 
 
@@ -152,6 +191,10 @@ def move_job(job: Job, numbers: Numbers) -> Job:
         return None if found is None else pose(found, numbers[*where, "rpy_deg"])
 
     part, tool, cell = at("part"), at("tool"), job.cell
+    axes = [
+        _moved_axis(axis, _of(numbers, "robot", "external", i))
+        for i, axis in enumerate(job.robot.externals)
+    ]
     if cell is not None:
         tables: dict[str, object] = {
             "head": cell.head.model_copy(update=_of(numbers, "cell", "head"))
@@ -163,10 +206,16 @@ def move_job(job: Job, numbers: Numbers) -> Job:
         cell = cell.model_copy(update=tables)
     return replace(
         job,
+        robot=replace(job.robot, externals=tuple(axes)) if axes else job.robot,
         placement=job.placement if part is None else part,
         tool=job.tool if tool is None else tool,
         cell=cell,
     )
+
+
+def _moved_axis(axis: ExternalAxis, numbers: Mapping[str, tuple[float, ...]]) -> ExternalAxis:
+    point = np.array(numbers["point_mm"]) / 1000 if "point_mm" in numbers else axis.point
+    return replace(axis, axis=np.array(numbers.get("axis", axis.axis)), point=point)
 
 
 def _of(numbers: Numbers, *where: str | int) -> dict[str, tuple[float, ...]]:

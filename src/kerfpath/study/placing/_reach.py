@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from kerfpath._arrays import Array, Ints
 from kerfpath._repr import short_repr
 from kerfpath.job import CutRequest, Job, PreparedJob
+from kerfpath.study._evaluator import out_of_reach
 from kerfpath.study.placing._place import (
     Numbers,
     middle_of,
@@ -19,9 +18,6 @@ from kerfpath.study.placing._place import (
 )
 
 __all__ = ["Placement", "placement_of"]
-
-STEPS = (np.radians(90.0), np.radians(15.0))
-"""Steps of gamma that are tried before the job's own: most nodes are reached at the first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,11 +50,14 @@ class Placement:
     def out_of_reach(self, offsets: Mapping[str, float]) -> list[Ints]:
         """Return of each contour the nodes that the robot reaches at no gamma and posture.
 
-        Gamma is sampled as the job has it, within its windows; margins of joints and postures of
-        the job are kept. The cell is not looked at.
+        Gamma is sampled as the job has it, within its windows, external axes on a coarse grid;
+        margins of joints and postures of the job are kept. The cell is not looked at.
         """
         moved = move_job(self.job, self.numbers(offsets))
-        return [_out_of_reach(moved, request) for request in self.requests]
+        return [
+            out_of_reach(moved, request.candidates[0].nodes, request.options.without_penalties)
+            for request in self.requests
+        ]
 
 
 def placement_of(prepared: PreparedJob) -> Placement:
@@ -69,14 +68,3 @@ def placement_of(prepared: PreparedJob) -> Placement:
         requests=tuple(prepared.contours),
         middle=middle_of(prepared.job, nodes),
     )
-
-
-def _out_of_reach(job: Job, request: CutRequest) -> Ints:
-    """Return the nodes of one contour without a pose: few samples of gamma first."""
-    nodes, options = request.candidates[0].nodes, request.options.without_penalties
-    left = np.arange(len(nodes))
-    for step in (*(step for step in STEPS if step > options.gamma_step), options.gamma_step):
-        if left.size:
-            graph = job.graph(nodes, replace(options, gamma_step=step), only=left)
-            left = left[np.diff(graph.start) == 0]
-    return left

@@ -58,7 +58,7 @@ class Infeasibility:
     """Why a placement is infeasible, and in which contour, at which of its nodes.
 
     More `progress` is nearer to being feasible. The contour's place in the job, `index`, is known
-    where a search found no path.
+    where a search found no path. It is `sure` unless there may be a plan all the same.
     """
 
     status: Status
@@ -68,6 +68,7 @@ class Infeasibility:
     node: int | None = None
     nodes: int | None = None
     index: int | None = None
+    sure: bool = True
 
     __repr__ = short_repr
 
@@ -147,11 +148,11 @@ def is_better(goal: str, value: float, other: float | None) -> bool:
 def is_estimated(value: PlacementValue) -> bool:
     """Return whether all that says that a placement is not the best is an estimate.
 
-    For a displacement, too, where no motion was found along a stretch or by the value function.
+    For a displacement, too, where no motion was found along a stretch or by the value function; and
+    with external axes wherever none was found along a course of theirs.
     """
-    return value.stage == "estimate" and (
-        value.infeasibility is None or value.infeasibility.status == "speed"
-    )
+    why = value.infeasibility
+    return value.stage == "estimate" and (why is None or not why.sure)
 
 
 def worst_of(goal: str, values: Sequence[float]) -> float:

@@ -124,6 +124,21 @@ class JobFile(Table):
         return self
 
     @model_validator(mode="after")
+    def _movable(self) -> JobFile:
+        """Require of what a layout moves that it is the part, or an axis that carries it."""
+        name = self.layout.move
+        carriers = [axis.name for axis in self.robot.external if axis.carries == "part"]
+        if name != "part" and name not in carriers:
+            hint = "vary base_x_mm, base_y_mm, base_z_mm or base_yaw_deg for what carries the robot"
+            raise fault(
+                f"one of {', '.join(map(repr, ('part', *carriers)))}",
+                f'"{name}"',
+                hint if any(axis.name == name for axis in self.robot.external) else "name one",
+                ("layout", "move"),
+            )
+        return self
+
+    @model_validator(mode="after")
     def _clearance_is_measured(self) -> JobFile:
         """Refuse a cost of clearance where the planner would not measure it."""
         here, why = ("comfort", "clearance_band_mm"), "with clearance_band_mm"

@@ -53,6 +53,9 @@ class LayoutTable(Table):
     """[layout]: the ranges in which `kerfpath layout` looks for the best placement."""
 
     goal: Goal = "speed"
+    move: Annotated[
+        Text, key('"part", or the name of the external axis that moves with it', '"part"')
+    ] = "part"
     x_mm: Millimetres = None
     y_mm: Millimetres = None
     z_mm: Millimetres = None
