@@ -180,10 +180,8 @@ def _sampled(task: PlanningTask) -> _Coarse:
     robot, options, K = task.robot, task.settings, len(task.contour)
     places, counts = _grid(robot)
     arm = robot.family.joints
-    slowest = max(
-        step / speed
-        for step, speed in zip(_steps(robot, counts), robot.speed_limits()[0][arm:], strict=True)
-    )
+    takes = _steps(robot, counts) / robot.speed_limits()[0][arm:]
+    slowest = takes.max() or np.inf  # none moves: as few nodes as there may be
     many = int(np.clip(task.dt * (K - 1) / slowest, min(K, FEW_NODES), min(K, NODES)))
     nodes = np.unique(np.round(np.linspace(0, K - 1, many)).astype(np.int64))
     hard = options.comfort.hard if options.comfort is not None else None

@@ -239,7 +239,7 @@ class Descent:
             if programs == 1:
                 promised = at.value(target) - self._modelled(model, delta, target)
             longest = float(np.abs(delta).max())
-            there = self.stand(at.free + delta, at.q)
+            there = self.stand(self._within(at.free + delta), at.q)
             soft = target in ("excess", "lost")
             if there.admitted or (soft and there.outside <= max(at.outside, 0)):
                 return _Step(there, promised, longest, programs)
@@ -247,6 +247,11 @@ class Descent:
                 break
             model = self._model(there, radius).through(delta)
         return _Step(None, promised, longest, programs)
+
+    def _within(self, free: Array) -> Array:
+        """Return `free` with the external axes where they are kept, which solvers do but nearly."""
+        free[:, 1:] = np.clip(free[:, 1:], self.low[:, 1:], self.high[:, 1:])
+        return free
 
     def _modelled(self, model: LinearModel, delta: Array, target: Target) -> float:
         q = model.q + model.moved(delta)

@@ -275,7 +275,9 @@ def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, Motio
     settings, comfort = plan.settings, plan.settings.comfort
     low, high = room_at_ends(plan)
     gamma, windows, q = plan.gamma, settings.gamma_windows, plan.unwrapped
-    x = q[:, plan.robot.family.joints :]
+    limits, arm = plan.robot.joint_limits(), plan.robot.family.joints
+    x, free = q[:, arm:], np.where(limits.endless, np.inf, 0.0)
+    ends = (limits.lower - free)[arm:], (limits.upper + free)[arm:]
     if windows:
         inside = nearest_inside(windows, plan.contour.s, gamma)
         gamma = np.full(len(gamma), np.nan) if inside is None else inside
@@ -289,17 +291,15 @@ def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, Motio
             periodic=settings.closure == "periodic",
             kept=kept,
         ),
-        limits=plan.robot.joint_limits()
-        if comfort is None
-        else comfort.narrowed(plan.robot, plan.q),
+        limits=limits if comfort is None else comfort.narrowed(plan.robot, plan.q),
         rotation=rotation_limits(settings.rotation, plan.robot.endless),
         weight=settings.weights,
         metric=settings.metric,
         objective=settings.objective,
         node_cost=plan.node_cost,
         radius=FIRST_STEPS * settings.gamma_step,
-        low=np.column_stack([low, np.full(x.shape, -np.inf)]),
-        high=np.column_stack([high, np.full(x.shape, np.inf)]),
+        low=np.column_stack([low, np.broadcast_to(ends[0], x.shape)]),
+        high=np.column_stack([high, np.broadcast_to(ends[1], x.shape)]),
     )
     return descent, descent.stand(np.column_stack([gamma, x]), q)
 

@@ -313,8 +313,8 @@ def _comfort(file: JobFile, robot: Robot) -> Comfort | None:
     Joints keep off their limits, as the digits of a program and what is straight between two nodes
     need; not where a range leaves no room for it.
     """
-    limits = robot.joint_limits()
-    ranges = (limits.upper - limits.lower)[~limits.endless]
+    limits, own = robot.joint_limits(), slice(robot.family.joints)
+    ranges = (limits.upper - limits.lower)[own][~limits.endless[own]]
     wide = bool((ranges > np.radians(2 * LIMITS_MARGIN)).all())
     return file.comfort.resolve({"limits": LIMITS_MARGIN} if wide else None)
 
