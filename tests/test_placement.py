@@ -8,7 +8,16 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from conftest import pose
-from kerfpath import InputError, NoFeasiblePath, audit, placed, placement_from_points, robot
+from kerfpath import (
+    Contour,
+    InputError,
+    NoFeasiblePath,
+    audit,
+    placed,
+    placement_from_points,
+    plan,
+    robot,
+)
 from kerfpath.cad import read_measured
 from kerfpath.placement import place_moves
 from kerfpath.transfer import back_off, transfer_move
@@ -197,3 +206,21 @@ def test_a_table_with_a_fault_is_refused_in_one_line(tmp_path, old, new, message
 def test_a_table_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(InputError, match="no such file; expected a table of measured points"):
         read_measured(tmp_path / "none.csv")
+
+
+def test_a_plan_with_external_axes_is_placed_with_the_axes_where_they_were(arm):
+    """A table turns while a straight cut is made; the part lies elsewhere on it then."""
+    turns = {"lower": -np.pi, "upper": np.pi, "velocity": 2.0, "acceleration": 4.0}
+    robot = arm.on_rail([0, 1, 0], lower=-1.0, upper=1.0, velocity=2.0, acceleration=4.0)
+    robot = robot.with_positioner([0, 0, 1], [1.2, 0, 0.4], **turns)
+    y = np.linspace(-0.2, 0.2, 9)
+    line = Contour(np.c_[0 * y, y, 0 * y], np.tile([0, 0, -1.0], (9, 1)), name="line")
+    tool, placement = frames()
+    course = np.c_[np.linspace(0, 0.1, 9), np.linspace(0, 0.3, 9)]
+    made = plan(line, robot, tool=tool, placement=placement, speed=0.05, external=course,
+                gamma_step=np.radians(15))  # fmt: skip
+    np.testing.assert_allclose(placed(made, placement).q, made.q, atol=EXACT)
+    there = placed(made, at([0.02, -0.03, 0.01], [0.02, -0.01, 0.05]) @ placement)
+    np.testing.assert_array_equal(there.external, made.external)
+    np.testing.assert_allclose(there.T_part_tip, made.T_part_tip, atol=EXACT)
+    assert audit(there, path_tolerance=1e-3) == []

@@ -16,7 +16,7 @@ from kerfpath.kernels.metric import turns_of
 from kerfpath.planner import plan as plan_contour
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner import refine
-from kerfpath.robots import posture_name
+from kerfpath.robots import base_in_part, posture_name
 from kerfpath.transfer import TransferMove, back_off, transfer_move
 
 __all__ = [
@@ -127,24 +127,30 @@ def placement_from_points(
 def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
     """Return the plan with the part at another placement: same tool path on it, other joints.
 
-    At every node the tool keeps its pose in the part, so gamma too, and the joints their branch.
-    Times stay; whether the limits are kept there is for the audit to say.
+    At every node the tool keeps its pose in the part, so gamma too, the joints their branch, and
+    external axes their values. Times stay; whether the limits are kept there is for the audit to
+    say.
 
     Parameters
     ----------
     plan : Plan
     T_base_part : (4, 4) m
+        With external axes at zero.
 
     Raises
     ------
     NoFeasiblePath
         A node out of reach in its posture.
     InputError
-        No pose, or a robot with an external axis.
+        No pose.
     """
     T_base_part = as_pose(T_base_part, "T_base_part")
     T_base_flange = T_base_part @ plan.T_part_tip @ np.linalg.inv(plan.T_flange_tip)
-    q = plan.robot.follow(T_base_flange, plan.q, plan.posture)
+    arm, axes = plan.robot.family.joints, plan.robot.externals
+    x = plan.q[:, arm:]
+    T_arm_flange = np.asarray(np.linalg.inv(base_in_part(axes, x)) @ T_base_flange, np.float64)
+    q = plan.robot.alone().follow(T_arm_flange, plan.q[:, :arm], plan.posture)
+    q = np.column_stack([q, x])
     lost = np.flatnonzero(np.isnan(q).any(axis=1))
     if lost.size:
         k = int(lost[0])
@@ -156,12 +162,14 @@ def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
         )
     # Nearest turn at the first node, and no jump of a turn from the old joints after it.
     q = plan.q + np.unwrap(q - plan.q, axis=0)
+    turn = turns_of(q).astype(np.int64)
+    turn[:, arm:] = 0
     before = plan.proof.without_bound().statement
     there = replace(
         plan,
         T_base_part=T_base_part,
         q=q,
-        turn=turns_of(q).astype(np.int64),
+        turn=turn,
         proof=Proof(optimal=False, statement=f"{before}; moved to another placement"),
     )
     s = plan.settings

@@ -13,6 +13,7 @@ from kerfpath.job import pose as pose_of
 from kerfpath.job import prepare, read_job
 from kerfpath.robots import robot
 from kerfpath.study import (
+    batch,
     contour_speeds,
     layout,
     pareto_of_job,
@@ -333,3 +334,11 @@ def test_a_plan_picked_from_a_front_is_the_one_that_was_found(tmp_path):
         assert cut.passed
         criteria = cut.plan.criteria
         assert criteria.range[0] == pytest.approx(values[1], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_batch_plans_robots_with_external_axes(tmp_path):
+    path = line_job(tmp_path, RAIL.format(low=-150, high=150))
+    (done,) = batch([path], tmp_path / "out", processes=1)
+    assert done.passed, done.reason
+    assert (done.folder / "plan.json").exists()

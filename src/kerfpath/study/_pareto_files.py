@@ -13,8 +13,8 @@ from kerfpath import __version__
 from kerfpath._repr import short_repr
 from kerfpath.cad import Part
 from kerfpath.errors import InputError
-from kerfpath.front import Front, Subproblem
-from kerfpath.job import JobResult, make_folder, prepare, run_prepared
+from kerfpath.front import Front, Subproblem, follows_courses
+from kerfpath.job import Job, JobResult, make_folder, prepare, run_prepared
 from kerfpath.post import write_files
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import FrontAxis, FrontPlan, render_front
@@ -117,7 +117,7 @@ def _page(found: JobFront, folder: Path) -> str:
         dominated=front.beaten.tolist(),
         marks={titles[name]: number for name, number in marks(front).items()},
         facts=facts,
-        notes=[_note(off_grid=off_grid), *others],
+        notes=[_note(off_grid=off_grid), *_courses_note(job), *others],
         command=f"kerfpath pareto {quote(str(job.path))} --out {where} --pick {{number}}",
         job_text=job.path.read_text(encoding="utf-8-sig"),
     )
@@ -133,6 +133,18 @@ def _note(*, off_grid: bool) -> str:
         "refined: off the grid others may be better or faster; "
     )
     return f"{known}the set is a sample of the front."
+
+
+def _courses_note(job: Job) -> list[str]:
+    """Say along what plans of the grid are proved, where external axes have courses."""
+    if not follows_courses(job.robot, job.options):
+        return []
+    names = ", ".join(axis.name for axis in job.robot.externals)
+    return [
+        f"On the grid {names} have the courses of the plans that kerfpath plan finds: an optimum "
+        "there is one along these, and nothing is proved of other courses. Over continuous "
+        "rotation plans leave them."
+    ]
 
 
 def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:

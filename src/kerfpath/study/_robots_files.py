@@ -35,7 +35,8 @@ ROBOT_COLUMNS = (
 )
 ROBOT_WORDS = (0, 5, 6)
 ROBOT_NOTES = (
-    "Margin: the fastest constant speed, exact on the job's grid, over the speed asked for, of the "
+    "Margin: the fastest constant speed, exact on the job's grid (and along one course of external "
+    "axes, where the job has them), over the speed asked for, of the "
     f"contour where that is least; from 1 on the robot does the job as it asks; {FINER}.",
     "Robot base, head and part stay where the job has them. The payload is stated, not checked: no "
     "job says what its head weighs.",
