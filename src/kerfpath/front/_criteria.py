@@ -105,13 +105,9 @@ class Range(PerJoint):
                 had, all_more = (float((w / velocity).sum()) for w in (widths[0], more))
                 width = widths[0] + min(1.0, (value - had) / max(all_more, ROOM)) * more
             else:
-                width, shares, some = (
-                    widths[1].copy(),
-                    widths[1] / velocity,
-                    problem.narrowed_joints,
-                )
-                left = max(0.0, value - float(shares[some:].sum()))
-                width[:some] = width[:some] * left / float(shares[:some].sum())
+                width, shares, free = widths[1].copy(), widths[1] / velocity, problem.free_joints
+                left = max(0.0, value - float(shares[free:].sum()))
+                width[:free] = width[:free] * left / float(shares[:free].sum())
         else:
             joints = np.array([self.joint])
             width = np.full(len(window), value)

@@ -197,8 +197,8 @@ class ParetoProblem:
         return self.options.method == "continuous" and self.robot.family.free_rotation
 
     @property
-    def narrowed_joints(self) -> int:
-        """How many joints, the first ones, windows narrow: on the grid not those with a course."""
+    def free_joints(self) -> int:
+        """How many joints, the first ones, have no course on the grid that a window would cut."""
         along = follows_courses(self.robot, self.options)
         return self.robot.family.joints if along else self.robot.joints
 

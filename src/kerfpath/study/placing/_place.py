@@ -123,16 +123,8 @@ def numbers_of(job: Job, offsets: Mapping[str, float], middle: Array) -> Numbers
     for i, axis in enumerate(job.robot.externals):
         numbers |= _axis_numbers(("robot", "external", i), axis, of_axes[axis.name])
     if job.cell is not None:
-        on_part = {axis.name: base @ part for axis in job.robot.externals if axis.carries == "part"}
-        alone = job.layout.move == "part"
-        of_loads = of_axes | on_part if alone else of_axes
-        of_ground = base if alone and on_part else base @ part
         for i, fixture in enumerate(job.cell.fixture):
-            motion = of_ground if fixture.on is None else of_loads[fixture.on]
-            if fixture.name in job.layout.standing and (
-                fixture.on is None or fixture.on in on_part
-            ):
-                motion = base
+            motion = _of_fixture(job, fixture.name, fixture.on, part, base, of_axes)
             put(("cell", "fixture", i), pose(fixture.xyz_mm, fixture.rpy_deg), motion)
         head = job.cell.head
         if head.file is not None:
@@ -150,6 +142,21 @@ def _of_axes(job: Job, part: Array, base: Array) -> dict[str, Array]:
         moves = moves or axis.name == job.layout.move
         found[axis.name] = base @ part if moves else base
     return found
+
+
+def _of_fixture(
+    job: Job, name: str, on: str | None, part: Array, base: Array, of_axes: Mapping[str, Array]
+) -> Array:
+    """Return how a fixture moves in the robot base, (4, 4) m, which may stand on an axis."""
+    carriers = [axis.name for axis in job.robot.externals if axis.carries == "part"]
+    alone = job.layout.move == "part"
+    if on is not None and on not in carriers:
+        return of_axes[on]  # it carries the robot
+    if name in job.layout.standing:
+        return base
+    if on is not None:
+        return base @ part if alone else of_axes[on]
+    return base if alone and carriers else base @ part
 
 
 def _axis_numbers(where: tuple[str | int, ...], axis: ExternalAxis, motion: Array) -> Numbers:
