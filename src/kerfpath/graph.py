@@ -45,6 +45,9 @@ class LayeredGraph:
         What became of each candidate: an index into `reasons`; all gamma of a variant in a row.
     reasons : tuple of Reason
         What the codes mean; code 0 is admitted.
+    external : (K, X, E) rad or m, or None
+        Values of the external axes at every node, of which each tilt has X variants; None: the
+        robot has none.
     kept : object
         The margins that all its vertices are known to keep, by whoever thinned it for them; None:
         nothing is known.
@@ -60,6 +63,7 @@ class LayeredGraph:
     turn: NDArray[np.int8]
     reason: NDArray[np.uint8]
     reasons: tuple[Reason, ...]
+    external: Array | None = None
     kept: object = None
 
     def __repr__(self) -> str:
@@ -117,29 +121,23 @@ class LayeredGraph:
             reason.flat[candidate[here & ~left[candidate]]] = reasons.index(why)
         left_of_layer = np.bincount(layer[keep], minlength=len(sizes))
         start = np.concatenate([[0], np.cumsum(left_of_layer)])
-        return self._of(keep, start, reason, reasons)
+        return replace(self._of(keep, start, slice(None)), reason=freeze(reason), reasons=reasons)
 
     def part(self, first: int, last: int) -> LayeredGraph:
         """Return the layers of nodes first to last."""
         vertices = slice(self.start[first], self.start[last + 1])
         start = self.start[first : last + 2] - self.start[first]
-        return self._of(vertices, start, self.reason[first : last + 1], self.reasons)
+        return self._of(vertices, start, slice(first, last + 1))
 
     def at_nodes(self, nodes: Ints) -> LayeredGraph:
         """Return the layers of some nodes (M,), ascending."""
         sizes, kept = np.diff(self.start), np.zeros(len(self.start) - 1, np.bool_)
         kept[nodes] = True
         start = np.concatenate([[0], np.cumsum(sizes[nodes])])
-        return self._of(np.repeat(kept, sizes), start, self.reason[nodes], self.reasons)
+        return self._of(np.repeat(kept, sizes), start, nodes)
 
-    def _of(
-        self,
-        vertices: Bools | slice,
-        start: Ints,
-        reason: NDArray[np.uint8],
-        reasons: tuple[Reason, ...],
-    ) -> LayeredGraph:
-        """Return the graph of some of the vertices."""
+    def _of(self, vertices: Bools | slice, start: Ints, nodes: Ints | slice) -> LayeredGraph:
+        """Return the graph of some of the vertices, those of some nodes."""
         return replace(
             self,
             q=freeze(self.q[vertices]),
@@ -148,8 +146,8 @@ class LayeredGraph:
             variant=freeze(self.variant[vertices]),
             posture=freeze(self.posture[vertices]),
             turn=freeze(self.turn[vertices]),
-            reason=freeze(reason),
-            reasons=reasons,
+            reason=freeze(self.reason[nodes]),
+            external=None if self.external is None else freeze(self.external[nodes]),
             kept=None,
         )
 
@@ -262,6 +260,7 @@ def build(
         turn=freeze(_end_to_end(turn)),
         reason=freeze(reason),
         reasons=arm.reasons(),
+        external=freeze(np.array(external)) if robot.externals else None,
     )
 
 

@@ -65,6 +65,7 @@ from kerfpath.job.run import JobResult as JobResult
 from kerfpath.job.run import advised as advised
 from kerfpath.job.run import certified as certified
 from kerfpath.job.run import check_job as check_job
+from kerfpath.job.run import course_of_plans as course_of_plans
 from kerfpath.job.run import cut_candidate as cut_candidate
 from kerfpath.job.run import fastest_along as fastest_along
 from kerfpath.job.run import fastest_speeds as fastest_speeds

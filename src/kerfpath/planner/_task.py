@@ -269,7 +269,7 @@ def task_of(
     x = None if external is None else course_of(external, contour, robot)[:, 0]
     if graph is not None:
         _require_fitting(graph, contour, robot, options)
-        x = _course_in(graph, robot)
+        x = _course_in(graph)
     return PlanningTask(
         contour=contour,
         robot=robot,
@@ -283,13 +283,10 @@ def task_of(
     )
 
 
-def _course_in(graph: LayeredGraph, robot: Robot) -> Array | None:
+def _course_in(graph: LayeredGraph) -> Array | None:
     """Return the course (K, E) of the external axes along which a graph was built, if any."""
-    arm, sizes = robot.family.joints, np.diff(graph.start)
-    if not robot.externals or not sizes.all():
-        return None
-    x = graph.q[graph.start[:-1], arm:]
-    return x if np.array_equal(np.repeat(x, sizes, axis=0), graph.q[:, arm:]) else None
+    x = graph.external
+    return x[:, 0] if x is not None and x.shape[1] == 1 else None
 
 
 def _layers(

@@ -8,10 +8,19 @@ from dataclasses import replace
 from threading import Lock
 from typing import Generic, TypeVar
 
+from kerfpath._arrays import Array
 from kerfpath.cad import Part
 from kerfpath.contour import Contour
 from kerfpath.graph import LayeredGraph
-from kerfpath.job import ContourTable, CutRequest, CutResult, Job, PreparedJob, prepare
+from kerfpath.job import (
+    ContourTable,
+    CutRequest,
+    CutResult,
+    Job,
+    PreparedJob,
+    course_of_plans,
+    prepare,
+)
 from kerfpath.studio._keys import graph_key, part_key, setup_key
 from kerfpath.studio._scene import tables_of
 
@@ -126,12 +135,18 @@ class Bench:
             self._part = key, job.read_part()
         return self._part[1]
 
-    def graph(self, job: Job, nodes: Contour, solved: Callable[[int], None]) -> LayeredGraph:
-        """Return the layered graph of a job's nodes."""
-        key = graph_key(job, nodes)
+    def graph(
+        self,
+        job: Job,
+        nodes: Contour,
+        solved: Callable[[int], None] | None = None,
+        external: Array | None = None,
+    ) -> LayeredGraph:
+        """Return the layered graph of a job's nodes, external axes as in `Job.graph`."""
+        key = graph_key(job, nodes, external)
         found = self._graphs.get(key)
         if found is None:
-            found = job.graph(nodes, progress=solved)
+            found = job.graph(nodes, external=external, progress=solved)
             self._graphs.put(key, found)
         return found
 
@@ -141,7 +156,10 @@ class Bench:
         if len(cuts) == 1:
             return one.candidate.nodes, one.graph
         nodes = one.request.candidates[0].nodes
-        return nodes, self.graph(job, nodes, lambda count: None)
+        plans = [cut.plan for cut in cuts if cut.plan is not None]
+        along = job.robot.externals and job.options.method == "continuous"
+        x = course_of_plans(job, nodes, plans) if along else None
+        return nodes, self.graph(job, nodes, external=x)
 
 
 def _pinned(request: CutRequest, job: Job, table: ContourTable) -> CutRequest:

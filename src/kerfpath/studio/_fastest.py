@@ -38,6 +38,7 @@ def fastest_message(
         contour=contour,
         speed_m_min=speed,
         on_grid_m_min=None if found.on_grid is None else float(at_most(found.on_grid * 60)),
-        binds=f"the {found.limit} of joint {found.joint + 1} at node {found.node}, {place} mm",
+        binds=f"the {found.limit} of {job.robot.joint_names[found.joint]} at node {found.node}, "
+        f"{place} mm",
         edits=[EditEntry(path=["contour", index, "speed_m_min"], value=speed)],
     )

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from kerfpath._arrays import Array
 from kerfpath.contour import Contour
 from kerfpath.job import CutRequest, Job
 
@@ -54,14 +55,15 @@ def motion_key(job: Job) -> str:
     return _digest(source, _stamps(job))
 
 
-def graph_key(job: Job, nodes: Contour) -> str:
-    """Return the key of the layered graph of some nodes."""
+def graph_key(job: Job, nodes: Contour, external: Array | None = None) -> str:
+    """Return the key of the layered graph of some nodes, external axes as in `Job.graph`."""
     source, options = job.source, job.options
     plan = {k: v for k, v in source.get("plan", {}).items() if k in GRAPH}
+    if job.robot.externals and external is None:  # the course that is taken depends on all of it
+        plan = _but(source.get("plan", {}), PROVING)
     tables = [source.get(name) for name in ("robot", "tool", "comfort")]
     arrays = [nodes.points, nodes.axes, nodes.s, job.placement]
-    if nodes.x is not None:
-        arrays.append(nodes.x)
+    arrays += [array for array in (nodes.x, external) if array is not None]
     digest = hashlib.sha256()
     for array in arrays:
         digest.update(array.tobytes())

@@ -52,7 +52,9 @@ class Looks:
         """
         prepared, cuts, nodes, graph = self._planning.whole(contour)
         shades = shades_of(prepared.job, graph, prepared.cell)
-        return map_message(cuts, nodes, graph, shades=shades, revision=revision)
+        return map_message(
+            cuts, nodes, graph, robot=prepared.job.robot, shades=shades, revision=revision
+        )
 
     def pose(self, ask: ReasonOf) -> PoseMessage:
         """Return where the robot is at a place of a map.
@@ -70,7 +72,7 @@ class Looks:
                 f"{ask.node} and {ask.posture}"
             )
         return pose_message(
-            ask.contour, prepared.job, nodes, with_collisions(cuts[0], graph),
+            ask.contour, prepared.job, cuts, nodes, with_collisions(cuts[0], graph),
             node=ask.node, gamma=ask.gamma, posture=ask.posture,
         )  # fmt: skip
 

@@ -13,7 +13,7 @@ from kerfpath.contour import Contour
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import CutResult, Job
 from kerfpath.losses import Loss, Reason
-from kerfpath.robots import posture_name
+from kerfpath.robots import Robot, posture_name
 from kerfpath.studio._map_messages import ShadeName
 from kerfpath.studio._messages import CodeLayer, CourseEntry, MapMessage, PoseMessage
 from kerfpath.studio._numbers import flat
@@ -34,6 +34,9 @@ KINDS = {
     Loss.PINNED: "pinned",
 }
 """What a loss is coloured by; others are "other"."""
+
+UNITS = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
+"""By what values are multiplied to be told, and the unit that they then have."""
 
 
 def map_id(graph: LayeredGraph) -> str:
@@ -58,6 +61,7 @@ def map_message(
     nodes: Contour,
     graph: LayeredGraph,
     *,
+    robot: Robot,
     shades: Sequence[ShadeName],
     revision: int,
 ) -> MapMessage:
@@ -70,6 +74,7 @@ def map_message(
     nodes : Contour
     graph : LayeredGraph
         Of the whole of it.
+    robot : Robot
     shades : sequence of ShadeName
         What it can be shaded by.
     revision : int
@@ -99,6 +104,7 @@ def map_message(
             for mu in shown_postures(graph)
         ],
         hidden=hidden_postures(graph),
+        external=_along(robot, graph, cuts),
         shades=list(shades),
         course=[
             CourseEntry(
@@ -113,9 +119,27 @@ def map_message(
     )
 
 
+def _along(robot: Robot, graph: LayeredGraph, cuts: Sequence[CutResult]) -> str:
+    """Say where the external axes are at the poses of a map; nothing where there are none."""
+    x = graph.external
+    if x is None:
+        return ""
+    names = " and ".join(axis.name for axis in robot.externals)
+    if x.shape[1] > 1:
+        return f"With {names} anywhere on the grid of the search."
+    if all(cut.plan is not None for cut in cuts):
+        return f"With {names} where the plan has it at each node."
+    if (x == x[0]).all():
+        held = (UNITS[axis.unit] for axis in robot.externals)
+        at = (f"{by * at:g} {unit}" for (by, unit), at in zip(held, x[0, 0], strict=True))
+        return f"No plan: with {names} at rest, at {' and '.join(at)}."
+    return f"No plan: with {names} along the course that promised most."
+
+
 def pose_message(
     contour: str,
     job: Job,
+    cuts: Sequence[CutResult],
     nodes: Contour,
     graph: LayeredGraph,
     *,
@@ -126,7 +150,8 @@ def pose_message(
     """Return where the robot is at a place of the map, and what became of that pose.
 
     Gamma is taken to the nearest sample of the map. With a tolerance of the tool axis the joints
-    are those of the nominal axis.
+    are those of the nominal axis. External axes are where the map has them; where that is a grid,
+    at the place of it that the map tells of, next to the plan's.
 
     Raises
     ------
@@ -137,12 +162,15 @@ def pose_message(
     off = np.angle(np.exp(1j * (graph.gamma - gamma)))
     sample = int(np.argmin(np.abs(off)))
     why = graph.reasons[int(codes[node, sample, posture])]
-    arm = job.robot.alone()
+    x = _external(graph, cuts, nodes, node, sample, posture)
+    arm = job.robot if x is None else job.robot.held(x)
     H = job.placement @ nodes.frames(job.options.frames)[node : node + 1]
     solved, reach = arm.inverse_nodes(
         np.ascontiguousarray(H), np.ascontiguousarray(graph.gamma[[sample]]), job.tool
     )
     q = solved[0, 0, posture] if reach[0, 0, posture] else None
+    if q is not None and x is not None:
+        q = np.append(q, x)
     admitted = KINDS.get(why.loss) == "admitted"
     reason = _turns(graph, why, node, sample, posture) if admitted else _in_numbers(job, why, q)
     return PoseMessage(
@@ -154,6 +182,29 @@ def pose_message(
         admitted=admitted,
         reason=reason,
     )
+
+
+def _external(
+    graph: LayeredGraph,
+    cuts: Sequence[CutResult],
+    nodes: Contour,
+    node: int,
+    sample: int,
+    posture: int,
+) -> Array | None:
+    """Return where the external axes are (E,) at a place of the map; None: there are none."""
+    if graph.external is None:
+        return None
+    codes = graph.reason[node, sample :: len(graph.gamma), posture]
+    places = graph.external[node]
+    best = np.tile(places, (len(codes) // len(places), 1))[codes == codes.min()]
+    plans = [cut.plan for cut in cuts if cut.plan is not None]
+    if len(best) == 1 or not plans:
+        return np.asarray(best[0])
+    s = np.concatenate([made.contour.s for made in plans])
+    x = np.concatenate([made.q for made in plans])[:, -best.shape[1] :]
+    own = x[np.argmin(np.abs(s - nodes.s[node]))]
+    return np.asarray(best[np.argmin(np.abs(best - own).max(axis=1))])
 
 
 def _turns(graph: LayeredGraph, why: Reason, node: int, sample: int, posture: int) -> str:

@@ -85,8 +85,11 @@ class JobMessage(Message):
 
 
 class JointEntry(Message):
-    """One joint of the robot."""
+    """One joint of the robot, or an external axis."""
 
+    name: str
+    unit: Literal["rad", "m"]
+    carries: Literal["robot", "part"] | None
     T: Numbers
     axis: Numbers
     lower: float | None
@@ -351,6 +354,7 @@ class MapMessage(Message):
     colours: list[str]
     layers: list[CodeLayer]
     hidden: list[str]
+    external: str
     shades: list[ShadeName]
     course: list[CourseEntry]
 

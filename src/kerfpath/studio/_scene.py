@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array
 from kerfpath.cell import Body, CuttingHead, link_bodies, surface
-from kerfpath.errors import InputError
 from kerfpath.job import CutRequest, Job, PreparedJob
-from kerfpath.robots import chain_of
+from kerfpath.robots import ExternalAxis, carried, chain_of
 from kerfpath.studio._messages import (
     BodyEntry,
     ContourEntry,
@@ -26,7 +25,7 @@ from kerfpath.studio._numbers import flat
 __all__ = ["Meshes", "scene_of", "scene_of_robot", "tables_of"]
 
 SAMPLE = 0.3
-"""rad: every joint of the sample pose, from the middle of its range; anything but zero will do."""
+"""rad or m: every joint of the sample pose, from the middle of its range; anything but zero."""
 
 
 class Meshes(dict[str, bytes]):
@@ -49,10 +48,9 @@ def scene_of(prepared: PreparedJob, revision: int) -> tuple[SceneMessage, Meshes
     Raises
     ------
     InputError
-        A robot whose joints nothing says the places of, or with external axes.
+        A robot whose joints nothing says the places of.
     """
     job, meshes = prepared.job, Meshes()
-    _require_shown(job)
     if prepared.cell is None:
         bodies = _own_bodies(job)
     else:  # the part is drawn as the drawing has it
@@ -77,20 +75,9 @@ def scene_of_robot(job: Job, revision: int) -> tuple[SceneMessage, Meshes]:
     InputError
         As `scene_of`.
     """
-    _require_shown(job)
     meshes = Meshes()
     entries = [_body(body, meshes) for body in _own_bodies(job)]
     return _scene(job, revision, entries, []), meshes
-
-
-def _require_shown(job: Job) -> None:
-    """Raise InputError for external axes: the page would show what they carry in a wrong place."""
-    if job.robot.externals:
-        names = ", ".join(axis.name for axis in job.robot.externals)
-        raise InputError(
-            f"{job.path}: the studio does not show external axes ({names}); plan the job with "
-            "kerfpath plan, whose report shows them"
-        )
 
 
 def _scene(
@@ -166,13 +153,19 @@ def _contour(request: CutRequest, index: int, placement: Array) -> ContourEntry:
 def _robot(job: Job) -> RobotEntry:
     robot, chain = job.robot, chain_of(job.robot)
     limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
+    origins = [*chain.origins, *map(_through, robot.externals)]
+    axes = [*chain.axes, *(axis.axis for axis in robot.externals)]
+    carries = [None] * robot.family.joints + [axis.carries for axis in robot.externals]
     joints = []
     for i in range(robot.joints):
         endless = bool(robot.endless[i])
         joints.append(
             JointEntry(
-                T=flat(chain.origins[i], 15),
-                axis=flat(chain.axes[i], 15),
+                name=robot.joint_names[i],
+                unit=robot.units[i],
+                carries=carries[i],
+                T=flat(origins[i], 15),
+                axis=flat(axes[i], 15),
                 lower=None if endless else float(limits.lower[i]),
                 upper=None if endless else float(limits.upper[i]),
                 endless=endless,
@@ -185,10 +178,19 @@ def _robot(job: Job) -> RobotEntry:
     )
 
 
+def _through(axis: ExternalAxis) -> Array:
+    """Return a frame (4, 4) m in the robot base, turned as that, through which an axis passes."""
+    T = np.eye(4)
+    T[:3, 3] = axis.point
+    return T
+
+
 def _sample(job: Job) -> SampleEntry:
     """Return a pose by the robot's own kinematics, for the page to hold its own against."""
     robot = job.robot
     limits = robot.joint_limits()
     middle = np.where(robot.endless, 0.0, (limits.lower + limits.upper) / 2)
     q = middle + SAMPLE
-    return SampleEntry(q=flat(q, 15), T=flat(robot.forward(q) @ job.tool, 15))
+    # Poses of the robot are those of the part and of its base with every external axis at zero.
+    part = carried(robot.externals, q[robot.family.joints :], "part")
+    return SampleEntry(q=flat(q, 15), T=flat(part @ robot.forward(q) @ job.tool, 15))

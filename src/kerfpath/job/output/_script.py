@@ -46,7 +46,7 @@ import numpy as np
 
 from kerfpath import {used}
 {cell}{execution}from kerfpath.post import build_program, language, post, write_files
-
+{robots}
 HERE = Path(__file__).parent
 MM = 1e-3  # m
 M_MIN = 1 / 60  # m/s
@@ -107,7 +107,7 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
         raise InputError(said)
     drawing = os.path.relpath(job.part_file.absolute(), folder or job.path.absolute().parent)
     at_nodes = replace(job.options, between_nodes="reported")  # what else comes after each plan
-    lines = [_robot(job), f"T_flange_tip = {_array(job.tool)}", ""]
+    lines = [_robot(job), *_externals(job), f"T_flange_tip = {_array(job.tool)}", ""]
     lines += [f"T_base_part = {_array(job.placement)}", "", _part(job, drawing), ""]
     lines += ["# How every plan is asked for.", _options(at_nodes)]
     if prepared.cell is not None:
@@ -130,8 +130,10 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
     execution = "from kerfpath.execution import keep_limits\n" if keeps else ""
     of_cell = ", ".join(name for name in OF_CELL if f"{name}(" in text)
     cell = f"from kerfpath.cell import {of_cell}\n" if prepared.cell is not None else ""
+    robots = "from kerfpath.robots import ExternalAxis\n" if job.robot.externals else ""
     names = {"job": _plain(job.path.name), "drawing": _plain(drawing)}
-    return HEAD.format(**names, used=used, execution=execution, cell=cell) + text
+    head = HEAD.format(**names, used=used, execution=execution, cell=cell, robots=robots)
+    return head + text
 
 
 def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
@@ -141,7 +143,6 @@ def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
         'a "guaranteed" between_nodes that nothing proves': assumed
         and job.options.between_nodes == "guaranteed",
         "solids from files in [cell]": job.cell is not None and has_files(job.cell),
-        "[[robot.external]]": bool(job.robot.externals),
         "[sequence]": job.sequence is not None,
         "[robot] without model": "model" not in job.source["robot"],
         'start = "best" or direction = "best"': any(len(r.candidates) > 1 for r in requests),
@@ -155,7 +156,7 @@ def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
 
 def _robot(job: Job) -> str:
     model = job.source["robot"]["model"]
-    plain, own = robot_of(model), job.robot
+    plain, own = robot_of(model), job.robot.alone()
     limits, before = own.joint_limits(), plain.joint_limits()
     known = {"velocity": plain.velocity, "acceleration": plain.acceleration}
     changed: dict[str, object] = {}
@@ -173,6 +174,31 @@ def _robot(job: Job) -> str:
             changed[name] = np.asarray(new)
     text = f"arm = robot({model!r})"
     return _call(f"{text}.with_limits", changed) if changed else text
+
+
+def _externals(job: Job) -> Iterator[str]:
+    """Yield the lines that give the robot its external axes."""
+    robot, n = job.robot, job.robot.family.joints
+    limits = robot.joint_limits()
+    travel = zip(limits.lower, limits.upper, *robot.speed_limits(), strict=True)
+    for i, (axis, values) in enumerate(zip(robot.externals, [*travel][n:], strict=True)):
+        said: dict[str, object] = {
+            "name": axis.name,
+            "kind": axis.kind,
+            "carries": axis.carries,
+            # As it is written: to make a direction a unit vector twice may move its last digit.
+            "axis": job.source["robot"]["external"][i]["axis"],
+            "point": axis.point,
+        }
+        said |= {} if axis.step is None else {"step": axis.step}
+        told = _mm if axis.kind == "linear" else _angle
+        yield "arm = arm.with_external("
+        yield f"    {_call('ExternalAxis', said).replace(chr(10), chr(10) + '    ')},"
+        for name, value in zip(("lower", "upper", "velocity", "acceleration"), values, strict=True):
+            yield f"    {name}={told(float(value))},"
+        if robot.endless[n + i]:
+            yield "    endless=True,"
+        yield ")"
 
 
 def _part(job: Job, file: str) -> str:

@@ -1,6 +1,7 @@
 """The run of a job: plan every contour, audit every plan, find the order of cutting."""
 
 from kerfpath.job.run._contour import advised as advised
+from kerfpath.job.run._contour import course_of_plans as course_of_plans
 from kerfpath.job.run._contour import cut_candidate as cut_candidate
 from kerfpath.job.run._foresee import foresee as foresee
 from kerfpath.job.run._foresee import require_foreseen as require_foreseen

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -24,7 +24,7 @@ from kerfpath.plans import Plan
 from kerfpath.progress import Progress
 from kerfpath.refiner import refine
 
-__all__ = ["GraphOf", "advised", "cut_candidate", "cut_in_posture"]
+__all__ = ["GraphOf", "advised", "course_of_plans", "cut_candidate", "cut_in_posture"]
 
 _T = TypeVar("_T")
 GraphOf = Callable[[Job, Contour, Callable[[int], None]], LayeredGraph]
@@ -141,14 +141,10 @@ def _cut_along_courses(
         try:
             graph = job.graph(nodes, progress=solved)
         except NoFeasiblePath:  # shown with the axes at rest
-            graph = job.graph(nodes, external=_at_rest(job, candidate), progress=solved)
+            graph = job.graph(nodes, external=course_of_plans(job, nodes, ()), progress=solved)
         whole = CutResult(request=request, candidate=candidate, graph=graph)
         return (replace(whole, broken=broken),)
-    x = np.array(_at_rest(job, candidate))
-    for made in plans:
-        first = int(np.searchsorted(nodes.s, made.contour.s[0]))
-        x[first : first + len(made.q)] = made.external
-    graph = job.graph(nodes, external=x, progress=solved)
+    graph = job.graph(nodes, external=course_of_plans(job, nodes, plans), progress=solved)
     whole = _whole(job, request, candidate, graph, cell, begin)
     begin("audit")
     return tuple(_audited(prepared, whole, made) for made in plans)
@@ -159,11 +155,18 @@ def _at_nodes(job: Job) -> PlanOptions:
     return replace(job.options, between_nodes="reported")
 
 
-def _at_rest(job: Job, candidate: Candidate) -> Array:
-    """Return where the external axes are nearest to zero, at every node (K, E) rad or m."""
+def course_of_plans(job: Job, nodes: Contour, plans: Sequence[Plan]) -> Array:
+    """Return where plans have the external axes at every node (K, E) rad or m.
+
+    Where none of them is, the axes are at rest: nearest to zero.
+    """
     limits, arm = job.robot.joint_limits(), job.robot.family.joints
     rest = np.clip(0.0, limits.lower[arm:], limits.upper[arm:])
-    return np.broadcast_to(rest, (len(candidate.nodes), len(rest)))
+    x = np.tile(rest, (len(nodes), 1))
+    for made in plans:
+        first = int(np.searchsorted(nodes.s, made.contour.s[0]))
+        x[first : first + len(made.q)] = made.external
+    return x
 
 
 def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> CutResult | None:

@@ -1,22 +1,27 @@
-/** What the joints do over a cut, as curves: speed, acceleration, angle; and those of another plan. */
+/** What the joints do over a cut, as curves: speed, acceleration, place; and those of another plan. */
 
 import { themeColour } from "./dom.js";
-import { deg } from "./format.js";
 
 /** @typedef {import("./messages.js").PlanMessage} PlanMessage */
+/** @typedef {import("./axes.js").Axis} Axis */
 /** @typedef {"speed" | "acceleration" | "angle"} Kind */
 
-/** @param {number} joint  0-based */
-export const jointColour = (joint) => themeColour(`--joint-${(joint % 7) + 1}`);
+/**
+ * Return the scale that the curve of an axis is drawn to: %, deg or mm.
+ * @param {Axis} axis
+ * @param {Kind} kind
+ */
+export const scaleOf = ({ unit }, kind) => (kind === "angle" ? unit : "%");
 
 /**
  * Return the columns to plot: time, then one per joint; pieces are apart by a gap.
  * @param {PlanMessage[]} plans
- * @param {number} joints
+ * @param {Axis[]} axes
  * @param {Kind} kind
  * @returns {(number | null)[][]}
  */
-export function columns(plans, joints, kind) {
+export function columns(plans, axes, kind) {
+  const joints = axes.length;
   /** @type {(number | null)[][]} */
   const out = Array.from({ length: joints + 1 }, () => []);
   let begin = 0;
@@ -32,7 +37,7 @@ export function columns(plans, joints, kind) {
       out[0].push(begin + (low + high) / 2);
       for (let j = 0; j < joints; j++) {
         const value = rows[k * joints + j];
-        out[j + 1].push(kind === "angle" ? deg(value) : 100 * value);
+        out[j + 1].push(kind === "angle" ? axes[j].of(value) : 100 * value);
       }
     }
     begin += time[time.length - 1];
@@ -57,9 +62,11 @@ export function span(found) {
  * Draw the curves of another plan behind those of a plot, dashed, in the colours of the joints.
  * @param {import("uplot")} plot
  * @param {(number | null)[][]} found
+ * @param {Axis[]} axes
+ * @param {Kind} kind
  * @param {(joint: number) => boolean} shown
  */
-export function dashed(plot, [time, ...joints], shown) {
+export function dashed(plot, [time, ...joints], axes, kind, shown) {
   if (!time) return;
   const { ctx: context, bbox } = plot;
   const ratio = window.devicePixelRatio || 1;
@@ -72,14 +79,14 @@ export function dashed(plot, [time, ...joints], shown) {
   context.setLineDash([4 * ratio, 3.5 * ratio]);
   joints.forEach((column, j) => {
     if (!shown(j)) return;
-    context.strokeStyle = jointColour(j);
+    context.strokeStyle = themeColour(axes[j].colour);
     context.beginPath();
     let drawing = false;
     column.forEach((value, k) => {
       if (value === null) return void (drawing = false);
       const [x, y] = [
         plot.valToPos(/** @type {number} */ (time[k]), "x", true),
-        plot.valToPos(value, "y", true),
+        plot.valToPos(value, scaleOf(axes[j], kind), true),
       ];
       if (drawing) context.lineTo(x, y);
       else context.moveTo(x, y);

@@ -1,6 +1,6 @@
 /** Poses near a known one: the tool turned about its beam, by Newton's method on the kinematics. */
 
-import { frames, multiply, rotation } from "./kinematics.js";
+import { baseOf, frames, multiply, rotation } from "./kinematics.js";
 
 /** @typedef {import("./messages.js").RobotModel} RobotModel */
 
@@ -10,20 +10,20 @@ const ENOUGH = 1e-7; // m and rad: far below what a picture shows
 
 /**
  * Return the joints with the tool turned about its beam, the tip held: Newton's method in strides,
- * so that the posture stays. Null where it does not come through.
- * @param {RobotModel} robot  of six joints
- * @param {ArrayLike<number>} from  rad
+ * so that the posture stays. External axes stand still. Null where it does not come through.
+ * @param {RobotModel} robot  of six joints, and external axes
+ * @param {ArrayLike<number>} from  rad or m
  * @param {number} angle  rad
  * @returns {number[] | null}
  */
 export function turnedAbout(robot, from, angle) {
-  const n = robot.joints.length;
-  if (n !== 6) return null;
+  const base = baseOf(robot);
+  if (robot.joints.length - base !== 6) return null;
   let q = Array.from(from);
-  const tip = frames(robot, q)[n + 1];
+  const tip = frames(robot, q)[robot.joints.length + 1];
   const strides = Math.max(1, Math.ceil(Math.abs(angle) / STRIDE));
   for (let i = 1; i <= strides; i++) {
-    const next = newton(robot, q, multiply(tip, rotation([0, 0, 1], (angle * i) / strides)));
+    const next = newton(robot, base, q, multiply(tip, rotation([0, 0, 1], (angle * i) / strides)));
     if (!next || next.some((each, j) => Math.abs(each - q[j]) > FAR)) return null;
     q = next;
   }
@@ -33,18 +33,19 @@ export function turnedAbout(robot, from, angle) {
 /**
  * Return joints that reach a pose of the tip, from joints near by, or null.
  * @param {RobotModel} robot
+ * @param {number} base  its frame
  * @param {number[]} from
  * @param {number[]} goal  16
  */
-function newton(robot, from, goal) {
+function newton(robot, base, from, goal) {
   const q = [...from];
   for (let turn = 0; turn < 8; turn++) {
     const found = frames(robot, q);
     const tip = found[found.length - 1];
     const error = difference(tip, goal);
     if (Math.max(...error.map(Math.abs)) < ENOUGH) return q;
-    const columns = robot.joints.map(({ axis }, i) => {
-      const frame = found[i + 1];
+    const columns = robot.joints.slice(0, 6).map(({ axis }, i) => {
+      const frame = found[base + i + 1];
       const z = [0, 4, 8].map(
         (r) => frame[r] * axis[0] + frame[r + 1] * axis[1] + frame[r + 2] * axis[2],
       );

@@ -1,4 +1,4 @@
-/** Forward kinematics: the frames of all joints from their angles, as the server's robot has them. */
+/** Forward kinematics: the frames of all joints from their values, as the server's robot has them. */
 
 /** @typedef {import("./messages.js").RobotModel} RobotModel */
 
@@ -41,18 +41,55 @@ export function rotation(axis, angle) {
 export const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
 /**
- * Return the frames of the robot: 0 is the base, i moves with joint i, the last is the tip.
+ * Return how far an external axis has moved what it carries.
+ * @param {import("./messages.js").Joint} joint
+ * @param {number} value  rad or m
+ */
+function motion({ T, axis, unit }, value) {
+  const pose = unit === "m" ? [...IDENTITY] : rotation(axis, value);
+  const [x, y, z] = [T[3], T[7], T[11]];
+  [0, 1, 2].forEach((r) => {
+    const [a, b, c] = [pose[4 * r], pose[4 * r + 1], pose[4 * r + 2]];
+    pose[4 * r + 3] = unit === "m" ? value * axis[r] : T[4 * r + 3] - (a * x + b * y + c * z);
+  });
+  return pose;
+}
+
+/**
+ * Return the frame that stands still: as many come before it as axes carry the part.
  * @param {RobotModel} robot
- * @param {ArrayLike<number>} q  rad
+ */
+export const groundOf = ({ joints }) => joints.filter(({ carries }) => carries === "part").length;
+
+/**
+ * Return the frame of the robot's base: as many come before it as there are external axes.
+ * @param {RobotModel} robot
+ */
+export const baseOf = ({ joints }) => joints.filter(({ carries }) => carries).length;
+
+/**
+ * Return the frames of the robot in the room: from that of the part over the ground to its base,
+ * then that of each joint, at last the tip. Without external axes the first is ground and base.
+ * @param {RobotModel} robot
+ * @param {ArrayLike<number>} q  rad or m
  * @returns {number[][]} n + 2 poses
  */
-export function frames(robot, q) {
-  const found = [IDENTITY];
-  robot.joints.forEach((joint, i) => {
-    found.push(multiply(multiply(found[i], joint.T), rotation(joint.axis, q[i])));
+export function frames({ joints, T_flange, T_tool }, q) {
+  /** @type {(what: "part" | "robot") => number[][]} of what is carried by none, one, more axes */
+  const carried = (what) =>
+    joints.reduce(
+      (found, joint, i) =>
+        joint.carries === what
+          ? [...found, multiply(found[found.length - 1], motion(joint, q[i]))]
+          : found,
+      [IDENTITY],
+    );
+  const found = [...carried("part").reverse(), ...carried("robot").slice(1)];
+  joints.forEach(({ carries, T, axis }, i) => {
+    if (carries) return;
+    found.push(multiply(multiply(found[found.length - 1], T), rotation(axis, q[i])));
   });
-  const last = found[found.length - 1];
-  found.push(multiply(multiply(last, robot.T_flange), robot.T_tool));
+  found.push(multiply(multiply(found[found.length - 1], T_flange), T_tool));
   return found;
 }
 

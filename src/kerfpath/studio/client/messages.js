@@ -22,24 +22,27 @@
  * @property {boolean} saved
  * @property {Fault[]} faults
  * @property {Record<string, string[]>} choices
- * @property {number[] | null} weights  1/rad, those that hold where the job has none
+ * @property {number[] | null} weights  1/rad or 1/m, those that hold where the job has none
  */
 
 /**
- * @typedef {object} Joint
- * @property {number[]} T  16, its frame at angle 0 in the frame of the joint before it
+ * @typedef {object} Joint  of the arm, or an external axis
+ * @property {string} name
+ * @property {"rad" | "m"} unit  of its values
+ * @property {"robot" | "part" | null} carries  what an external axis moves
+ * @property {number[]} T  16, its frame at 0 in that of the joint before it; of an external axis: in the room
  * @property {number[]} axis  3, unit vector in its own frame
  * @property {number | null} lower
  * @property {number | null} upper
  * @property {boolean} endless
- * @property {number} velocity  rad/s
- * @property {number} acceleration  rad/s2
+ * @property {number} velocity  rad/s or m/s
+ * @property {number} acceleration  rad/s2 or m/s2
  */
 
 /**
  * @typedef {object} RobotModel
  * @property {string} id
- * @property {Joint[]} joints
+ * @property {Joint[]} joints  those of the arm, then the external axes
  * @property {number[]} T_flange  16, in the last joint's frame
  * @property {number[]} T_tool  16, the tip in the flange
  */
@@ -48,7 +51,7 @@
  * @typedef {object} Body
  * @property {string} name
  * @property {"robot" | "head" | "part" | "fixture" | "floor"} kind
- * @property {number} frame  0 stands still, i moves with joint i
+ * @property {number} frame  of those of kinematics.js
  * @property {string} mesh
  * @property {boolean} approximate
  */
@@ -246,6 +249,7 @@
  * @property {string[]} colours
  * @property {{posture: number, name: string, codes: string}[]} layers
  * @property {string[]} hidden
+ * @property {string} external  where the external axes are at its poses, "" without any
  * @property {{by: string, words: string, unit: string}[]} shades
  * @property {{name: string, s: number[], gamma: number[], posture: number[]}[]} course
  */

@@ -1,20 +1,31 @@
-/** The joints of the chosen contour against time: speed, acceleration, angle; the cursor is the player's. */
+/** The joints of the chosen contour against time: speed, acceleration, place; the cursor is the player's. */
 
 import UPlot from "uplot";
 
-import { columns, dashed, jointColour, span } from "./curves.js";
+import { axesOf } from "./axes.js";
+import { columns, dashed, scaleOf, span } from "./curves.js";
 import { byId, el, textSize, themeColour } from "./dom.js";
-import { fixed } from "./format.js";
+import { digits, fixed } from "./format.js";
 
 /** @typedef {import("./store.js").Store} Store */
 /** @typedef {import("./player.js").Player} Player */
 /** @typedef {import("./curves.js").Kind} Kind */
 
-/** @type {Record<Kind, {title: string, label: string}>} */
+/** @type {Record<Kind, {title: string, per: string}>} */
 const KINDS = {
-  speed: { title: "Speed", label: "joint speed, % of limit" },
-  acceleration: { title: "Accel.", label: "joint acceleration, % of limit" },
-  angle: { title: "Angle", label: "joint angle, deg" },
+  speed: { title: "Speed", per: "/s" },
+  acceleration: { title: "Accel.", per: "/s\u00b2" },
+  angle: { title: "Angle", per: "" },
+};
+
+/**
+ * What the scales of each kind are called.
+ * @type {Record<Kind, Record<string, string>>}
+ */
+const SCALES = {
+  speed: { "%": "joint speed, % of limit" },
+  acceleration: { "%": "joint acceleration, % of limit" },
+  angle: { deg: "joint angle, deg", mm: "linear axes, mm" },
 };
 
 export class Plots {
@@ -75,17 +86,18 @@ export class Plots {
     });
   }
 
-  /** The plans that are shown, and how many joints they have. */
+  /** The plans that are shown, the joints of the robot, and what they are drawn as. */
   shown() {
     const plans = this.store.plans.get(this.store.selected ?? "") ?? [];
-    return { plans, joints: this.store.scene?.robot.joints.length ?? 0 };
+    const { robot } = this.store.scene ?? {};
+    return { plans, axes: axesOf(robot), joints: robot?.joints ?? [] };
   }
 
   draw() {
-    const { plans, joints } = this.shown();
+    const { plans, axes } = this.shown();
     this.plot?.destroy();
     this.plot = null;
-    this.legend(plans.length ? joints : 0);
+    this.legend();
     const nopath = this.store.nopaths.has(this.store.selected ?? "");
     this.said.replaceChildren(
       ...(plans.length
@@ -103,8 +115,9 @@ export class Plots {
     this.host.replaceChildren();
     this.host.dataset.contour = this.store.selected ?? "";
     if (!plans.length || !this.host.clientHeight) return;
-    const against = this.store.against?.plans.get(this.store.selected ?? "") ?? [];
-    this.beside = against.length ? columns(against, joints, this.kind) : [];
+    const against = this.store.compared(this.store.selected ?? "");
+    this.beside = against.length ? columns(against, axes, this.kind) : [];
+    const scales = [...new Set(axes.map((each) => scaleOf(each, this.kind)))];
     const em = textSize();
     const font = `${0.82 * em}px ${getComputedStyle(document.body).fontFamily}`;
     const [quiet, line, rule] = ["--quiet", "--line", "--rule"].map(themeColour);
@@ -119,7 +132,15 @@ export class Plots {
         padding: [0.4 * em, 0.8 * em, 0, 0],
         scales: {
           x: { time: false, range: (_, low, high) => this.until(low, high) },
-          y: { range: (_, low, high) => this.range(low, high) },
+          ...Object.fromEntries(
+            scales.map((scale) => [
+              scale,
+              {
+                /** @type {import("uplot").Range.Function} */
+                range: (_, low, high) => this.range(low ?? 0, high ?? 0, scale),
+              },
+            ]),
+          ),
         },
         cursor: { y: false, points: { size: 0.45 * em }, drag: { x: false, y: false } },
         axes: [
@@ -132,32 +153,37 @@ export class Plots {
             gap: 3,
             space: 4 * em,
           },
-          {
+          ...scales.map((scale, i) => ({
             ...axis,
-            grid,
+            scale,
+            side: /** @type {const} */ ([3, 1])[i],
+            grid: i ? { show: false } : grid,
             ticks,
-            label: KINDS[this.kind].label,
+            label: SCALES[this.kind][scale],
             size: 2.9 * em,
             gap: 3,
             space: 2 * em,
-          },
+          })),
         ],
         series: [
           {},
-          ...Array.from({ length: joints }, (_, j) => ({
-            stroke: jointColour(j),
+          ...axes.map((each, j) => ({
+            scale: scaleOf(each, this.kind),
+            stroke: themeColour(each.colour),
             width: Math.max(1.5, em / 9),
             points: { show: false },
             show: !this.off.has(j),
           })),
         ],
         hooks: {
-          drawAxes: [(plot) => dashed(plot, this.beside, (joint) => !this.off.has(joint))],
+          drawAxes: [
+            (plot) => dashed(plot, this.beside, axes, this.kind, (joint) => !this.off.has(joint)),
+          ],
           draw: [(plot) => this.limits(plot)],
           setCursor: [(plot) => this.say(plot)],
         },
       },
-      /** @type {any} */ (columns(plans, joints, this.kind)),
+      /** @type {any} */ (columns(plans, axes, this.kind)),
       this.host,
     );
     this.plot.over.append(this.line);
@@ -181,10 +207,14 @@ export class Plots {
   /**
    * @param {number} least
    * @param {number} most
+   * @param {string} scale
    * @returns {[number, number]}
    */
-  range(least, most) {
-    const [other, others] = span(this.beside.slice(1).filter((_, j) => !this.off.has(j)));
+  range(least, most, scale) {
+    const { axes } = this.shown();
+    const here = (/** @type {number} */ j) =>
+      !this.off.has(j) && axes[j] && scaleOf(axes[j], this.kind) === scale;
+    const [other, others] = span(this.beside.slice(1).filter((_, j) => here(j)));
     const [low, high] = [Math.min(least, other), Math.max(most, others)];
     if (this.kind === "angle") {
       const room = Math.max(2, 0.06 * (high - low));
@@ -213,7 +243,7 @@ export class Plots {
       [eta, "--caution-line", [5, 4]],
     ]))
       for (const sign of [-1, 1]) {
-        const y = plot.valToPos(sign * share * 100, "y", true);
+        const y = plot.valToPos(sign * share * 100, "%", true);
         context.strokeStyle = themeColour(colour);
         context.lineWidth = 1.2 * ratio;
         context.setLineDash(dash.map((each) => each * ratio));
@@ -225,12 +255,18 @@ export class Plots {
     context.restore();
   }
 
-  /** @param {number} joints */
-  legend(joints) {
+  legend() {
+    const { plans, axes, joints } = this.shown();
     byId("plot-legend").replaceChildren(
-      ...Array.from({ length: joints }, (_, j) => {
+      ...(plans.length ? axes : []).map(({ label, unit, of, colour }, j) => {
         const key = el("i", { class: "key" });
-        key.style.background = jointColour(j);
+        key.style.background = themeColour(colour);
+        const { name, lower, upper, velocity, acceleration } = joints[j];
+        const [low, high] = [lower, upper].map((each) =>
+          each === null ? null : digits(of(each), 4),
+        );
+        const travel = low === null ? "endless" : `${low} to ${high} ${unit}`;
+        const limits = [velocity, acceleration].map((each) => digits(of(each), 4));
         const toggle = () => {
           if (!this.off.delete(j)) this.off.add(j);
           this.plot?.setSeries(j + 1, { show: !this.off.has(j) });
@@ -241,11 +277,11 @@ export class Plots {
           {
             class: "joint",
             "aria-pressed": String(!this.off.has(j)),
-            title: `Show or hide joint ${j + 1}`,
+            title: `Show or hide ${name}: ${travel}, ${limits[0]} ${unit}/s, ${limits[1]} ${unit}/s\u00b2`,
             onclick: toggle,
           },
           key,
-          `J${j + 1}`,
+          label,
         );
         return button;
       }),
@@ -260,13 +296,18 @@ export class Plots {
     const { idx, left = -1 } = plot.cursor;
     this.tip.hidden = idx === null || idx === undefined || left < 0;
     if (this.tip.hidden || idx === null || idx === undefined) return;
-    const unit = this.kind === "angle" ? "deg" : "%";
+    const { axes, joints } = this.shown();
     const rows = plot.data.slice(1).flatMap((column, j) => {
       const value = column[idx];
       if (this.off.has(j) || value === null || value === undefined) return [];
+      const { label, unit, of, colour } = axes[j];
       const key = el("i", { class: "key" });
-      key.style.background = jointColour(j);
-      return [el("span", {}, key, `J${j + 1} `, el("b", {}, `${fixed(value, 1)} ${unit}`))];
+      key.style.background = themeColour(colour);
+      const { velocity, acceleration } = joints[j];
+      const limit = { speed: velocity, acceleration, angle: 0 }[this.kind];
+      const so = `${digits((of(limit) * value) / 100)} ${unit}${KINDS[this.kind].per}`;
+      const share = `${fixed(value, 1)} ${scaleOf(axes[j], this.kind)}`;
+      return [el("span", {}, key, `${label} `, el("b", {}, limit ? `${share}, ${so}` : share))];
     });
     this.tip.replaceChildren(
       el("span", { class: "quiet" }, `${fixed(plot.data[0][idx], 3)} s`),

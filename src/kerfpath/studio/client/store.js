@@ -139,6 +139,22 @@ export class Store {
   }
 
   /**
+   * Return the plans of a contour in the job that is compared; none of a robot with other joints.
+   * @param {string} contour
+   */
+  compared(contour) {
+    return (this.against?.plans.get(contour) ?? []).filter((plan) => this.fits(plan));
+  }
+
+  /**
+   * Whether a plan has the joints of the robot that is shown.
+   * @param {PlanMessage} plan
+   */
+  fits(plan) {
+    return plan.weights.length === this.scene?.robot.joints.length;
+  }
+
+  /**
    * Return what these are called; null: there are none.
    * @param {string} contour
    */
@@ -333,12 +349,14 @@ export class Store {
     this.emit("plan", answer);
   }
 
-  /** Forget what belongs to contours that the job no longer has, and choose one that it has. */
+  /** Forget what is of contours or joints that the job no longer has; choose a contour it has. */
   dropMissing() {
     const names = new Set(this.contours());
     if (this.candidate && !names.has(this.candidate.contour)) this.withdraw();
     for (const known of [this.plans, this.before, this.nopaths, this.maps])
       for (const name of [...known.keys()]) if (!names.has(name)) known.delete(name);
+    for (const known of [this.plans, this.before])
+      for (const [name, [plan]] of [...known]) if (!this.fits(plan)) known.delete(name);
     if (this.selected === null || !names.has(this.selected))
       this.select(this.contours()[0] ?? null);
     const come = this.scene?.contours.find(({ loop }) => loop === this.awaited);

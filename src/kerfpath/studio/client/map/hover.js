@@ -117,9 +117,10 @@ export class Hover {
         ? ""
         : `joint ${i + 1} at ${degrees(at)}, its limit is ${degrees(limit)}`;
     }
+    // Of the arm: where the external axes are is not chosen by the cursor.
     let [nearest, room] = [-1, Infinity];
-    joints.forEach(({ lower, upper, endless }, i) => {
-      if (endless || lower === null || upper === null) return;
+    joints.forEach(({ lower, upper, endless, carries }, i) => {
+      if (endless || carries || lower === null || upper === null) return;
       const left = Math.min(q[i] - lower, upper - q[i]);
       if (left >= 0 && left < room) [nearest, room] = [i, left];
     });

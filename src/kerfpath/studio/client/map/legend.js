@@ -44,6 +44,7 @@ export function legend(grid, layer, ink, lines) {
   const hidden = message.hidden.map((each) => el("p", {}, each));
   return [
     el("ul", {}, ...rows),
+    ...(message.external ? [el("p", { class: "quiet" }, message.external)] : []),
     ...(keys.childElementCount ? [keys] : []),
     ...(hidden.length
       ? [el("details", {}, el("summary", {}, "Postures not shown"), ...hidden)]

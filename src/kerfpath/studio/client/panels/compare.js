@@ -1,5 +1,6 @@
 /** Two plans side by side: one that is kept, against the one that is shown now. */
 
+import { axesOf } from "../axes.js";
 import { byId, el, icon } from "../dom.js";
 import { jointsAt } from "../kinematics.js";
 import { OF_JOINT, body, jointRows, rows } from "./differences.js";
@@ -90,12 +91,12 @@ export function comparePanel(store, connection, player, view) {
   function follow() {
     const { moment } = player;
     const plan = moment?.span.plan;
-    const others = (ghost && plan && store.against?.plans.get(plan.contour)) || [];
+    const others = (ghost && plan && store.compared(plan.contour)) || [];
     if (!plan || !moment || !others.length) return view.accompany(null);
     const [s] = jointsAt(plan.time, plan.s, 1, moment.local);
     const other = others.find((each) => s <= each.s[each.s.length - 1]) ?? others.at(-1);
     if (!other) return;
-    view.accompany(jointsAt(other.s, other.q, other.criteria.range.length, s));
+    view.accompany(jointsAt(other.s, other.q, other.weights.length, s));
   }
 
   function draw() {
@@ -133,14 +134,16 @@ export function comparePanel(store, connection, player, view) {
    */
   function compared({ entry, plans }, live) {
     const { id, name } = entry;
-    const then = plans.get(store.selected ?? "") ?? [];
+    const then = store.compared(store.selected ?? "");
     const now = store.plans.get(store.selected ?? "") ?? [];
     const both = then.length > 0 && now.length > 0;
     const told = then.length
       ? now.length
         ? ""
         : `This contour has no plan now; ${name} has one.`
-      : `${name} has no plan of this contour.`;
+      : plans.has(store.selected ?? "")
+        ? `The robot of ${name} has other joints or external axes.`
+        : `${name} has no plan of this contour.`;
     return [
       both ? figures(entry, then, now) : el("p", { class: "quiet small" }, told),
       both ? byJoint(entry, then, now) : null,
@@ -232,7 +235,10 @@ export function comparePanel(store, connection, player, view) {
       entry.metric === metric && entry.objective === objective && weights(then) === weights(now);
     const { outcome } = store;
     const known = outcome && !store.stale(outcome) ? (outcome.cycle?.total ?? null) : null;
-    const found = rows(then, now, { alike, cycle: [entry.cycle?.total ?? null, known] });
+    const found = rows(then, now, {
+      ...{ alike, cycle: [entry.cycle?.total ?? null, known] },
+      axes: axesOf(store.scene?.robot),
+    });
     return el(
       "div",
       {},
@@ -257,7 +263,7 @@ export function comparePanel(store, connection, player, view) {
       kind = /** @type {import("./differences.js").OfJoint} */ (each);
       draw();
     };
-    const tabs = Object.entries(OF_JOINT).map(([each, { title }]) =>
+    const tabs = Object.entries(OF_JOINT).map(([each, title]) =>
       el(
         "button",
         {
@@ -273,7 +279,12 @@ export function comparePanel(store, connection, player, view) {
       { open, ontoggle: () => (open = fold.open) },
       el("summary", { "data-key": "by joint" }, "Joint by joint"),
       el("div", { class: "segments", role: "group", "aria-label": "Criterion" }, ...tabs),
-      el("table", { class: "compared" }, columns(entry.name), body(jointRows(then, now, kind))),
+      el(
+        "table",
+        { class: "compared" },
+        columns(entry.name),
+        body(jointRows(then, now, kind, axesOf(store.scene?.robot))),
+      ),
     );
     return fold;
   }

@@ -4,6 +4,7 @@ import { el } from "../dom.js";
 import { deg, digits, fixed } from "../format.js";
 
 /** @typedef {import("../messages.js").PlanMessage} PlanMessage */
+/** @typedef {import("../axes.js").Axis} Axis */
 /** @typedef {import("../messages.js").KeptEntry} KeptEntry */
 /** @typedef {"displacement" | "range" | "peak_velocity" | "peak_acceleration"} OfJoint */
 
@@ -17,26 +18,53 @@ import { deg, digits, fixed } from "../format.js";
  * @property {number} [places]  default: three digits that count
  */
 
-/** @type {Record<OfJoint, {title: string, unit: string, name: string}>} */
+/** @type {Record<OfJoint, string>} */
 export const OF_JOINT = {
-  displacement: { title: "Moves", unit: "deg", name: "moves" },
-  range: { title: "Range", unit: "deg", name: "range" },
-  peak_velocity: { title: "Speed", unit: "% limit", name: "top speed" },
-  peak_acceleration: { title: "Accel.", unit: "% limit", name: "top acceleration" },
+  displacement: "Moves",
+  range: "Range",
+  peak_velocity: "Speed",
+  peak_acceleration: "Accel.",
 };
 
 const sum = (/** @type {number[]} */ values) => values.reduce((total, each) => total + each, 0);
 
 /**
- * Return a criterion of a joint over all pieces of a contour, in deg or % of its limit.
+ * Return a criterion of a joint over all pieces of a contour, in its unit or % of its limit.
  * @param {PlanMessage[]} plans
  * @param {OfJoint} kind
  * @param {number} joint
+ * @param {Axis} axis
  */
-function ofJoint(plans, kind, joint) {
+function ofJoint(plans, kind, joint, { of }) {
   const values = plans.map(({ criteria }) => criteria[kind][joint]);
-  if (kind === "displacement") return deg(sum(values));
-  return kind === "range" ? deg(Math.max(...values)) : 100 * Math.max(...values);
+  if (kind === "displacement") return of(sum(values));
+  return kind === "range" ? of(Math.max(...values)) : 100 * Math.max(...values);
+}
+
+/**
+ * Return how far the joints of the arm move, and each external axis.
+ * @param {PlanMessage[]} then
+ * @param {PlanMessage[]} now
+ * @param {Axis[]} axes
+ * @returns {Row[]}
+ */
+function travel(then, now, axes) {
+  const moved = (/** @type {PlanMessage[]} */ plans) =>
+    axes.map((axis, joint) => ofJoint(plans, "displacement", joint, axis));
+  const [before, after] = [moved(then), moved(now)];
+  const arm = axes.filter(({ external }) => !external).length;
+  /** @type {(name: string, unit: string, from: number, to: number) => Row} */
+  const row = (name, unit, from, to) => ({
+    ...{ name, unit, better: -1, places: 1 },
+    then: sum(before.slice(from, to)),
+    now: sum(after.slice(from, to)),
+  });
+  return [
+    row("Joint travel", "deg", 0, arm),
+    ...axes
+      .slice(arm)
+      .map(({ label, unit }, i) => row(`Travel of ${label}`, unit, arm + i, arm + i + 1)),
+  ];
 }
 
 /**
@@ -76,21 +104,17 @@ const seconds = (plans) => sum(plans.map(({ time }) => time[time.length - 1]));
  * Return the criteria of two plans.
  * @param {PlanMessage[]} then
  * @param {PlanMessage[]} now
- * @param {{alike: boolean, cycle: [number | null, number | null]}} more
+ * @param {{alike: boolean, cycle: [number | null, number | null], axes: Axis[]}} more
  * @returns {Row[]}
  */
-export function rows(then, now, { alike, cycle }) {
+export function rows(then, now, { alike, cycle, axes }) {
   const [before, after] = [nearest(then), nearest(now)];
   const cost = (/** @type {PlanMessage[]} */ plans) => sum(plans.map((plan) => plan.cost));
   /** @type {Row[]} */
   const found = [
     { name: "Time of the cut", unit: "s", then: seconds(then), now: seconds(now), better: -1 },
     { name: "Cycle of the job", unit: "s", then: cycle[0], now: cycle[1], better: -1, places: 1 },
-    {
-      ...{ name: "Joint travel", unit: "deg", better: -1, places: 1 },
-      then: deg(sum(then.flatMap(({ criteria }) => criteria.displacement))),
-      now: deg(sum(now.flatMap(({ criteria }) => criteria.displacement))),
-    },
+    ...travel(then, now, axes),
     {
       ...{ name: "Top speed", unit: "% limit", better: -1, places: 1 },
       then: largest(then, "peak_velocity"),
@@ -120,15 +144,15 @@ export function rows(then, now, { alike, cycle }) {
  * @param {PlanMessage[]} then
  * @param {PlanMessage[]} now
  * @param {OfJoint} kind
+ * @param {Axis[]} axes
  * @returns {Row[]}
  */
-export function jointRows(then, now, kind) {
-  const joints = then[0].criteria.displacement.length;
-  return Array.from({ length: joints }, (_, joint) => ({
-    name: `J${joint + 1}`,
-    unit: OF_JOINT[kind].unit,
-    then: ofJoint(then, kind, joint),
-    now: ofJoint(now, kind, joint),
+export function jointRows(then, now, kind, axes) {
+  return axes.map((axis, joint) => ({
+    name: axis.label,
+    unit: kind === "displacement" || kind === "range" ? axis.unit : "% limit",
+    then: ofJoint(then, kind, joint, axis),
+    now: ofJoint(now, kind, joint, axis),
     better: -1,
     places: 1,
   }));

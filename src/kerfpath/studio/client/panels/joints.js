@@ -1,7 +1,8 @@
 /** The joints of the robot: the weight of each, to drag, and beside it how much the joint does. */
 
+import { axesOf } from "../axes.js";
 import { byId, el, icon } from "../dom.js";
-import { deg, digits, fixed } from "../format.js";
+import { UNITS, digits, fixed } from "../format.js";
 import { gesture, weight } from "./fields.js";
 
 /** @typedef {import("../store.js").Store} Store */
@@ -25,7 +26,7 @@ export function jointsPanel(store, connection) {
     icon("reset"),
     "Usual weights",
   );
-  const body = el("tbody");
+  const [body, units] = [el("tbody"), el("span")];
   const table = el(
     "table",
     { class: "joints" },
@@ -38,7 +39,7 @@ export function jointsPanel(store, connection) {
         ...[
           ["", ""],
           ["weight", "× usual"],
-          ["moves", "deg"],
+          ["moves", units],
           ["speed", "% limit"],
           ["accel.", "% limit"],
         ].map(([name, unit]) => el("th", { scope: "col" }, name, el("small", {}, unit))),
@@ -56,22 +57,28 @@ export function jointsPanel(store, connection) {
   );
   /** @type {{slider: ReturnType<typeof weight>, moves: HTMLElement, shares: {set: (value: number | null) => void}[]}[]} */
   let rows = [];
-  store.on(["job", "selected", "plan", "connection"], draw);
+  let built = "";
+  store.on(["job", "scene", "selected", "plan", "connection"], draw);
   draw();
 
-  /** @param {number} count */
-  function build(count) {
-    rows = Array.from({ length: count }, (_, j) => {
+  /** @param {import("../axes.js").Axis[]} axes */
+  function build(axes) {
+    body.replaceChildren();
+    table.classList.toggle(
+      "named",
+      axes.some(({ external }) => external),
+    );
+    units.textContent = [...new Set(axes.map(({ unit }) => unit))].join(", ");
+    rows = axes.map(({ label, colour }, j) => {
       const slider = weight(j, (ratio, drag) => set(j, ratio, drag));
       const key = el("i", { class: "key" });
-      key.style.background = `var(--joint-${(j % 7) + 1})`;
-      return { slider, key, moves: el("td"), shares: [share(), share()] };
-    }).map(({ slider, key, moves, shares }, j) => {
+      key.style.background = `var(${colour})`;
+      const [moves, shares] = [el("td"), [share(), share()]];
       body.append(
         el(
           "tr",
           {},
-          el("th", { scope: "row" }, el("label", { for: slider.id }, key, `J${j + 1}`)),
+          el("th", { scope: "row", title: label }, el("label", { for: slider.id }, key, label)),
           el("td", {}, slider.element),
           moves,
           ...shares.map(({ element }) => element),
@@ -98,13 +105,15 @@ export function jointsPanel(store, connection) {
   }
 
   function draw() {
-    const { job, selected } = store;
+    const { job, selected, scene } = store;
     const base = job?.weights ?? [];
-    host.hidden = !base.length;
-    if (rows.length !== base.length) {
-      body.replaceChildren();
-      build(base.length);
-    }
+    const axes = axesOf(scene?.robot);
+    // Those of a job that has been changed come before its scene.
+    host.hidden = !base.length || axes.length !== base.length;
+    if (host.hidden) return;
+    const key = JSON.stringify(axes);
+    if (key !== built) build(axes);
+    built = key;
     const disabled = store.connection !== "open" || !job?.values;
     const given = /** @type {number[] | null} */ (job?.values?.plan?.weights ?? null);
     usual.disabled = disabled || !given;
@@ -115,13 +124,14 @@ export function jointsPanel(store, connection) {
       plans.some((plan) => store.stale(plan)),
     );
     rows.forEach(({ slider, moves, shares }, j) => {
+      const { unit } = scene?.robot.joints[j] ?? { unit: "rad" };
       slider.show(
         given ? given[j] / base[j] : 1,
-        `${digits((given ?? base)[j], 3)} per rad`,
+        `${digits((given ?? base)[j], 3)} per ${unit}`,
         disabled,
       );
-      const moved = total(plans, j);
-      moves.replaceChildren(...(plans.length ? amount(deg(moved), deg(total(held, j))) : []));
+      const [now, before] = [total(plans, j), total(held, j)].map(UNITS[unit].of);
+      moves.replaceChildren(...(plans.length ? amount(now, before, axes[j].unit) : []));
       for (const [i, name] of /** @type {const} */ ([
         "peak_velocity",
         "peak_acceleration",
@@ -142,14 +152,15 @@ const total = (plans, joint) =>
 
 /**
  * Return how far a joint moves, with an arrow where that is more or less than before.
- * @param {number} now  deg
- * @param {number} before  deg, 0: not known
+ * @param {number} now  deg or mm
+ * @param {number} before  the same, 0: not known
+ * @param {string} unit
  */
-function amount(now, before) {
+function amount(now, before, unit) {
   const text = fixed(now, 1);
   if (!before || Math.abs(now - before) < 0.02 * before) return [text];
   const more = now > before;
-  const said = `${more ? "more" : "less"} than before: ${fixed(before, 1)} deg`;
+  const said = `${more ? "more" : "less"} than before: ${fixed(before, 1)} ${unit}`;
   const arrow = el(
     "span",
     { class: more ? "up" : "down", title: said },

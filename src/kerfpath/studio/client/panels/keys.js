@@ -61,6 +61,9 @@ const band = (name, label, unit, suffix = unit) => {
   ];
 };
 
+/** The title of the keys of external axes, which a job has as many of as axes. */
+export const EXTERNAL = "External axes";
+
 /** @type {{title: string, contour?: boolean, keys: Key[]}[]} */
 export const GROUPS = [
   {
@@ -72,6 +75,10 @@ export const GROUPS = [
       number("plan.eta_velocity", "Share of the speed limits"),
       number("plan.eta_acceleration", "Share of the acceleration limits"),
     ],
+  },
+  {
+    title: EXTERNAL,
+    keys: [],
   },
   {
     title: "Place of the part",
@@ -176,6 +183,34 @@ export const GROUPS = [
     ],
   },
 ];
+
+/** @typedef {{name: string, kind: "linear" | "rotary", endless: boolean}} External */
+
+/**
+ * Return the keys of the external axes of a job, in the units of their kinds.
+ * @param {External[]} axes
+ * @returns {Key[]}
+ */
+export const externalKeys = (axes) =>
+  axes.flatMap(({ name, kind, endless }, i) => {
+    const [table, unit] = [`robot.external.${i}`, kind === "linear" ? "mm" : "deg"];
+    /** @type {(key: string, label: string, per?: string) => Key} */
+    const own = (key, label, per = "") =>
+      number(`${table}.${key}_${unit}${per.replace("/", "_")}`, `${name}, ${label}`, unit + per);
+    /** @type {(key: string, label: string, unit?: string) => Key} */
+    const list = (key, label, unit) => ({
+      ...{ key: `${table}.${key}`, label: `${name}, ${label}`, unit, kind: "list" },
+    });
+    return [
+      list("axis", "direction"),
+      ...(kind === "rotary" ? [list("point_mm", "a point of it", "mm")] : []),
+      ...(endless ? [] : [own("lower", "from"), own("upper", "to")]),
+      own("velocity", "speed", "/s"),
+      own("acceleration", "acceleration", "/s2"),
+      own("home", "at home"),
+      own("step", "step of a grid"),
+    ];
+  });
 
 /** How nodes may be laid on a contour: exactly one of these keys is in its table. */
 export const SAMPLINGS = {

@@ -1,7 +1,8 @@
 /** All options: a control of its kind for every key that is not in sight already, and a search. */
 
+import { axesOf } from "../axes.js";
 import { byId, el, icon } from "../dom.js";
-import { GROUPS, SAMPLINGS } from "./keys.js";
+import { EXTERNAL, GROUPS, SAMPLINGS, externalKeys } from "./keys.js";
 
 /** @typedef {import("../store.js").Store} Store */
 /** @typedef {import("../messages.js").Path} Path */
@@ -29,7 +30,7 @@ export function morePanel(store, connection, player) {
     const count = el("span", { class: "quiet" });
     const fold = el(
       "details",
-      { class: "group-of-keys" },
+      { class: "group-of-keys", hidden: !rows.length },
       el("summary", {}, title, contour ? el("small", {}, " this contour") : null, count),
       ...rows.map(({ element }) => element),
     );
@@ -49,11 +50,26 @@ export function morePanel(store, connection, player) {
       none,
     ),
   );
+  let built = "";
   store.on(["job", "selected", "connection", "scene"], draw);
   draw();
 
+  /** Have controls for the keys of each external axis of the job. */
+  function build() {
+    const keys = externalKeys(store.job?.values?.robot.external ?? []);
+    const now = JSON.stringify(keys);
+    const own = groups.find(({ title }) => title === EXTERNAL);
+    if (!own || !store.job?.values || now === built) return;
+    built = now;
+    for (const { element } of own.rows) element.remove();
+    own.rows = keys.map(row);
+    own.fold.append(...own.rows.map(({ element }) => element));
+    filter();
+  }
+
   function draw() {
     host.hidden = !store.job;
+    build();
     for (const { rows, count } of groups) {
       rows.forEach((each) => each.show());
       const set = rows.filter((each) => each.given()).length;
@@ -88,7 +104,8 @@ export function morePanel(store, connection, player) {
    */
   function path(key) {
     const [first, ...rest] = key.split(".");
-    return first === "contour" ? [first, table(), ...rest] : [first, ...rest];
+    const inner = rest.map((part) => (/^\d+$/.test(part) ? Number(part) : part));
+    return first === "contour" ? [first, table(), ...inner] : [first, ...inner];
   }
 
   /** @param {string} key */
@@ -303,8 +320,16 @@ export function morePanel(store, connection, player) {
   function joints(what, id) {
     const { input, show } = list(what, id);
     const take = () => {
-      const q = player.moment?.q.map((each) => Number(((each * 180) / Math.PI).toFixed(2)));
-      if (q) set(what, q);
+      const { moment } = player;
+      if (!moment) return;
+      const axes = axesOf(store.scene?.robot);
+      const at = axes.map(({ of }, j) => Number(of(moment.q[j]).toFixed(2)));
+      const arm = axes.filter(({ external }) => !external).length;
+      /** @type {[string, unknown][]} */
+      const others = axes
+        .slice(arm)
+        .map(({ unit }, i) => [`robot.external.${i}.home_${unit}`, at[arm + i]]);
+      send([what.key, at.slice(0, arm)], ...others);
     };
     const words = { title: "The pose that is shown", "aria-label": "Take the pose that is shown" };
     const here = el("button", { ...words, class: "tool", onclick: take }, icon("follow"));

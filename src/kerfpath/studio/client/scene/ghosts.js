@@ -1,4 +1,4 @@
-/** Ghosts that stay: the robot as it stood at places that were chosen, until they are cleared. */
+/** Ghosts that stay: all that moves, as it stood at places that were chosen, until they are cleared. */
 
 import { Color, Group, Mesh, MeshStandardMaterial } from "three";
 
@@ -36,8 +36,8 @@ export class Ghosts {
     machine.pose(store.scene.robot, moment.q, true);
     const kept = machine.ghost.clone();
     machine.ghostFrames.forEach(({ matrix }, i) => matrix.copy(before[i]));
-    kept.visible = true;
     kept.traverse((each) => {
+      each.visible = true;
       if (each instanceof Mesh && each.material === machine.ghostMaterial)
         each.material = this.material;
     });

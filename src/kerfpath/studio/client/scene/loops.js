@@ -76,7 +76,8 @@ export class Loops {
   pointed(stage, x, y, deepest) {
     const { camera, size } = stage;
     camera.updateMatrixWorld();
-    const m = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse).elements;
+    const seen = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse);
+    const m = seen.multiply(this.group.matrix).elements;
     const at = new Vector3();
     /** @type {{loop: Loop, away: number} | null} */
     let best = null;
@@ -91,7 +92,8 @@ export class Loops {
         const away = behind ? Infinity : toSegment(x, y, px, py, sx, sy);
         [px, py, behind] = [sx, sy, w <= 0];
         if (away >= (best?.away ?? REACH)) continue;
-        if (at.set(a, b, c).distanceTo(camera.position) > deepest + THICK) continue;
+        at.set(a, b, c).applyMatrix4(this.group.matrix);
+        if (at.distanceTo(camera.position) > deepest + THICK) continue;
         best = { loop, away };
       }
     }

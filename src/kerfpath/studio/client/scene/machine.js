@@ -1,4 +1,4 @@
-/** Robot, head, part, fixtures: bodies that stand still or move with a joint, and the robot's ghost. */
+/** Robot, head, part, fixtures: bodies that stand still or move with an axis, and their ghost. */
 
 import {
   BufferAttribute,
@@ -15,7 +15,7 @@ import {
 } from "three";
 
 import { themeColour } from "../dom.js";
-import { frames } from "../kinematics.js";
+import { baseOf, frames, groundOf } from "../kinematics.js";
 import { creased, merged, mesh } from "./meshes.js";
 
 /** @typedef {import("../messages.js").SceneMessage} SceneMessage */
@@ -32,18 +32,35 @@ const COLOURS = {
 };
 const MOST_EDGES = 60000;
 
+/** @typedef {{standing?: string[], move?: string}} Layout  what goes with the part, as [layout] says */
+
 /**
- * What moves a body: a joint, the part with what holds it, or nothing. A floor goes with the base.
- * @param {Body} body
- * @param {string[]} standing  names of the fixtures that do not go with the part
- * @returns {number | "carried" | "standing"}
+ * Return the frame in which the part is placed elsewhere: 0, or that before an axis that goes with it.
+ * @param {SceneMessage["robot"]} robot
+ * @param {Layout} layout
  */
-const carrier = ({ kind, name, frame }, standing) =>
-  kind === "part" || (kind === "fixture" && !standing.includes(name))
-    ? "carried"
-    : kind === "fixture"
-      ? "standing"
-      : frame;
+function placedIn({ joints }, { move }) {
+  const axes = joints.filter(({ carries }) => carries === "part");
+  const first = axes.findIndex(({ name }) => name === move);
+  return first < 0 ? 0 : axes.length - first;
+}
+
+/**
+ * What a body goes with where all is placed elsewhere: the part, what stands, or the robot.
+ * @param {Body} body
+ * @param {SceneMessage["robot"]} robot
+ * @param {Layout} layout
+ * @returns {"carried" | "standing" | "frames"}
+ */
+function goesWith({ kind, name, frame }, robot, layout) {
+  const [ground, moved] = [groundOf(robot), placedIn(robot, layout)];
+  if (kind === "part") return "carried";
+  if (kind !== "fixture" || frame > ground) return "frames";
+  if (layout.standing?.includes(name)) return "standing";
+  const alone = moved === 0 && ground > 0; // the part is moved on its axis
+  const goes = alone ? frame < ground : frame < moved || frame === ground;
+  return goes ? "carried" : "standing";
+}
 
 /**
  * Return the matrix of a pose.
@@ -60,13 +77,16 @@ export class Machine {
     this.frames = [];
     /** @type {Group[]} */
     this.ghostFrames = [];
-    /** The part with its fixtures, and the fixtures that do not go with it; both in the base. */
-    this.carried = new Group();
-    this.standing = new Group();
+    /** @type {Group[]} in each frame the part and what goes with it where it is placed elsewhere */
+    this.carried = [];
+    /** @type {Group[]} in each frame the fixtures that do not go with the part */
+    this.standing = [];
+    this.ground = 0; // the frame that stands still
+    this.base = 0; // that of the robot's base
+    this.moved = 0; // the frame in which the part is placed elsewhere
     /** The part where the job has it, seen while it is shown elsewhere. */
     this.left = new Group();
     this.left.visible = false;
-    this.carried.matrixAutoUpdate = this.standing.matrixAutoUpdate = false;
     /** @type {Record<Kind, MeshStandardMaterial>} */
     this.materials = /** @type {any} */ ({});
     for (const kind of /** @type {Kind[]} */ (Object.keys(COLOURS))) {
@@ -108,13 +128,14 @@ export class Machine {
   /**
    * Build the bodies of a scene; resolves once all are there.
    * @param {SceneMessage} scene
-   * @param {string[]} standing  names of the fixtures that do not go with the part
+   * @param {Layout} layout
    */
-  async build(scene, standing) {
+  async build(scene, layout) {
     /** @type {Map<string, Body[]>} */
     const groups = new Map();
     for (const body of scene.bodies) {
-      const key = `${carrier(body, standing)} ${body.kind} ${body.approximate}`;
+      const by = goesWith(body, scene.robot, layout);
+      const key = `${body.frame} ${by} ${body.kind} ${body.approximate}`;
       groups.set(key, [...(groups.get(key) ?? []), body]);
     }
     const made = await Promise.all(
@@ -125,24 +146,29 @@ export class Machine {
           bodies[0].approximate && bodies[0].kind === "robot" ? Math.PI / 2 : undefined,
         ),
         edged: !(bodies[0].approximate && bodies[0].kind === "robot"),
-        by: carrier(bodies[0], standing),
+        by: goesWith(bodies[0], scene.robot, layout),
+        frame: bodies[0].frame,
         kind: bodies[0].kind,
       })),
     );
     this.clear();
+    this.ground = groundOf(scene.robot);
+    this.base = baseOf(scene.robot);
+    this.moved = placedIn(scene.robot, layout);
     for (let i = 0; i <= scene.robot.joints.length; i++) {
-      const [frame, ghost] = [new Group(), new Group()];
-      frame.matrixAutoUpdate = ghost.matrixAutoUpdate = false;
-      this.group.add(frame);
+      const [frame, carried, standing, ghost] = Array.from({ length: 4 }, () => new Group());
+      for (const each of [frame, carried, standing, ghost]) each.matrixAutoUpdate = false;
+      this.group.add(frame.add(carried, standing));
       this.ghost.add(ghost);
       this.frames.push(frame);
+      this.carried.push(carried);
+      this.standing.push(standing);
       this.ghostFrames.push(ghost);
     }
-    this.frames[0].add(this.carried, this.standing);
-    this.standing.add(this.left);
+    this.standing[0].add(this.left);
     this.triangles = 0;
-    for (const { faces, edges, edged, by, kind } of made) {
-      const parent = typeof by === "number" ? this.frames[by] : this[by];
+    for (const { faces, edges, edged, by, frame, kind } of made) {
+      const parent = this[by][frame];
       const body = new Mesh(faces, this.materials[kind]);
       body.name = kind;
       parent.add(body);
@@ -157,11 +183,11 @@ export class Machine {
         left.raycast = () => {}; // nobody points at it
         this.left.add(left);
       }
-      if (typeof by === "number" && kind !== "floor")
+      if (by === "frames" ? kind !== "floor" : frame !== this.ground)
         for (const [order, material] of [this.veil, this.ghostMaterial].entries()) {
           const part = new Mesh(faces, material);
           part.renderOrder = 10 + order;
-          this.ghostFrames[by].add(part);
+          this.ghostFrames[frame].add(part);
         }
     }
   }
@@ -172,15 +198,15 @@ export class Machine {
     });
     this.group.clear();
     this.ghost.clear();
-    this.carried.clear();
-    this.standing.clear();
     this.left.clear();
     this.frames = [];
+    this.carried = [];
+    this.standing = [];
     this.ghostFrames = [];
   }
 
   /**
-   * Put the robot, or its ghost, where its joints say; returns the pose of the tip.
+   * Put all that moves, or its ghost, where the joints say; returns the pose of the tip.
    * @param {SceneMessage["robot"]} robot
    * @param {ArrayLike<number>} q
    * @param {boolean} [ghost]
@@ -188,20 +214,24 @@ export class Machine {
   pose(robot, q, ghost = false) {
     const found = frames(robot, q);
     const groups = ghost ? this.ghostFrames : this.frames;
-    groups.forEach((group, i) => {
+    // Until a robot with other joints is built, the one before it stands.
+    const built = groups.length === found.length - 1 ? groups : [];
+    built.forEach((group, i) => {
       group.matrix.copy(matrix(found[i]));
       group.matrixWorldNeedsUpdate = true;
+      // A ghost of the part where the part itself is would only tint it.
+      if (ghost && i < this.ground) group.visible = !group.matrix.equals(this.frames[i].matrix);
     });
     return found[found.length - 1];
   }
 
-  /** Return points all over the bodies, in the base: enough to see how far they reach. */
+  /** Return points all over the bodies but a floor, in the room: enough to see how far they reach. */
   outline() {
     this.group.updateMatrixWorld(true);
     /** @type {Vector3[]} */
     const found = [];
     this.group.traverse((each) => {
-      if (!(each instanceof Mesh)) return;
+      if (!(each instanceof Mesh) || each.name === "floor") return;
       const at = each.geometry.getAttribute("position");
       const stride = Math.max(1, Math.floor(at.count / 600));
       for (let i = 0; i < at.count; i += stride)

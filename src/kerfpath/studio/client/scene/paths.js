@@ -64,7 +64,8 @@ export class Paths {
     this.beam.renderOrder = 4;
     this.mark.renderOrder = 5;
     this.lines = [this.chosen, this.through, this.all, this.kerf, this.beam, this.mark];
-    this.group.add(...this.lines);
+    // All go with the part; the beam goes with the head.
+    this.group.add(...this.lines.filter((each) => each !== this.beam));
     /** @type {Track[]} */
     this.tracks = [];
     /** @type {ColourBy} */

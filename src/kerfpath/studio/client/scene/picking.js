@@ -57,7 +57,7 @@ export class Picking {
   pointed(x, y) {
     const { stage, machine } = this.view;
     if (!this.loops.shown.length || !machine.frames.length) return null;
-    const part = machine.carried.children.find(({ name }) => name === "part");
+    const part = machine.carried[0].children.find(({ name }) => name === "part");
     const hit = part ? this.loops.struck(stage, x, y, part) : null;
     return this.loops.pointed(stage, x, y, hit?.distance ?? Infinity);
   }

@@ -65,6 +65,10 @@ export class Placing {
     this.numbers = null;
     /** Where the scene has the part. */
     this.there = new Matrix4();
+    /** How external axes have moved what the part is placed in, the part in it, and the base. */
+    this.turned = new Matrix4();
+    this.inside = new Matrix4();
+    this.railed = new Matrix4();
     this.handle = new Object3D();
     this.group = new Group();
     this.group.matrixAutoUpdate = false;
@@ -90,8 +94,11 @@ export class Placing {
     this.gizmo.addEventListener("objectChange", () => {
       this.handle.updateMatrix();
       const { matrix: at } = this.handle;
-      if (this.what === "robot") this.base.copy(at);
-      else this.part.copy(at).multiply(new Matrix4().setPosition(this.middle.clone().negate()));
+      if (this.what === "robot") this.base.copy(at).multiply(this.railed.clone().invert());
+      else {
+        const away = new Matrix4().setPosition(this.carriedMiddle().negate());
+        this.part.copy(this.turned).invert().multiply(at).multiply(away);
+      }
       this.fresh = true;
       this.apply();
       this.tell(false);
@@ -286,26 +293,42 @@ export class Placing {
   /** Have all in the scene where it is now. */
   apply() {
     const { machine } = this.view;
-    const away = this.base.clone().invert();
     machine.group.matrixAutoUpdate = false;
     set(machine.group, this.base);
-    set(machine.standing, away);
     machine.left.visible = this.moved;
-    set(machine.carried, away.clone().multiply(this.part));
     this.lay();
   }
 
-  /** Have lines and handles where they are now. */
+  /** The middle of the part, in what it is placed in. */
+  carriedMiddle() {
+    return this.middle.clone().applyMatrix4(this.inside);
+  }
+
+  /** Have part and fixtures, lines and handles where they are now: only the robot goes with its base. */
   lay() {
-    const { paths, picking, stage } = this.view;
+    const { machine, paths, picking, stage } = this.view;
+    const { frames, ground, moved } = machine;
+    if (frames.length) {
+      this.turned.copy(frames[moved].matrix);
+      this.inside.copy(this.turned).invert().multiply(frames[0].matrix);
+      this.railed.copy(frames[machine.base].matrix);
+    }
+    const motion = this.turned.clone().multiply(this.part).multiply(this.turned.clone().invert());
+    frames.slice(0, ground + 1).forEach(({ matrix: at }, i) => {
+      const seen = this.base.clone().multiply(at).invert();
+      set(machine.standing[i], seen.clone().multiply(at));
+      set(machine.carried[i], seen.multiply(motion).multiply(at));
+    });
+    const there = this.turned.clone().multiply(this.part).multiply(this.inside);
     for (const each of [paths.group, picking.loops.group, this.group]) {
       each.matrixAutoUpdate = false;
-      set(each, this.part);
+      set(each, there);
     }
     if (this.moved) paths.shine(null);
     if (!this.gizmo.dragging) {
-      const at = this.middle.clone().applyMatrix4(this.part);
-      const whole = this.what === "robot" ? this.base : this.part.clone().setPosition(at);
+      const at = this.carriedMiddle().applyMatrix4(this.part);
+      const part = this.turned.clone().multiply(this.part.clone().setPosition(at));
+      const whole = this.what === "robot" ? this.base.clone().multiply(this.railed) : part;
       whole.decompose(this.handle.position, this.handle.quaternion, new Vector3());
     }
     stage.invalidate();

@@ -34,7 +34,8 @@ export class SceneView {
     this.stage = new Stage(this.canvas);
     this.machine = new Machine();
     this.paths = new Paths();
-    this.stage.scene.add(this.machine.group, this.machine.ghost, this.paths.group);
+    const { group: lines, beam } = this.paths;
+    this.stage.scene.add(this.machine.group, this.machine.ghost, lines, beam);
     this.picking = new Picking(this, connection);
     this.near = new Near(this);
     this.ghosts = new Ghosts(this);
@@ -131,14 +132,14 @@ export class SceneView {
     const { scene } = this.store;
     if (!scene) return;
     this.placing.landed();
-    const standing = this.store.job?.values?.layout?.standing ?? [];
-    const key = JSON.stringify([scene.robot, scene.bodies, standing]);
+    const layout = this.store.job?.values?.layout ?? {};
+    const key = JSON.stringify([scene.robot, scene.bodies, layout.standing, layout.move]);
     if (key === this.built) return this.placing.apply();
     const first = this.built === "";
     this.built = key;
     try {
       this.ghosts.clear();
-      await this.machine.build(scene, standing);
+      await this.machine.build(scene, layout);
       this.trouble = "";
     } catch (fault) {
       this.trouble = fault instanceof Error ? fault.message : String(fault);
@@ -159,7 +160,8 @@ export class SceneView {
     const { scene } = this.store;
     if (!scene || !this.ready || scene.bodies.some(({ kind }) => kind === "floor")) return;
     const box = new Box3();
-    for (const body of this.machine.frames[0].children) box.expandByObject(body);
+    const still = this.machine.frames.slice(0, this.machine.base + 1);
+    for (const body of still.flatMap(({ children }) => children)) box.expandByObject(body);
     this.stage.layFloor(box.expandByScalar(0.5), -0.001);
   }
 
@@ -206,6 +208,7 @@ export class SceneView {
     }
     const q = moment?.q ?? scene.sample.q;
     const tip = this.machine.pose(scene.robot, q);
+    this.placing.lay();
     const cutting = moment?.span.kind === "cut" || moment?.span.kind === "pierce";
     this.paths.shine(cutting ? tip : null);
     this.paths.cutUntil(moment?.t ?? 0);
@@ -252,9 +255,11 @@ export class SceneView {
     const tip = this.machine.pose(scene.robot, moment?.q ?? scene.sample.q);
     const head = [tip[3], tip[7], tip[11]];
     const mark = nopaths.get(selected ?? "")?.point;
+    const { matrix: there } = this.paths.group;
     if (view === "head") this.carried = new Vector3().fromArray(head);
     if (view === "head" || (view === "mark" && mark)) {
       const at = new Vector3().fromArray((view === "mark" && mark) || head);
+      if (view === "mark") at.applyMatrix4(there);
       const around = [-1, 1].map((sign) => at.clone().addScalar(0.16 * sign));
       this.stage.look("part", around);
       return;
@@ -262,7 +267,8 @@ export class SceneView {
     /** @type {Vector3[]} */
     const points = [];
     for (const { points: xyz } of [...scene.contours, ...(this.store.part?.loops ?? [])])
-      for (let i = 0; i < xyz.length; i += 3) points.push(new Vector3().fromArray(xyz, i));
+      for (let i = 0; i < xyz.length; i += 3)
+        points.push(new Vector3().fromArray(xyz, i).applyMatrix4(there));
     if (view !== "part") points.push(...this.machine.outline());
     if (points.length) this.stage.look(view, points);
   }
@@ -279,7 +285,8 @@ export class SceneView {
     let found = null;
     for (const { contour, points } of this.paths.tracks)
       for (let k = 0; k < points.length / 3; k++) {
-        const seen = this.stage.project(point.fromArray(points, 3 * k));
+        point.fromArray(points, 3 * k).applyMatrix4(this.paths.group.matrix);
+        const seen = this.stage.project(point);
         const away = Math.hypot(seen.x - x, seen.y - y);
         if (away < best && seen.z < 1) {
           best = away;
