@@ -61,6 +61,33 @@ allowed = "it bends"
 )
 """Two contours that are clear of a post, by pairs of their own."""
 
+CARRIED = """
+[[robot.external]]
+name = "rail"
+kind = "linear"
+carries = "robot"
+axis = [0, 1, 0]
+lower_mm = -400
+upper_mm = 400
+velocity_mm_s = 1000
+acceleration_mm_s2 = 1500
+
+[[robot.external]]
+name = "table"
+kind = "rotary"
+carries = "part"
+axis = [0.1, 0, 1]
+point_mm = [1200, 0, 500]
+endless = true
+velocity_deg_s = 90
+acceleration_deg_s2 = 180
+
+"""
+UNITS = '[program.rapid]\nmechanical_units = ["TRACK", "STATION"]\n'
+TURNED = QUICK.replace("[tool]", CARRIED + "[tool]").replace("spacing_mm = 1", "spacing_mm = 2")
+TURNED += UNITS
+"""On a rail, with a table whose axis leans: what a direction is made a unit vector of matters."""
+
 
 def scripted(folder, text):
     """The job of a text beside the part of the demo, and its script there."""
@@ -73,7 +100,9 @@ def scripted(folder, text):
     return job, script
 
 
-@pytest.mark.parametrize("text", [QUICK, FEATURES, CELLED], ids=["plain", "features", "cell"])
+@pytest.mark.parametrize(
+    "text", [QUICK, FEATURES, CELLED, TURNED], ids=["plain", "features", "cell", "external"]
+)
 def test_the_script_comes_to_the_plans_and_the_program_of_the_job(tmp_path, text):
     job, script = scripted(tmp_path, text)
     made = runpy.run_path(str(script))
@@ -96,6 +125,16 @@ def test_the_script_says_units_and_keeps_what_the_job_says(tmp_path):
     assert "path.resample(spacing=1 * MM)" in text
     assert "3 * M_MIN" in text
     assert max(map(len, text.splitlines())) < 110
+
+
+def test_the_script_says_external_axes_in_their_units(tmp_path):
+    _, script = scripted(tmp_path, TURNED)
+    text = script.read_text()
+    assert "axis=[0.1, 0, 1]" in text
+    assert "lower=-400 * MM" in text
+    assert "velocity=1000 * MM" in text
+    assert "acceleration=np.radians(180)" in text
+    assert text.count("endless=True") == 1
 
 
 def test_names_cannot_become_code(tmp_path):
