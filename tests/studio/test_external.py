@@ -182,7 +182,7 @@ def test_the_map_is_that_along_the_plan_and_so_are_its_poses(planned):
     made = last(heard, "plan", contour="hole 10")
     page.say("map", contour="hole 10")
     seen = page.until("map", contour="hole 10")
-    assert seen["external"] == "With rail and table where the plan has it at each node."
+    assert seen["external"] == "Along the plan's course of rail and table."
     q = rows(made)
     for node in (0, len(q) // 2, len(q) - 1):
         gamma, posture = made["gamma"][node], made["posture"][node]

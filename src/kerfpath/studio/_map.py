@@ -128,12 +128,12 @@ def _along(robot: Robot, graph: LayeredGraph, cuts: Sequence[CutResult]) -> str:
     if x.shape[1] > 1:
         return f"With {names} anywhere on the grid of the search."
     if all(cut.plan is not None for cut in cuts):
-        return f"With {names} where the plan has it at each node."
+        return f"Along the plan's course of {names}."
     if (x == x[0]).all():
         held = (UNITS[axis.unit] for axis in robot.externals)
-        at = (f"{by * at:g} {unit}" for (by, unit), at in zip(held, x[0, 0], strict=True))
+        at = (f"{by * value:g} {unit}" for (by, unit), value in zip(held, x[0, 0], strict=True))
         return f"No plan: with {names} at rest, at {' and '.join(at)}."
-    return f"No plan: with {names} along the course that promised most."
+    return f"No plan: along the course of {names} that promised most."
 
 
 def pose_message(

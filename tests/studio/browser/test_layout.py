@@ -30,7 +30,7 @@ SETTLED = """() => {
 PART = """() => {
     const { machine } = studio.view;
     machine.group.updateMatrixWorld(true);
-    return [...machine.carried.children[0].matrixWorld.elements];
+    return [...machine.carried[0].children[0].matrixWorld.elements];
 }"""
 
 
