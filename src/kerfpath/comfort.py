@@ -3,7 +3,7 @@
 The measures, of an arm whose model angles are sign * q - offset:
 
 ==============  ====  ======================================================================
-wrist           rad   angle between axes 4 and 6, away from being in line: 0 where sin q5 is
+wrist           rad   angle between axes 4 and 6 (of seven axes 5 and 7), away from being in line
 elbow           rad   angle between the upper arm (axis 2 to 3) and what lies behind it (axis 3
                       to the wrist centre or, of a UR arm, to axis 4), away from stretched or
                       folded: the offset a2 of the forearm is part of it
@@ -19,7 +19,7 @@ c3^2) sin(elbow) shoulder sin(wrist), that of a UR arm a2 a3 sin(elbow) shoulder
 these three zeros, and only there, such arms lose a direction of motion. Sources: B. Siciliano et
 al., "Robotics: Modelling, Planning and Control" (2009), section 3.3; T. Yoshikawa, "Manipulability
 of robotic mechanisms", IJRR 4(2), 1985. Which singularities a five-axis wrist has depends on the
-tool; its manipulability knows the tool.
+tool; its manipulability knows the tool. A seven-axis arm has those of its others with joint 3 held.
 """
 
 from __future__ import annotations
@@ -354,7 +354,10 @@ def _shoulder(robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
     """Return the distance (B,) m of the wrist from the plane of axis 1 along axis 2."""
     g, angle = robot.geometry, robot.sign * q - robot.offset
     q2, q23 = angle[:, 1], angle[:, 1] + angle[:, 2]
-    if robot.kinematics == "ur":
+    if robot.kinematics == "srs":
+        x, z = np.sin(angle[:, 3]) * np.cos(angle[:, 2]), np.cos(angle[:, 3])
+        along = g["c2"] * np.sin(q2) + g["c3"] * (x * np.cos(q2) + z * np.sin(q2))
+    elif robot.kinematics == "ur":
         along = g["a2"] * np.cos(q2) + g["a3"] * np.cos(q23) + g["d5"] * np.sin(q23 + angle[:, 3])
     else:
         along = g["a1"] + g["c2"] * np.sin(q2) + g["c3"] * np.sin(q23) + g["a2"] * np.cos(q23)
@@ -365,8 +368,7 @@ def _straight(g: Mapping[str, float]) -> float:
     return 0.0
 
 
-def _forearm(g: Mapping[str, float]) -> float:
-    """Return the angle (rad) at which the wrist centre lies off the forearm's axis."""
+def _forearm(g: Mapping[str, float]) -> float:  # rad by which the wrist centre is off its axis
     return float(np.arctan2(g["a2"], g["c3"]))
 
 
@@ -374,6 +376,7 @@ _BENDS: Mapping[str, Mapping[str, tuple[int, Callable[[Mapping[str, float]], flo
     "opw": {"wrist": (4, _straight), "elbow": (2, _forearm)},
     "ur": {"wrist": (4, _straight), "elbow": (2, _straight)},
     "five": {"elbow": (2, _forearm)},
+    "srs": {"wrist": (5, _straight), "elbow": (3, _straight)},
 }
 """By family and measure: the joint that bends, and what its angle is off by, from the lengths."""
 

@@ -15,7 +15,7 @@ from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
 from kerfpath.errors import InputError
 from kerfpath.kernels.turns import JointLimits, count_admissible, fill_admissible
 from kerfpath.losses import Loss, Reason
-from kerfpath.robots import Robot, base_in_part
+from kerfpath.robots import Robot, base_in_part, samples_of
 
 __all__ = ["LayeredGraph", "build", "external_grid", "gamma_grid"]
 
@@ -46,7 +46,7 @@ class LayeredGraph:
     reasons : tuple of Reason
         What the codes mean; code 0 is admitted.
     external : (K, X, E) rad or m, or None
-        Values of the external axes at every node, of which each tilt has X variants; None: the
+        Values of what a pose leaves free at every node, each tilt in X variants; None: the
         robot has none.
     kept : object
         The margins that all its vertices are known to keep, by whoever thinned it for them; None:
@@ -195,8 +195,8 @@ def build(
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     external : (K, X, E) rad or m, optional
-        Values of the robot's E external axes, each a variant of each tilt; default: all of a grid
-        in their steps.
+        Values of what a pose leaves free, joint 3 of a seven-axis arm and then the external axes,
+        each a variant of each tilt; default: all of a grid in their steps.
     progress : callable, optional
         Called with the number of nodes done since the last call.
 
@@ -209,7 +209,7 @@ def build(
     wanted = _wanted(postures, robot.postures)
     arm = robot.alone()
     arm.require_few_turns()
-    limits = arm.joint_limits()
+    limits, inner = arm.turn_limits(), len(arm.free)
     if not robot.family.free_rotation:
         gamma = freeze(np.zeros(1))
     tilt = freeze(np.zeros((1, 2))) if tilt is None else tilt
@@ -225,14 +225,15 @@ def build(
         """Solve nodes first..last-1 and keep what the limits admit."""
         H, x = frames[first:last, :, None], external[first:last]
         if robot.externals:
-            H = np.linalg.inv(base_in_part(robot.externals, x))[:, None] @ H
-        H = np.ascontiguousarray(H).reshape(-1, 4, 4)
-        q, reach = arm.inverse_nodes(H, gamma, T_flange_tip)
+            H = np.linalg.inv(base_in_part(robot.externals, x[..., inner:]))[:, None] @ H
+        H = np.ascontiguousarray(np.broadcast_to(H, (*H.shape[:2], places, 4, 4)))
+        given = np.broadcast_to(x[:, None, :, 0], H.shape[:3]).ravel() if inner else None
+        q, reach = arm.inverse_nodes(H.reshape(-1, 4, 4), gamma, T_flange_tip, given)
         q = q.reshape(last - first, samples, *q.shape[2:])
         piece = _admitted(q, reach.reshape(q.shape[:3]), wanted, limits, reason[first:last])
         if robot.externals:
             node = np.repeat(np.arange(len(x)), piece.sizes)
-            at = x[node, piece.sample // len(gamma) % places]
+            at = x[node, piece.sample // len(gamma) % places, inner:]
             still = np.zeros(at.shape, np.int8)
             piece = piece._replace(
                 q=np.column_stack([piece.q, at]), turn=np.column_stack([piece.turn, still])
@@ -260,30 +261,35 @@ def build(
         turn=freeze(_end_to_end(turn)),
         reason=freeze(reason),
         reasons=arm.reasons(),
-        external=freeze(np.array(external)) if robot.externals else None,
+        external=freeze(np.array(external)) if robot.free.size else None,
     )
 
 
 def external_grid(robot: Robot) -> Array:
-    """Return every combination (X, E) of the samples of a robot's external axes, rad or m.
+    """Return every combination (X, E) of the samples of what a pose leaves free, rad or m.
+
+    Of joint 3 of a seven-axis arm, and of the external axes.
 
     Raises
     ------
     InputError
         One of them has no step.
     """
-    if not robot.externals:
+    limits, free = robot.joint_limits(), robot.free.tolist()
+    if not free:
         return np.zeros((1, 0))
-    limits, arm = robot.joint_limits(), robot.family.joints
+    steps = [robot.elbow_step] * (len(free) - len(robot.externals))
+    steps += [axis.step for axis in robot.externals]
     samples = [
-        axis.samples(float(lower), float(upper), endless=bool(endless))
-        for axis, lower, upper, endless in zip(
-            robot.externals,
-            limits.lower[arm:],
-            limits.upper[arm:],
-            robot.endless[arm:],
-            strict=True,
+        samples_of(
+            robot.joint_names[i],
+            step,
+            float(limits.lower[i]),
+            float(limits.upper[i]),
+            endless=bool(robot.endless[i]),
+            key="step=" if i >= robot.family.joints else "robot.with_elbow_step(...)",
         )
+        for i, step in zip(free, steps, strict=True)
     ]
     return np.stack(np.meshgrid(*samples, indexing="ij"), axis=-1).reshape(-1, len(samples))
 

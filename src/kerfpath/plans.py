@@ -176,7 +176,7 @@ class Plan:
     T_flange_tip, T_base_part : (4, 4)
         Tool and placement of the part, m.
     q : (K, n) rad
-        Joints at the nodes; the last column is the external axis where there is one (a rail: m).
+        Joints at the nodes; external axes are the last columns (a rail: m).
     gamma : (K,) rad
         Free rotation about the tool axis at the nodes.
     tilt : (K, 2) rad, optional
@@ -311,6 +311,11 @@ class Plan:
         return freeze(self.q[:, self.robot.family.joints :]) if self.robot.externals else None
 
     @property
+    def course(self) -> Array:
+        """Values (K, E) rad or m of what poses leave free beside gamma, as `Robot.free` has it."""
+        return freeze(self.q[:, self.robot.free])
+
+    @property
     def unwrapped(self) -> Array:
         """The joints (K, n) rad with endless joints turned on, not wrapped."""
         return np.vstack([self.q[:1], self.q[:1] + np.cumsum(self.increments, axis=0)])
@@ -347,10 +352,10 @@ class Plan:
 def on_turns(robot: Robot, q: Array) -> tuple[Array, Ints]:
     """Return joints q (K, n) rad as a plan has them, endless ones wrapped, and their turns (K, n).
 
-    The turns of endless joints, and of an external axis, are 0.
+    The turns of endless joints, and of what a pose leaves free, are 0.
     """
     turning = ~robot.endless
-    turning[robot.family.joints :] = False
+    turning[robot.free] = False
     turn = np.where(turning, metric.turns_of(q), 0).astype(np.int64)
     return np.where(robot.endless, metric.wrap(q), q), turn
 

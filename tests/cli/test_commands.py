@@ -411,7 +411,7 @@ def test_a_drawing_is_shown_before_its_job_is_planned(folder, tmp_path, command)
 
 
 def test_robots_lists_the_library_and_shows_sources():
-    assert "68 robots" in run("robots").stdout
+    assert "69 robots" in run("robots").stdout
     shown = run("robots", "abb_irb2400_155").stdout
     assert "joint 2 + joint 3: -60 to 65 deg" in shown
     assert re.search(r"^acceleration deg/s\^2 +not known *$", shown, re.MULTILINE)
@@ -419,7 +419,7 @@ def test_robots_lists_the_library_and_shows_sources():
     data = json.loads(run("robots", "kuka_kr120_r2500_pro", "--json").stdout)
     assert data["lower_deg"] is None
     assert "copy error" in data["limits_missing"]
-    assert len(json.loads(run("robots", "--json").stdout)["robots"]) == 68
+    assert len(json.loads(run("robots", "--json").stdout)["robots"]) == 69
 
 
 def test_robots_lists_rails_and_positioners_too():

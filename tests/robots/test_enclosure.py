@@ -11,7 +11,7 @@ from kerfpath import InputError, robot
 from kerfpath.kernels.enclosure import BOX, NONE, SMOOTH
 from kerfpath.robots import FAMILIES, robot_ids
 
-IDS = robot_ids()
+IDS = [name for name in robot_ids() if robot(name).encloses]
 SAMPLES = 15_000  # of each of the 68 robots: 10^6 in all
 FLOAT_KINEMATICS = 1e-9
 """Error of the joints that floats find, rad: as in test_robot, away from what is singular."""

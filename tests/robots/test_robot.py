@@ -18,10 +18,12 @@ from kerfpath.robots import (
 )
 
 IDS = robot_ids()
+SIX = [name for name in IDS if robot(name).joints == 6]
+"""Seven axes: test_seven_axes.py."""
 
 
-def random_joints(rng, count, near_singular=False):
-    q = rng.uniform(-np.pi, np.pi, (count, 6))
+def random_joints(rng, count, near_singular=False, joints=6):
+    q = rng.uniform(-np.pi, np.pi, (count, joints))
     if near_singular:
         # Wrist stretched (q5 = 0 or pi in the model), by amounts down to nothing at all.
         q[:, 4] = rng.choice([0.0, np.pi], count) + 10.0 ** rng.uniform(-16, -4, count)
@@ -39,6 +41,10 @@ def joint_frames(r):
             for a, d, t in links
         ]
         return [z] * 6, [pin.SE3.Identity(), *poses[:5]], poses[5]
+    if r.kinematics == "srs":
+        heights = [0, g["c1"], 0, g["c2"], 0, g["c3"], 0, g["c4"]]
+        poses = [pin.SE3(np.eye(3), np.array([0, 0, h], dtype=float)) for h in heights]
+        return [z, y, z, y, z, y, z], poses[:7], poses[7]
     places = [(0, 0, 0), (g["a1"], g["b"], g["c1"]), (0, 0, g["c2"]), (g["a2"], 0, g["c3"])]
     places += [(0, 0, 0), (0, 0, 0), (0, 0, g["c4"])]
     poses = [pin.SE3(np.eye(3), np.array(xyz, dtype=float)) for xyz in places]
@@ -63,16 +69,16 @@ def pinocchio_pose(r, q):
 
 
 def test_the_library_has_all_robots_with_sources():
-    assert len(IDS) == 68
+    assert len(IDS) == 69
     for name in IDS:
         r = robot(name)
         assert r.id == name
         assert r.manufacturer
         assert r.sources["geometry_limits_velocity"]
-        assert r.acceleration_ratio in acceleration_ratios()
+        assert r.acceleration_ratio in acceleration_ratios() or r.joints == 7
 
 
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("name", SIX)
 def test_a_wrist_turned_over_brings_the_flange_to_the_same_pose(name):
     """All joints but one by a constant, that one mirrored, from one posture to its neighbour."""
     r = robot(name)
@@ -94,14 +100,14 @@ def test_a_wrist_turned_over_brings_the_flange_to_the_same_pose(name):
 @pytest.mark.parametrize("name", IDS)
 def test_forward_kinematics_agree_with_pinocchio(name):
     r = robot(name)
-    q = random_joints(np.random.default_rng(1), 50)
+    q = random_joints(np.random.default_rng(1), 50, joints=r.joints)
     # Both multiply a dozen rotations in double precision.
     np.testing.assert_allclose(r.forward(q), pinocchio_pose(r, q), atol=1e-12)
 
 
 @pytest.mark.equation(4)
 @pytest.mark.parametrize("near_singular", [False, True])
-@pytest.mark.parametrize("name", IDS)
+@pytest.mark.parametrize("name", SIX)
 def test_inverse_kinematics_return_the_pose_and_find_the_joints(name, near_singular):
     r = robot(name)
     q = random_joints(np.random.default_rng(2), 300, near_singular)
@@ -301,7 +307,7 @@ def test_a_robot_without_limits_is_refused_until_they_are_given():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: robot("abb_irb4600"), "not in the library of 68; nearest: .*abb_irb4600_60_205"),
+        (lambda: robot("abb_irb4600"), "not in the library of 69; nearest: .*abb_irb4600_60_205"),
         (lambda: robot("zzz"), "nothing there is called like it"),
         (lambda: robot("staubli_tx60", acceleration_ratio="fast"), "'fast' is not one of"),
         (lambda: robot("staubli_tx60").with_limits(lower=np.full(6, 9.0)), "joint 1 are reversed"),

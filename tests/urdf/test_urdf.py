@@ -57,16 +57,17 @@ def frames_of(r):
 def described(tmp_path, r, *, gauge=None, inside=LIMIT):
     """Write a library robot as a URDF; with a generator, in joint frames chosen at random."""
     origins, axes, flange = frames_of(r)
+    n = r.joints
     if gauge is not None:
         # A joint frame may be turned at will, and shifted along its axis.
-        for i in range(6):
+        for i in range(n):
             G = np.eye(4)
             G[:3, :3] = Rotation.random(rng=gauge).as_matrix()
             G[:3, 3] = axes[i] * gauge.uniform(-1, 1)
             origins[i] = origins[i] @ G
             axes[i] = G[:3, :3].T @ axes[i]
             after = np.linalg.inv(G)
-            if i < 5:
+            if i < n - 1:
                 origins[i + 1] = after @ origins[i + 1]
             else:
                 flange = after @ flange
@@ -74,14 +75,13 @@ def described(tmp_path, r, *, gauge=None, inside=LIMIT):
         foot[:3, :3], end[:3, :3] = Rotation.random(2, rng=gauge).as_matrix()
         foot[:3, 3], end[:3, 3] = gauge.uniform(-1, 1, (2, 3))
         origins[0], flange = foot @ origins[0], flange @ end
-    names = ["base", *(f"link_{i}" for i in range(1, 7)), "tool0"]
+    names = ["base", *(f"link_{i}" for i in range(1, n + 1)), "tool0"]
     joints = [
         joint(f"j{i + 1}", names[i], names[i + 1], origins[i], axes[i], inside=inside)
-        for i in range(6)
+        for i in range(n)
     ]
-    return urdf(
-        tmp_path, [*joints, joint("end", "link_6", "tool0", flange, kind="fixed", inside="")]
-    )
+    end = joint("end", f"link_{n}", "tool0", flange, kind="fixed", inside="")
+    return urdf(tmp_path, [*joints, end], names)
 
 
 @pytest.mark.parametrize("name", robot_ids())
@@ -94,11 +94,12 @@ def test_a_library_robot_comes_back_from_its_description(tmp_path, name):
         assert back.geometry[key] == pytest.approx(value, abs=1e-9)
     np.testing.assert_array_equal(back.T_base_foot, np.eye(4))
     np.testing.assert_array_equal(back.T_end_flange, np.eye(4))
-    q = np.random.default_rng(30).uniform(-np.pi, np.pi, (50, 6))
+    q = np.random.default_rng(30).uniform(-np.pi, np.pi, (50, r.joints))
     np.testing.assert_allclose(back.forward(q), r.forward(q), atol=1e-9)
     np.testing.assert_allclose(chain_of(back).forward(q), r.forward(q), atol=1e-9)
-    assert len(back.inverse(r.forward(q), within_limits=False)) == len(
-        r.inverse(r.forward(q), within_limits=False)
+    given = r.given_of(q)
+    assert len(back.inverse(r.forward(q), given=given, within_limits=False)) == len(
+        r.inverse(r.forward(q), given=given, within_limits=False)
     )
 
 

@@ -4,8 +4,11 @@ On a straight move J(q) q' = V, the tool's twist per interval. If s is the least
 J at a sample and J changes by at most L for each radian that the joints turn, then within a step h
 of the interval the joints stay within r of the sample, where L r^2 - s r + |V| h = 0; the least
 singular value stays above s - L r, joint speeds below S = |V| / (s - L r), and their change per
-step below Q h with Q = (L S^2 + |V'|) / (s - L r). A step is divided until what it can hide is too
-small to matter, or cannot reach a limit. Lengths are in m, so that 1 m weighs as much as 1 rad.
+step below Q h with Q = (L S^2 + |V'|) / (s - L r). Of seven joints one runs evenly, by x per
+interval: V is less by its share x J_x, J is that of the others and changes with it, too, by L x, so
+that V' is at most L x (S + x) more, and (S + x)^2 stands for S^2. A step is divided until what it
+can hide is too small to matter, or cannot reach a limit. Lengths are in m, so that 1 m weighs as
+much as 1 rad.
 """
 
 from __future__ import annotations
@@ -147,6 +150,8 @@ class _StraightMoves:
         self._step = np.diff(self._poses[:, :3, 3], axis=0)
         dq = joint_increments(plan)
         self._x = dq[:, self._n :]
+        self._own = np.arange(self._n)[np.arange(self._n) != chain.even]
+        self._even = np.zeros(len(dq)) if chain.even is None else dq[:, chain.even]
         rate, reach = np.sqrt((self._step**2).sum(1) + (self._turn**2).sum(1)), _reaches(chain)
         rotary = np.array([axis.kind == "rotary" for axis in chain.externals], dtype=float)
         spun, slid = np.abs(self._x) @ rotary, np.abs(self._x) @ (1 - rotary)
@@ -154,39 +159,48 @@ class _StraightMoves:
         far = _farthest(chain, self._poses[:, :3, 3], plan.q[:, self._n :])
         self._size = rate + slid + spun * far
         # What the twist changes by per interval: the axis that it is measured about turns with it.
-        still = self._n == 6
+        still = self._n >= 6
         own = 0.0 if still else (self._turn**2).sum(1)
         self._change = own + spun * rate * (1.0 + reach[0]) + self._turned * self._size
         if len(chain.externals) > 1:  # the one carries the other's axis along
             self._change = self._change + 2 * spun * (slid + spun * far)
         self._lipschitz = _lipschitz(reach) * (1.0 if still else 2.0)
+        if chain.even is not None:
+            run = np.abs(self._even)
+            self._turned = self._turned + self._lipschitz * run
+            self._size = self._size + run * float(np.hypot(reach[chain.even], 1.0))
         limits, (velocity, _) = plan.robot.joint_limits(), plan.robot.speed_limits()
         bound, couplings = ~plan.robot.endless, plan.robot.couplings
-        bound[self._n :] = False  # external axes run evenly
+        bound[np.setdiff1d(np.arange(len(bound)), self._own)] = False  # they run evenly
         self.rows = np.vstack([np.eye(dq.shape[1]), *(c.row[None] for c in couplings)])
         self._low = np.append(np.where(bound, limits.lower, -np.inf), [c.lower for c in couplings])
         self._high = np.append(np.where(bound, limits.upper, np.inf), [c.upper for c in couplings])
-        self._fast = (np.diff(plan.time)[:, None] * velocity)[:, : self._n]
+        self._fast = (np.diff(plan.time)[:, None] * velocity)[:, self._own]
 
     def speeds(self, k: Ints, q: Array) -> tuple[Array, Array]:
         """Return joint speeds (S, n) per interval at samples, and least singular values (S,)."""
         T, J = self._chain.jacobian(q)
         V = np.concatenate([self._step[k], self._turn[k]], axis=1)
         V = V - (self._chain.twists(q, T[:, :3, 3]) @ self._x[k, :, None])[..., 0]
+        if (even := self._chain.even) is not None:
+            V = V - J[:, :, even] * self._even[k, None]
+        J = J[:, :, self._own]
         if self._n < 6:
             z = T[:, :3, 2]
-            J = J.copy()
             J[:, 3:] -= z[:, :, None] * np.einsum("bi,bij->bj", z, J[:, 3:])[:, None]
             V[:, 3:] -= z * (z * V[:, 3:]).sum(axis=1, keepdims=True)
         U, s, Vt = np.linalg.svd(J, full_matrices=False)
         least = s[:, -1]
         inverse = np.where(s > 1e-12, 1 / np.maximum(s, 1e-12), 0.0)
-        v = np.einsum("bji,bj,bkj,bk->bi", Vt, inverse, U, V)
+        v = np.empty((len(q), self._n))
+        v[:, self._own] = np.einsum("bji,bj,bkj,bk->bi", Vt, inverse, U, V)
+        if even is not None:
+            v[:, even] = self._even[k]
         return np.concatenate([v, self._x[k]], axis=1), least
 
     def settled(self, steps: _Steps) -> Bools:
         """Say of which steps what they hide is known not to matter."""
-        L, own = self._lipschitz, slice(self._n)
+        L, own = self._lipschitz, self._own
         s, size = np.maximum(steps.s0, steps.s1), self._size[steps.k]
         s = s - self._turned[steps.k] * steps.h
         root = s**2 - 4 * L * size * steps.h
@@ -194,7 +208,8 @@ class _StraightMoves:
         r = np.where(known, (s - np.sqrt(np.maximum(root, 0.0))) / (2 * L), np.inf)
         floor = np.where(known, s - L * np.where(known, r, 0.0), 1.0)
         speed = size / floor
-        second = (L * speed**2 + self._change[steps.k]) / floor
+        both = speed + np.abs(self._even[steps.k])
+        second = (L * both**2 + self._change[steps.k]) / floor
         hidden = second * steps.h**2 / 8
         faster = (second * steps.h / 2)[:, None]
         one, two = steps.q0 @ self.rows.T, steps.q1 @ self.rows.T

@@ -31,12 +31,16 @@ class JointChain:
         Tip in the frame of the last joint, m.
     externals : tuple of ExternalAxis
         What carries the first joint, and the part against it; their values are the last of q.
+    even : int, optional
+        The joint that runs evenly from node to node whatever the tool does, as external axes do:
+        of seven that which a pose leaves free.
     """
 
     origins: Array
     axes: Array
     tip: Array
     externals: tuple[ExternalAxis, ...] = ()
+    even: int | None = None
 
     __repr__ = short_repr
 
@@ -154,7 +158,11 @@ def chain_of(robot: Robot) -> JointChain:
     if robot.chain is not None:
         given = robot.chain
         return JointChain(
-            origins=given.origins, axes=given.axes, tip=given.end, externals=robot.externals
+            origins=given.origins,
+            axes=given.axes,
+            tip=given.end,
+            externals=robot.externals,
+            even=robot.family.given,
         )
     origins, axes, end = _MODELS[robot.kinematics](robot.geometry)
     for i, axis in enumerate(axes):
@@ -167,6 +175,7 @@ def chain_of(robot: Robot) -> JointChain:
         axes=robot.sign[:, None] * axes,
         tip=end @ robot.T_end_flange,
         externals=robot.externals,
+        even=robot.family.given,
     )
 
 
@@ -206,4 +215,17 @@ def _five(g: dict[str, float]) -> tuple[Array, Array, Array]:
     return origins[:5], axes[:5], end
 
 
-_MODELS = {"opw": _opw, "ur": _ur, "five": _five}
+def _srs(g: dict[str, float]) -> tuple[Array, Array, Array]:
+    """Return origins (7, 4, 4), axes (7, 3) and end of an arm with spherical shoulder and wrist.
+
+    Upright at zero: all axes pass along one vertical line or are parallel to y, axis 2 at the
+    height c1, axis 4 c2 above it, axis 6 c3 further, the flange c4 over that.
+    """
+    height = np.cumsum([0.0, g["c1"], 0.0, g["c2"], 0.0, g["c3"], 0.0, g["c4"]])
+    steps = np.tile(np.eye(4), (8, 1, 1))
+    steps[:, 2, 3] = np.diff(height, prepend=0.0)
+    axes = np.tile([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]], (4, 1))[:7]
+    return steps[:7], axes, steps[7]
+
+
+_MODELS = {"opw": _opw, "ur": _ur, "five": _five, "srs": _srs}

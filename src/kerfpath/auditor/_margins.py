@@ -1,7 +1,8 @@
 """The margins of comfort at the nodes, from the lines that the joints turn about alone.
 
 Nothing of the arm's lengths or model angles is used: the elbow is an angle between points on axes 2
-and 3 and the wrist, seen along axis 2; the shoulder a distance of the wrist from a plane.
+and 3 and the wrist, seen along axis 2, of a seven-axis arm between axes
+3 and 5; the shoulder a distance of the wrist from a plane.
 """
 
 from __future__ import annotations
@@ -93,11 +94,13 @@ def _meet(points: list[Array], along: list[Array], i: int, j: int) -> Array:
 
 def _wrist(plan: Plan, chain: JointChain) -> Array:
     _, along = _lines(plan, chain)
-    return _off_line(along[5], along[3])
+    return _off_line(along[-1], along[-3])
 
 
 def _elbow(plan: Plan, chain: JointChain) -> Array:
     points, along = _lines(plan, chain)
+    if len(along) > 6:
+        return _off_line(along[2], along[4])
     outer = _meet(points, along, 4, 3)
     upper, fore = (_across(v, along[1]) for v in (points[2] - points[1], outer - points[2]))
     return _off_line(upper, fore)

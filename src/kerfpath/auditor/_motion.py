@@ -63,7 +63,8 @@ def motion_of(plan: Plan, chain: JointChain, interpolation: Interpolation, parts
 
     "linear": the tip runs straight and the tool turns evenly about one axis from pose to pose, as
     linear moves do; the joints follow by inverse kinematics. "joint": the joints run evenly. An
-    external axis runs evenly in both, the straight line being one of the part.
+    external axis runs evenly in both, the straight line being one of the part, as does joint 3 of a
+    seven-axis arm.
     """
     K, dq = len(plan.q), joint_increments(plan)
     f = np.linspace(0.0, 1.0, parts + 1)
@@ -103,8 +104,8 @@ def straight(start: Array, end: Array, k: Ints, f: Array) -> Array:
 def follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
     """Solve the tool poses `wanted` (B, 4, 4) by Newton's method from the joints q (B, n).
 
-    Five joints are asked for tip and tool axis alone; an external axis stays as it is. Returns the
-    joints and what they miss (B,).
+    Five joints are asked for tip and tool axis alone; an external axis stays as it is, and so does
+    the joint that runs evenly. Returns the joints and what they miss (B,).
     """
     q, n = q.copy(), len(chain.axes)
     residual = np.full(len(q), np.inf)
@@ -119,6 +120,8 @@ def follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
             z = T[:, :3, 2]
             error[:, 3:] = np.cross(z, wanted[open_, :3, 2])
             J[:, 3:] -= z[:, :, None] * np.einsum("bi,bij->bj", z, J[:, 3:])[:, None]
+        if chain.even is not None:
+            J[:, :, chain.even] = 0.0
         residual[open_] = np.abs(error).max(axis=1)
         late = residual[open_] > REACHED
         if not late.any():

@@ -122,6 +122,22 @@ def _opw(g: Mapping[str, float]) -> list[Line]:
     ]
 
 
+def _srs(g: Mapping[str, float]) -> list[Line]:
+    """Return lines from joint to joint; the outer halves of both long links turn with axes 3, 5."""
+    arm = g["c2"] + g["c3"]
+    base, shoulder, upper, fore, _, wrist, _ = (fraction * arm for fraction in FRACTIONS)
+    here = (0.0, 0.0, 0.0)
+    return [
+        ("base", 0, here, (0.0, 0.0, g["c1"] / 2), base),
+        ("link 1", 1, (0.0, 0.0, g["c1"] / 2), (0.0, 0.0, g["c1"]), shoulder),
+        ("link 2", 2, here, (0.0, 0.0, g["c2"] / 2), upper),
+        ("link 3", 3, (0.0, 0.0, g["c2"] / 2), (0.0, 0.0, g["c2"]), upper),
+        ("link 4", 4, here, (0.0, 0.0, g["c3"] / 2), fore),
+        ("link 5", 5, (0.0, 0.0, g["c3"] / 2), (0.0, 0.0, g["c3"]), fore),
+        ("link 6", 6, here, (0.0, 0.0, g["c4"] / 2), wrist),
+    ]
+
+
 def _ur(g: Mapping[str, float]) -> list[Line]:
     """Return lines beside the Denavit-Hartenberg ones: the links lie next to each other along d4.
 
@@ -144,6 +160,7 @@ _LINES: dict[str, Callable[[Mapping[str, float]], list[Line]]] = {
     "opw": _opw,
     "five": _opw,
     "ur": _ur,
+    "srs": _srs,
 }
 
 

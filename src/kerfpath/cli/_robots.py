@@ -217,7 +217,8 @@ def show_robot(name: str, *, as_json: bool) -> None:
     if r.limits_missing:
         out.print(f"limits missing: {escape(r.limits_missing)}")
     if r.acceleration is None:
-        out.print(f"acceleration: not published; nearest named ratio: {r.acceleration_ratio}")
+        ratio = f"; nearest named ratio: {r.acceleration_ratio}" if r.acceleration_ratio else ""
+        out.print(f"acceleration: not published{ratio}")
     else:
         out.print(f"acceleration: {escape(r.acceleration_source)}")
     for note in r.notes:

@@ -193,6 +193,7 @@ def run_along(
     InputError
         As `executed`.
     """
+    robot.require_no_free_joint("the motion between the nodes")
     course = ToolCourse.of(moves[0].T_part_tip, moves[1:], controller)
     borders = course.borders
     long = np.diff(borders)

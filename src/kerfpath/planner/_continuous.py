@@ -264,7 +264,7 @@ def _refine_path(
     at = below + path.share * (above - below)
     low = made.gamma - (at - graph.gamma_at(sample - clear[0]))
     high = made.gamma + graph.gamma_at(sample + (path.one != path.other) + clear[1]) - at
-    begun = np.column_stack([made.gamma, made.unwrapped[:, made.robot.family.joints :]])
+    begun = np.column_stack([made.gamma, made.unwrapped[:, made.robot.free]])
     low, high = (
         np.column_stack([gamma, begun[:, 1:] + side * FREE])
         for gamma, side in ((low, -1.0), (high, 1.0))

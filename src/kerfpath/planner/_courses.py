@@ -1,10 +1,11 @@
-"""Courses of the external axes: smooth, from a search over coarse samples of all that is free.
+"""Courses of external axes and elbows: smooth, from a search over coarse samples of what is free.
 
 Rails and tables are slow beside the arm, and a grid of their values would quantise what they may
-accelerate. So a few nodes are taken, at each of them every place of a coarse grid of the axes, of
-gamma and of the postures, and the best way through these within the velocity limits is found by
-dynamic programming. The course of the axes is then the smoothest curve that stays near it; gamma is
-planned anew along it, and both together are refined by the true kinematics.
+accelerate, as it would that of joint 3 of a seven-axis arm, which is treated as one of them. So a
+few nodes are taken, at each of them every place of a coarse grid of the axes, of gamma and of the
+postures, and the best way through these within the velocity limits is found by dynamic programming.
+The course of the axes is then the smoothest curve that stays near it; gamma is planned anew along
+it, and both together are refined by the true kinematics.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ __all__ = ["along_a_course", "coarse_places", "courses", "external_course"]
 
 FEW_NODES, NODES = 9, 41
 """Nodes at which the axes are sampled: as many as leave them time for a step, within these."""
-STEP = {"linear": 0.15, "rotary": np.radians(12)}
+STEP = {"m": 0.15, "rad": np.radians(12)}
 """m and rad: steps of the axes, where there are not too many places."""
 MOST_PLACES = 1500
 GAMMA_STEP = {1: np.radians(12), 2: np.radians(20), 3: np.radians(24)}
@@ -94,7 +95,7 @@ class _Coarse:
 
 
 def coarse_places(robot: Robot) -> Array:
-    """Return a coarse grid (X, E) of the values of a robot's external axes, rad or m."""
+    """Return a coarse grid (X, E) of the values of what a pose leaves free, rad or m."""
     return _grid(robot)[0]
 
 
@@ -108,7 +109,7 @@ def external_course(
     options: PlanOptions | None = None,
     cell: Cell | None = None,
 ) -> Array:
-    """Return the course (K, E) rad or m of the external axes that promises most.
+    """Return the course (K, E) rad or m of what a pose leaves free that promises most.
 
     Arguments as in `kerfpath.plan`; without a speed the gentlest one.
 
@@ -128,7 +129,7 @@ def external_course(
 def along_a_course(
     task: PlanningTask, clear: Callable[[Array], Bools], *, at_any_speed: bool = False
 ) -> PlanningTask:
-    """Return the task along the course that promises most, where its robot has external axes.
+    """Return the task along the course that promises most, where its robot has one to choose.
 
     `clear` as of `courses`.
 
@@ -139,7 +140,7 @@ def along_a_course(
     NoFeasiblePath
         As `external_course`.
     """
-    if not task.robot.externals or task.placed or task.settings.method != "continuous":
+    if not task.robot.free.size or task.placed or task.settings.method != "continuous":
         return task
     if at_any_speed:
         return task.along(next(courses(replace(task, dt=SLOWLY), (GENTLE,), clear)))
@@ -151,7 +152,7 @@ def courses(
     styles: tuple[_Style, ...] = STYLES,
     clear: Callable[[Array], Bools] = lambda q: np.ones(len(q), np.bool_),
 ) -> Iterator[Array]:
-    """Yield courses (K, E) rad or m of a task's external axes, that which promises most first.
+    """Yield courses (K, E) rad or m of what poses leave free, that which promises most first.
 
     With `clear`, which says of joint vectors (B, n) whether they are clear (B,), ways lead through
     clear samples, as far as some rounds of looking at those on them and about them bring it.
@@ -179,8 +180,7 @@ def courses(
 def _sampled(task: PlanningTask) -> _Coarse:
     robot, options, K = task.robot, task.settings, len(task.contour)
     places, counts = _grid(robot)
-    arm = robot.family.joints
-    takes = _steps(robot, counts) / robot.speed_limits()[0][arm:]
+    takes = _steps(robot, counts) / robot.speed_limits()[0][robot.free]
     slowest = takes.max() or np.inf  # none moves: as few nodes as there may be
     many = int(np.clip(task.dt * (K - 1) / slowest, min(K, FEW_NODES), min(K, NODES)))
     nodes = np.unique(np.round(np.linspace(0, K - 1, many)).astype(np.int64))
@@ -206,13 +206,13 @@ def _sampled(task: PlanningTask) -> _Coarse:
 
 
 def _grid(robot: Robot) -> tuple[Array, tuple[int, ...]]:
-    """Return a grid (X, E) of the external axes, rad or m, and how many values each has in it."""
-    arm, limits = robot.family.joints, robot.joint_limits()
-    bounds = list(zip(robot.externals, limits.lower[arm:], limits.upper[arm:], strict=True))
-    endless = robot.endless[arm:]
+    """Return a grid (X, E) of what is free, rad or m, and how many values each has in it."""
+    free, limits = robot.free, robot.joint_limits()
+    bounds = list(zip(limits.lower[free], limits.upper[free], strict=True))
+    endless = robot.endless[free]
     wanted = [
-        (2 * np.pi if turns else upper - lower) / STEP[axis.kind]
-        for (axis, lower, upper), turns in zip(bounds, endless, strict=True)
+        (2 * np.pi if turns else upper - lower) / STEP[robot.units[i]]
+        for i, (lower, upper), turns in zip(free, bounds, endless, strict=True)
     ]
     moving = max(1, sum(count > 0 for count in wanted))
     share = min(1.0, (MOST_PLACES / np.prod(np.add(wanted, 1))) ** (1 / moving))
@@ -223,7 +223,7 @@ def _grid(robot: Robot) -> tuple[Array, tuple[int, ...]]:
         else np.linspace(lower, upper, count)
         if count > 1
         else np.array([(lower + upper) / 2])
-        for (_, lower, upper), turns, count in zip(bounds, endless, counts, strict=True)
+        for (lower, upper), turns, count in zip(bounds, endless, counts, strict=True)
     ]
     places = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1).reshape(-1, len(grids))
     return places, counts
@@ -244,7 +244,7 @@ def _clear_way(
         for k in hit:
             own = np.arange(graph.start[k], graph.start[k + 1])
             far = np.abs(cells[graph.variant[own]] - cells[way[k, 0]])
-            far = np.where(task.robot.endless[-len(counts) :], np.minimum(far, counts - far), far)
+            far = np.where(task.robot.endless[task.robot.free], np.minimum(far, counts - far), far)
             looked.append(own[(far <= ABOUT).all(axis=1) & ~coarse.closed[own]])
         at = np.concatenate(looked)
         coarse.closed[at] = ~clear(graph.q[at])
@@ -297,34 +297,34 @@ def _best_way(coarse: _Coarse, task: PlanningTask, style: _Style) -> Ints:
 
 
 def _layer(coarse: _Coarse, robot: Robot, k: int) -> CoarseLayer:
-    """Return the arm's joints at every sample of a node, one turn of each."""
+    """Return the joints that follow at every sample of a node, one turn of each."""
     graph = coarse.graph
     own = slice(graph.start[k], graph.start[k + 1])
     shape = len(coarse.places), len(graph.gamma), robot.postures
-    q, ok = np.zeros((*shape, robot.family.joints)), np.zeros(shape, np.bool_)
+    q, ok = np.zeros((*shape, len(robot.solved))), np.zeros(shape, np.bool_)
     at = graph.variant[own], graph.sample[own], graph.posture[own]
-    q[at], ok[at] = graph.q[own, : robot.family.joints], ~coarse.closed[own]
+    q[at], ok[at] = graph.q[own][:, robot.solved], ~coarse.closed[own]
     return CoarseLayer(q=q, ok=ok)
 
 
 def _nearby(coarse: _Coarse, task: PlanningTask, parts: int, style: _Style) -> Nearby:
     """Return where steps to each place may come from in the time of some intervals."""
     robot, options = task.robot, task.settings
-    arm, counts = robot.family.joints, coarse.counts
+    free, solved, counts = robot.free, robot.solved, coarse.counts
     velocity = options.eta_v * robot.speed_limits()[0]
     reach = [range(-FARTHEST, FARTHEST + 1) if n > 1 else range(1) for n in counts]
     moves = np.stack(np.meshgrid(*reach, indexing="ij"), axis=-1).reshape(-1, len(counts))
     cells = np.stack(np.unravel_index(np.arange(len(coarse.places)), counts), axis=-1)
     there = cells[:, None] + moves
-    endless = robot.endless[arm:]
+    endless = robot.endless[free]
     there = np.where(endless, there % counts, there)
     inside = ((there >= 0) & (there < counts)).all(axis=2)
     index = np.ravel_multi_index(np.moveaxis(there, 2, 0), counts, mode="clip")
     span = velocity * task.dt * parts
     weight = span * (1 / velocity if options.weights is None else options.weights)
-    steps = _steps(robot, coarse.counts) / span[arm:]
+    steps = _steps(robot, coarse.counts) / span[free]
     share, square = np.abs(moves) * steps, style.square * parts
-    cost = style.axes * (weight[arm:] * share).sum(axis=1) + square * (share**2).sum(axis=1)
+    cost = style.axes * (weight[free] * share).sum(axis=1) + square * (share**2).sum(axis=1)
     # Between the middles of two cells it is a step more than between their edges.
     cost = np.where((share - steps <= 1).all(axis=1), cost, np.inf)
     limits = robot.joint_limits()
@@ -334,38 +334,38 @@ def _nearby(coarse: _Coarse, task: PlanningTask, parts: int, style: _Style) -> N
         place=np.where(inside, index, -1),
         cost=cost,
         turns=min((samples - 1) // 2, int(np.ceil(TURN * samples / (2 * np.pi)))),
-        span=span[:arm],
-        wraps=(robot.endless | wide)[:arm],
-        weight=weight[:arm],
+        span=span[solved],
+        wraps=(robot.endless | wide)[solved],
+        weight=weight[solved],
         square=square,
     )
 
 
 def _steps(robot: Robot, counted: tuple[int, ...]) -> Array:
     """Return the step (E,) of each axis in the grid, rad or m."""
-    arm, limits = robot.family.joints, robot.joint_limits()
+    free, limits = robot.free, robot.joint_limits()
     counts = np.array(counted)
-    span = np.where(robot.endless[arm:], 2 * np.pi, (limits.upper - limits.lower)[arm:])
-    between = np.where(robot.endless[arm:], counts, np.maximum(counts - 1, 1))
+    span = np.where(robot.endless[free], 2 * np.pi, (limits.upper - limits.lower)[free])
+    between = np.where(robot.endless[free], counts, np.maximum(counts - 1, 1))
     return np.asarray(span / between)
 
 
 def _smooth(coarse: _Coarse, robot: Robot, path: Ints, K: int) -> Array:
     """Return the smoothest course (K, E) that stays within half a step of the places of a way."""
-    arm, limits = robot.family.joints, robot.joint_limits()
-    endless, steps = robot.endless[arm:], _steps(robot, coarse.counts)
+    free, limits = robot.free, robot.joint_limits()
+    lower, upper = limits.lower[free], limits.upper[free]
+    endless, steps = robot.endless[free], _steps(robot, coarse.counts)
     x = coarse.places[path]
     x = np.vstack([x[:1], x[:1] + np.cumsum(increments(x, endless), axis=0)])
     course = np.empty((K, x.shape[1]))
     for i in range(x.shape[1]):
         low, high = x[:, i] - steps[i] / 2, x[:, i] + steps[i] / 2
         if not endless[i]:
-            low = np.maximum(low, limits.lower[arm + i])
-            high = np.minimum(high, limits.upper[arm + i])
+            low, high = np.maximum(low, lower[i]), np.minimum(high, upper[i])
         eased = _eased(low, high, coarse.nodes)
         course[:, i] = CubicSpline(coarse.nodes, eased)(np.arange(K)) if len(x) > 1 else eased[0]
         if not endless[i]:
-            course[:, i] = np.clip(course[:, i], limits.lower[arm + i], limits.upper[arm + i])
+            course[:, i] = np.clip(course[:, i], lower[i], upper[i])
     return np.where(endless, wrap(course), course)
 
 
@@ -385,8 +385,7 @@ def _eased(low: Array, high: Array, nodes: Ints) -> Array:
 
 def _stuck(coarse: _Coarse, robot: Robot, k: int) -> str:
     """Say where the way through the samples ends, and why that may be."""
-    names = ", ".join(axis.name for axis in robot.externals)
-    graph = coarse.graph
+    names, graph = robot.free_names, coarse.graph
     if graph.start[k + 1] == graph.start[k]:
         where = f"node {coarse.nodes[k]} is out of reach at every sampled value of {names}"
         loss = graph.main_loss(k)

@@ -101,7 +101,7 @@ def fastest_speed(
     the acceleration: `refine` moves gamma off it, from the fastest path and from others, to what is
     faster still (the best found, which is not proved to be the best there is), where that is clear
     and keeps the margins of `comfort`, which may have no costs here. `plan` finds a motion at the
-    speed returned, too. External axes follow the gentlest course, or `external`; `refine` moves
+    speed returned, too. External axes, and the elbow of seven, follow the gentlest course, or `external`; `refine` moves
     them, too, and looks for courses that are faster. With
     `ceiling` it is also proved, as far as a limited amount of work does, above which speed there is
     no motion at all, on the grid or off it, see `FastestSpeed.ceiling`. Off the grid a speed that
@@ -168,7 +168,7 @@ def _fastest(
         found = FastestSpeed.of(task.contour, least)
         return found, [found.node]
     motions, step = list[QuickMotion](), longest_step(task.contour)
-    fixed = task.placed or not task.robot.externals or task.settings.method != "continuous"
+    fixed = task.placed or not task.robot.free.size or task.settings.method != "continuous"
     ways = quick_motions(along, there)
     for quick in ways if fixed else _over_courses(task, finder, ways):
         motions.append(quick)

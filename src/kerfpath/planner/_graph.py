@@ -85,25 +85,25 @@ def layered_graph(
 
 
 def course_of(external: ArrayLike, contour: Contour, robot: Robot) -> Array:
-    """Return values of the external axes at every node, (K, E) or (K, X, E), as (K, X, E), checked.
+    """Return values of what is free at every node, (K, E) or (K, X, E), as (K, X, E), checked.
 
     Raises
     ------
     InputError
         Another number of nodes or axes; a value out of the range of its axis.
     """
-    arm, limits = robot.family.joints, robot.joint_limits()
+    free, limits = robot.free, robot.joint_limits()
     x = np.asarray(external, dtype=float)
     x = x[:, None] if x.ndim == 2 else x
-    x = floats(x, "external", (len(contour), None, len(robot.externals)), copy=False)
-    low, high = limits.lower[arm:], limits.upper[arm:]
-    out = ((x < low) | (x > high)) & ~robot.endless[arm:]
+    x = floats(x, "external", (len(contour), None, len(free)), copy=False)
+    low, high = limits.lower[free], limits.upper[free]
+    out = ((x < low) | (x > high)) & ~robot.endless[free]
     if out.any():
         node, place, i = np.argwhere(out)[0]
-        axis = robot.externals[i]
+        name, unit = robot.joint_names[free[i]], robot.units[free[i]]
         raise InputError(
-            f"external: {axis.name} is at {x[node, place, i]:.6g} {axis.unit} at node {node}, "
-            f"outside its range {low[i]:g} to {high[i]:g} {axis.unit}"
+            f"external: {name} is at {x[node, place, i]:.6g} {unit} at node {node}, "
+            f"outside its range {low[i]:g} to {high[i]:g} {unit}"
         )
     return x
 

@@ -104,7 +104,7 @@ def _from_quickest(
     priced = asked.comfort is not None and asked.comfort.prices_clearance
     held = task.problem.limits
     unknown = held.torque is not None or held.jerk is not None
-    on_a_grid = task.robot.externals and task.external is None
+    on_a_grid = task.robot.free.size and task.external is None
     if asked.closure == "periodic" or priced or unknown or on_a_grid:
         raise _judged(broken, task, begin) from None
     judged, best = None, None

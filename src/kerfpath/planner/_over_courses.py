@@ -1,4 +1,4 @@
-"""Plans of arm and external axes, along the courses that promise most, and the best of them."""
+"""Plans with a course to choose: along those that promise most, and the best of them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ RUNGS = (1.25, 1.06)
 def plan_over_courses(
     task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]
 ) -> Plan:
-    """Return the best motion found of arm and external axes together.
+    """Return the best motion found of all joints together, where poses leave some free.
 
     A tolerance of the tool axis is searched along the course of the best motion at the nominal
     axis; along all courses where there is none.
@@ -63,7 +63,7 @@ def graph_over_courses(
     cell: Cell | None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
-    """Return the layered graph along the courses of the external axes of the plans found.
+    """Return the layered graph along the courses of the plans found.
 
     Each is the course of a refined plan, that of the best one first; a path may change from one to
     another where the limits of the axes let it. Arguments as in `kerfpath.plan`.
@@ -77,9 +77,8 @@ def graph_over_courses(
     plans = _plans(task, ClearSearch(task, cell), lambda what: None)
     ways: list[Array] = []
     for made in sorted(plans, key=lambda plan: plan.cost):
-        x = made.q[:, task.arm :]
-        if not any(np.allclose(x, other, atol=ALIKE) for other in ways):
-            ways.append(x)
+        if not any(np.allclose(made.course, other, atol=ALIKE) for other in ways):
+            ways.append(made.course)
     return layered_graph(
         contour,
         robot,
@@ -99,13 +98,13 @@ def _plans(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]
     NoFeasiblePath
         As `plan_over_courses`.
     """
-    begin("search for a course of the external axes")
+    begin(f"search for a course of {task.robot.free_names}")
     places = coarse_places(task.robot)
     if len(places) == 1:  # none moves
         still = task.along(np.repeat(places, len(task.contour), axis=0))
         return [plan_continuous(still, finder.of(still), begin)]
     nominal = _nominal(task, finder, begin)
-    known = None if nominal is None else nominal.external
+    known = None if nominal is None else nominal.course
     ways = courses(task, clear=finder.clear) if known is None else iter([known])
     tried = _along(ways, task, finder, begin, nominal)
     if tried.plans:
@@ -173,8 +172,9 @@ def _along(
             continue
         made, best = replace(claimed(found, there), settings=task.settings), tried.best
         tried.plans.append(made)
-        if best is not None and abs(made.cost - best.cost) <= SAME * best.cost:
-            break  # two courses have led to one optimum
+        same = best is not None and abs(made.cost - best.cost) <= SAME * best.cost
+        if same and task.robot.family.given is None:
+            break  # two courses have led to one optimum; of an elbow each has a twin, half a turn on
     return tried
 
 
@@ -192,11 +192,11 @@ def _nominal(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], Non
 
 
 def _unproved(task: PlanningTask, broken: NoFeasiblePath) -> NoFeasiblePath:
-    names = ", ".join(axis.name for axis in task.robot.externals)
+    names = task.robot.free_names
     said = (
         f"{broken}; along the courses of {names} that promised most, which proves nothing of others"
     )
     numbers = {getattr(reason, "which", None) for reason in broken.counts}
-    for number, axis in enumerate(task.robot.externals, task.arm + 1):
+    for number, axis in enumerate(task.robot.externals, task.robot.family.joints + 1):
         said += f"; joint {number} is {axis.name}" if number in numbers else ""
     return NoFeasiblePath(said, proved=False, node=broken.node, counts=broken.counts)

@@ -97,8 +97,9 @@ def plan(
     graph : LayeredGraph, optional
         The layered graph of this very task, kept from `layered_graph`.
     external : (K, E) rad or m, optional
-        Values of the robot's external axes at every node, from which they are refined; default:
-        method "continuous" looks for a smooth course, the others take all of a grid in their steps.
+        Values of the robot's external axes at every node, from which they are refined; of a
+        seven-axis arm those of joint 3 before them. Default: method "continuous" looks for a smooth
+        course, the others take all of a grid in their steps.
     progress : callable, optional
         Called with the number of nodes whose poses have been solved since the last call. Of very
         many nodes every few are solved first, and all only where these do not lead to a plan.
@@ -131,7 +132,7 @@ def plan(
     finder = ClearSearch(task, cell)
     begin = phase or (lambda what: None)
     try:
-        if asked.method == "continuous" and robot.externals and not task.placed:
+        if asked.method == "continuous" and robot.free.size and not task.placed:
             made = plan_over_courses(task, finder, begin)
         elif asked.method == "continuous":
             made = plan_continuous(task, finder, begin)

@@ -85,7 +85,7 @@ class PlanningTask:
     dt : float s
         Time from node to node at the speed asked for.
     external : (K, E) rad or m, optional
-        Course of the external axes; None: a grid of their values at every node.
+        Course of what a pose leaves free; None: a grid of its values at every node.
     placed : bool
         The course, or the graph, was given with the task.
     layers : callable
@@ -104,11 +104,6 @@ class PlanningTask:
     placed: bool = False
 
     __repr__ = short_repr
-
-    @property
-    def arm(self) -> int:
-        """Number of joints of the arm, without external axes."""
-        return self.robot.family.joints
 
     @cached_property
     def built(self) -> Layered:
@@ -156,7 +151,7 @@ class PlanningTask:
         return replace(self, settings=settings, layers=_layers)
 
     def along(self, external: Array) -> PlanningTask:
-        """Return the task with another course (K, E) of the external axes, not built."""
+        """Return the task with another course (K, E) of what a pose leaves free, not built."""
         return replace(self, external=external, placed=True, layers=_layers)
 
     def at_nodes(self, nodes: Ints) -> Layered:
@@ -284,7 +279,7 @@ def task_of(
 
 
 def _course_in(graph: LayeredGraph) -> Array | None:
-    """Return the course (K, E) of the external axes along which a graph was built, if any."""
+    """Return the course (K, E) of what is free along which a graph was built, if any."""
     x = graph.external
     return x[:, 0] if x is not None and x.shape[1] == 1 else None
 

@@ -54,10 +54,10 @@ class ThinTask:
         if np.ptp(made.posture):
             return None
         q = np.stack([np.interp(at, self.nodes, joint) for joint in made.unwrapped.T], axis=1)
-        free = np.column_stack([np.unwrap(made.gamma), made.unwrapped[:, task.arm :]])
+        free = np.column_stack([np.unwrap(made.gamma), made.unwrapped[:, task.robot.free]])
         spline, end = CubicSpline(self.nodes, free), self.nodes[-1]
         free = spline(np.minimum(at, end)) + spline(end, 1) * np.maximum(at - end, 0)[:, None]
-        gamma, q[:, task.arm :] = free[:, 0], free[:, 1:]
+        gamma, q[:, task.robot.free] = free[:, 0], free[:, 1:]
         claim = Proof(optimal=False, statement="found over continuous rotation")
         return Plan(
             contour=task.contour,
@@ -83,7 +83,7 @@ def thinned(task: PlanningTask) -> ThinTask | None:
     not come out even; and where one of the few nodes has no pose. The graph of all nodes is not
     built for it.
     """
-    last, axes = len(task.contour) - 1, len(task.robot.externals)
+    last, axes = len(task.contour) - 1, len(task.robot.free)
     if last < MANY / (1 + axes) or task.settings.tilt is not None:
         return None
     if axes and task.external is None:

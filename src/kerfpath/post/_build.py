@@ -112,10 +112,10 @@ def build_program(
     if not plans:
         raise InputError("build_program: expected at least one plan, got none")
     first = plans[0]
-    if arc_tolerance is not None and first.robot.externals:
-        moving = ", ".join(axis.name for axis in first.robot.externals)
+    if arc_tolerance is not None and first.robot.free.size:
         raise InputError(
-            f"program: how controllers move {moving} along an arc differs; leave arcs_mm out"
+            f"program: how controllers move {first.robot.free_names} along an arc differs; leave "
+            "arcs_mm out"
         )
     for plan in plans[1:]:
         _require_same_cell(first, plan)

@@ -16,8 +16,8 @@ DERIVATIVE_STEP = 1e-5
 class JointCurves:
     """q_k of every node in one posture: the true kinematics, not a model of it.
 
-    What is free at a node are gamma, rad, and the values of the E external axes, rad or m, in this
-    order: F = 1 + E numbers.
+    What is free at a node are gamma, rad, joint 3 of a seven-axis arm, and the values of the
+    external axes, rad or m, in this order: F = 1 + E numbers.
 
     Parameters
     ----------
@@ -33,6 +33,7 @@ class JointCurves:
     def __init__(self, robot: Robot, H: Array, T_flange_tip: Array, posture: Ints) -> None:
         self._robot = robot.alone()
         self._externals = robot.externals
+        self._inner = self._robot.free
         self._H = H
         self._T_tip_flange = np.linalg.inv(T_flange_tip)
         self._posture = posture
@@ -42,10 +43,13 @@ class JointCurves:
 
         NaN at the nodes that are out of reach.
         """
-        H, x = self._H, free[:, 1:]
+        x = free[:, 1 + len(self._inner) :]
+        H = self._H
         if self._externals:
             H = np.linalg.inv(base_in_part(self._externals, x)) @ H
-        arm = self._of_arm(H, free[:, 0], np.ascontiguousarray(near[:, : self._robot.joints]))
+        near = np.array(near[:, : self._robot.joints])
+        near[:, self._inner] = free[:, 1 : 1 + len(self._inner)]
+        arm = self._of_arm(H, free[:, 0], near)
         return np.concatenate([arm, x], axis=1)
 
     def _of_arm(self, H: Array, gamma: Array, near: Array) -> Array:

@@ -187,7 +187,7 @@ def _lowest(descent: Descent, start: MotionState, least: float) -> tuple[MotionS
 
 def _room_kept(plan: Plan, found: MotionState) -> bool:
     """Return whether the tool can still back off at both ends where external axes have moved."""
-    if plan.settings.retract is None or not plan.robot.externals:
+    if plan.settings.retract is None or not plan.robot.free.size:
         return True  # gamma is held where it can
     ends = [0, -1]
     q, _ = on_turns(plan.robot, found.q)
@@ -275,9 +275,9 @@ def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, Motio
     settings, comfort = plan.settings, plan.settings.comfort
     low, high = room_at_ends(plan)
     gamma, windows, q = plan.gamma, settings.gamma_windows, plan.unwrapped
-    limits, arm = plan.robot.joint_limits(), plan.robot.family.joints
-    x, free = q[:, arm:], np.where(limits.endless, np.inf, 0.0)
-    ends = (limits.lower - free)[arm:], (limits.upper + free)[arm:]
+    limits, mine = plan.robot.joint_limits(), plan.robot.free
+    x, free = q[:, mine], np.where(limits.endless, np.inf, 0.0)
+    ends = (limits.lower - free)[mine], (limits.upper + free)[mine]
     if windows:
         inside = nearest_inside(windows, plan.contour.s, gamma)
         gamma = np.full(len(gamma), np.nan) if inside is None else inside
@@ -347,8 +347,8 @@ def _divide_plan(plan: Plan, nodes: Contour) -> Plan | str:
         return "the times of a reduced feed hold at its own nodes, not between them"
     gamma = CubicSpline(coarse, np.unwrap(plan.gamma + twist))(index)
     near = np.stack([np.interp(index, coarse, q) for q in plan.unwrapped.T], axis=1)
-    arm = plan.robot.family.joints
-    near[:, arm:] = CubicSpline(coarse, plan.unwrapped[:, arm:])(index)
+    if (free := plan.robot.free).size:
+        near[:, free] = CubicSpline(coarse, plan.unwrapped[:, free])(index)
     return replace(
         plan,
         contour=nodes,

@@ -33,7 +33,7 @@ def room_at_ends(plan: Plan) -> tuple[Array, Array]:
             curves = JointCurves(plan.robot, H, plan.T_flange_tip, posture)
             near = np.broadcast_to(q[end], (len(AWAY), n))
             gamma = plan.gamma[end] + sign * AWAY
-            there = curves.at(np.column_stack([gamma, near[:, plan.robot.family.joints :]]), near)
+            there = curves.at(np.column_stack([gamma, near[:, plan.robot.free]]), near)
             reached = np.asarray(np.isfinite(there).all(axis=1))
             there = np.where(reached[:, None], there, near)
             tool = plan.T_flange_tip

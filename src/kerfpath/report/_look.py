@@ -35,6 +35,7 @@ SCALE = ("#440154", "#414487", "#2a788e", "#22a884", "#7ad151")
 # Six hues, and a light and a dark shade of each, found by a search that keeps all pairs apart
 # for normal, protan and deutan sight (Machado, Oliveira, Fernandes 2009; CIELAB distance 12).
 JOINT_COLOURS = ("#0061cc", "#f4a918", "#0ea069", "#df5ac2", "#f05d16", "#55bdff")
+SEVENTH_COLOUR = "#8a8d00"
 EXTERNAL_COLOURS = ("#6b4fbb", "#7a5c3e", "#5b6675")
 """Of external axes, which have their names beside their lines."""
 _LOW = ("#4089d9", "#fce3b4", "#6bc5a3", "#f6ceed", "#f6a076", "#86d0ff")
@@ -69,7 +70,8 @@ def reason_colours(reasons: Sequence[Reason]) -> tuple[str, ...]:
 
 def joint_colours(robot: Robot) -> tuple[str, ...]:
     """Return a colour for each joint of a robot, external axes last."""
-    return JOINT_COLOURS[: robot.family.joints] + EXTERNAL_COLOURS[: len(robot.externals)]
+    arm = (*JOINT_COLOURS, SEVENTH_COLOUR)[: robot.family.joints]
+    return arm + EXTERNAL_COLOURS[: len(robot.externals)]
 
 
 def base_layout(height: int, **more: Any) -> go.Layout:

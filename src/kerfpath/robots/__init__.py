@@ -15,6 +15,7 @@ from kerfpath.robots._external import ExternalAxis as ExternalAxis
 from kerfpath.robots._external import Travel as Travel
 from kerfpath.robots._external import base_in_part as base_in_part
 from kerfpath.robots._external import carried as carried
+from kerfpath.robots._external import samples_of as samples_of
 from kerfpath.robots._families import FAMILIES as FAMILIES
 from kerfpath.robots._families import Family as Family
 from kerfpath.robots._families import posture_name as posture_name

@@ -55,7 +55,7 @@ def read_description(
         meshes=meshes,
         snap=0.0 if snap is None else snap,
     )
-    if snap is not None or len(found.joints) != 6 or in_closed_form(found.chain):
+    if snap is not None or in_closed_form(found.chain):
         return found
     meant = {
         snap: read_urdf(path, base=base, tip=tip, mount=mount, meshes=False, snap=snap).chain
@@ -70,8 +70,13 @@ def read_description(
         f"{found.path} ({found.base} to {found.tip}): as it is written the arm is of no family "
         f"with a closed form, with its angles rounded to 15 deg it is: snap={least:g} takes them "
         f"as meant, which moves the tip by up to {off * 1e3:.2g} mm and "
-        f"{np.degrees(turned):.2g} deg; snap=0 keeps what is written, as a general "
-        "arm, whose solver may need minutes to prepare"
+        f"{np.degrees(turned):.2g} deg"
+        + (
+            "; snap=0 keeps what is written, as a general arm, whose solver may need minutes to "
+            "prepare"
+            if len(found.joints) == 6
+            else ""
+        )
     )
 
 
@@ -82,7 +87,7 @@ def _alike(one: KinematicChain, two: KinematicChain) -> bool:
 
 def _moved(found: Description, meant: KinematicChain) -> tuple[float, float]:
     """Return how far rounding moves the tip, m, and turns it, rad, over random joint vectors."""
-    q = np.random.default_rng(1571).uniform(-np.pi, np.pi, (POSES, 6))
+    q = np.random.default_rng(1571).uniform(-np.pi, np.pi, (POSES, len(found.joints)))
     here, there = found.chain.forward(q), meant.forward(q)
     off = np.linalg.norm(there[:, :3, 3] - here[:, :3, 3], axis=1)
     between = np.swapaxes(here[:, :3, :3], 1, 2) @ there[:, :3, :3]

@@ -13,7 +13,14 @@ from kerfpath._arrays import Array, floats, freeze, scalar
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
-__all__ = ["ExternalAxis", "Travel", "base_in_part", "carried", "require_distinct_axes"]
+__all__ = [
+    "ExternalAxis",
+    "Travel",
+    "base_in_part",
+    "carried",
+    "require_distinct_axes",
+    "samples_of",
+]
 
 MOST_EXTERNAL = 3
 """External axes that a robot may have."""
@@ -86,25 +93,6 @@ class ExternalAxis:
         """Unit of its values."""
         return "m" if self.kind == "linear" else "rad"
 
-    def samples(self, lower: float, upper: float, *, endless: bool) -> Array:
-        """Return its samples (E,), at most a step apart, both ends of the range among them.
-
-        Raises
-        ------
-        InputError
-            It has no step.
-        """
-        if self.step is None:
-            raise InputError(
-                f"{self.name}: the exact search takes its values on a grid and needs their step; "
-                'give step=, or choose method "continuous"'
-            )
-        if endless:
-            parts = int(np.ceil(2 * np.pi / self.step * (1 - 1e-9)))
-            return freeze(-np.pi + 2 * np.pi / parts * np.arange(1, parts + 1, dtype=float))
-        parts = int(np.ceil((upper - lower) / self.step * (1 - 1e-9)))
-        return freeze(np.linspace(lower, upper, parts + 1))
-
     def require_range(self, lower: float, upper: float) -> None:
         """Raise InputError where the ends of its range are reversed; they may be the same."""
         if not lower <= upper:
@@ -127,12 +115,40 @@ class ExternalAxis:
         return T
 
 
-def require_distinct_axes(robot: str, axes: Sequence[ExternalAxis]) -> None:
-    """Raise InputError for too many external axes of a robot, or two of one name."""
-    names = [axis.name for axis in axes]
-    if len(names) > MOST_EXTERNAL:
+def samples_of(
+    name: str, step: float | None, lower: float, upper: float, *, endless: bool, key: str = "step="
+) -> Array:
+    """Return samples of a coordinate, at most a step apart, both ends of the range among them.
+
+    Raises
+    ------
+    InputError
+        There is no step; `key` says how to give it.
+    """
+    if step is None:
         raise InputError(
-            f"robot {robot!r}: expected at most {MOST_EXTERNAL} external axes, got "
+            f"{name}: the exact search takes its values on a grid and needs their step; "
+            f'give {key}, or choose method "continuous"'
+        )
+    if endless:
+        parts = int(np.ceil(2 * np.pi / step * (1 - 1e-9)))
+        return freeze(-np.pi + 2 * np.pi / parts * np.arange(1, parts + 1, dtype=float))
+    parts = int(np.ceil((upper - lower) / step * (1 - 1e-9)))
+    return freeze(np.linspace(lower, upper, parts + 1))
+
+
+def require_distinct_axes(
+    robot: str, axes: Sequence[ExternalAxis], redundant: bool = False
+) -> None:
+    """Raise InputError for too many external axes of a robot, or two of one name.
+
+    Of a `redundant` arm, whose elbow is free, too, there may be one less.
+    """
+    names = [axis.name for axis in axes]
+    if len(names) > (most := MOST_EXTERNAL - redundant):
+        why = ", as the elbow of the arm is free, too" if redundant else ""
+        raise InputError(
+            f"robot {robot!r}: expected at most {most} external axes{why}, got "
             f"{len(names)}: {', '.join(names)}"
         )
     for name in names:

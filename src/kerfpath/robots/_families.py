@@ -12,7 +12,7 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
-from kerfpath.kernels import enclosure, enclosure_ur, five, kinematics, ur
+from kerfpath.kernels import enclosure, enclosure_ur, five, kinematics, srs, ur
 from kerfpath.robots import _general
 
 __all__ = ["FAMILIES", "Family", "posture_name", "postures_named"]
@@ -47,7 +47,8 @@ class Family:
         `chain`, the robot's joint frames, in their place.
     forward_all, inverse_all : callable
         (model, q (B, n), out_T (B, 4, 4)) and (model, T (B, 4, 4), out_q (B, P, n), out_reach
-        (B, P)), between joints and the model's own base and end frames.
+        (B, P)), between joints and the model's own base and end frames. Where a joint is `given`,
+        its angles (B,) are the third argument of the inverse.
     inverse_nodes : callable, optional
         As `kernels.kinematics.inverse_nodes`, where a family has it in one piece.
     follow_all : callable, optional
@@ -62,6 +63,8 @@ class Family:
         2 i to 2 i + 1 or back, while all others turn by a constant; None where there is none.
     poses_at_once : int
         Poses solved per piece of work: large against the overhead, small against the memory.
+    given : int, optional
+        The joint, from 0, that a pose leaves free: the inverse finds the others where it stands.
     free_rotation : bool
         Whether a tool tip and a tool axis leave the rotation about that axis free. If not, a
         layer has one sample of gamma, and poses ask for the tip and the axis alone.
@@ -81,6 +84,7 @@ class Family:
     wrist: str = ""
     flips: int | None = None
     poses_at_once: int = 100_000
+    given: int | None = None
     free_rotation: bool = True
 
     __repr__ = short_repr
@@ -131,6 +135,17 @@ FAMILIES = {
             inverse_all=five.inverse_all,
             inverse_nodes=five.inverse_nodes,
             free_rotation=False,
+        ),
+        Family(
+            name="srs",
+            words="arm of seven axes with a spherical shoulder and wrist",
+            joints=7,
+            lengths=("c1", "c2", "c3", "c4"),
+            postures=EIGHT,
+            model=srs.SrsArm,
+            forward_all=srs.forward_all,
+            inverse_all=srs.inverse_all,
+            given=2,
         ),
         Family(
             name="general",

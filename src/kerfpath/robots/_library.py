@@ -61,7 +61,7 @@ def read_robot(kind: type[A], name: str, acceleration_ratio: str | None = None) 
         upper=_radians(joints.get("upper_deg")),
         velocity=_radians(joints.get("velocity_deg_s")),
         acceleration=_radians(joints.get("acceleration_deg_s2")),
-        endless=np.isin(np.arange(1, 7), joints["endless"]),
+        endless=np.isin(np.arange(1, len(joints["sign"]) + 1), joints["endless"]),
         couplings=tuple(
             Coupling(
                 row=np.array(c["row"], dtype=float),
@@ -87,6 +87,11 @@ def read_robot(kind: type[A], name: str, acceleration_ratio: str | None = None) 
     if acceleration_ratio not in ratios:
         raise InputError(
             f"acceleration_ratio: {acceleration_ratio!r} is not one of {', '.join(ratios)}"
+        )
+    if (n := len(ratios[acceleration_ratio])) != found.joints:
+        raise InputError(
+            f"acceleration_ratio: {acceleration_ratio!r} is for {n} joints, and {name!r} has "
+            f"{found.joints}; give its accelerations with robot.with_limits(acceleration=...)"
         )
     if found.velocity is None:
         raise InputError(f"robot {name!r}: its speeds are not known, so no ratio can apply to them")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -35,7 +36,7 @@ POSES = 64
 
 @dataclass(frozen=True, slots=True)
 class _Lines:
-    """The joint axes of a six-axis arm at angle zero, in the frame of its foot.
+    """The joint axes of an arm at angle zero, in the frame of its foot.
 
     The foot stands on axis 1, nearest to the base origin, z along axis 1 and up, x near that of
     the base.
@@ -44,9 +45,9 @@ class _Lines:
     foot: Array
     """(4, 4) in the base, m."""
     place: Array
-    """(6, 3) m: a point of each axis."""
+    """(n, 3) m: a point of each axis."""
     along: Array
-    """(6, 3): direction of each axis."""
+    """(n, 3): direction of each axis."""
     tip: Array
     """(4, 4) m."""
     sign_1: float
@@ -73,12 +74,12 @@ class _Lines:
 
 
 def in_closed_form(chain: KinematicChain) -> bool:
-    """Return whether a chain of six joints is of a family with a closed form."""
+    """Return whether a chain is of a family with a closed form that descriptions are read as."""
     lines = _lines(chain)
     return any(
         not isinstance(derived := derive(lines), str)
         and _miss(chain, _fit_end(name, lines, *derived)) <= EXACT
-        for name, derive in DERIVED
+        for name, derive in DERIVED.get(len(chain.axes), ())
     )
 
 
@@ -94,15 +95,17 @@ def recognise(chain: KinematicChain, *, as_written: bool = False) -> Manipulator
     Raises
     ------
     InputError
-        Not six joints; a closed form that few digits miss; no solver for the others.
+        Neither six nor seven joints; a closed form that few digits miss; no solver for the others,
+        or an arm of seven axes without a spherical shoulder and wrist.
     """
     n = len(chain.axes)
-    if n != 6:
-        redundant = "the arm is redundant, and planning with a free elbow is not offered"
-        why = redundant if n > 6 else "such arms are not recognised from descriptions"
-        raise InputError(f"expected 6 joints between base and tip, got {n}: {why}")
+    if n not in DERIVED:
+        raise InputError(
+            f"expected 6 or 7 joints between base and tip, got {n}: such arms are not recognised "
+            "from descriptions"
+        )
     lines, misfits = _lines(chain), []
-    for name, derive in DERIVED:
+    for name, derive in DERIVED[n]:
         derived = derive(lines)
         words = FAMILIES[name].words
         if isinstance(derived, str):
@@ -113,12 +116,15 @@ def recognise(chain: KinematicChain, *, as_written: bool = False) -> Manipulator
         if miss <= EXACT:
             return model
         misfits.append(f"not an {words}, which it misses by {miss:.1e} (m and rad)")
-        if miss > ROUNDED or as_written:
+        if miss > ROUNDED or (as_written and n == 6):
             continue
         raise InputError(
             f"nearly an {words}, but {miss:.1e} off (m and rad, allowed {EXACT:g}); write its "
-            "axes and lengths with more digits, or take the arm as it is written with snap=0"
+            "axes and lengths with more digits"
+            + (", or take the arm as it is written with snap=0" if n == 6 else "")
         )
+    if n == 7:
+        raise InputError(f"{'; '.join(misfits)}: no other arms of seven axes are planned")
     try:
         require_solver()
     except InputError as error:
@@ -128,7 +134,7 @@ def recognise(chain: KinematicChain, *, as_written: bool = False) -> Manipulator
 
 
 def _lines(chain: KinematicChain) -> _Lines:
-    T = chain.frames(np.zeros((1, 6)))[0, 1:]
+    T = chain.frames(np.zeros((1, len(chain.axes))))[0, 1:]
     along = np.einsum("nij,nj->ni", T[:, :3, :3], chain.axes)
     place = T[:, :3, 3]
     sign = -1.0 if along[0, 2] < -NEARLY else 1.0
@@ -223,6 +229,38 @@ def _ur(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
     return lengths, signs, [np.arctan2(x[1], x[0]), q2, q23 - q2, theta - q23, q5, 0.0]
 
 
+def _srs(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
+    """Return lengths, signs and model angles at zero, or why the axes are not those of S-R-S.
+
+    Directions are chosen such that c2, c3 and c4 are not negative.
+    """
+    if misfit := at.misfit(parallel=(), square=range(6)):
+        return misfit
+    centres = [at.meet(i, i - 1) for i in (1, 3, 5)]
+    for centre, i in zip(centres, (1, 3, 5), strict=True):
+        off = max(at.distance(centre, i - 1), at.distance(centre, i + 1))
+        if off > NEARLY:
+            return f"axes {i}, {i + 1} and {i + 2} do not meet in a point, by {off * 1e3:.3g} mm"
+    steps = np.diff([*centres, at.tip[:3, 3]], axis=0)
+    z, y = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
+    signs, zero, lengths = [at.sign_1], [], [centres[0][2]]
+    for i, step in zip((1, 3, 5), steps, strict=True):
+        before_y, before_z = y, z
+        y, sign_y = _turned(at.along[i], partial(_along, before_y))
+        z, sign_z = _turned(at.along[i + 1], partial(_along, step), partial(_along, before_z))
+        # What turns about z takes the y of before to this one, what turns about y the z.
+        zero.append(np.arctan2(before_z @ np.cross(before_y, y), before_y @ y))
+        zero.append(np.arctan2(y @ np.cross(before_z, z), before_z @ z))
+        signs += [sign_y, sign_z]
+        lengths.append(z @ step)
+    names = FAMILIES["srs"].lengths
+    return dict(zip(names, lengths, strict=True)), signs, [*zero, 0.0]
+
+
+def _along(one: Array, other: Array) -> float:
+    return float(one @ other)
+
+
 def _turned(direction: Array, *wanted: Callable[[Array], float]) -> tuple[Array, float]:
     """Return a direction or its opposite, and which: whatever makes `wanted` of it positive.
 
@@ -236,7 +274,7 @@ def _turned(direction: Array, *wanted: Callable[[Array], float]) -> tuple[Array,
 def _fit_end(
     family: str, at: _Lines, lengths: dict[str, float], signs: list[float], zero: list[float]
 ) -> Manipulator:
-    """Return the model with joint 6 and the end turned onto the tip."""
+    """Return the model with the last joint and the end turned onto the tip."""
     model = Manipulator(
         id="",
         kinematics=family,
@@ -246,17 +284,18 @@ def _fit_end(
         T_base_foot=at.foot,
     )
     want = at.foot @ at.tip
-    left = np.linalg.inv(model.forward(np.zeros(6))) @ want
+    still = np.zeros(model.joints)
+    left = np.linalg.inv(model.forward(still)) @ want
     if np.hypot(left[0, 2], left[1, 2]) < NEARLY and left[2, 2] > 0:
-        sixth = _round(-float(np.arctan2(left[1, 0], left[0, 0])))
-        model = replace(model, offset=np.append(model.offset[:5], sixth))
-        left = np.linalg.inv(model.forward(np.zeros(6))) @ want
+        last = _round(-float(np.arctan2(left[1, 0], left[0, 0])))
+        model = replace(model, offset=np.append(model.offset[:-1], last))
+        left = np.linalg.inv(model.forward(still)) @ want
     return replace(model, T_end_flange=_tidy(left))
 
 
 def _miss(chain: KinematicChain, model: Manipulator) -> float:
     """Return the largest entry by which the model's poses differ from the chain's."""
-    q = np.random.default_rng(2008).uniform(-np.pi, np.pi, (POSES, 6))
+    q = np.random.default_rng(2008).uniform(-np.pi, np.pi, (POSES, model.joints))
     return float(np.abs(model.forward(q) - chain.forward(q)).max())
 
 
@@ -269,5 +308,5 @@ def _tidy(T: Array) -> Array:
     return np.eye(4) if np.abs(T - np.eye(4)).max() < NONE else T
 
 
-DERIVED = (("opw", _opw), ("ur", _ur))
-"""The families with a closed form, and what lays each into the lines of an arm."""
+DERIVED = {6: (("opw", _opw), ("ur", _ur)), 7: (("srs", _srs),)}
+"""By number of joints the families with a closed form, and what lays each into lines of an arm."""

@@ -36,19 +36,21 @@ NOTHING_GIVEN: Mapping[str, Given] = MappingProxyType({})
 class Robot(Manipulator):
     """An arm of one of the families, its limits and where they come from.
 
-    Joint vectors follow the robot's own description (its URDF where `frames` says so); poses are
-    of the flange in the robot base, z along the last axis and out of the flange.
+    Joint vectors follow the robot's own description (its URDF where `frames` says so), in its
+    order; poses are of the flange in the robot base, z along the last axis and out of the flange.
+    Of a seven-axis arm a pose leaves joint 3 free, as it does external axes; plans choose it.
 
     Parameters
     ----------
     id, manufacturer, model : str
-    kinematics : {"opw", "ur", "five", "general"}
+    kinematics : {"opw", "ur", "five", "srs", "general"}
         The family, see `kerfpath.robots.FAMILIES`.
     geometry : mapping
         Its lengths, m: a1, a2, b, c1, c2, c3, c4 (Brandstoetter, Angerer and Hofbaur 2014; of a
         five-axis arm c4 is that of the head's flange at q5 = 0, along the forearm), or
         d1, a2, a3, d4, d5, d6 (Denavit and Hartenberg's, as Universal Robots publishes them);
-        of a general arm none, its `chain` says all.
+        c1, c2, c3, c4 from foot to shoulder, elbow, wrist and flange of a seven-axis arm; of a
+        general arm none, its `chain` says all.
     sign : (n,)
         +1 or -1, and
     offset : (n,) rad
@@ -86,6 +88,9 @@ class Robot(Manipulator):
         In the robot base; default: that of a robot that stands upright.
     externals : tuple of ExternalAxis
         Rails and positioners: joints more, the last of q and of the limits. See `on_rail`.
+    elbow_step : float rad, optional
+        Of a seven-axis arm: the largest step of the samples of joint 3 where the exact search takes
+        it on a grid, see `with_elbow_step`.
 
     Raises
     ------
@@ -232,6 +237,18 @@ class Robot(Manipulator):
             return None
         free = np.full(self.joints - len(self.jerk), np.inf)
         return JerkLimit(bound=np.append(self.jerk, free))
+
+    def with_elbow_step(self, step: float) -> Robot:
+        """Return this robot with joint 3 sampled in steps of at most `step` rad on a grid.
+
+        Methods "exact", "paper" and "known" need it of a seven-axis arm.
+
+        Raises
+        ------
+        InputError
+            An arm whose poses leave no joint free; a step that is not positive.
+        """
+        return replace(self, elbow_step=step)
 
     def on_rail(self, direction: ArrayLike, **travel: Unpack[Travel]) -> Robot:
         """Return this robot with its base on a rail along `direction` (3,).

@@ -48,7 +48,7 @@ def scene_of(prepared: PreparedJob, revision: int) -> tuple[SceneMessage, Meshes
     Raises
     ------
     InputError
-        A robot whose joints nothing says the places of.
+        A robot whose joints nothing says the places of; an arm of seven axes.
     """
     job, meshes = prepared.job, Meshes()
     if prepared.cell is None:
@@ -83,6 +83,7 @@ def scene_of_robot(job: Job, revision: int) -> tuple[SceneMessage, Meshes]:
 def _scene(
     job: Job, revision: int, bodies: list[BodyEntry], contours: list[ContourEntry]
 ) -> SceneMessage:
+    job.robot.require_no_free_joint(f"{job.path}: the studio")
     return SceneMessage(
         revision=revision,
         robot=_robot(job),

@@ -103,6 +103,7 @@ class Evaluator:
 
     def __post_init__(self) -> None:
         require_rates_alone(self.job.robot, "a study of places or robots")
+        self.job.robot.require_no_free_joint("a study of places or robots")
 
     @cached_property
     def cell(self) -> Cell | None:

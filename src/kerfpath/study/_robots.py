@@ -217,6 +217,8 @@ def with_robot(job: Job, candidate: Robot) -> Job:
         A posture that its family has not; a cell that asks for the links of a description; a job
         with a load or jerk limits.
     """
+    for each in (job.robot, candidate):
+        each.require_no_free_joint("a list of robots")
     if job.robot.load is not None or job.robot.jerk is not None:
         raise InputError(
             "its limits on torque and jerk are not known: remove mass_kg and jerk_deg_s3 to "

@@ -19,7 +19,8 @@ End = Literal["start", "end"]
 def back_off(plan: Plan, end: End, retract: float) -> Array:
     """Return the joints (n,) rad after backing off an end of a plan along the tool axis.
 
-    The posture is kept, an endless joint stays on its turn, and external axes stand still.
+    The posture is kept, an endless joint stays on its turn, and external axes stand still, as does
+    joint 3 of a seven-axis arm.
 
     Parameters
     ----------
@@ -38,7 +39,8 @@ def back_off(plan: Plan, end: End, retract: float) -> Array:
     arm, n = plan.robot.alone(), plan.robot.family.joints
     T = arm.forward(q[:n]) @ plan.T_flange_tip
     T[:3, 3] -= retract * T[:3, 2]
-    found = arm.inverse(T @ np.linalg.inv(plan.T_flange_tip))
+    given = arm.given_of(q[None])
+    found = arm.inverse(T @ np.linalg.inv(plan.T_flange_tip), given=given)
     q_found = found.q[found.posture == plan.posture[node]]
     q_found = np.hstack([q_found, np.tile(q[n:], (len(q_found), 1))])
     # An endless joint is solved within one turn: bring it onto the turn that the contour is on.

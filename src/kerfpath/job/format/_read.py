@@ -144,7 +144,7 @@ class Job:
         (K, E) or (K, X, E), or take the gentlest course.
         """
         chosen = options or self.options
-        if self.robot.externals and external is None and chosen.method == "continuous":
+        if self.robot.free.size and external is None and chosen.method == "continuous":
             external = external_course(
                 nodes, self.robot, tool=self.tool, placement=self.placement, options=chosen
             )
@@ -256,8 +256,8 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
 
 
 def places_of(job: Job, nodes: Contour) -> Array | None:
-    """Return a coarse grid (K, X, E) of a job's external axes at every node; None: it has none."""
-    if not job.robot.externals:
+    """Return a coarse grid (K, X, E) of what poses leave free at every node; None: nothing."""
+    if not job.robot.free.size:
         return None
     places = coarse_places(job.robot)
     return np.broadcast_to(places, (len(nodes), *places.shape))

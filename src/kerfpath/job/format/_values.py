@@ -94,7 +94,7 @@ def one_of(what: str, names: Callable[[], Collection[str]], hint: str = "") -> A
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
 NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0, le=LARGEST)]
-Axis = Annotated[int, Field(ge=1, le=6)]
+Axis = Annotated[int, Field(ge=1, le=7)]
 # TOML arrays arrive as lists: not strict about that, while their elements stay strict.
 Three = Annotated[tuple[Number, ...], Field(strict=False, min_length=3, max_length=3)]
 # One number for every joint: how many that are is known once the robot is.

@@ -69,7 +69,7 @@ def _posture(robot: Robot, q: Array, said: Ints) -> Ints:
     """
     arm = robot.alone()
     q = np.ascontiguousarray(q[:, : arm.joints])
-    solved, reach = arm.inverse_all(np.ascontiguousarray(arm.forward(q)))
+    solved, reach = arm.inverse_all(np.ascontiguousarray(arm.forward(q)), arm.given_of(q))
     off = np.abs(np.remainder(solved - q[:, None] + np.pi, 2 * np.pi) - np.pi)
     fits = reach & (np.where(reach[..., None], off, np.inf).max(axis=2) < SAME_POSTURE)
     row = np.arange(len(q))
@@ -79,11 +79,11 @@ def _posture(robot: Robot, q: Array, said: Ints) -> Ints:
 
 
 def _turn(robot: Robot, q: Array, said: Ints) -> Ints:
-    """Return the turns (K, n) from (-pi, pi] to joints q (K, n); an external axis has none."""
+    """Return the turns (K, n) from (-pi, pi] to joints q (K, n); what is free has none."""
     turn = np.ceil((q - np.pi) / (2 * np.pi)).astype(np.int64)
     kept = np.abs(q - 2 * np.pi * said) <= np.pi + SAME
     turn = np.where(kept, said, turn)
-    turn[:, robot.family.joints :] = 0
+    turn[:, robot.free] = 0
     return turn
 
 

@@ -209,7 +209,7 @@ def _same_pose(program: Program, asked: Array, read: Array, rules: Rules) -> Arr
     off = np.linalg.norm(T[0, :3, 3] - T[1, :3, 3])
     turned = np.linalg.norm(T[0, :3, :3] - T[1, :3, :3]) / np.sqrt(2)
     near = off <= POINT + rules.point_step + REACH * left and turned <= ANGLE + left
-    near = near and np.abs(asked - read)[program.robot.family.joints :].max(initial=0) <= POINT
+    near = near and np.abs(asked - read)[program.robot.free].max(initial=0) <= POINT
     return read if near and np.abs(asked - read).max() <= SAME_BRANCH else asked
 
 

@@ -212,8 +212,10 @@ def _cut(group: ReadGroup, job: Job, interval: float | None = None) -> ReadCut:
         end = move.T_part_tip
         assert end is not None
         stops = [end]
-        if move.kind == "circular" and job.robot.externals:
-            raise InputError(f"{move.place}: arcs with external axes are not of our making")
+        if move.kind == "circular" and job.robot.free.size:
+            raise InputError(
+                f"{move.place}: arcs with {job.robot.free_names} are not of our making"
+            )
         if T and move.kind == "circular" and move.T_part_via is not None:
             stops = _arc(T[-1], move.T_part_via, end, move, interval)
         for stop in stops:
@@ -227,8 +229,8 @@ def _cut(group: ReadGroup, job: Job, interval: float | None = None) -> ReadCut:
             laser = switch.on if switch.signal == "laser" else laser
     poses = np.array(T)
     flange = job.placement @ poses @ np.linalg.inv(job.tool)
-    external = np.array([_external(move, job.robot) for move in moves])
-    q = follow_poses(job.robot, flange, _q(group.joint[-1]), external)
+    free = np.array([_free(move, job.robot) for move in moves])
+    q = follow_poses(job.robot, flange, _q(group.joint[-1]), free)
     last = len(poses) - 1
     switches = [s for move in group.path for s in move.switches if s.signal == "laser"]
     return ReadCut(
@@ -268,14 +270,15 @@ def _q(move: ReadMove) -> Array:
     return move.q
 
 
-def _external(move: ReadMove, robot: Robot) -> Array:
-    """Return the values (E,) m and rad of the external axes at the target of a move."""
-    values = move.external_of(robot.externals)
-    if values is None:
-        if not robot.externals:
-            return np.zeros(0)
-        raise InputError(f"{move.place}: no value of {robot.externals[0].name} is said")
-    return values
+def _free(move: ReadMove, robot: Robot) -> Array:
+    """Return the values (E,) rad and m of what a pose leaves free at the target of a move."""
+    if not robot.free.size:
+        return np.zeros(0)
+    if move.q is not None:
+        return move.q[robot.free]
+    if move.external is None or robot.family.given is not None:
+        raise InputError(f"{move.place}: no value of {robot.joint_names[robot.free[0]]} is said")
+    return move.external
 
 
 def _arc(
@@ -303,24 +306,29 @@ def _arc(
 def branch_of(robot: Robot, q: Array) -> int:
     """Return which posture joints (n,) are in; external axes have no part in it."""
     robot, q = robot.alone(), q[: robot.family.joints]
-    solved, reach = robot.inverse_all(robot.forward(q)[None])
+    solved, reach = robot.inverse_all(robot.forward(q)[None], robot.given_of(q[None]))
     apart = np.abs((solved[0] - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
     return int(np.argmin(np.where(reach[0], apart, np.inf)))
 
 
-def follow_poses(robot: Robot, T: Array, q0: Array, external: Array | None = None) -> Array:
+def follow_poses(robot: Robot, T: Array, q0: Array, free: Array | None = None) -> Array:
     """Return joints (K, n) at flange poses T (K, 4, 4), on the branch of q0; NaN out of reach.
 
-    External axes are at the values (K, E) m and rad that are given.
+    What poses leave free, joint 3 of a seven-axis arm and external axes, is at the values (K, E)
+    rad and m that are given.
     """
-    if external is not None and robot.externals:
+    if free is not None and robot.externals:
         # Where they have carried base and part, the arm alone sees the poses there.
+        inner, external = np.split(free, [len(robot.free) - len(robot.externals)], axis=1)
         seen = np.linalg.inv(base_in_part(robot.externals, external)) @ T
-        q = follow_poses(robot.alone(), seen, q0[: robot.family.joints])
+        q = follow_poses(robot.alone(), seen, q0[: robot.family.joints], inner)
         return np.hstack([q, external])
     posture = branch_of(robot, q0)
     if robot.family.follow_all is None:
-        q = robot.follow(T, np.tile(q0, (len(T), 1)), np.full(len(T), posture))
+        near = np.tile(q0, (len(T), 1))
+        if free is not None:
+            near[:, robot.free] = free
+        q = robot.follow(T, near, np.full(len(T), posture))
         good = ~np.isnan(q).any(axis=1)
         q[good] = np.unwrap(np.vstack([q0, q[good]]), axis=0)[1:]
         return q

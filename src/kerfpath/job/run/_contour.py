@@ -156,16 +156,16 @@ def _at_nodes(job: Job) -> PlanOptions:
 
 
 def course_of_plans(job: Job, nodes: Contour, plans: Sequence[Plan]) -> Array:
-    """Return where plans have the external axes at every node (K, E) rad or m.
+    """Return where plans have what poses leave free at every node (K, E) rad or m.
 
-    Where none of them is, the axes are at rest: nearest to zero.
+    Where none of them is, it is at rest: nearest to zero.
     """
-    limits, arm = job.robot.joint_limits(), job.robot.family.joints
-    rest = np.clip(0.0, limits.lower[arm:], limits.upper[arm:])
+    limits, free = job.robot.joint_limits(), job.robot.free
+    rest = np.clip(0.0, limits.lower[free], limits.upper[free])
     x = np.tile(rest, (len(nodes), 1))
     for made in plans:
         first = int(np.searchsorted(nodes.s, made.contour.s[0]))
-        x[first : first + len(made.q)] = made.external
+        x[first : first + len(made.q)] = made.course
     return x
 
 
@@ -182,7 +182,7 @@ def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> 
     graph = job.graph(candidate.nodes)
     made = plan(
         candidate.nodes, job.robot, tool=job.tool, placement=job.placement, speed=candidate.speed,
-        options=_at_nodes(job), cell=prepared.cell, graph=None if job.robot.externals else graph,
+        options=_at_nodes(job), cell=prepared.cell, graph=None if job.robot.free.size else graph,
     )  # fmt: skip
     cut = _audited(prepared, CutResult(request=request, candidate=candidate, graph=graph), made)
     return cut if cut.passed else None

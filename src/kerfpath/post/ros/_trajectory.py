@@ -132,14 +132,16 @@ def _straight(
     T[:, :3, :3] = Slerp([0.0, 1.0], ends)(way[:, 0]).as_matrix()
     evenly = before + way * (move.q - before)
     robot, n = program.robot, program.robot.family.joints
-    # External axes run evenly; where they have carried base and part, the arm sees the tip there.
+    # What a pose leaves free runs evenly; the arm sees the tip from where external axes carry it.
     seen = np.linalg.inv(base_in_part(robot.externals, evenly[:, n:])) @ program.T_base_part @ T
     # The tool's rotation about its axis counts only for arms that can choose it.
-    solved, reach = robot.alone().inverse_nodes(seen, np.zeros(1), program.T_flange_tip)
+    arm = robot.alone()
+    given = arm.given_of(evenly)
+    solved, reach = arm.inverse_nodes(seen, np.zeros(1), program.T_flange_tip, given)
     apart = solved[:, 0] - evenly[:, None, :n]
     apart -= 2 * np.pi * np.round(apart / (2 * np.pi))
     off = np.where(reach[:, 0], np.abs(apart).max(axis=2), np.inf)
     if not (off.min(axis=1) < BRANCH).all():
         raise InputError("a straight move leaves the robot's reach, or its posture, on the way")
-    arm = evenly[:, :n] + apart[np.arange(len(share)), off.argmin(axis=1)]
-    return np.hstack([arm, evenly[:, n:]])
+    q = evenly[:, :n] + apart[np.arange(len(share)), off.argmin(axis=1)]
+    return np.hstack([q, evenly[:, n:]])

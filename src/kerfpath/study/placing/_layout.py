@@ -238,6 +238,7 @@ def layout_as(
     path, then = str(Path(job).resolve()), digest(Path(job).resolve())
     at = load_job(path, then)
     require_rates_alone(at.job.robot, "a layout")
+    at.job.robot.require_no_free_joint("a layout")
     if follows_courses(at.job.robot, at.job.options) and not leaves_grid(at.job):
         raise InputError(
             "a layout: the bounds of an arm that leaves no rotation free hold on a grid of its "

@@ -18,6 +18,7 @@ from kerfpath.job.format._values import (
     Lengths,
     NotNegative,
     Number,
+    Positive,
     Ratio,
     Signs,
     Text,
@@ -82,7 +83,7 @@ class RobotTable(Table):
         None
     )
     kinematics: Annotated[
-        Literal["opw", "ur", "five"] | None, key("a family of arms", '"five"')
+        Literal["opw", "ur", "five", "srs"] | None, key("a family of arms", '"five"')
     ] = None
     geometry_mm: Annotated[
         Lengths | None,
@@ -112,7 +113,7 @@ class RobotTable(Table):
         0.0
     )
     endless: Annotated[
-        tuple[Axis, ...] | None, key("axis numbers from 1 to 6, each once", "[4, 6]", strict=False)
+        tuple[Axis, ...] | None, key("axis numbers from 1 to 7, each once", "[4, 6]", strict=False)
     ] = None
     lower_deg: Annotated[
         Joints | None,
@@ -152,6 +153,9 @@ class RobotTable(Table):
     ] = None
     acceleration_ratio: Annotated[
         Ratio | None, key("a ratio of acceleration to speed, by its name", '"iontec_20_to_70kg"')
+    ] = None
+    elbow_step_deg: Annotated[
+        Positive | None, key("a number above 0, the step of joint 3 of seven in deg", "10")
     ] = None
     external: External = ()
 
@@ -200,16 +204,27 @@ class RobotTable(Table):
                     "add them from its data sheet",
                     (name,),
                 )
+        if self.elbow_step_deg is not None and known.family.given is None:
+            raise fault(
+                "elbow_step_deg only of an arm of seven axes",
+                f"{known.joints}",
+                "remove it",
+                ("elbow_step_deg",),
+            )
         if known.acceleration is None and not given(
             self, "acceleration_deg_s2", "acceleration_ratio"
         ):
-            ratio = known.acceleration_ratio or next(iter(acceleration_ratios()))
+            remedy, ratios = (
+                f"add acceleration_deg_s2 = [{known.joints} numbers]",
+                [name for name, each in acceleration_ratios().items() if len(each) == known.joints],
+            )
+            if ratios:
+                remedy += (
+                    ", or, to assume a typical ratio to the speeds, acceleration_ratio = "
+                    f'"{known.acceleration_ratio or ratios[0]}"'
+                )
             raise fault(
-                f"joint accelerations, as {holder}",
-                "none",
-                f"add acceleration_deg_s2 = [{known.joints} numbers], or, to assume a typical "
-                f'ratio to the speeds, acceleration_ratio = "{ratio}"',
-                ("acceleration_deg_s2",),
+                f"joint accelerations, as {holder}", "none", remedy, ("acceleration_deg_s2",)
             )
         try:
             self._arm(folder)  # limits given may contradict those known
@@ -308,6 +323,8 @@ class RobotTable(Table):
                 ),
                 acceleration_source=f"assumed: ratio {self.acceleration_ratio} times the speeds",
             )
+        if self.elbow_step_deg is not None:
+            changed = changed.with_elbow_step(float(np.radians(self.elbow_step_deg)))
         return changed
 
     def _known(self, folder: Path, *, bodies: bool = False) -> Robot:
