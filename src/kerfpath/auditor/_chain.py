@@ -221,9 +221,8 @@ def _srs(g: dict[str, float]) -> tuple[Array, Array, Array]:
     Upright at zero: all axes pass along one vertical line or are parallel to y, axis 2 at the
     height c1, axis 4 c2 above it, axis 6 c3 further, the flange c4 over that.
     """
-    height = np.cumsum([0.0, g["c1"], 0.0, g["c2"], 0.0, g["c3"], 0.0, g["c4"]])
     steps = np.tile(np.eye(4), (8, 1, 1))
-    steps[:, 2, 3] = np.diff(height, prepend=0.0)
+    steps[:, 2, 3] = 0.0, g["c1"], 0.0, g["c2"], 0.0, g["c3"], 0.0, g["c4"]
     axes = np.tile([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]], (4, 1))[:7]
     return steps[:7], axes, steps[7]
 

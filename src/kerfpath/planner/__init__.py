@@ -2,7 +2,7 @@
 
 from kerfpath.planner._best import best_motion as best_motion
 from kerfpath.planner._certified import with_bound as with_bound
-from kerfpath.planner._courses import coarse_places as coarse_places
+from kerfpath.planner._coarse import coarse_places as coarse_places
 from kerfpath.planner._courses import external_course as external_course
 from kerfpath.planner._draft import draft as draft
 from kerfpath.planner._fastest import FastestSpeed as FastestSpeed

@@ -1,18 +1,15 @@
 """Courses of external axes and elbows: smooth, from a search over coarse samples of what is free.
 
 Rails and tables are slow beside the arm, and a grid of their values would quantise what they may
-accelerate, as it would that of joint 3 of a seven-axis arm, which is treated as one of them. So a
-few nodes are taken, at each of them every place of a coarse grid of the axes, of gamma and of the
-postures, and the best way through these within the velocity limits is found by dynamic programming.
-The course of the axes is then the smoothest curve that stays near it; gamma is planned anew along
-it, and both together are refined by the true kinematics.
+accelerate, as it would that of joint 3 of a seven-axis arm, which is treated as one of them. So the
+best ways through coarse samples are found; a course is the smoothest curve that stays near one.
+Gamma is planned anew along it, and both together are refined by the true kinematics.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,83 +17,25 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import lsq_linear
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath._repr import short_repr
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.graph import LayeredGraph
-from kerfpath.kernels.courses import CoarseLayer, Nearby, best_steps
 from kerfpath.kernels.metric import increments, wrap
 from kerfpath.options import PlanOptions
 from kerfpath.planner._clear import ClearSearch
-from kerfpath.planner._graph import layered_graph
+from kerfpath.planner._coarse import Coarse, Style, clear_way, reached, sampled, steps_of
 from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.robots import Robot
 
-__all__ = ["along_a_course", "coarse_places", "courses", "external_course"]
+__all__ = ["along_a_course", "courses", "external_course"]
 
-FEW_NODES, NODES = 9, 41
-"""Nodes at which the axes are sampled: as many as leave them time for a step, within these."""
-STEP = {"m": 0.15, "rad": np.radians(12)}
-"""m and rad: steps of the axes, where there are not too many places."""
-MOST_PLACES = 1500
-GAMMA_STEP = {1: np.radians(12), 2: np.radians(20), 3: np.radians(24)}
-"""rad, by the number of axes."""
-FARTHEST = 2
-"""Steps of the grid that an axis moves at most from one of these nodes to the next."""
-TURN = np.radians(40)
-"""rad that gamma turns by at most."""
-
-ROUNDS = 16
-"""Ways looked at for one whose samples are all clear in the cell."""
-ABOUT = 2
-"""Steps of the grid around a place that collides, of which all samples are looked at."""
 SLOW, SLOWLY = 1e-6, 1e6
 """m/s and s from node to node: so slow that no limit binds."""
-
-
-class _Style(NamedTuple):
-    """What a course is to be good for: prices of speed squared, and of the axes' own moves."""
-
-    square: float
-    axes: float
-
-
-GENTLE = _Style(1e6, 1.0)
+GENTLE = Style(1e6, 1.0)
 """Where no speed is asked for: the least speeds alone."""
-STYLES = (_Style(1.0, 1.0), _Style(8.0, 1.0), _Style(1.0, 8.0))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Coarse:
-    """The coarse samples of a task.
-
-    Parameters
-    ----------
-    nodes : (M,) int
-        The nodes that have samples.
-    places : (X, E) rad or m
-        The grid of the axes.
-    counts : tuple of int
-        Values of each axis in it.
-    graph : LayeredGraph
-        All samples within limits and margins; its variants are the places.
-    closed : (N,) bool
-        Its vertices that are known not to be clear; more become known.
-    """
-
-    nodes: Ints
-    places: Array
-    counts: tuple[int, ...]
-    graph: LayeredGraph
-    closed: Bools
-
-    __repr__ = short_repr
-
-
-def coarse_places(robot: Robot) -> Array:
-    """Return a coarse grid (X, E) of the values of what a pose leaves free, rad or m."""
-    return _grid(robot)[0]
+STYLES = (Style(1.0, 1.0), Style(8.0, 1.0), Style(1.0, 8.0))
+VALLEYS = 5
+"""Places of joint 3, each better than those beside it, that courses are to end in."""
 
 
 def external_course(
@@ -149,7 +88,7 @@ def along_a_course(
 
 def courses(
     task: PlanningTask,
-    styles: tuple[_Style, ...] = STYLES,
+    styles: tuple[Style, ...] = STYLES,
     clear: Callable[[Array], Bools] = lambda q: np.ones(len(q), np.bool_),
 ) -> Iterator[Array]:
     """Yield courses (K, E) rad or m of what poses leave free, that which promises most first.
@@ -162,199 +101,42 @@ def courses(
     NoFeasiblePath
         There is no way through the samples; says from which of the nodes on.
     """
-    coarse, robot = _sampled(task), task.robot
+    coarse, robot = sampled(task), task.robot
     known: list[Array] = []
     for style in styles:
-        try:
-            path = _clear_way(coarse, task, style, clear)
-        except NoFeasiblePath:
-            if not known:
-                raise
-            return
-        course = _smooth(coarse, robot, path, len(task.contour))
-        if not any(np.allclose(course, other, atol=1e-3) for other in known):
-            known.append(course)
-            yield course
+        for end in _ends(coarse, task, style) if style is styles[0] else (None,):
+            try:
+                path = clear_way(coarse, task, style, clear, end)
+            except NoFeasiblePath:
+                if not known:
+                    raise
+                break
+            course = _smooth(coarse, robot, path, len(task.contour))
+            if not any(np.allclose(course, other, atol=1e-3) for other in known):
+                known.append(course)
+                yield course
 
 
-def _sampled(task: PlanningTask) -> _Coarse:
-    robot, options, K = task.robot, task.settings, len(task.contour)
-    places, counts = _grid(robot)
-    takes = _steps(robot, counts) / robot.speed_limits()[0][robot.free]
-    slowest = takes.max() or np.inf  # none moves: as few nodes as there may be
-    many = int(np.clip(task.dt * (K - 1) / slowest, min(K, FEW_NODES), min(K, NODES)))
-    nodes = np.unique(np.round(np.linspace(0, K - 1, many)).astype(np.int64))
-    hard = options.comfort.hard if options.comfort is not None else None
-    graph = layered_graph(
-        task.contour,
-        robot,
-        tool=task.T_flange_tip,
-        placement=task.T_base_part,
-        options=replace(
-            options, gamma_step=GAMMA_STEP[len(counts)], tilt=None, comfort=hard, retract=None
-        ),
-        nodes=nodes,
-        external=np.broadcast_to(places, (K, *places.shape)),
-    )
-    return _Coarse(
-        nodes=nodes,
-        places=places,
-        counts=counts,
-        graph=graph,
-        closed=np.zeros(len(graph.q), np.bool_),
-    )
+def _ends(coarse: Coarse, task: PlanningTask, style: Style) -> list[int | None]:
+    """Return the places that courses are to end at, the best first; None: the best of all.
+
+    An arm's own joint that is free has many valleys, whose depths the samples hardly tell apart;
+    where there are external axes, too, there are too many places to look for them.
+    """
+    if len(coarse.counts) > 1 or task.robot.externals:
+        return [None]
+    least = reached(coarse, task, style)[0].min(axis=(1, 2))
+    beside = np.pad(least, 1, mode="wrap" if task.robot.endless[task.robot.free[0]] else "edge")
+    lowest = np.isfinite(least) & (least <= beside[:-2]) & (least <= beside[2:])
+    places = np.flatnonzero(lowest)
+    return [None, *places[np.argsort(least[places], kind="stable")][1:VALLEYS].tolist()]
 
 
-def _grid(robot: Robot) -> tuple[Array, tuple[int, ...]]:
-    """Return a grid (X, E) of what is free, rad or m, and how many values each has in it."""
-    free, limits = robot.free, robot.joint_limits()
-    bounds = list(zip(limits.lower[free], limits.upper[free], strict=True))
-    endless = robot.endless[free]
-    wanted = [
-        (2 * np.pi if turns else upper - lower) / STEP[robot.units[i]]
-        for i, (lower, upper), turns in zip(free, bounds, endless, strict=True)
-    ]
-    moving = max(1, sum(count > 0 for count in wanted))
-    share = min(1.0, (MOST_PLACES / np.prod(np.add(wanted, 1))) ** (1 / moving))
-    counts = tuple(int(np.ceil((count + 1) * share)) if count else 1 for count in wanted)
-    grids = [
-        np.linspace(-np.pi, np.pi, count, endpoint=False)
-        if turns
-        else np.linspace(lower, upper, count)
-        if count > 1
-        else np.array([(lower + upper) / 2])
-        for (lower, upper), turns, count in zip(bounds, endless, counts, strict=True)
-    ]
-    places = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1).reshape(-1, len(grids))
-    return places, counts
-
-
-def _clear_way(
-    coarse: _Coarse, task: PlanningTask, style: _Style, clear: Callable[[Array], Bools]
-) -> Ints:
-    """Return the best way whose samples are clear, or the last one tried; as `_best_way`."""
-    graph, counts = coarse.graph, coarse.counts
-    cells = np.stack(np.unravel_index(np.arange(len(coarse.places)), counts), axis=-1)
-    way = _best_way(coarse, task, style)
-    for _ in range(ROUNDS):
-        hit = np.flatnonzero(~clear(graph.q[_vertices(coarse, way)]))
-        if not hit.size:
-            break
-        looked = []
-        for k in hit:
-            own = np.arange(graph.start[k], graph.start[k + 1])
-            far = np.abs(cells[graph.variant[own]] - cells[way[k, 0]])
-            far = np.where(task.robot.endless[task.robot.free], np.minimum(far, counts - far), far)
-            looked.append(own[(far <= ABOUT).all(axis=1) & ~coarse.closed[own]])
-        at = np.concatenate(looked)
-        coarse.closed[at] = ~clear(graph.q[at])
-        try:
-            way = _best_way(coarse, task, style)
-        except NoFeasiblePath:
-            break
-    return way[:, 0]
-
-
-def _vertices(coarse: _Coarse, way: Ints) -> Ints:
-    """Return the vertex of the graph (M,) that a way has at each sampled node."""
-    graph = coarse.graph
-    found = []
-    for k, (place, sample, posture) in enumerate(way.tolist()):
-        own = slice(graph.start[k], graph.start[k + 1])
-        same = (graph.variant[own] == place) & (graph.sample[own] == sample)
-        same &= graph.posture[own] == posture
-        found.append(int(graph.start[k]) + int(np.flatnonzero(same)[-1]))
-    return np.array(found)
-
-
-def _best_way(coarse: _Coarse, task: PlanningTask, style: _Style) -> Ints:
-    """Return the place, gamma and posture (M, 3) of each sampled node on the best way."""
-    robot, graph, count = task.robot, coarse.graph, len(coarse.nodes)
-    before = _layer(coarse, robot, 0)
-    value = np.where(before.ok, 0.0, np.inf)
-    if not before.ok.any():
-        why = _stuck(coarse, robot, 0)
-        raise NoFeasiblePath(why, node=-1, proved=False, counts=graph.counts(0))
-    back = np.full((count, *value.shape), -1, np.int64)
-    for k in range(1, count):
-        here, reached = _layer(coarse, robot, k), np.empty(value.shape)
-        parts = int(coarse.nodes[k] - coarse.nodes[k - 1])
-        best_steps(before, value, here, _nearby(coarse, task, parts, style), reached, back[k])
-        if not np.isfinite(reached).any():
-            raise NoFeasiblePath(
-                _stuck(coarse, robot, k),
-                node=int(coarse.nodes[k - 1]),
-                proved=False,
-                counts=graph.counts(k),
-            )
-        before, value = here, reached
-    at = int(np.argmin(value))
-    path = [at]
-    for k in range(count - 1, 0, -1):
-        at = int(back[k].flat[at])
-        path.append(at)
-    return np.stack(np.unravel_index(path[::-1], value.shape), axis=1).astype(np.int64)
-
-
-def _layer(coarse: _Coarse, robot: Robot, k: int) -> CoarseLayer:
-    """Return the joints that follow at every sample of a node, one turn of each."""
-    graph = coarse.graph
-    own = slice(graph.start[k], graph.start[k + 1])
-    shape = len(coarse.places), len(graph.gamma), robot.postures
-    q, ok = np.zeros((*shape, len(robot.solved))), np.zeros(shape, np.bool_)
-    at = graph.variant[own], graph.sample[own], graph.posture[own]
-    q[at], ok[at] = graph.q[own][:, robot.solved], ~coarse.closed[own]
-    return CoarseLayer(q=q, ok=ok)
-
-
-def _nearby(coarse: _Coarse, task: PlanningTask, parts: int, style: _Style) -> Nearby:
-    """Return where steps to each place may come from in the time of some intervals."""
-    robot, options = task.robot, task.settings
-    free, solved, counts = robot.free, robot.solved, coarse.counts
-    velocity = options.eta_v * robot.speed_limits()[0]
-    reach = [range(-FARTHEST, FARTHEST + 1) if n > 1 else range(1) for n in counts]
-    moves = np.stack(np.meshgrid(*reach, indexing="ij"), axis=-1).reshape(-1, len(counts))
-    cells = np.stack(np.unravel_index(np.arange(len(coarse.places)), counts), axis=-1)
-    there = cells[:, None] + moves
-    endless = robot.endless[free]
-    there = np.where(endless, there % counts, there)
-    inside = ((there >= 0) & (there < counts)).all(axis=2)
-    index = np.ravel_multi_index(np.moveaxis(there, 2, 0), counts, mode="clip")
-    span = velocity * task.dt * parts
-    weight = span * (1 / velocity if options.weights is None else options.weights)
-    steps = _steps(robot, coarse.counts) / span[free]
-    share, square = np.abs(moves) * steps, style.square * parts
-    cost = style.axes * (weight[free] * share).sum(axis=1) + square * (share**2).sum(axis=1)
-    # Between the middles of two cells it is a step more than between their edges.
-    cost = np.where((share - steps <= 1).all(axis=1), cost, np.inf)
-    limits = robot.joint_limits()
-    wide = limits.upper - limits.lower > 2 * np.pi
-    samples = len(coarse.graph.gamma)
-    return Nearby(
-        place=np.where(inside, index, -1),
-        cost=cost,
-        turns=min((samples - 1) // 2, int(np.ceil(TURN * samples / (2 * np.pi)))),
-        span=span[solved],
-        wraps=(robot.endless | wide)[solved],
-        weight=weight[solved],
-        square=square,
-    )
-
-
-def _steps(robot: Robot, counted: tuple[int, ...]) -> Array:
-    """Return the step (E,) of each axis in the grid, rad or m."""
-    free, limits = robot.free, robot.joint_limits()
-    counts = np.array(counted)
-    span = np.where(robot.endless[free], 2 * np.pi, (limits.upper - limits.lower)[free])
-    between = np.where(robot.endless[free], counts, np.maximum(counts - 1, 1))
-    return np.asarray(span / between)
-
-
-def _smooth(coarse: _Coarse, robot: Robot, path: Ints, K: int) -> Array:
+def _smooth(coarse: Coarse, robot: Robot, path: Ints, K: int) -> Array:
     """Return the smoothest course (K, E) that stays within half a step of the places of a way."""
     free, limits = robot.free, robot.joint_limits()
     lower, upper = limits.lower[free], limits.upper[free]
-    endless, steps = robot.endless[free], _steps(robot, coarse.counts)
+    endless, steps = robot.endless[free], steps_of(robot, coarse.counts)
     x = coarse.places[path]
     x = np.vstack([x[:1], x[:1] + np.cumsum(increments(x, endless), axis=0)])
     course = np.empty((K, x.shape[1]))
@@ -381,17 +163,3 @@ def _eased(low: Array, high: Array, nodes: Ints) -> Array:
     room = np.maximum(high - low, 1e-9)
     found = lsq_linear(change, np.zeros(len(change)), bounds=(low, low + room))
     return np.asarray(np.clip(found.x, low, high))
-
-
-def _stuck(coarse: _Coarse, robot: Robot, k: int) -> str:
-    """Say where the way through the samples ends, and why that may be."""
-    names, graph = robot.free_names, coarse.graph
-    if graph.start[k + 1] == graph.start[k]:
-        where = f"node {coarse.nodes[k]} is out of reach at every sampled value of {names}"
-        loss = graph.main_loss(k)
-        return f"{where}; most are lost by {loss}" if loss else where
-    return (
-        f"no motion of the arm and {names} was found from node {coarse.nodes[k - 1]} to node "
-        f"{coarse.nodes[k]} within the velocity limits; the values of {names} were sampled, which "
-        "proves nothing of those between"
-    )

@@ -17,7 +17,8 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanOptions
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._continuous import claimed, clear_motion, plan_continuous
-from kerfpath.planner._courses import coarse_places, courses
+from kerfpath.planner._coarse import coarse_places
+from kerfpath.planner._courses import courses
 from kerfpath.planner._graph import layered_graph
 from kerfpath.planner._quickest import QuickMotion, quicker
 from kerfpath.planner._task import PlanningTask, task_of
@@ -174,7 +175,7 @@ def _along(
         tried.plans.append(made)
         same = best is not None and abs(made.cost - best.cost) <= SAME * best.cost
         if same and task.robot.family.given is None:
-            break  # two courses have led to one optimum; of an elbow each has a twin, half a turn on
+            break  # two courses have led to one optimum; those of an elbow have twins, mirrored
     return tried
 
 

@@ -122,7 +122,7 @@ def _ur(g: Mapping[str, float]) -> KinematicChain:
 def _srs(g: Mapping[str, float]) -> KinematicChain:
     """Return the chain of an S-R-S arm: upright at zero, its axes z, y, z, y, z, y, z."""
     origins, end = np.tile(np.eye(4), (7, 1, 1)), np.eye(4)
-    origins[[0, 3, 5], 2, 3] = g["c1"], g["c2"], g["c3"]
+    origins[[1, 3, 5], 2, 3] = g["c1"], g["c2"], g["c3"]
     end[2, 3] = g["c4"]
     return KinematicChain(origins=origins, axes=np.array([Z, Y, Z, Y, Z, Y, Z]), end=end)
 
