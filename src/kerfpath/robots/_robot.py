@@ -215,7 +215,7 @@ class Robot(Manipulator):
         ------
         InputError
             A load is given, but no robot description with a positive definite inertia of every
-            link, or no torque limits; or there is an external axis.
+            link, or no torque limits; or there is an external axis, or a seventh one.
         """
         if self.load is None:
             return None
@@ -223,7 +223,9 @@ class Robot(Manipulator):
         if self.externals:
             names = " and ".join(axis.name for axis in self.externals)
             why = f"what {names} does to them is not known"
-        if self.chain is None or self.inertia is None or self.externals:
+        elif self.free.size:
+            why = f"of an arm whose {self.free_names} is free limits on them are not kept yet"
+        if self.chain is None or self.inertia is None or self.free.size:
             raise InputError(f"robot {self.id!r}: its torques are not known: {why}")
         if self.torque is None:
             raise self._lacks("joint torques", "torque=")

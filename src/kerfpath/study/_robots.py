@@ -179,8 +179,11 @@ def _reason(contours: Sequence[ContourSpeed]) -> str:
 
 
 def _ratio_of(candidate: Robot, ratio: str | None) -> str | None:
-    """Return by which ratio accelerations are assumed; None where they are known, or not at all."""
-    if candidate.acceleration is not None or candidate.velocity is None:
+    """Return by which ratio accelerations are assumed; None where they are known, or not at all.
+
+    Nor for an arm whose elbow is free, which the list refuses: ratios are those of six joints.
+    """
+    if candidate.acceleration is not None or candidate.velocity is None or candidate.free.size:
         return None
     return candidate.acceleration_ratio if ratio == NEAREST else ratio
 
