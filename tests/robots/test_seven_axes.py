@@ -10,6 +10,7 @@ from tests.urdf.test_urdf import described
 from conftest import pose
 from kerfpath import InputError, Robot, robot
 from kerfpath.comfort import jacobian, measure
+from kerfpath.dynamics import Load
 from kerfpath.robots import chain_of
 from kerfpath.robots._recognise import recognise
 from kerfpath.urdf import KinematicChain
@@ -168,6 +169,11 @@ def test_it_is_recognised_in_whatever_joint_frames(tmp_path, lbr, seed):
     assert back.geometry["c3"] == pytest.approx(0.40, abs=1e-9)
     q = np.random.default_rng(6).uniform(-3, 3, (50, 7))
     np.testing.assert_allclose(back.forward(q), back.chain.forward(q), atol=1e-9)
+
+
+def test_torques_of_an_arm_whose_elbow_is_free_are_refused(lbr):
+    with pytest.raises(InputError, match="whose joint 3 is free limits on them are not kept yet"):
+        lbr.with_load(Load(mass=2.0, centre=[0, 0, 0.1]))
 
 
 def test_arms_of_seven_axes_that_are_not_of_this_kind_are_refused(lbr):
