@@ -26,8 +26,8 @@ __all__ = ["follows_courses", "graph_of_runs", "plan_run"]
 
 
 def follows_courses(robot: Robot, options: PlanOptions) -> bool:
-    """Return whether runs on the grid follow courses of external axes, not a grid of them."""
-    return bool(robot.externals) and options.method == "continuous"
+    """Return whether runs on the grid follow courses of what poses leave free, not a grid."""
+    return bool(robot.free.size) and options.method == "continuous"
 
 
 def graph_of_runs(

@@ -102,9 +102,10 @@ def fastest_speed(
     faster still (the best found, which is not proved to be the best there is), where that is clear
     and keeps the margins of `comfort`, which may have no costs here. `plan` finds a motion at the
     speed returned, too. External axes, and the elbow of seven, follow the gentlest course, or
-    `external`; `refine` moves them, too, and looks for courses that are faster. With `ceiling` it is also proved, as far as a limited amount of work does, above which speed there is
-    no motion at all, on the grid or off it, see `FastestSpeed.ceiling`. Off the grid a speed that
-    is `enough`, m/s, may be returned although there are faster ones.
+    `external`; `refine` moves them, too, and looks for courses that are faster. With `ceiling` it
+    is also proved, as far as a limited amount of work does, above which speed there is no motion at
+    all, on the grid or off it, see `FastestSpeed.ceiling`. Off the grid a speed that is `enough`,
+    m/s, may be returned although there are faster ones.
 
     Raises
     ------

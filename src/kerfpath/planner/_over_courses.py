@@ -16,8 +16,8 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanOptions
 from kerfpath.planner._clear import ClearSearch
-from kerfpath.planner._continuous import claimed, clear_motion, plan_continuous
 from kerfpath.planner._coarse import coarse_places
+from kerfpath.planner._continuous import claimed, clear_motion, plan_continuous
 from kerfpath.planner._courses import courses
 from kerfpath.planner._graph import layered_graph
 from kerfpath.planner._quickest import QuickMotion, quicker

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, positive, scalar
+from kerfpath.dynamics import ArmDynamics
 from kerfpath.errors import InputError
 from kerfpath.kernels import turns
+from kerfpath.limits import JerkLimit, TorqueLimit
 from kerfpath.losses import Loss, Reason
 from kerfpath.robots._burden import Burden
 from kerfpath.robots._coupling import AXIS_3, Coupling
@@ -192,6 +194,38 @@ class Limited(Burden):
             hint = f", or robot({self.id!r}, acceleration_ratio={ratio!r})" if ratio else ""
             raise self._lacks("joint accelerations", "acceleration=", hint)
         return self.velocity, self.acceleration
+
+    def torque_limit(self) -> TorqueLimit | None:
+        """Return what limits the torques; None where no load is given.
+
+        Raises
+        ------
+        InputError
+            A load is given, but no robot description with a positive definite inertia of every
+            link, or no torque limits; or there is an external axis, or a seventh one.
+        """
+        if self.load is None:
+            return None
+        why = self.inertia_missing or "only a description (URDF) says what its links weigh"
+        if self.externals:
+            names = " and ".join(axis.name for axis in self.externals)
+            why = f"what {names} does to them is not known"
+        elif self.free.size:
+            why = f"of an arm whose {self.free_names} is free limits on them are not kept yet"
+        if self.chain is None or self.inertia is None or self.free.size:
+            raise InputError(f"robot {self.id!r}: its torques are not known: {why}")
+        if self.torque is None:
+            raise self._lacks("joint torques", "torque=")
+        inertia = self.load.on(self.inertia, self.chain.end)
+        dynamics = ArmDynamics(chain=self.chain, inertia=inertia, gravity=self.gravity)
+        return TorqueLimit(bound=self.torque, dynamics=dynamics)
+
+    def jerk_limit(self) -> JerkLimit | None:
+        """Return what limits the jerks, nothing that of an external axis; None where none does."""
+        if self.jerk is None:
+            return None
+        free = np.full(self.joints - len(self.jerk), np.inf)
+        return JerkLimit(bound=np.append(self.jerk, free))
 
     def bounds(self) -> tuple[Reason, ...]:
         """Return the reasons for poses beyond a limit: low and high of each joint and coupling."""

@@ -124,7 +124,10 @@ def recognise(chain: KinematicChain, *, as_written: bool = False) -> Manipulator
             + (", or take the arm as it is written with snap=0" if n == 6 else "")
         )
     if n == 7:
-        raise InputError(f"{'; '.join(misfits)}: no other arms of seven axes are planned")
+        raise InputError(
+            f"{'; '.join(misfits)}: no other arms of seven axes are planned; where the first joint "
+            "carries the arm, the link that the arm stands on is named as mount"
+        )
     try:
         require_solver()
     except InputError as error:

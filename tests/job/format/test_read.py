@@ -256,7 +256,7 @@ FAULTS = [
     ("[plan]", "[other.plan]", 15, "other: expected a known table"),
     # robot
     ("abb_irb4600_60_205", "abb_irb4600", 2, "robot.model: .*nearest: abb_irb4600_20_250"),
-    ("[4, 6]", "[4, 7]", 3, "robot.endless: .* from 1 to 6.* got 7 as number 2"),
+    ("[4, 6]", "[4, 7]", 3, "robot.endless: .* from 1 to 6.* got 7;"),
     ("[4, 6]", "[4, 4]", 3, "robot.endless: expected each axis once"),
     ("[4, 6]", "4", 3, "robot.endless: .*got 4;"),
     (ACCELERATION, "", 1, "robot.acceleration_deg_s2: .*ratio = .iontec_20_to_70kg"),

@@ -214,18 +214,15 @@ class RobotTable(Table):
         if known.acceleration is None and not given(
             self, "acceleration_deg_s2", "acceleration_ratio"
         ):
-            remedy, ratios = (
-                f"add acceleration_deg_s2 = [{known.joints} numbers]",
-                [name for name, each in acceleration_ratios().items() if len(each) == known.joints],
-            )
-            if ratios:
+            remedy = f"add acceleration_deg_s2 = [{known.joints} numbers]"
+            every = acceleration_ratios().items()
+            if ratios := [name for name, each in every if len(each) == known.joints]:
+                ratio = known.acceleration_ratio or ratios[0]
                 remedy += (
-                    ", or, to assume a typical ratio to the speeds, acceleration_ratio = "
-                    f'"{known.acceleration_ratio or ratios[0]}"'
+                    f', or, to assume a typical ratio to the speeds, acceleration_ratio = "{ratio}"'
                 )
-            raise fault(
-                f"joint accelerations, as {holder}", "none", remedy, ("acceleration_deg_s2",)
-            )
+            expected = f"joint accelerations, as {holder}"
+            raise fault(expected, "none", remedy, ("acceleration_deg_s2",))
         try:
             self._arm(folder)  # limits given may contradict those known
         except InputError as error:
