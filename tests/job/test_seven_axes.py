@@ -165,5 +165,5 @@ def test_studio_and_lists_of_robots_say_that_they_do_not_know_it(folder):
     with pytest.raises(InputError, match="the studio does not know arms of seven axes"):
         scene_of_robot(job, 1)
     six = robot("abb_irb4600_60_205", acceleration_ratio="iontec_20_to_70kg")
-    with pytest.raises(InputError, match=r"a list of robots: .* how joint 3 moves"):
+    with pytest.raises(InputError, match="a list of robots does not know arms of seven axes"):
         with_robot(job, six)

@@ -183,12 +183,8 @@ class RobotTable(Table):
             where = next((k for k in keys[:2] if said.startswith(f"{k}: ")), keys[2])
             raise fault_in_words(said.removeprefix(f"{where}: "), (where,)) from None
         if len(given(self, "acceleration_deg_s2", "acceleration_ratio")) == 2:
-            raise fault(
-                "acceleration_deg_s2 or acceleration_ratio",
-                "both",
-                "remove one",
-                ("acceleration_ratio",),
-            )
+            expected = "acceleration_deg_s2 or acceleration_ratio"
+            raise fault(expected, "both", "remove one", ("acceleration_ratio",))
         holder = (
             f"the library does not know those of {self.model}"
             if self.model
@@ -218,9 +214,7 @@ class RobotTable(Table):
             every = acceleration_ratios().items()
             if ratios := [name for name, each in every if len(each) == known.joints]:
                 ratio = known.acceleration_ratio or ratios[0]
-                remedy += (
-                    f', or, to assume a typical ratio to the speeds, acceleration_ratio = "{ratio}"'
-                )
+                remedy += f', or, to assume a typical ratio, acceleration_ratio = "{ratio}"'
             expected = f"joint accelerations, as {holder}"
             raise fault(expected, "none", remedy, ("acceleration_deg_s2",))
         try:
