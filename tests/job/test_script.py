@@ -61,6 +61,21 @@ allowed = "it bends"
 )
 """Two contours that are clear of a post, by pairs of their own."""
 
+PRODUCT = """
+[[robot.external]]
+model = "kuka_dkp400.tilt"
+xyz_mm = [1600, 0, 0]
+rpy_deg = [0, 0, 30]
+acceleration_deg_s2 = 120
+
+[[robot.external]]
+model = "kuka_dkp400.table"
+xyz_mm = [1600, 0, 0]
+rpy_deg = [0, 0, 30]
+acceleration_deg_s2 = 240
+"""
+"""A positioner of the library."""
+
 CARRIED = """
 [[robot.external]]
 name = "rail"
@@ -130,11 +145,25 @@ def test_the_script_says_units_and_keeps_what_the_job_says(tmp_path):
 def test_the_script_says_external_axes_in_their_units(tmp_path):
     _, script = scripted(tmp_path, TURNED)
     text = script.read_text()
-    assert "axis=[0.1, 0, 1]" in text
     assert "lower=-400 * MM" in text
     assert "velocity=1000 * MM" in text
     assert "acceleration=np.radians(180)" in text
     assert text.count("endless=True") == 1
+
+
+def test_the_script_has_external_axes_of_the_library_as_they_stand(tmp_path):
+    job, script = scripted(tmp_path, QUICK + PRODUCT)
+    names = {"__file__": str(script)}
+    exec(script.read_text().split("# How every plan")[0], names)
+    arm = names["arm"]
+    for made, meant in zip(arm.externals, job.robot.externals, strict=True):
+        assert (made.name, made.kind, made.carries) == (meant.name, meant.kind, meant.carries)
+        assert made.axis.tolist() == meant.axis.tolist()
+        assert made.point.tolist() == meant.point.tolist()
+    assert arm.joint_limits().upper.tolist() == job.robot.joint_limits().upper.tolist()
+    assert [each.tolist() for each in arm.speed_limits()] == [
+        each.tolist() for each in job.robot.speed_limits()
+    ]
 
 
 def test_names_cannot_become_code(tmp_path):

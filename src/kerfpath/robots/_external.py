@@ -82,7 +82,9 @@ class ExternalAxis:
         if not axis.any():
             raise InputError(f"{self.name} axis: expected a direction, got {axis.tolist()}")
         _set = object.__setattr__
-        _set(self, "axis", freeze(axis / np.linalg.norm(axis)))
+        length = np.linalg.norm(axis)
+        unit = abs(length - 1) < 1e-15  # stays as it is: a copy of an axis is that axis
+        _set(self, "axis", freeze(axis if unit else axis / length))
         _set(self, "point", floats(self.point, f"{self.name} point", (3,)))
         if self.step is not None:
             step = scalar(self.step, f"{self.name} step", unit=self.unit, above=0.0)

@@ -186,8 +186,7 @@ def _externals(job: Job) -> Iterator[str]:
             "name": axis.name,
             "kind": axis.kind,
             "carries": axis.carries,
-            # As it is written: to make a direction a unit vector twice may move its last digit.
-            "axis": job.source["robot"]["external"][i]["axis"],
+            "axis": axis.axis,
             "point": axis.point,
         }
         said |= {} if axis.step is None else {"step": axis.step}
