@@ -21,16 +21,8 @@ check: .venv/dev.stamp
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# The wheel as a stranger installs it: by itself, without any extra.
-PACKAGE := build/package
 package: .venv/dev.stamp
-	rm -rf dist $(PACKAGE)
-	$(BIN)/uv build --quiet --no-build-isolation --python $(BIN)/python --out-dir dist
-	$(BIN)/uv venv --quiet $(PACKAGE)
-	grep -v '^ *--hash' requirements/run.txt | tr -d '\\' > $(PACKAGE)/pinned.txt
-	VIRTUAL_ENV=$(PACKAGE) $(BIN)/uv pip install --quiet -c $(PACKAGE)/pinned.txt dist/*.whl
-	$(PACKAGE)/bin/python -I tests/core_alone.py
-	$(PACKAGE)/bin/kerfpath --help 2>&1 | grep "run pip install 'kerfpath\[programs\]'"
+	.ci/package
 
 bench: .venv/bench.stamp
 	$(BIN)/python -m benchmarks

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from resource import RUSAGE_SELF, getrusage
 from time import perf_counter
 
 import numpy as np
@@ -85,8 +86,10 @@ def _tube(*, quick: bool) -> Sheet:
         ("rail and chuck", _chucked(_railed(arm)), None),
     ):
         cost, seconds = _planned(contour, each, external)
-        rows.append((name, cost, seconds, *_fastest(contour, each, external)))
-    return Sheet(columns=("tube", "cost", "plan, s", "fastest, m/s", "seconds"), rows=rows)
+        peak = f"{getrusage(RUSAGE_SELF).ru_maxrss / 1e6:.2f}"
+        rows.append((name, cost, seconds, peak, *_fastest(contour, each, external)))
+    columns = ("tube", "cost", "plan, s", "peak memory so far, GB", "fastest, m/s", "seconds")
+    return Sheet(columns=columns, rows=rows)
 
 
 def _planned(contour: Contour, each: Robot, external: Array | None) -> tuple[str, str]:
