@@ -92,7 +92,8 @@ def test_what_is_no_job_is_refused(tmp_path):
 
 
 def test_what_is_not_installed_is_said_in_one_line(tmp_path, monkeypatch):
-    monkeypatch.setattr("kerfpath.cli._studio.find_spec", lambda name: None)
+    for name in ("starlette", "uvicorn", "websockets"):
+        monkeypatch.setitem(sys.modules, name, None)
     result = run("studio", write_job(tmp_path), "--no-browser")
     assert_refused(result, "starlette, uvicorn, websockets", "pip install 'kerfpath[studio]'")
 
