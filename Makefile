@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 DEMO_OUT ?= demo-out
 
-.PHONY: demo test test-slow check package bench figures lock clean
+.PHONY: demo test test-slow check docs package bench figures lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/kerfpath demo --out $(DEMO_OUT)
@@ -21,6 +21,14 @@ check: .venv/dev.stamp
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# The site, with every warning an error; then that no page of it asks another host for anything.
+SITE := build/docs
+docs: .venv/docs.stamp
+	rm -rf $(SITE)
+	$(BIN)/sphinx-build -q -W --keep-going -n -c docs -d build/doctrees . $(SITE)
+	$(BIN)/python docs/_ext/own_host.py $(SITE)
+	@echo 'To read it: $(SITE)/index.html'
+
 package: .venv/dev.stamp
 	.ci/package
 
@@ -32,7 +40,7 @@ figures: .venv/run.stamp
 	$(BIN)/python examples/known_against_proposed.py
 	$(BIN)/python examples/techniques.py
 
-# One environment, filled in steps: what running needs, what developing adds, what benchmarks add.
+# One environment, filled in steps: what running needs, what developing adds, what benchmarks and the site add.
 .venv/tools.stamp: requirements/build.txt
 	$(PYTHON) -c 'import sys; sys.exit("kerfpath needs Python 3.11 or newer, this is " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'
 	$(PYTHON) -m venv .venv
@@ -52,6 +60,10 @@ figures: .venv/run.stamp
 	VIRTUAL_ENV=.venv $(BIN)/uv pip install --quiet --compile-bytecode --require-hashes -r requirements/bench.txt
 	touch $@
 
+.venv/docs.stamp: requirements/docs.txt .venv/dev.stamp
+	VIRTUAL_ENV=.venv $(BIN)/uv pip install --quiet --compile-bytecode --require-hashes -r requirements/docs.txt
+	touch $@
+
 # Resolve the pinned requirement files again (they name no host).
 LOCK := $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-header --no-annotate --python-version 3.11
 lock: .venv/tools.stamp
@@ -60,6 +72,7 @@ lock: .venv/tools.stamp
 	$(LOCK) --extra dev pyproject.toml -c requirements/build.txt -o requirements/dev.txt
 	$(LOCK) --extra cad --extra cells --extra programs --extra report --extra studio pyproject.toml -c requirements/dev.txt -o requirements/run.txt
 	$(LOCK) --extra bench pyproject.toml -c requirements/dev.txt -o requirements/bench.txt
+	$(LOCK) --extra docs pyproject.toml -c requirements/dev.txt -o requirements/docs.txt
 
 clean:
 	rm -rf .venv $(DEMO_OUT) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache

@@ -1,0 +1,72 @@
+"""The site: every page is in its contents, and what its pages load is their own."""
+
+import importlib.util
+import re
+import sys
+
+import pytest
+
+from conftest import ROOT
+
+DOCS = ROOT / "docs"
+
+
+def part_of_site(name):
+    """A module of docs/_ext, which the build of the site loads from there."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / "_ext" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def contents_of(page):
+    """The pages that the tables of contents of a page lead to, directly and through those."""
+    trees = re.findall(r"^```\{toctree\}\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+    for line in "\n".join(trees).splitlines():
+        if line and not line.startswith(":"):
+            entry = re.sub(r".*<(.*)>", r"\1", line)
+            found = (page.parent / f"{entry}.md").resolve()
+            yield found
+            yield from contents_of(found)
+
+
+def test_every_page_of_docs_is_in_the_contents_once():
+    listed = [page for page in contents_of(DOCS / "index.md") if page.is_relative_to(DOCS)]
+    assert sorted(listed) == sorted(set(DOCS.rglob("*.md")) - {DOCS / "index.md"})
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.html", '<script src="https://cdn.example/a.js"></script>'),
+        ("a.html", '<link rel="stylesheet" href="//fonts.example/a.css">'),
+        ("a.html", '<img src="http://img.example/a.png">'),
+        ("a.html", "<style>@import 'https://fonts.example/a.css';</style>"),
+        ("a.html", '<p style="background: url(https://img.example/a.png)">'),
+        ("a.html", "<script>fetch('https://api.example/a')</script>"),
+        ("a.svg", '<svg><image xlink:href="https://img.example/a.png"/></svg>'),
+        ("a.css", "@font-face { src: url(//fonts.example/a.woff2) }"),
+        ("a.js", 'new WebSocket("wss://api.example/")'),
+    ],
+)
+def test_what_a_page_would_load_from_another_host_is_found(tmp_path, name, text):
+    own_host = part_of_site("own_host")
+    (tmp_path / name).write_text(text)
+    (address,) = own_host.foreign_in(tmp_path / name)
+    assert ".example/" in address
+    assert own_host.main(tmp_path) == 1
+
+
+def test_links_to_follow_and_files_of_the_site_are_no_finding(tmp_path):
+    own_host = part_of_site("own_host")
+    page = '<a href="https://a.example/"><img src="_images/a.png"><script src="a.js"></script></a>'
+    (tmp_path / "a.html").write_text(page)
+    (tmp_path / "a.js").write_text(
+        '// https://a.example/\nfetch("a.json"); "http://www.w3.org/2000/svg"'
+    )
+    assert own_host.main(tmp_path) == 0
+
+
+def test_a_site_without_pages_is_refused(tmp_path):
+    assert part_of_site("own_host").main(tmp_path) == 1
