@@ -28,7 +28,7 @@ include_patterns = [
 ]
 exclude_patterns = [".*", "build", "dist", "demo-out", "tests"]
 
-extensions = ["myst_parser"]
+extensions = ["myst_parser", "reference.directive"]
 myst_heading_anchors = 4
 highlight_language = "none"
 nitpicky = True

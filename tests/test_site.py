@@ -1,23 +1,19 @@
 """The site: every page is in its contents, and what its pages load is their own."""
 
-import importlib.util
 import re
-import sys
 
 import pytest
 
+import own_host
 from conftest import ROOT
+from reference import commands
 
 DOCS = ROOT / "docs"
 
 
-def part_of_site(name):
-    """A module of docs/_ext, which the build of the site loads from there."""
-    spec = importlib.util.spec_from_file_location(name, DOCS / "_ext" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+def bare(markdown):
+    """Markdown without the marks that the generated pages set."""
+    return re.sub(r"[`\\]", "", markdown)
 
 
 def contents_of(page):
@@ -51,7 +47,6 @@ def test_every_page_of_docs_is_in_the_contents_once():
     ],
 )
 def test_what_a_page_would_load_from_another_host_is_found(tmp_path, name, text):
-    own_host = part_of_site("own_host")
     (tmp_path / name).write_text(text)
     (address,) = own_host.foreign_in(tmp_path / name)
     assert ".example/" in address
@@ -59,7 +54,6 @@ def test_what_a_page_would_load_from_another_host_is_found(tmp_path, name, text)
 
 
 def test_links_to_follow_and_files_of_the_site_are_no_finding(tmp_path):
-    own_host = part_of_site("own_host")
     page = '<a href="https://a.example/"><img src="_images/a.png"><script src="a.js"></script></a>'
     (tmp_path / "a.html").write_text(page)
     (tmp_path / "a.js").write_text(
@@ -69,4 +63,32 @@ def test_links_to_follow_and_files_of_the_site_are_no_finding(tmp_path):
 
 
 def test_a_site_without_pages_is_refused(tmp_path):
-    assert part_of_site("own_host").main(tmp_path) == 1
+    assert own_host.main(tmp_path) == 1
+
+
+def test_the_page_of_commands_has_every_command_with_its_options_and_their_help():
+    page = commands.page()
+    sections = dict(re.findall(r"^## kerfpath (\S+)\n(.*?)(?=^## |\Z)", page, re.M | re.S))
+    assert list(sections) == list(commands.program().commands)
+    for name, command in commands.program().commands.items():
+        text = bare(sections[name])
+        assert bare(command.help.partition("\n")[0]) in text
+        for parameter in command.params:
+            assert f"| {parameter.metavar or parameter.name} |" in text or all(
+                option in text for option in parameter.opts
+            )
+            assert bare(parameter.help) in text, parameter.name
+
+
+SHOWN = [
+    (page, line)
+    for page in sorted(DOCS.rglob("*.md"))
+    for line in re.findall(r"^ {4}kerfpath (\S.*)$", page.read_text(), re.MULTILINE)
+]
+
+
+@pytest.mark.parametrize(("page", "line"), SHOWN, ids=[f"{p.stem}: {n}" for p, n in SHOWN])
+def test_a_command_that_a_page_shows_exists_with_its_options(page, line):
+    name, *words = line.partition(" #")[0].split()
+    options = {option for each in commands.program().commands[name].params for option in each.opts}
+    assert {word for word in words if word.startswith("-")} <= options

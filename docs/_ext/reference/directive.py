@@ -1,0 +1,30 @@
+"""The Sphinx directive that lays a generated page: {generated} and the name of its module."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+from sphinx.util.typing import ExtensionMetadata
+
+__all__ = ["setup"]
+
+
+class Generated(SphinxDirective):
+    """The page that a module of this package returns, in place of the directive."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Return the page, which is made again at each build: its source is code."""
+        self.env.note_reread()
+        text = import_module(f"reference.{self.arguments[0]}").page()
+        return self.parse_text_to_nodes(text, allow_section_headings=True)
+
+
+def setup(app: Sphinx) -> ExtensionMetadata:
+    """Add the directive to Sphinx."""
+    app.add_directive("generated", Generated)
+    return {"parallel_read_safe": True}
