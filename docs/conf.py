@@ -32,6 +32,7 @@ extensions = ["myst_parser", "reference.directive"]
 myst_heading_anchors = 4
 highlight_language = "none"
 nitpicky = True
+smartquotes = False
 
 html_theme = "furo"
 html_title = f"kerfpath {release}"

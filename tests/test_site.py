@@ -2,11 +2,13 @@
 
 import re
 
+import numpy as np
 import pytest
 
 import own_host
 from conftest import ROOT
-from reference import commands
+from kerfpath.robots import external, external_ids, robot, robot_ids
+from reference import commands, library
 
 DOCS = ROOT / "docs"
 
@@ -92,3 +94,23 @@ def test_a_command_that_a_page_shows_exists_with_its_options(page, line):
     name, *words = line.partition(" #")[0].split()
     options = {option for each in commands.program().commands[name].params for option in each.opts}
     assert {word for word in words if word.startswith("-")} <= options
+
+
+@pytest.mark.parametrize(
+    "known",
+    [*map(robot, robot_ids()), *map(external, external_ids())],
+    ids=lambda known: known.id,
+)
+def test_the_page_of_the_library_has_each_product_with_its_doubts_and_sources(known):
+    anchor = f"({known.id.replace('_', '-')})="
+    section = bare(library.page().partition(anchor)[2].partition("\n##")[0])
+    assert all(note in section for note in known.notes)
+    assert all(f": {source}" in section for source in known.sources.values())
+    if known.id in robot_ids():
+        rows = dict(re.findall(r"^\| (\w+) deg\S* \| (.*) \|$", section, re.MULTILINE))
+        for limit in ("lower", "upper", "velocity", "acceleration"):
+            values = getattr(known, limit)
+            said = [np.radians(float(word)) for word in rows.get(limit, "").split("|") if word]
+            assert said == pytest.approx([] if values is None else values, rel=1e-12)
+    else:
+        assert all(f"| {name} |" in section for name in known.axis_ids)

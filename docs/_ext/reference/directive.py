@@ -21,7 +21,8 @@ class Generated(SphinxDirective):
         """Return the page, which is made again at each build: its source is code."""
         self.env.note_reread()
         text = import_module(f"reference.{self.arguments[0]}").page()
-        return self.parse_text_to_nodes(text, allow_section_headings=True)
+        made: list[nodes.Node] = self.parse_text_to_nodes(text, allow_section_headings=True)
+        return made
 
 
 def setup(app: Sphinx) -> ExtensionMetadata:

@@ -12,7 +12,7 @@ NAMES = re.compile(
     r"|(?<![\w-])--[a-z][a-z-]*"  # an option
     r"|\[{1,2}[a-z][\w.]*\]{1,2}"  # a table
     r"|\b[\w-]+\.(?:csv|html|json|md|mod|sqlite|toml)\b"  # a file
-    r"|\b[a-z0-9]+_[a-z0-9_]+\b"  # a key
+    r"|(?<![\w/])[\w./+-]*[a-z0-9]_[\w./+-]*\w"  # a key, or a path with one
 )
 
 
