@@ -1,14 +1,19 @@
 """The site: every page is in its contents, and what its pages load is their own."""
 
 import re
+import shutil
+import tomllib
 
 import numpy as np
 import pytest
 
 import own_host
 from conftest import ROOT
+from kerfpath.job import prepare, read_job
+from kerfpath.job.format.tables import TABLES, JobFile
+from kerfpath.post import languages
 from kerfpath.robots import external, external_ids, robot, robot_ids
-from reference import commands, library
+from reference import commands, job_keys, library
 
 DOCS = ROOT / "docs"
 
@@ -16,6 +21,11 @@ DOCS = ROOT / "docs"
 def bare(markdown):
     """Markdown without the marks that the generated pages set."""
     return re.sub(r"[`\\]", "", markdown)
+
+
+def bare_code(cell):
+    """The text of a cell that is code."""
+    return cell.removeprefix("`").removesuffix("`")
 
 
 def contents_of(page):
@@ -114,3 +124,37 @@ def test_the_page_of_the_library_has_each_product_with_its_doubts_and_sources(kn
             assert said == pytest.approx([] if values is None else values, rel=1e-12)
     else:
         assert all(f"| {name} |" in section for name in known.axis_ids)
+
+
+JOB_TABLES = {**TABLES, **{f"program.{name}": each.settings for name, each in languages().items()}}
+
+
+@pytest.mark.parametrize("name", JOB_TABLES)
+def test_the_page_of_job_keys_has_each_key_as_its_table_reads_it(name):
+    (section,) = re.findall(
+        rf"^## `\[+{re.escape(name)}\]+`\n(.*?)(?=^## |\Z)", job_keys.page(), re.M | re.S
+    )
+    rows = [row.split(" | ") for row in re.findall(r"^\| (`.*) \|$", section, re.MULTILINE)]
+    assert [row[0].strip("`") for row in rows] == list(JOB_TABLES[name].model_fields)
+    for key, takes, example, default in rows:
+        field = JOB_TABLES[name].model_fields[key.strip("`")]
+        assert takes
+        assert (default == "required") == field.is_required()
+        if example:
+            assert tomllib.loads(f"value = {bare_code(example)}")
+        if default.startswith("`"):
+            value = tomllib.loads(f"value = {bare_code(default)}")["value"]
+            assert value == (list(field.default) if isinstance(value, list) else field.default)
+
+
+def test_the_page_of_job_keys_begins_with_the_tables_of_the_file():
+    tops = re.findall(r"^## `\[+([a-z]+)\]", job_keys.page(), re.MULTILINE)
+    assert tuple(dict.fromkeys(tops)) == tuple(JobFile.model_fields)
+
+
+def test_the_job_of_the_quickstart_reads(tmp_path):
+    (text,) = re.findall(r"```toml\n(.*?)```", (DOCS / "quickstart.md").read_text(), re.DOTALL)
+    (tmp_path / "door.toml").write_text(text)
+    shutil.copy(ROOT / "src/kerfpath/demo/b_pillar.step", tmp_path / "door.step")
+    (request,) = prepare(read_job(tmp_path / "door.toml")).contours
+    assert request.task.pick == "skin/outer"
