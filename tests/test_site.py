@@ -11,9 +11,10 @@ import own_host
 from conftest import ROOT
 from kerfpath.job import prepare, read_job
 from kerfpath.job.format.tables import TABLES, JobFile
+from kerfpath.kernels import EQUATIONS
 from kerfpath.post import languages
 from kerfpath.robots import external, external_ids, robot, robot_ids
-from reference import commands, job_keys, library
+from reference import commands, equations, job_keys, library
 
 DOCS = ROOT / "docs"
 
@@ -158,3 +159,15 @@ def test_the_job_of_the_quickstart_reads(tmp_path):
     shutil.copy(ROOT / "src/kerfpath/demo/b_pillar.step", tmp_path / "door.step")
     (request,) = prepare(read_job(tmp_path / "door.toml")).contours
     assert request.task.pick == "skin/outer"
+
+
+def test_the_index_of_equations_leads_to_the_code_and_the_tests_of_each():
+    rows = re.findall(r"^\| \((\d+)\) \| (.*) \|$", equations.page(), re.MULTILINE)
+    assert [int(number) for number, _ in rows] == list(EQUATIONS)
+    for number, row in rows:
+        said, where, tests = row.split(" | ")
+        assert said
+        assert EQUATIONS[int(number)].replace(":", ".") in where
+        assert "[`test_" in tests
+        for target in re.findall(r"\]\(([^)]+)\)", where + tests):
+            assert (DOCS / "reference" / target).is_file()

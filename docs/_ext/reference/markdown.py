@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-__all__ = ["code", "prose", "table"]
+__all__ = ["code", "plain", "prose", "table"]
 
 NAMES = re.compile(
     r"`[^`]+`"  # code already
@@ -25,6 +25,11 @@ def prose(text: str) -> str:
     """Return a text of a help or a data file as Markdown, the names in it as code."""
     marked = NAMES.sub(lambda found: found[0] if found[0][0] == "`" else code(found[0]), text)
     return marked.replace("<", r"\<")
+
+
+def plain(text: str) -> str:
+    """Return a text in which nothing is marked, however it may look."""
+    return re.sub(r"([\\`*_\[\]<>])", r"\\\1", text)
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

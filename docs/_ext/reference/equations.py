@@ -1,0 +1,54 @@
+"""The index of equations: where the code has each equation of the paper, and what tests it."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from functools import reduce
+from importlib import import_module
+from pathlib import Path
+
+from kerfpath import kernels
+from reference.markdown import code, plain, table
+
+__all__ = ["page"]
+
+ROOT = Path(__file__).parents[3]
+TO_ROOT = "../.."
+"""From the page of this index."""
+TEST = re.compile(r"((?:^@pytest\.mark\..*\n)+)def (test_\w+)", re.MULTILINE)
+
+
+def page() -> str:
+    """Return one row for each equation, and the notation of the kernels."""
+    rows = [[f"({number})", *_said_of(number), _tests_of(number)] for number in kernels.EQUATIONS]
+    notation = (kernels.__doc__ or "").partition(":\n\n")[2]
+    return "\n\n".join(
+        [
+            table(["equation", "what it is", "where", "tested by"], rows),
+            "## Notation",
+            f"```{{eval-rst}}\n{notation}\n```",
+        ]
+    )
+
+
+def _said_of(number: int) -> list[str]:
+    """Return the summary of what an equation is, without its number, and a link to its code."""
+    module, _, name = kernels.EQUATIONS[number].partition(":")
+    found = reduce(getattr, name.split("."), import_module(module))
+    function = getattr(found, "py_func", found)  # what numba has compiled
+    summary = (inspect.getdoc(function) or "").partition("\n\n")[0]
+    file = Path(inspect.getsourcefile(function) or "").relative_to(ROOT)
+    said = re.sub(r"\s*\(Eq\. \d+\)", "", summary)
+    return [plain(said), f"[{code(f'{module}.{name}')}]({TO_ROOT}/{file.as_posix()})"]
+
+
+def _tests_of(number: int) -> str:
+    """Return links to the tests that name an equation."""
+    found = [
+        f"[{code(name)}]({TO_ROOT}/{file.relative_to(ROOT).as_posix()})"
+        for file in sorted((ROOT / "tests").rglob("test_*.py"))
+        for marks, name in TEST.findall(file.read_text(encoding="utf-8"))
+        if f"@pytest.mark.equation({number})\n" in marks
+    ]
+    return ", ".join(found)
