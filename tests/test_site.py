@@ -162,12 +162,17 @@ def test_the_job_of_the_quickstart_reads(tmp_path):
 
 
 def test_the_index_of_equations_leads_to_the_code_and_the_tests_of_each():
-    rows = re.findall(r"^\| \((\d+)\) \| (.*) \|$", equations.page(), re.MULTILINE)
-    assert [int(number) for number, _ in rows] == list(EQUATIONS)
-    for number, row in rows:
-        said, where, tests = row.split(" | ")
+    lines = re.findall(r"^- \*\*\((\d+)\)\*\* (.*)$", equations.page(), re.MULTILINE)
+    assert [int(number) for number, _ in lines] == list(EQUATIONS)
+    for number, line in lines:
+        said, _, tests = line.partition(" [`kerfpath.")
         assert said
-        assert EQUATIONS[int(number)].replace(":", ".") in where
+        assert tests.startswith(EQUATIONS[int(number)].replace(":", ".").removeprefix("kerfpath."))
         assert "[`test_" in tests
-        for target in re.findall(r"\]\(([^)]+)\)", where + tests):
+        for target in re.findall(r"\]\(([^)]+)\)", tests):
             assert (DOCS / "reference" / target).is_file()
+
+
+@pytest.mark.parametrize("module", [commands, equations, job_keys, library])
+def test_what_is_made_for_a_page_begins_with_a_heading(module):
+    assert module.page().startswith("## ")

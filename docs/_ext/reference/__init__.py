@@ -1,4 +1,5 @@
-"""The pages of the reference that are made from the code when the site is built.
+"""The sections of the reference that are made from the code when the site is built.
 
-Each module but `directive` returns one as Markdown; `directive` lays it on its page.
+Each module but `directive` and `markdown` returns those of one page as Markdown, by `page()`;
+`directive` lays them there.
 """

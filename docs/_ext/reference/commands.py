@@ -29,7 +29,7 @@ def page() -> str:
     """Return the help of the program and of every command."""
     group = program()
     top = typer.Context(group, info_name="kerfpath")
-    parts = [*_help(group.help), _parameters(group, top)]
+    parts = ["## kerfpath", *_help(group.help), _parameters(group, top)]
     for name, command in group.commands.items():
         assert isinstance(command, TyperCommand)
         context = typer.Context(command, info_name=name, parent=top)

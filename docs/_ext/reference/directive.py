@@ -13,7 +13,10 @@ __all__ = ["setup"]
 
 
 class Generated(SphinxDirective):
-    """The page that a module of this package returns, in place of the directive."""
+    """The sections that a module of this package returns, in place of the directive.
+
+    They begin with a heading: MyST lays sections ahead of what comes before the first of them.
+    """
 
     required_arguments = 1
 

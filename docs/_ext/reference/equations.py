@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 from kerfpath import kernels
-from reference.markdown import code, plain, table
+from reference.markdown import code, plain
 
 __all__ = ["page"]
 
@@ -20,33 +20,37 @@ TEST = re.compile(r"((?:^@pytest\.mark\..*\n)+)def (test_\w+)", re.MULTILINE)
 
 
 def page() -> str:
-    """Return one row for each equation, and the notation of the kernels."""
-    rows = [[f"({number})", *_said_of(number), _tests_of(number)] for number in kernels.EQUATIONS]
+    """Return a line for each equation, and the notation of the kernels."""
     notation = (kernels.__doc__ or "").partition(":\n\n")[2]
     return "\n\n".join(
         [
-            table(["equation", "what it is", "where", "tested by"], rows),
+            "## In the code",
+            "\n".join(map(_line, kernels.EQUATIONS)),
             "## Notation",
             f"```{{eval-rst}}\n{notation}\n```",
         ]
     )
 
 
-def _said_of(number: int) -> list[str]:
-    """Return the summary of what an equation is, without its number, and a link to its code."""
+def _line(number: int) -> str:
+    """Return the summary of what an equation is, without its number, its code and its tests."""
     module, _, name = kernels.EQUATIONS[number].partition(":")
     found = reduce(getattr, name.split("."), import_module(module))
     function = getattr(found, "py_func", found)  # what numba has compiled
     summary = (inspect.getdoc(function) or "").partition("\n\n")[0]
-    file = Path(inspect.getsourcefile(function) or "").relative_to(ROOT)
-    said = re.sub(r"\s*\(Eq\. \d+\)", "", summary)
-    return [plain(said), f"[{code(f'{module}.{name}')}]({TO_ROOT}/{file.as_posix()})"]
+    said = plain(re.sub(r"\s*\(Eq\. \d+\)", "", summary).replace("\n", " "))
+    where = _link(f"{module}.{name}", Path(inspect.getsourcefile(function) or ""))
+    return f"- **({number})** {said} {where}, tested by {_tests_of(number)}"
+
+
+def _link(name: str, file: Path) -> str:
+    return f"[{code(name)}]({TO_ROOT}/{file.relative_to(ROOT).as_posix()})"
 
 
 def _tests_of(number: int) -> str:
     """Return links to the tests that name an equation."""
     found = [
-        f"[{code(name)}]({TO_ROOT}/{file.relative_to(ROOT).as_posix()})"
+        _link(name, file)
         for file in sorted((ROOT / "tests").rglob("test_*.py"))
         for marks, name in TEST.findall(file.read_text(encoding="utf-8"))
         if f"@pytest.mark.equation({number})\n" in marks

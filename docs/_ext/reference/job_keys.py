@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Literal, get_args, get_origin
 
@@ -31,8 +32,9 @@ def page() -> str:
 
 
 def _about(model: type[BaseModel]) -> str:
-    """Return what a table is, in the words of its class."""
-    return prose((model.__doc__ or "").partition("\n\n")[0])
+    """Return what a table is, in the words of its class, which may begin with its name."""
+    said = re.sub(r"^\[.*?\]: ", "", (model.__doc__ or "").partition("\n\n")[0])
+    return prose(said[0].upper() + said[1:])
 
 
 def _keys(name: str, model: type[BaseModel]) -> str:
