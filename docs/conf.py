@@ -28,14 +28,31 @@ include_patterns = [
 ]
 exclude_patterns = [".*", "build", "dist", "demo-out", "tests"]
 
-extensions = ["myst_parser", "reference.directive"]
+extensions = ["myst_parser", "reference.directive", "reference.docstrings", "sphinx.ext.viewcode"]
+autodoc_default_options = {"members": True, "exclude-members": "model_config"}
+autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+autodoc_typehints = "none"  # docstrings have types, shapes and units
+default_role = "py:obj"
 myst_heading_anchors = 4
 highlight_language = "none"
 nitpicky = True
-smartquotes = False
+smartquotes_action = "D"  # dashes alone
 
 html_theme = "furo"
 html_title = f"kerfpath {release}"
 html_extra_path = ["_site"]
 html_copy_source = False
+html_theme_options = {  # the accents of the studio
+    "light_css_variables": {
+        "color-brand-primary": "#0b6b66",
+        "color-brand-content": "#0b6b66",
+        "color-brand-visited": "#0b6b66",
+    },
+    "dark_css_variables": {
+        "color-brand-primary": "#4fc4b8",
+        "color-brand-content": "#4fc4b8",
+        "color-brand-visited": "#4fc4b8",
+    },
+}
 html_show_sphinx = False

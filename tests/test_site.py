@@ -1,5 +1,6 @@
 """The site: every page is in its contents, and what its pages load is their own."""
 
+import importlib
 import re
 import shutil
 import tomllib
@@ -7,6 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 
+import kerfpath
 import own_host
 from conftest import ROOT
 from kerfpath.job import prepare, read_job
@@ -14,7 +16,7 @@ from kerfpath.job.format.tables import TABLES, JobFile
 from kerfpath.kernels import EQUATIONS
 from kerfpath.post import languages
 from kerfpath.robots import external, external_ids, robot, robot_ids
-from reference import commands, equations, job_keys, library
+from reference import api, commands, equations, job_keys, library
 
 DOCS = ROOT / "docs"
 
@@ -173,6 +175,31 @@ def test_the_index_of_equations_leads_to_the_code_and_the_tests_of_each():
             assert (DOCS / "reference" / target).is_file()
 
 
-@pytest.mark.parametrize("module", [commands, equations, job_keys, library])
+@pytest.mark.parametrize("module", [api, commands, equations, job_keys, library])
 def test_what_is_made_for_a_page_begins_with_a_heading(module):
     assert module.page().startswith("## ")
+
+
+PACKAGES = re.findall(r"\[`(kerfpath[.a-z]*)`\]", (DOCS / "reference" / "python.md").read_text())
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_the_page_of_a_package_describes_each_name_once(package):
+    page = api.page(package)
+    here = re.findall(rf"^\.\. \S+:: {re.escape(package)}\.(\w+)$", page, re.MULTILINE)
+    elsewhere = re.findall(r"\{py:obj\}`kerfpath\.(\w+)`", page)
+    named = set(api.public_names(importlib.import_module(package)))
+    assert sorted([*here, *elsewhere]) == sorted(named)
+    assert set(elsewhere) <= set(kerfpath.__all__)
+    stub = DOCS / "reference" / "python" / f"{package.rpartition('.')[2]}.md"
+    assert f"```{{generated}} api {package}\n" in stub.read_text()
+
+
+def test_what_pages_import_from_is_described():
+    used = {
+        module
+        for page in [ROOT / "README.md", *DOCS.rglob("*.md")]
+        for module in re.findall(r"^ *from (kerfpath[.\w]*) import", page.read_text(), re.M)
+    }
+    assert "kerfpath.operations" in used
+    assert {".".join(module.split(".")[:2]) for module in used} <= set(PACKAGES)

@@ -19,11 +19,13 @@ class Generated(SphinxDirective):
     """
 
     required_arguments = 1
+    optional_arguments = 1
 
     def run(self) -> list[nodes.Node]:
         """Return the page, which is made again at each build: its source is code."""
         self.env.note_reread()
-        text = import_module(f"reference.{self.arguments[0]}").page()
+        name, *about = self.arguments
+        text = import_module(f"reference.{name}").page(*about)
         made: list[nodes.Node] = self.parse_text_to_nodes(text, allow_section_headings=True)
         return made
 
