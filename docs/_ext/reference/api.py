@@ -6,6 +6,7 @@ import ast
 import inspect
 import re
 from collections.abc import Mapping
+from functools import cache
 from importlib import import_module
 from itertools import pairwise
 from types import ModuleType
@@ -54,12 +55,16 @@ def page(package: str = "kerfpath") -> str:
 
 def public_names(module: ModuleType) -> dict[str, str]:
     """Return what a package names, and the module that it has each from."""
-    tree = ast.parse(inspect.getsource(module))
-    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    imports = [node for node in ast.walk(_tree(module)) if isinstance(node, ast.ImportFrom)]
     homes = {alias.asname or alias.name: each.module for each in imports for alias in each.names}
     named = [alias.asname for each in imports for alias in each.names if alias.asname]
     names = sorted(getattr(module, "__all__", named))
     return {name: homes.get(name) or module.__name__ for name in names if name[0] != "_"}
+
+
+@cache
+def _tree(module: ModuleType) -> ast.Module:
+    return ast.parse(inspect.getsource(module))
 
 
 def _comment(home: str, name: str) -> str:
@@ -67,8 +72,7 @@ def _comment(home: str, name: str) -> str:
     module = import_module(home)
     if (deeper := public_names(module).get(name, home)) != home:
         return _comment(deeper, name)
-    body = ast.parse(inspect.getsource(module)).body
-    for statement, below in pairwise(body):
+    for statement, below in pairwise(_tree(module).body):
         targets = statement.targets if isinstance(statement, ast.Assign) else []
         if any(isinstance(target, ast.Name) and target.id == name for target in targets) and (
             isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from functools import reduce
+from functools import cache, reduce
 from importlib import import_module
 from pathlib import Path
 
@@ -40,19 +40,19 @@ def _line(number: int) -> str:
     summary = (inspect.getdoc(function) or "").partition("\n\n")[0]
     said = plain(re.sub(r"\s*\(Eq\. \d+\)", "", summary).replace("\n", " "))
     where = _link(f"{module}.{name}", Path(inspect.getsourcefile(function) or ""))
-    return f"- **({number})** {said} {where}, tested by {_tests_of(number)}"
+    return f"- **({number})** {said} {where}, tested by {', '.join(_tests()[number])}"
 
 
 def _link(name: str, file: Path) -> str:
     return f"[{code(name)}]({TO_ROOT}/{file.relative_to(ROOT).as_posix()})"
 
 
-def _tests_of(number: int) -> str:
-    """Return links to the tests that name an equation."""
-    found = [
-        _link(name, file)
-        for file in sorted((ROOT / "tests").rglob("test_*.py"))
-        for marks, name in TEST.findall(file.read_text(encoding="utf-8"))
-        if f"@pytest.mark.equation({number})\n" in marks
-    ]
-    return ", ".join(found)
+@cache
+def _tests() -> dict[int, list[str]]:
+    """Return links to the tests that name an equation, by its number."""
+    found: dict[int, list[str]] = {number: [] for number in kernels.EQUATIONS}
+    for file in sorted((ROOT / "tests").rglob("test_*.py")):
+        for marks, name in TEST.findall(file.read_text(encoding="utf-8")):
+            for number in re.findall(r"mark\.equation\((\d+)\)", marks):
+                found[int(number)].append(_link(name, file))
+    return found
