@@ -137,6 +137,18 @@ def test_the_page_of_the_library_has_each_product_with_its_doubts_and_sources(
         assert all(f"| {name} |" in section for name in known.axis_ids)
 
 
+def words_in(schema):
+    """The words that a JSON schema admits, wherever they are in it."""
+    if isinstance(schema, dict):
+        found = [*schema.get("enum", ()), schema.get("const")]
+        yield from (word for word in found if isinstance(word, str))
+        for inner in schema.values():
+            yield from words_in(inner)
+    elif isinstance(schema, list):
+        for inner in schema:
+            yield from words_in(inner)
+
+
 JOB_TABLES = {**TABLES, **{f"program.{name}": each.settings for name, each in languages().items()}}
 
 
@@ -150,6 +162,9 @@ def test_the_page_of_job_keys_has_each_key_as_its_table_reads_it(name):
     for key, takes, example, default in rows:
         field = JOB_TABLES[name].model_fields[key.strip("`")]
         assert takes
+        if "below" not in takes:
+            schema = JOB_TABLES[name].model_json_schema()["properties"][key.strip("`")]
+            assert all(word in takes for word in words_in(schema))
         assert (default == "required") == field.is_required()
         if example:
             assert tomllib.loads(f"value = {bare_code(example)}")

@@ -16,15 +16,15 @@ CONFIG = Config(
     napoleon_use_rtype=False,
     napoleon_custom_sections=[("Attributes", "params_style")],
 )
-NOT_MARKED = re.compile(r"\||(?<=\w)_(?!\w)|\*")
-"""What marks something in reStructuredText, and nothing in a docstring of this house."""
+NOT_MARKED = re.compile(r"(``.+?``)|\||(?<=\w)_(?!\w)|\*")
+"""What marks something in reStructuredText, and nothing in a docstring of this house; or code."""
 
 
 def _read(
     app: Sphinx, what: str, name: str, thing: object, options: object, lines: list[str]
 ) -> None:
     """Rewrite a docstring in place; only those of classes and functions have sections."""
-    lines[:] = [NOT_MARKED.sub(r"\\\g<0>", line) for line in lines]
+    lines[:] = [NOT_MARKED.sub(lambda found: found[1] or f"\\{found[0]}", line) for line in lines]
     if what in {"class", "exception", "function", "method"}:
         text = NumpyDocstring("\n".join(lines), CONFIG, app, what, name, thing, options)
         lines[:] = text.lines()

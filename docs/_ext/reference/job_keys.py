@@ -66,9 +66,11 @@ def _default(field: FieldInfo) -> str:
 
 def _takes(field: FieldInfo) -> str:
     """Return what a message says was expected, and the words that the key takes."""
-    expected = field.description or ""
-    words = [code(_toml(word)) for word in _words(field.annotation) if word not in expected]
-    return ": ".join(filter(None, (prose(expected), ", ".join(words))))
+    expected, words = field.description or "", list(_words(field.annotation))
+    if all(word in expected for word in words):
+        return prose(expected)
+    said = ", ".join(code(_toml(word)) for word in words)
+    return f"{prose(expected)}: {said}" if expected else said
 
 
 def _words(annotation: object) -> Iterator[str]:
