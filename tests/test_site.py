@@ -218,6 +218,11 @@ def test_the_page_of_a_package_describes_each_name_once(package):
     assert f"```{{generated}} api {package}\n" in stub.read_text()
 
 
+def test_every_package_that_is_an_interface_has_a_page():
+    packages = {path.parent.name for path in (ROOT / "src/kerfpath").glob("[a-z]*/__init__.py")}
+    assert {f"kerfpath.{name}" for name in packages - {"cli", "kernels", "studio"}} <= set(PACKAGES)
+
+
 def test_what_pages_import_from_is_described():
     used = {
         module
