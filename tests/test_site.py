@@ -209,7 +209,8 @@ PACKAGES = re.findall(r"\[`(kerfpath[.a-z]*)`\]", (DOCS / "reference" / "python.
 @pytest.mark.parametrize("package", PACKAGES)
 def test_the_page_of_a_package_describes_each_name_once(package):
     page = api.page(package)
-    here = re.findall(rf"^\.\. \S+:: {re.escape(package)}\.(\w+)$", page, re.MULTILINE)
+    here = re.findall(r"^\.\. \S+:: (?!kerfpath)(\w+)$", page, re.MULTILINE)
+    assert set(re.findall(r"currentmodule:: (\S+)$", page, re.MULTILINE)) == {package}
     elsewhere = re.findall(r"\{py:obj\}`kerfpath\.(\w+)`", page)
     named = set(api.public_names(importlib.import_module(package)))
     assert sorted([*here, *elsewhere]) == sorted(named)

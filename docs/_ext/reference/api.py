@@ -36,17 +36,16 @@ def page(package: str = "kerfpath") -> str:
         if module is not kerfpath and id(thing) in top:
             elsewhere.append(f"{{py:obj}}`kerfpath.{top[id(thing)]}`")
             continue
-        directive, said = "py:data", f"\n\n   {_comment(home, name) or _value(thing)}"
+        directive, said = "py:data", _comment(home, name) or _value(thing)
         if inspect.isclass(thing):
-            directive = "autoexception" if issubclass(thing, Exception) else "autoclass"
-            said = ""
+            directive, said = "autoexception" if issubclass(thing, Exception) else "autoclass", ""
         elif inspect.isfunction(inspect.unwrap(thing) if callable(thing) else thing):
             directive, said = "autofunction", ""
-        found[directive].append(f".. {directive}:: {package}.{name}{said}")
+        found[directive].append(f".. {directive}:: {name}\n\n   {said}".rstrip())
     parts = []
     for directive, heading in KINDS.items():
         if found[directive]:
-            body = "\n\n".join(found[directive])
+            body = "\n\n".join([f".. py:currentmodule:: {package}", *found[directive]])
             parts.append(f"## {heading}\n\n```{{eval-rst}}\n{body}\n```")
     if elsewhere:
         parts.append(f"## At the top, in {code('kerfpath')}\n\n{', '.join(elsewhere)}")
