@@ -20,6 +20,7 @@ NEEDS = {
     ),
     "report": ("plotly",),
     "studio": ("starlette", "uvicorn", "websockets"),
+    "tables": ("pandas",),
 }  # fmt: skip
 """Modules that each extra of the package installs."""
 

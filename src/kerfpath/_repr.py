@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from html import escape
 from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 
-__all__ = ["counted", "short_repr"]
+__all__ = ["counted", "html_table", "in_degrees", "short_repr"]
 
 LONGEST = 240
 """Characters of a line; what does not fit is left out."""
@@ -38,6 +39,23 @@ def short_repr(thing: Any) -> str:
             break
         said.append(f"{part}, ")
     return "".join(said).removesuffix(", ") + ")"
+
+
+def html_table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table as HTML, for notebooks: text alone, everything escaped."""
+    lines = [("th", heads), *(("td", row) for row in rows)]
+    body = "".join(
+        f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
+        for tag, cells in lines
+    )
+    return f"<table><caption>{escape(caption)}</caption>{body}</table>"
+
+
+def in_degrees(value: float, unit: str) -> str:
+    """Return a value in rad or m, or per s or s^2, as people read it: "12.50 deg/s", "40.00 mm"."""
+    of, slash, per = unit.partition("/")
+    factor, word = (180 / np.pi, "deg") if of == "rad" else (1e3, "mm")
+    return f"{factor * value:.2f} {word}{slash}{per}"
 
 
 def _short(value: Any) -> str:

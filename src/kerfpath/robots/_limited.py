@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath._arrays import Array, Bools, Ints, as_pose, bools, floats, positive, scalar
+from kerfpath._repr import html_table, in_degrees
 from kerfpath.dynamics import ArmDynamics
 from kerfpath.errors import InputError
 from kerfpath.kernels import turns
@@ -59,6 +60,19 @@ class Limited(Burden):
         known = f"accelerations {'not ' if self.acceleration is None else ''}known"
         words = f"{self.manufacturer} {self.model}, {self.joints} joints, {self.kinematics}"
         return f"Robot({self.id!r}, {words}, {known})"
+
+    def _repr_html_(self) -> str:
+        """Return a small table for notebooks: the joints and their limits."""
+        limits = {"lower": "", "upper": "", "velocity": "/s", "acceleration": "/s^2"}
+        rows = []
+        for i, (name, unit) in enumerate(zip(self.joint_names, self.units, strict=True)):
+            row = [name]
+            for limit, per in limits.items():
+                values = getattr(self, limit)
+                said = "not known" if values is None else in_degrees(values[i], unit + per)
+                row.append("endless" if self.endless[i] and not per else said)
+            rows.append(row)
+        return html_table(repr(self), ["joint", *limits], rows)
 
     def __post_init__(self) -> None:
         _set = object.__setattr__

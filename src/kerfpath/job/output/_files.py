@@ -26,7 +26,7 @@ from kerfpath.job.plan_file import (
 )
 from kerfpath.job.programs import audit_of_cuts, program_of
 from kerfpath.job.run import JobResult
-from kerfpath.plans import Plan
+from kerfpath.plans import Plan, joint_columns
 from kerfpath.post import language, replace_program
 from kerfpath.sequence import PartPlan
 from kerfpath.transfer import TransferMove
@@ -305,10 +305,7 @@ def trajectory_text(plans: Sequence[Plan], moves: Sequence[TransferMove] = ()) -
 
     Transfer moves stand where they are made, a row per corner; each has a time of its own.
     """
-    arm = range(1, (plans[0].robot.family.joints if plans else 6) + 1)
-    header = ["contour", "node", "kind", "t_s", *(f"q{i}_deg" for i in arm)]
-    for axis in plans[0].robot.externals if plans else ():
-        header.append(f"{axis.name}_{'mm' if axis.kind == 'linear' else 'deg'}")
+    header = ["contour", "node", "kind", "t_s", *_joint_header(plans)]
     header += ["x_mm", "y_mm", "z_mm", "axis_x", "axis_y", "axis_z", "gamma_deg", "posture"]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -332,6 +329,14 @@ def trajectory_text(plans: Sequence[Plan], moves: Sequence[TransferMove] = ()) -
     if len(moves) > len(plans):
         _write_air(writer, moves[-1], plans[-1])
     return out.getvalue()
+
+
+def _joint_header(plans: Sequence[Plan]) -> list[str]:
+    if not plans:
+        return [f"q{i}_deg" for i in range(1, 7)]
+    robot, shown = plans[0].robot, {"m": "mm", "rad": "deg"}
+    names = zip(joint_columns(robot), robot.units, strict=True)
+    return [f"{name}_{shown[unit]}" for name, unit in names]
 
 
 def _write_air(writer: Any, move: TransferMove, plan: Plan) -> None:

@@ -1,166 +1,33 @@
-"""The plan: what the robot does at every node, by which criteria, and what has been proved."""
+"""The plan: what the robot does at every node."""
 
 from __future__ import annotations
 
-import math
-import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, Bools, Ints, as_pose, floats, freeze, integers, scalar
-from kerfpath._repr import short_repr
-from kerfpath.certificate import Certificate
+from kerfpath._extras import require_extra
+from kerfpath._repr import html_table, in_degrees
 from kerfpath.comfort import measures
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.kernels import metric
 from kerfpath.limits import rates_of
 from kerfpath.options import PlanOptions
+from kerfpath.plans._columns import joint_columns
+from kerfpath.plans._criteria import Criteria, Feed, Proof
 from kerfpath.robots import Robot, can_back_off
-from kerfpath.search import METRIC_CODES, Metric, ObjectiveKind
 from kerfpath.tilt import tilt_frames
 
-__all__ = ["Criteria", "Feed", "Plan", "Proof", "has_room", "on_turns", "path_cost"]
+if TYPE_CHECKING:
+    import pandas
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Proof:
-    """What is proved about a plan.
-
-    Parameters
-    ----------
-    optimal : bool
-        No path on its graph is better.
-    statement : str
-        The claim in words.
-    grid_cost : float or None
-        Where the plan is refined: the cost of the path on the graph that it was refined from, if
-        that keeps all limits.
-    bound : float or None
-        No motion that keeps (5) and (6) at the nodes costs less, at any gamma, posture and turn;
-        None where nothing of the kind is proved.
-    gap : float or None
-        How far the plan may be from the best motion: (cost - bound) / cost.
-    certificate : Certificate or None
-        What proves the bound, see `kerfpath.certificate`.
-    """
-
-    optimal: bool
-    statement: str
-    grid_cost: float | None = None
-    bound: float | None = None
-    gap: float | None = None
-    certificate: Certificate | None = None
-
-    __repr__ = short_repr
-
-    @property
-    def bound_claim(self) -> str:
-        """The bound in words, as the statement has it; "" where there is none."""
-        if self.bound is None:
-            return ""
-        return (
-            f"no motion within the limits costs less than {self.bound_shown}, {self.gap_shown} % "
-            "below this plan, at any gamma, posture and turn"
-        )
-
-    def without_bound(self) -> Proof:
-        """Return what it says beside its bound: of another motion the bound and its gap do not."""
-        rest = [part for part in self.statement.split("; ") if part != self.bound_claim]
-        return replace(self, statement="; ".join(rest), bound=None, gap=None, certificate=None)
-
-    @property
-    def bound_shown(self) -> str:
-        """The bound to two places, never more than it is; "-" where there is none."""
-        return "-" if self.bound is None else f"{math.floor(self.bound * 100) / 100:.2f}"
-
-    @property
-    def gap_shown(self) -> str:
-        """The gap in per cent to two places, never less than it is; "-" where there is none."""
-        return "-" if self.gap is None else f"{max(math.ceil(self.gap * 1e4), 0) / 100:.2f}"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Feed:
-    """Where a retimed path keeps the commanded speed, where it is slowest, and what binds there.
-
-    Parameters
-    ----------
-    full : float
-        Share of the path length at the commanded speed.
-    slowest : float
-        Speed of the slowest interval as a share of the commanded speed; 1 where none is slowed.
-    node : int
-        The node that the slowest interval starts from; -1 where none is slowed.
-    joint : int
-        The joint nearest to its limit in that interval or at its ends, 0-based; -1 for none.
-    limit : {"velocity", "acceleration"} or None
-        Which limit that is.
-    """
-
-    full: float
-    slowest: float
-    node: int
-    joint: int
-    limit: Literal["velocity", "acceleration"] | None
-
-    def __str__(self) -> str:
-        """Say it in one line."""
-        if self.limit is None:
-            return "full speed throughout"
-        return (
-            f"full speed on {self.full:.1%} of the length; slowest, {self.slowest:.1%} of it, from "
-            f"node {self.node} on, where the {self.limit} of joint {self.joint + 1} binds"
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Criteria:
-    """Smoothness of a plan, joint by joint, each (n,), and what it comes near to.
-
-    In rad and rad/s; for a rail in m and m/s.
-
-    Parameters
-    ----------
-    displacement : rad
-        Total displacement (7).
-    largest_increment : rad
-        Largest increment between nodes (8).
-    range : rad
-        Coordinate range (9).
-    peak_velocity, peak_acceleration : share of the limit
-        Largest finite difference over the joint's limit, before eta.
-    nearest : mapping of str to (float, int)
-        The least of each measure of `kerfpath.comfort`, in its unit, and the node it stands at.
-    """
-
-    displacement: Array
-    largest_increment: Array
-    range: Array
-    peak_velocity: Array
-    peak_acceleration: Array
-    nearest: Mapping[str, tuple[float, int]]
-
-    __repr__ = short_repr
-
-
-def path_cost(
-    dq: Array,
-    weights: Array,
-    metric_name: Metric,
-    objective: ObjectiveKind,
-    node_cost: Array | None = None,
-) -> float:
-    """Return the objective (14) or (15) of joint increments (K-1, n) rad, with the nodes' costs."""
-    total = metric.total_distance if objective == "sum" else metric.maximum_distance
-    cost = float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
-    if node_cost is None:
-        return cost
-    return cost + float(node_cost.sum()) if objective == "sum" else max(cost, *node_cost.tolist())
+__all__ = ["Plan", "has_room", "on_turns"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -348,6 +215,72 @@ class Plan:
             nearest={name: (float(of.min()), int(of.argmin())) for name, of in measured.items()},
         )
 
+    @property
+    def columns(self) -> dict[str, Array | Ints | list[str]]:
+        """A table of the nodes: K values of each column by its name, which ends in the unit.
+
+        Columns are named as in trajectory.csv, in SI: contour, node, kind, t_s; s_m, the way along
+        the contour; the joints, q1_rad and on, then external axes by their names (`rail_m`,
+        `table_rad`); x_m, y_m, z_m, axis_x, axis_y, axis_z, the tool in the robot base; gamma_rad;
+        lead_rad and lean_rad, where a tilt was asked for; posture; speed_m_s, that of the tip on
+        its way to the next node, which the last has not: NaN.
+        """
+        units = zip(joint_columns(self.robot), self.robot.units, strict=True)
+        joints = [f"{name}_{unit}" for name, unit in units]
+        s, tilted = self.contour.s, self.settings.tilt is not None
+        return {
+            "contour": [self.name] * len(s),
+            "node": np.arange(len(s)),
+            "kind": list(self.contour.kinds),
+            "t_s": self.time,
+            "s_m": freeze(s - s[0]),
+            **dict(zip(joints, self.q.T, strict=True)),
+            **dict(zip(("x_m", "y_m", "z_m"), self.points.T, strict=True)),
+            **dict(zip(("axis_x", "axis_y", "axis_z"), self.axes.T, strict=True)),
+            "gamma_rad": self.gamma,
+            **(dict(zip(("lead_rad", "lean_rad"), self.tilt.T, strict=True)) if tilted else {}),
+            "posture": self.posture,
+            "speed_m_s": freeze(np.append(np.diff(s) / np.diff(self.time), np.nan)),
+        }
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the nodes as a DataFrame, a row each, with the columns of `columns`.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        require_extra("tables", "Plan.to_pandas")
+        import pandas
+
+        return pandas.DataFrame(self.columns)
+
+    def _repr_html_(self) -> str:
+        """Return a small table for notebooks: the joints, their way, and shares of their limits."""
+        of, robot = self.criteria, self.robot
+        rows = [
+            [
+                name,
+                in_degrees(way, unit),
+                in_degrees(span, unit),
+                f"{100 * velocity:.0f} %",
+                f"{100 * acceleration:.0f} %",
+            ]
+            for name, unit, way, span, velocity, acceleration in zip(
+                robot.joint_names,
+                robot.units,
+                of.displacement,
+                of.range,
+                of.peak_velocity,
+                of.peak_acceleration,
+                strict=True,
+            )
+        ]
+        heads = ["joint", "displacement", "range", "peak velocity", "peak acceleration"]
+        proved = f"<p>{escape(self.proof.statement)}</p>" if self.proof.statement else ""
+        return html_table(repr(self), heads, rows) + proved
+
 
 def on_turns(robot: Robot, q: Array) -> tuple[Array, Ints]:
     """Return joints q (K, n) rad as a plan has them, endless ones wrapped, and their turns (K, n).
@@ -362,15 +295,6 @@ def on_turns(robot: Robot, q: Array) -> tuple[Array, Ints]:
 
 def _mean_step(time: Array) -> float:
     return float(time[-1] - time[0]) / (len(time) - 1)
-
-
-def __getattr__(name: str) -> object:
-    if name != "Settings":
-        raise AttributeError(f"module 'kerfpath.plans' has no attribute {name!r}")
-    warnings.warn(
-        "kerfpath.plans.Settings is kerfpath.PlanOptions now", DeprecationWarning, stacklevel=2
-    )
-    return PlanOptions
 
 
 def has_room(options: PlanOptions, robot: Robot, q: Array, posture: Ints, tool: Array) -> Bools:

@@ -1,0 +1,23 @@
+"""The plan: what the robot does at every node, by which criteria, and what has been proved."""
+
+import warnings
+
+from kerfpath.plans._columns import joint_columns as joint_columns
+from kerfpath.plans._criteria import Criteria as Criteria
+from kerfpath.plans._criteria import Feed as Feed
+from kerfpath.plans._criteria import Proof as Proof
+from kerfpath.plans._criteria import path_cost as path_cost
+from kerfpath.plans._plan import Plan as Plan
+from kerfpath.plans._plan import has_room as has_room
+from kerfpath.plans._plan import on_turns as on_turns
+
+
+def __getattr__(name: str) -> object:
+    if name != "Settings":
+        raise AttributeError(f"module 'kerfpath.plans' has no attribute {name!r}")
+    from kerfpath.options import PlanOptions
+
+    warnings.warn(
+        "kerfpath.plans.Settings is kerfpath.PlanOptions now", DeprecationWarning, stacklevel=2
+    )
+    return PlanOptions

@@ -1,0 +1,190 @@
+"""Plans and robots as other Python packages take them: tables, notebooks, the page on all of it."""
+
+import csv
+import io
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+import pytest
+from tests.post.external_cells import moving_plan
+
+from conftest import ROOT
+from kerfpath import InputError, Tilt, robot
+from kerfpath.job.output._files import trajectory_text
+from programs import arc, frames, hand_plan
+
+PAGE = (ROOT / "docs" / "interoperability.md").read_text(encoding="utf-8")
+SHOWN = {"rad": ("deg", 180 / np.pi), "m": ("mm", 1e3)}
+"""What trajectory.csv has in place of SI, and the factor."""
+
+
+@pytest.fixture(scope="module")
+def plain(arm):
+    return hand_plan(arc(count=9), arm, *frames())
+
+
+def carried(arm, *names):
+    """A plan on a gantry's linear axes of these names, and a table, all of which move."""
+    slow = {"velocity": 2.0, "acceleration": 4.0}
+    cell = arm
+    for i, name in enumerate(names):
+        cell = cell.on_rail(np.eye(3)[i], lower=-1.0, upper=1.0, name=name, **slow)
+    tool, placement = frames()
+    cell = cell.with_positioner(
+        [0, 0, 1], placement[:3, 3], lower=-1.0, upper=1.0, name="table", **slow
+    )
+    share = np.linspace(0, 1, 7)[:, None]
+    course = share * np.linspace(0.03, 0.1, len(cell.externals))
+    return moving_plan(arc(count=7), cell, tool, placement, course)
+
+
+# Tables.
+
+
+def test_a_table_says_what_the_plan_says(plain):
+    table = plain.to_pandas()
+    assert isinstance(table, pd.DataFrame)
+    assert len(table) == len(plain.q)
+    np.testing.assert_array_equal(table[[f"q{i}_rad" for i in range(1, 7)]], plain.q)
+    np.testing.assert_array_equal(table[["x_m", "y_m", "z_m"]], plain.points)
+    np.testing.assert_array_equal(table[["axis_x", "axis_y", "axis_z"]], plain.axes)
+    for name, values in (("t_s", plain.time), ("gamma_rad", plain.gamma), ("s_m", plain.contour.s)):
+        np.testing.assert_array_equal(table[name], values)
+    # Way over time, as hand_plan was asked for: 0.1 m/s; nothing follows the last node.
+    np.testing.assert_allclose(table["speed_m_s"][:-1], 0.1, rtol=1e-6)
+    assert np.isnan(table["speed_m_s"].iloc[-1])
+    assert "lead_rad" not in table
+    assert table["contour"].unique().tolist() == [plain.name]
+
+
+@pytest.mark.parametrize("names", [(), ("rail",), ("x", "y")])
+def test_a_table_and_trajectory_csv_have_the_same_names_and_values(arm, names):
+    plan = carried(arm, *names)
+    kept = pd.read_csv(io.StringIO(trajectory_text([plan])))
+    table = plan.to_pandas().drop(columns=["s_m", "speed_m_s"])
+    shown = {}
+    for name, values in table.items():
+        stem, _, unit = name.rpartition("_")
+        word, factor = SHOWN.get(unit, ("", 1.0))
+        shown[f"{stem}_{word}" if word else name] = values * factor if word else values
+    assert list(shown) == list(kept)
+    for name, values in shown.items():
+        if name in ("contour", "kind"):
+            assert values.tolist() == kept[name].tolist()
+        else:  # a multiplication, in another order: one rounding
+            np.testing.assert_allclose(values, kept[name], rtol=1e-15)
+
+
+def test_an_axis_called_as_a_column_of_the_tool_has_a_column_of_its_own(arm):
+    plan = carried(arm, "x", "y")
+    table = plan.to_pandas()
+    np.testing.assert_array_equal(table[["x_axis_m", "y_axis_m", "table_rad"]], plan.external)
+    np.testing.assert_array_equal(table[["x_m", "y_m"]], plan.points[:, :2])
+    header = next(csv.reader(io.StringIO(trajectory_text([plan]))))
+    assert len(set(header)) == len(header)
+
+
+def test_a_tilt_has_columns_where_it_was_asked_for(plain):
+    asked = replace(plain.settings, tilt=Tilt(cone=0.05, steps=1))
+    tilt = np.linspace(0, 0.02, 2 * len(plain.q)).reshape(-1, 2)
+    table = replace(plain, tilt=tilt, settings=asked).to_pandas()
+    np.testing.assert_array_equal(table[["lead_rad", "lean_rad"]], tilt)
+
+
+def test_tables_of_several_contours_stand_below_each_other(arm):
+    plans = [hand_plan(arc(name, count=5), arm, *frames()) for name in ("one", "two")]
+    table = pd.concat([plan.to_pandas() for plan in plans], ignore_index=True)
+    assert table.groupby("contour")["node"].max().tolist() == [4, 4]
+
+
+def test_without_pandas_the_columns_are_there_and_to_pandas_says_what_to_install(
+    plain, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    assert plain.columns["q1_rad"].shape == (len(plain.q),)
+    with pytest.raises(InputError, match=r"Plan.to_pandas: pandas is .* 'kerfpath\[tables\]'"):
+        plain.to_pandas()
+
+
+def test_the_core_imports_nothing_of_its_extras():
+    code = (
+        "import sys, kerfpath; [getattr(kerfpath, n) for n in ('Plan', 'Robot', 'plan', 'robot')];"
+        "sys.exit(bool({'pandas', 'plotly', 'OCP', 'pinocchio'} & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+# Notebooks.
+
+
+class Cells(HTMLParser):
+    """The tags of a piece of HTML, and the text of each row of its table."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.tags, self.rows, self.open = set(), [], []
+        self.feed(html)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.add(tag)
+        self.open.append(tag)
+        assert not attributes
+        if tag == "tr":
+            self.rows.append([])
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] in ("td", "th"):
+            self.rows[-1].append(data)
+
+
+def test_a_plan_shows_its_joints_in_a_notebook(arm):
+    plan = carried(arm, "x")
+    shown = Cells(plan._repr_html_())
+    assert shown.tags <= {"table", "caption", "tr", "th", "td", "p"}
+    assert [row[0] for row in shown.rows[1:]] == list(plan.robot.joint_names)
+    joint_2, x = shown.rows[2], shown.rows[7]
+    assert joint_2[2] == f"{np.degrees(np.ptp(plan.q[:, 1])):.2f} deg"
+    assert x[2] == f"{1e3 * np.ptp(plan.q[:, 6]):.2f} mm"
+    assert x[3] == f"{100 * np.abs(plan.velocity_share[:, 6]).max():.0f} %"
+
+
+def test_a_robot_shows_its_limits_in_a_notebook(arm):
+    rows = Cells(carried(arm, "x").robot._repr_html_()).rows
+    assert rows[1] == ["joint 1", "-180.00 deg", "180.00 deg", "175.00 deg/s", "320.00 deg/s^2"]
+    assert rows[4][:3] == ["joint 4", "endless", "endless"]
+    assert rows[7] == ["x", "-1000.00 mm", "1000.00 mm", "2000.00 mm/s", "4000.00 mm/s^2"]
+    unknown = Cells(robot("kuka_kr120_r2500_pro")._repr_html_()).rows
+    assert unknown[1] == ["joint 1", *["not known"] * 4]
+
+
+def test_names_are_text_in_notebooks_and_nothing_else(plain):
+    mean = '<script src="https://example.com/x.js"></script>'
+    named = replace(plain, contour=replace(plain.contour, name=mean))
+    named = replace(named, robot=replace(plain.robot, id=mean))
+    named = replace(named, proof=replace(plain.proof, statement=mean))
+    for html in (named._repr_html_(), named.robot._repr_html_()):
+        assert "script" not in Cells(html).tags
+
+
+# The page.
+
+
+@pytest.mark.parametrize("number", range(len(re.findall("```python", PAGE))))
+def test_a_block_of_the_page_runs_in_a_new_session(number, tmp_path):
+    code = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    first = code[0] if number else ""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", first + "\n" + code[number]],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() or not number
