@@ -234,6 +234,10 @@ def robots(
     name: Annotated[
         str | None, typer.Argument(help="Id of one robot, rail or positioner; default: all.")
     ] = None,
+    urdf: Annotated[
+        Path | None,
+        typer.Option(help="Write the joints and limits of the robot as a description (URDF)."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """List the library, or show a robot, rail or positioner of it with limits and their sources.
@@ -243,10 +247,12 @@ def robots(
 
     Example: kerfpath robots abb_irb4600_60_205
     """
-    from kerfpath.cli._robots import list_robots, show_external, show_robot
+    from kerfpath.cli._robots import list_robots, show_external, show_robot, write_urdf
     from kerfpath.robots import external_ids
 
-    if name is None:
+    if urdf is not None:
+        write_urdf(name, urdf, as_json=as_json)
+    elif name is None:
         list_robots(as_json=as_json)
     elif name in external_ids():
         show_external(name, as_json=as_json)

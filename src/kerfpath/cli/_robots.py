@@ -1,15 +1,19 @@
-"""`kerfpath robots`: print the library as tables, or one robot or product with its sources."""
+"""`kerfpath robots`: the library as tables, one robot or product with its sources, or its URDF."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 from rich.markup import escape
 
 from kerfpath._arrays import Array
+from kerfpath._writing import write_whole
 from kerfpath.cli._show import out, print_json, table
+from kerfpath.errors import InputError
 from kerfpath.robots import ExternalProduct, KnownAxis, external, external_ids, robot, robot_ids
 
-__all__ = ["list_robots", "show_external", "show_robot"]
+__all__ = ["list_robots", "show_external", "show_robot", "write_urdf"]
 
 UNITS = {"lower": "", "upper": "", "velocity": "/s", "acceleration": "/s^2"}
 """Limits of external axes, and what follows mm or deg in their units."""
@@ -204,12 +208,12 @@ def show_robot(name: str, *, as_json: bool) -> None:
     out.print(f"payload {r.payload:g} kg, reach {r.reach:g} m")
     lengths = ", ".join(f"{k} {v * 1000:g}" for k, v in r.geometry.items())
     out.print(f"lengths ({r.kinematics.upper()}, mm): {lengths}")
+    rest = [""] * (r.joints - 1)
     rows = [
-        [what, *(["not known", *[""] * 5] if values is None else [f"{v:g}" for v in values])]
+        [what, *(["not known", *rest] if values is None else [f"{v:g}" for v in values])]
         for what, values in limits.items()
     ]
-    joints = [f"joint {i}" for i in range(1, 7)]
-    table(["limit", *joints], rows, numbers=joints)
+    table(["limit", *r.joint_names], rows, numbers=r.joint_names)
     for c in couplings:
         out.print(
             f"{c['what']}: {c['lower_deg']:g} to {c['upper_deg']:g} deg ({escape(str(c['note']))})"
@@ -225,6 +229,31 @@ def show_robot(name: str, *, as_json: bool) -> None:
         out.print(f"note: {escape(note)}")
     for what, source in r.sources.items():
         out.print(f"source of {what.replace('_', ' ')}: {escape(source)}")
+
+
+def write_urdf(name: str | None, path: Path, *, as_json: bool) -> None:
+    """Write the description of a robot of the library to a file, and say so.
+
+    Raises
+    ------
+    InputError
+        No robot; as `Robot.to_urdf`; no place to write to.
+    """
+    if name is None or name in external_ids():
+        raise InputError(
+            f"--urdf: expected the id of a robot, got {name or 'none'}; kerfpath robots lists them"
+        )
+    text = robot(name).to_urdf()
+    try:
+        write_whole({path: text.encode()})
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot write ({error.strerror}); choose another --urdf"
+        ) from None
+    if as_json:
+        print_json({"id": name, "files": [str(path)]})
+    else:
+        out.print(f"wrote {escape(str(path))}")
 
 
 def _key(said: str) -> str:

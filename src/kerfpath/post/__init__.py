@@ -4,6 +4,7 @@ from kerfpath._extras import require_extra
 
 require_extra("programs", "robot programs")
 
+from kerfpath._names import identifier as identifier
 from kerfpath.post._arcs import circle_through as circle_through
 from kerfpath.post._arcs import with_arcs as with_arcs
 from kerfpath.post._build import build_program as build_program
@@ -30,7 +31,6 @@ from kerfpath.post._languages import ENTRY_POINTS as ENTRY_POINTS
 from kerfpath.post._languages import Language as Language
 from kerfpath.post._languages import language as language
 from kerfpath.post._languages import languages as languages
-from kerfpath.post._names import identifier as identifier
 from kerfpath.post._outline import issues_before_planning as issues_before_planning
 from kerfpath.post._places import Line as Line
 from kerfpath.post._places import TimedLine as TimedLine

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath._arrays import Array, not_negative, scalar
+from kerfpath._names import identifier, identifiers
 from kerfpath._repr import short_repr
 from kerfpath.cell import UNPROVED
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
 from kerfpath.post._arcs import with_arcs
-from kerfpath.post._names import identifier, identifiers
 from kerfpath.post._program import (
     Comment,
     Handshake,

@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import Any
 
 from kerfpath._arrays import Array
+from kerfpath._names import identifiers
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._frames import Order, controller_frames, euler
-from kerfpath.post._names import identifiers
 from kerfpath.post._program import Program
 
 __all__ = ["CalledFormatter", "off_name"]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
+from kerfpath._names import LONGEST_NAME, identifiers
 from kerfpath.errors import InputError
 from kerfpath.post._formatter import Formatter
 from kerfpath.post._issue import ProgramIssue
-from kerfpath.post._names import LONGEST_NAME, identifiers
 from kerfpath.post._program import Program, Section
 
 __all__ = [

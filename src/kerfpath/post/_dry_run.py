@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from kerfpath._arrays import scalar
+from kerfpath._names import identifiers
 from kerfpath.errors import InputError
-from kerfpath.post._names import identifiers
 from kerfpath.post._preflight import LOWEST_SHARE
 from kerfpath.post._program import (
     Await,

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kerfpath._names import identifier, identifiers
 from kerfpath.post._issue import ProgramIssue
 from kerfpath.post._languages import language as find_language
-from kerfpath.post._names import identifier, identifiers
 from kerfpath.post._preflight import foresee
 from kerfpath.post._program import Handshake, JointMove, LinearMove, Program, Section, Switch, Wait
 from kerfpath.post._settings import LanguageSettings

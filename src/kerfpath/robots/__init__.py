@@ -33,3 +33,4 @@ from kerfpath.robots._products import external_ids as external_ids
 from kerfpath.robots._robot import Robot as Robot
 from kerfpath.robots._robot import robot as robot
 from kerfpath.robots._solutions import Solutions as Solutions
+from kerfpath.robots._written import joint_identifiers as joint_identifiers

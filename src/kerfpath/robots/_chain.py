@@ -9,15 +9,15 @@ import numpy as np
 
 from kerfpath.errors import InputError
 from kerfpath.robots._carried import CarriedChain
-from kerfpath.robots._robot import Robot
+from kerfpath.robots._manipulator import Manipulator
 from kerfpath.urdf import KinematicChain, turns
 
-__all__ = ["chain_of", "model_chain", "require_axes"]
+__all__ = ["arm_chain", "chain_of", "model_chain", "require_axes"]
 
 X, Y, Z = np.eye(3)
 
 
-def chain_of(robot: Robot) -> KinematicChain:
+def chain_of(robot: Manipulator) -> KinematicChain:
     """Return the joint frames of a robot; their end is its flange.
 
     With external axes they begin at what these carry, see `CarriedChain`.
@@ -28,7 +28,7 @@ def chain_of(robot: Robot) -> KinematicChain:
         The robot has no description, and its family no model that says where its joints are; of
         one with external axes, limits that are not known.
     """
-    arm = model_chain(robot) if robot.chain is None else robot.chain
+    arm = arm_chain(robot)
     if not robot.externals:
         return arm
     limits = robot.joint_limits()
@@ -41,7 +41,12 @@ def chain_of(robot: Robot) -> KinematicChain:
     )
 
 
-def require_axes(chain: KinematicChain, robot: Robot) -> None:
+def arm_chain(robot: Manipulator) -> KinematicChain:
+    """Return the joint frames of the arm alone; raises as `chain_of`."""
+    return model_chain(robot) if robot.chain is None else robot.chain
+
+
+def require_axes(chain: KinematicChain, robot: Manipulator) -> None:
     """Require that a cell's chain has the external axes of a robot, and all their travel.
 
     Raises
@@ -69,7 +74,7 @@ def require_axes(chain: KinematicChain, robot: Robot) -> None:
             raise InputError("cell: it was built with less travel of the external axes than asked")
 
 
-def model_chain(robot: Robot) -> KinematicChain:
+def model_chain(robot: Manipulator) -> KinematicChain:
     """Return the joint frames of the model of its family, whatever its description says."""
     if robot.kinematics not in _MODELS:
         raise InputError(

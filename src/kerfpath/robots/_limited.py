@@ -201,13 +201,24 @@ class Limited(Burden):
         InputError
             One of them is not known; says how to give it.
         """
-        if self.velocity is None:
-            raise self._lacks("joint velocities", "velocity=")
+        velocity = self.velocity_limits()
         if self.acceleration is None:
             ratio = self.acceleration_ratio
             hint = f", or robot({self.id!r}, acceleration_ratio={ratio!r})" if ratio else ""
             raise self._lacks("joint accelerations", "acceleration=", hint)
-        return self.velocity, self.acceleration
+        return velocity, self.acceleration
+
+    def velocity_limits(self) -> Array:
+        """Return the joint velocities (n,) rad/s.
+
+        Raises
+        ------
+        InputError
+            They are not known.
+        """
+        if self.velocity is None:
+            raise self._lacks("joint velocities", "velocity=")
+        return self.velocity
 
     def torque_limit(self) -> TorqueLimit | None:
         """Return what limits the torques; None where no load is given.

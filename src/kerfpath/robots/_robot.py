@@ -25,6 +25,7 @@ from kerfpath.robots._known_axis import Given, KnownAxis, described_axes, requir
 from kerfpath.robots._library import read_robot
 from kerfpath.robots._manipulator import Manipulator
 from kerfpath.robots._products import ExternalProduct
+from kerfpath.robots._written import urdf_of
 
 __all__ = ["Robot", "robot"]
 
@@ -162,6 +163,20 @@ class Robot(Manipulator):
         if externals is None:
             return arm
         return arm._with_known(described_axes(description), externals, f"{description.path}")
+
+    def to_urdf(self) -> str:
+        """Return a description (URDF) of its joints, limits and external axes, without bodies.
+
+        Links are base_link, link_1 and so on, and tool0, the flange; with external axes ground, on
+        which base_link stands, each axis's carriage, and part: `from_urdf` reads it with tip
+        "tool0", mount "base_link" and, where an axis carries the part, part "part".
+
+        Raises
+        ------
+        InputError
+            Couplings, which a URDF cannot say; limits or velocities that are not known.
+        """
+        return urdf_of(self)
 
     def with_limits(
         self,

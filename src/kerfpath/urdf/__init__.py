@@ -1,5 +1,7 @@
 """Robot descriptions (URDF): the chain of joints from base to tip, its limits, bodies and masses.
 
+Read, and written from joints.
+
 Knows nothing of kinematic families: `kerfpath.Robot.from_urdf` recognises those, and therefore
 this package lies below `robots` and imports nothing of it.
 """
@@ -13,3 +15,5 @@ from kerfpath.urdf._description import read_urdf as read_urdf
 from kerfpath.urdf._inertia import ChainInertia as ChainInertia
 from kerfpath.urdf._inertia import joined as joined
 from kerfpath.urdf._inertia import require_tensor as require_tensor
+from kerfpath.urdf._write import urdf_text as urdf_text
+from kerfpath.urdf._xml import Joint as Joint

@@ -11,10 +11,10 @@ from functools import cached_property
 
 import numpy as np
 
+from kerfpath._names import identifier
 from kerfpath.post._divide import require_one_file
 from kerfpath.post._external import arm_joints, said, said_unit
 from kerfpath.post._formatter import Formatter, number
-from kerfpath.post._names import identifier
 from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import (
     CircularMove,

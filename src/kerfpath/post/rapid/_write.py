@@ -16,10 +16,10 @@ from typing import TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array
+from kerfpath._names import identifiers
 from kerfpath.post._divide import divide_sections, rename_sections
 from kerfpath.post._external import carrier_frame
 from kerfpath.post._formatter import Formatter, number
-from kerfpath.post._names import identifiers
 from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import (
     Await,

@@ -16,12 +16,11 @@ from kerfpath._arrays import Array, Ints
 from kerfpath.post._divide import require_one_file
 from kerfpath.post._external import setup_remarks
 from kerfpath.post._formatter import Formatter, number, plain
-from kerfpath.post._names import identifiers
 from kerfpath.post._orientations import quaternions
 from kerfpath.post._program import JointMove, LinearMove, Wait
 from kerfpath.post._settings import LanguageSettings, LinesPerFile, Rules, setting
 from kerfpath.post.ros._trajectory import Trajectory, rates, trajectory
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, joint_identifiers
 
 __all__ = ["Ros", "RosSettings", "head", "joint_names", "rules"]
 
@@ -46,13 +45,8 @@ def rules(settings: RosSettings) -> Rules:
 
 
 def joint_names(robot: Robot, settings: RosSettings) -> list[str]:
-    """Return the names of all joints: those of the settings, or joint_1 and so on.
-
-    External axes, the last, have their own names.
-    """
-    arm = [f"joint_{i}" for i in range(1, robot.family.joints + 1)]
-    names = identifiers((axis.name for axis in robot.externals), taken=arm)
-    return settings.joint_names or [*arm, *names]
+    """Return the names of all joints: those of the settings, or those of `Robot.to_urdf`."""
+    return settings.joint_names or joint_identifiers(robot)
 
 
 def head(names: list[str]) -> list[str]:
