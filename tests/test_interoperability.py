@@ -10,12 +10,16 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pandas as pd
+import pinocchio as pin
 import pytest
+from ruamel.yaml import YAML
 from tests.post.external_cells import moving_plan
 
 from conftest import ROOT
 from kerfpath import InputError, Tilt, robot
 from kerfpath.job.output._files import trajectory_text
+from kerfpath.post import joint_trajectory, post
+from kerfpath.post.ros import RosSettings
 from programs import arc, frames, hand_plan
 
 PAGE = (ROOT / "docs" / "interoperability.md").read_text(encoding="utf-8")
@@ -117,6 +121,89 @@ def test_the_core_imports_nothing_of_its_extras():
         "sys.exit(bool({'pandas', 'plotly', 'OCP', 'pinocchio'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+# Motions.
+
+
+def test_rates_are_those_of_a_parabola_wherever_its_nodes_are(plain):
+    """A law: of a motion that is one parabola they are exact, at the ends as well."""
+    rng = np.random.default_rng(3)
+    time = np.concatenate([[0.0], np.cumsum(rng.uniform(0.02, 0.2, len(plain.q) - 1))])
+    c0, c1, c2 = rng.normal(size=(3, 6)) * [[0.1], [0.1], [0.05]]
+    q = c0 + c1 * time[:, None] + c2 * time[:, None] ** 2
+    motion = replace(plain, q=q, time=time).motion
+    np.testing.assert_allclose(motion.q, q, atol=1e-14)
+    # Second differences of numbers of about 1 over steps of 0.02 s: 1e-16 / 4e-4 each.
+    np.testing.assert_allclose(motion.v, c1 + 2 * c2 * time[:, None], atol=1e-12)
+    np.testing.assert_allclose(motion.a, np.tile(2 * c2, (len(time), 1)), atol=1e-10)
+
+
+def test_two_nodes_are_a_straight_line(arm):
+    two = hand_plan(arc(count=2), arm, *frames())
+    slope = np.diff(two.q, axis=0) / two.time[-1]
+    np.testing.assert_allclose(two.motion.v, np.vstack([slope, slope]), rtol=1e-12)
+    assert not two.motion.a.any()
+
+
+def test_an_endless_joint_goes_on_where_the_plan_is_wrapped(plain):
+    q = np.array(plain.q)
+    q[:, 5] = np.linspace(3.0, 3.8, len(q))
+    expected = q[:, 5].copy()
+    q[q > np.pi] -= 2 * np.pi
+    motion = replace(plain, q=q).motion
+    np.testing.assert_allclose(motion.q[:, 5], expected, atol=1e-14)
+    assert np.ptp(motion.v[:, 5]) < 1e-12
+
+
+@pytest.mark.parametrize("names", [(), ("y",)])
+def test_pinocchio_moves_as_the_plan_does(arm, names):
+    plan = carried(arm.with_limits(endless=[0, 0, 0, 1, 0, 1]), *names)
+    robot = plan.robot
+    model = pin.buildModelFromXML(robot.to_urdf())
+    motion = plan.to_pinocchio(model)
+    assert motion.q.shape == (len(plan.q), model.nq)
+    assert motion.v.shape == motion.a.shape == (len(plan.q), model.nv)
+    data, dt = model.createData(), 1e-6
+    flange, part = (model.getFrameId(name) for name in ("tool0", "part"))
+    for q, v, row, dq in zip(motion.q, motion.v, plan.q, plan.motion.v, strict=True):
+        assert pin.isNormalized(model, q, 1e-12)
+        pin.framesForwardKinematics(model, data, q)
+        T = data.oMf[part].actInv(data.oMf[flange]).homogeneous
+        np.testing.assert_allclose(T, robot.forward(row), atol=1e-9)
+        # A step along v leads where a step of all joints leads.
+        pin.framesForwardKinematics(model, data, pin.integrate(model, q, v * dt))
+        T = data.oMf[part].actInv(data.oMf[flange]).homogeneous
+        np.testing.assert_allclose(T, robot.forward(row + dq * dt), atol=1e-9)
+
+
+def test_a_model_of_other_joints_is_refused(plain, arm):
+    railed = carried(arm, "rail")
+    model = pin.buildModelFromXML(plain.robot.to_urdf())
+    with pytest.raises(InputError, match=r"model: expected .* got one with no rail, table; pinocc"):
+        railed.to_pinocchio(model)
+    with pytest.raises(InputError, match="got one with 8 degrees of freedom"):
+        plain.to_pinocchio(pin.buildModelFromXML(railed.robot.to_urdf()))
+
+
+@pytest.mark.parametrize("names", [(), ("rail",)])
+def test_the_ros_message_is_the_one_that_is_written(arm, names):
+    plan = carried(arm, *names)
+    (text, _) = post([plan], "ros").values()
+    made = plan.to_ros()
+    assert made == YAML(typ="safe").load(text)
+    assert made["joint_names"] == [f"joint_{i}" for i in range(1, 7)] + [*names, "table"]
+    urdf = plan.robot.to_urdf()
+    assert all(f'<joint name="{name}"' in urdf for name in made["joint_names"])
+
+
+def test_settings_of_the_ros_message_and_its_refusals_are_those_of_the_program(plain):
+    settings = RosSettings(joint_names=[f"a{i}" for i in range(6)], step_ms=100)
+    coarse = joint_trajectory([plain], settings)
+    assert coarse["joint_names"] == settings.joint_names
+    assert len(coarse["points"]) < len(plain.to_ros()["points"])
+    with pytest.raises(InputError, match="joint_names has 5 names, the robot 6 joints"):
+        joint_trajectory([plain], RosSettings(joint_names=[f"a{i}" for i in range(5)]))
 
 
 # Notebooks.

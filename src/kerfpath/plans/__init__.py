@@ -7,6 +7,8 @@ from kerfpath.plans._criteria import Criteria as Criteria
 from kerfpath.plans._criteria import Feed as Feed
 from kerfpath.plans._criteria import Proof as Proof
 from kerfpath.plans._criteria import path_cost as path_cost
+from kerfpath.plans._motion import JointMotion as JointMotion
+from kerfpath.plans._motion import node_rates as node_rates
 from kerfpath.plans._plan import Plan as Plan
 from kerfpath.plans._plan import has_room as has_room
 from kerfpath.plans._plan import on_turns as on_turns

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +22,8 @@ from kerfpath.limits import rates_of
 from kerfpath.options import PlanOptions
 from kerfpath.plans._columns import joint_columns
 from kerfpath.plans._criteria import Criteria, Feed, Proof
-from kerfpath.robots import Robot, can_back_off
+from kerfpath.plans._motion import JointMotion, in_model, node_rates
+from kerfpath.robots import Robot, can_back_off, joint_identifiers
 from kerfpath.tilt import tilt_frames
 
 if TYPE_CHECKING:
@@ -255,6 +257,44 @@ class Plan:
         import pandas
 
         return pandas.DataFrame(self.columns)
+
+    @property
+    def motion(self) -> JointMotion:
+        """Time (K,), joints, velocities and accelerations (K, n) at the nodes, SI.
+
+        Endless joints are not wrapped. Rates are those of the parabola through a node and its
+        neighbours. At the ends the robot moves: stops there are the program's.
+        """
+        q = self.unwrapped
+        v, a = node_rates(self.time, q)
+        return JointMotion(self.time, freeze(q), freeze(v), freeze(a))
+
+    def to_pinocchio(self, model: Any) -> JointMotion:
+        """Return `motion` as a pinocchio model counts joints: q (K, nq), v and a (K, nv).
+
+        Parameters
+        ----------
+        model : pinocchio.Model
+            Of `Robot.to_urdf`, or another with joints of the same names and no others.
+
+        Raises
+        ------
+        InputError
+            Other joints.
+        """
+        return in_model(self.motion, joint_identifiers(self.robot), model)
+
+    def to_ros(self) -> dict[str, object]:
+        """Return a program of this plan as the fields of a trajectory_msgs/JointTrajectory.
+
+        As `kerfpath.post.joint_trajectory`, which also takes several plans and settings.
+
+        Raises
+        ------
+        InputError
+            The extra `programs` is not installed; a program that its preflight refuses.
+        """
+        return dict(import_module("kerfpath.post").joint_trajectory([self]))
 
     def _repr_html_(self) -> str:
         """Return a small table for notebooks: the joints, their way, and shares of their limits."""

@@ -27,6 +27,7 @@ from kerfpath.post._formatter import Formatter as Formatter
 from kerfpath.post._groups import ReadGroup as ReadGroup
 from kerfpath.post._groups import groups_of as groups_of
 from kerfpath.post._issue import ProgramIssue as ProgramIssue
+from kerfpath.post._joint_trajectory import joint_trajectory as joint_trajectory
 from kerfpath.post._languages import ENTRY_POINTS as ENTRY_POINTS
 from kerfpath.post._languages import Language as Language
 from kerfpath.post._languages import language as language

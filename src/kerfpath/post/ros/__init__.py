@@ -5,8 +5,10 @@ from kerfpath.post.ros._check import check
 from kerfpath.post.ros._read import read
 from kerfpath.post.ros._trajectory import Trajectory as Trajectory
 from kerfpath.post.ros._trajectory import trajectory as trajectory
+from kerfpath.post.ros._write import Message as Message
 from kerfpath.post.ros._write import Ros as Ros
 from kerfpath.post.ros._write import RosSettings as RosSettings
+from kerfpath.post.ros._write import message as message
 from kerfpath.post.ros._write import rules
 
 ROS = Language(

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from kerfpath._arrays import Array, Bools, Ints, freeze
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
+from kerfpath.plans import node_rates
 from kerfpath.post._program import JointMove, LinearMove, Program, Wait
 from kerfpath.post._times import timetable
 from kerfpath.robots import base_in_part
@@ -49,12 +50,7 @@ def rates(time: Array, q: Array, stops: Bools) -> tuple[Array, Array]:
 
     Elsewhere they are those of the parabola through a point and its two neighbours.
     """
-    velocity, acceleration = np.zeros_like(q), np.zeros_like(q)
-    step = np.diff(time)[:, None]
-    slope = np.diff(q, axis=0) / step
-    before, after = step[:-1], step[1:]
-    velocity[1:-1] = (after * slope[:-1] + before * slope[1:]) / (before + after)
-    acceleration[1:-1] = 2 * np.diff(slope, axis=0) / (before + after)
+    velocity, acceleration = node_rates(time, q)
     velocity[stops] = acceleration[stops] = 0.0
     return velocity, acceleration
 

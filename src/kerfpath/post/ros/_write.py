@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, TypedDict
 
 import numpy as np
 
@@ -17,16 +17,48 @@ from kerfpath.post._divide import require_one_file
 from kerfpath.post._external import setup_remarks
 from kerfpath.post._formatter import Formatter, number, plain
 from kerfpath.post._orientations import quaternions
-from kerfpath.post._program import JointMove, LinearMove, Wait
+from kerfpath.post._program import JointMove, LinearMove, Program, Wait
 from kerfpath.post._settings import LanguageSettings, LinesPerFile, Rules, setting
 from kerfpath.post.ros._trajectory import Trajectory, rates, trajectory
 from kerfpath.robots import Robot, joint_identifiers
 
-__all__ = ["Ros", "RosSettings", "head", "joint_names", "rules"]
+__all__ = ["Message", "Ros", "RosSettings", "head", "joint_names", "message", "rules"]
 
 DECIMALS = {"positions": 10, "velocities": 6, "accelerations": 6}
 SECOND = 1_000_000_000
 """In ns."""
+
+
+class Time(TypedDict):
+    """A time or a duration: builtin_interfaces/Time and Duration."""
+
+    sec: int
+    nanosec: int
+
+
+class Header(TypedDict):
+    """std_msgs/Header."""
+
+    stamp: Time
+    frame_id: str
+
+
+class Point(TypedDict):
+    """trajectory_msgs/JointTrajectoryPoint; rad, rad/s, rad/s^2, of linear axes in m."""
+
+    positions: list[float]
+    velocities: list[float]
+    accelerations: list[float]
+    effort: list[float]
+    time_from_start: Time
+
+
+class Message(TypedDict):
+    """trajectory_msgs/JointTrajectory."""
+
+    header: Header
+    joint_names: list[str]
+    points: list[Point]
 
 
 class RosSettings(LanguageSettings):
@@ -84,10 +116,7 @@ class Ros(Formatter):
         yield from (f"# {plain(remark)}" for remark in setup_remarks(robot, si=True))
         yield f"# What is switched when is in {program.name}.events.yaml."
         yield from head(joint_names(robot, self.settings))
-        ns = _ns(motion.time)
-        velocity, acceleration = rates(ns / SECOND, motion.q, motion.stops)
-        columns = zip(DECIMALS.items(), (motion.q, velocity, acceleration), strict=True)
-        rows = np.hstack([values.round(decimals) + 0.0 for (_, decimals), values in columns])
+        rows, ns = _rows(motion)
         fields = (
             f"{name}: [{', '.join([f'%.{decimals}f'] * robot.joints)}]"
             for name, decimals in DECIMALS.items()
@@ -136,6 +165,35 @@ class Ros(Formatter):
 
     def _done(self, kind: str) -> str:
         return _event(next(self._ends), f"done: {kind}")
+
+
+def message(program: Program, settings: RosSettings) -> Message:
+    """Return the message that `Ros` writes of a program, as its fields."""
+    rows, ns = _rows(trajectory(program, settings.step_ms * 1e-3))
+    parts = [part.tolist() for part in np.split(rows, len(DECIMALS), axis=1)]
+    return {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+        "joint_names": joint_names(program.robot, settings),
+        "points": [
+            {
+                "positions": q,
+                "velocities": velocity,
+                "accelerations": acceleration,
+                "effort": [],
+                "time_from_start": {"sec": time // SECOND, "nanosec": time % SECOND},
+            }
+            for q, velocity, acceleration, time in zip(*parts, ns.tolist(), strict=True)
+        ],
+    }
+
+
+def _rows(motion: Trajectory) -> tuple[Array, Ints]:
+    """Return what points say, (K, 3n), positions, velocities, accelerations, and times (K,) ns."""
+    ns = _ns(motion.time)
+    columns = zip(
+        DECIMALS.values(), (motion.q, *rates(ns / SECOND, motion.q, motion.stops)), strict=True
+    )
+    return np.hstack([values.round(decimals) + 0.0 for decimals, values in columns]), ns
 
 
 def _ns(time: Array) -> Ints:

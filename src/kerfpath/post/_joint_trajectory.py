@@ -1,0 +1,27 @@
+"""A program as a ROS message in memory, refused as the file would be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kerfpath.plans import Plan
+from kerfpath.post._build import build_program
+from kerfpath.post._program import Program
+from kerfpath.post._writer import post_and_read
+from kerfpath.post.ros import Message, RosSettings, message
+
+__all__ = ["joint_trajectory"]
+
+
+def joint_trajectory(
+    source: Program | Sequence[Plan], settings: RosSettings | None = None, *, strict: bool = False
+) -> Message:
+    """Return the fields of a trajectory_msgs/JointTrajectory, as `post(..., "ros")` writes them.
+
+    Arguments and refusals are those of `post`. What is switched when is in no message: the events
+    beside it, which only `post` returns, say that.
+    """
+    program = source if isinstance(source, Program) else build_program(source)
+    settings = settings or RosSettings()
+    post_and_read(program, "ros", settings, strict=strict)
+    return message(program, settings)
