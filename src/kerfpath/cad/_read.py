@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +22,11 @@ from kerfpath.cad._units import GAP, require_unit
 from kerfpath.errors import InputError
 from kerfpath.progress import Progress, no_progress
 
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
+
+    from kerfpath.cad._shape import NamedShape
+
 __all__ = ["content_of", "read"]
 
 Columns = Mapping[str, str] | Sequence[str]
@@ -28,8 +35,16 @@ KEPT = 4
 """Parts that are kept for when a file of the same content is read again, those read last."""
 
 
+class Wrapping(Protocol):
+    """What build123d and CadQuery call a shape."""
+
+    @property
+    def wrapped(self) -> Any:
+        """The OCP shape."""
+
+
 def read(
-    path: str | Path,
+    path: str | PathLike[str] | Wrapping | TopoDS_Shape | Sequence[Wrapping | TopoDS_Shape],
     unit: str | None = None,
     *,
     gap: float = GAP,
@@ -38,15 +53,17 @@ def read(
     columns: Columns | None = None,
     progress: Progress = no_progress,
 ) -> Part:
-    """Return the part that a drawing holds: STEP, IGES, DXF, or a table of points.
+    """Return the part that a drawing holds: STEP, IGES, DXF, a table of points; or a shape.
 
     Parameters
     ----------
-    path : str or Path
-        .step, .stp, .iges, .igs, .dxf, .csv, .tsv or .txt.
+    path : str, Path or shape
+        .step, .stp, .iges, .igs, .dxf, .csv, .tsv or .txt. Or a shape of OCP in memory, what has
+        one as `.wrapped` (build123d, CadQuery), or a list of these: faces, or edges. It is copied,
+        and read in this process, where OCCT may crash on what is damaged.
     unit : str, optional
         What the numbers in the file mean, instead of what its header says: um, mm, cm, dm, m, km,
-        mil, in or ft.
+        mil, in or ft. A shape says none: its numbers are taken for mm.
     gap : float m
         Distance between the ends of two curves that a loop bridges; loose faces (IGES) are sewn
         together over it.
@@ -66,9 +83,9 @@ def read(
     ------
     InputError
         No such file, another format than its suffix says, a damaged one, nothing to cut in it,
-        no length unit known, a direction that is none, or something that does not go with it.
+        no length unit known, a direction that is none, or something that does not go with it; no
+        shape, an empty one, or one with a point that is not finite.
     """
-    path = Path(path)
     require_unit(unit)
     scalar(gap, "gap", unit="m", above=0.0)
     asked = _Asked(
@@ -78,6 +95,11 @@ def read(
         axis=_direction(axis, "axis"),
         columns=columns,
     )
+    if not isinstance(path, str | PathLike):
+        if columns is not None:
+            raise InputError("shape: columns: expected a table, got a shape")
+        return _given(path, asked, progress)
+    path = Path(path)
     content = content_of(path, _EXPECTED)
     kind = _KINDS.get(path.suffix.lower())
     if kind is None:
@@ -148,11 +170,9 @@ def _drawn(kind: str, path: Path, content: bytes, asked: _Asked, progress: Progr
 
         return read_dxf(path, content, unit, gap, axis)
     stand_by()
-    from kerfpath.cad._faces import part_of
     from kerfpath.cad._iges import read_iges
     from kerfpath.cad._shape import occt, uncollected
     from kerfpath.cad._step import read_step
-    from kerfpath.cad._wires import part_of_wires
 
     key = (kind, sha256(content).digest(), unit, gap, asked.outer_towards, asked.axis)
     part = _kept.pop(key, None)
@@ -161,20 +181,43 @@ def _drawn(kind: str, path: Path, content: bytes, asked: _Asked, progress: Progr
         try:
             drawn = call_apart(translate, path.absolute(), unit, gap, size=len(content))
             with occt(), uncollected():
-                if drawn.faces and axis is not None:
-                    raise InputError("axis: expected a drawing of lines, got one of faces")
-                if drawn.faces:
-                    part = part_of(path, drawn, gap, asked.outer_towards, progress)
-                elif axis is not None:
-                    part = part_of_wires(path, drawn, gap, axis)
-                else:
-                    raise nothing_drawn(drawn.left_out)
+                part = _part_of(path, drawn, asked, progress)
         except InputError as error:
             raise InputError(f"{path}: {_in_words(kind, content, error)}") from None
     _kept[key] = part
     while len(_kept) > KEPT:
         _kept.pop(next(iter(_kept)), None)
     return replace(part, path=path)
+
+
+def _given(given: object, asked: _Asked, progress: Progress) -> Part:
+    """Return the part that a shape in memory is."""
+    require_extra("cad", "shape: reading it")
+    from kerfpath.cad._given import drawn_of_given
+    from kerfpath.cad._shape import occt, uncollected
+
+    try:
+        with occt(), uncollected():
+            drawn = drawn_of_given(given, asked.unit, asked.gap)
+            if not drawn.faces and asked.axis is None:
+                raise InputError("it has edges and no face; say the tool axis with axis")
+            return _part_of(Path("shape"), drawn, asked, progress)
+    except InputError as error:
+        raise InputError(f"shape: {error}") from None
+
+
+def _part_of(path: Path, drawn: NamedShape, asked: _Asked, progress: Progress) -> Part:
+    """Return the part that faces, or lines with an axis, make up."""
+    from kerfpath.cad._faces import part_of
+    from kerfpath.cad._wires import part_of_wires
+
+    if drawn.faces and asked.axis is not None:
+        raise InputError("axis: expected a drawing of lines, got one of faces")
+    if drawn.faces:
+        return part_of(path, drawn, asked.gap, asked.outer_towards, progress)
+    if asked.axis is None:
+        raise nothing_drawn(drawn.left_out)
+    return part_of_wires(path, drawn, asked.gap, np.array(asked.axis))
 
 
 def _in_words(kind: str, content: bytes, error: InputError) -> InputError:

@@ -25,4 +25,5 @@ from kerfpath.cell._shapes import frustum as frustum
 from kerfpath.cell._shapes import surface as surface
 from kerfpath.cell._sheet import edges_of as edges_of
 from kerfpath.cell._sheet import thicken as thicken
+from kerfpath.cell._stl import mesh_of as mesh_of
 from kerfpath.cell._stl import read_stl as read_stl

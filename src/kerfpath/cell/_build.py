@@ -13,7 +13,7 @@ from kerfpath.cell._cell import Cell, Pair
 from kerfpath.cell._head import CuttingHead, MeshHead
 from kerfpath.cell._links import link_bodies
 from kerfpath.cell._mesh import Mesh
-from kerfpath.cell._shapes import Shape, box_between
+from kerfpath.cell._shapes import Capsule, Hull, Shape, box_between
 from kerfpath.errors import InputError
 from kerfpath.robots import CarriedChain, Robot, chain_of
 from kerfpath.urdf import KinematicChain
@@ -74,14 +74,18 @@ def cell_of(
     Raises
     ------
     InputError
-        A part without its placement; a fixture on an axis that is not there; as `Cell`.
+        A part without its placement; a body of another package; a fixture on an axis that is not
+        there; as `Cell`.
     """
     chain = chain_of(robot)
     head = CuttingHead() if head is None else head
     own = dict(near_miss_of or {})
     tool_bodies = tuple(head if isinstance(head, Sequence) else head.bodies(chain, tool))
     parts: tuple[Body, ...] = ()
+    for name, shape in (fixtures or {}).items():
+        _require_solid(shape, f"fixture {name!r}")
     if part is not None:
+        _require_solid(part, "part")
         if placement is None:
             raise InputError("cell: a part needs its placement, T_base_part (4, 4)")
         placed = part.moved(as_pose(placement, "placement"))
@@ -112,6 +116,14 @@ def cell_of(
         T_flange_tip=as_pose(tool, "tool"),
         T_base_part=None if placement is None else as_pose(placement, "placement"),
     )
+
+
+def _require_solid(shape: object, what: str) -> None:
+    if not isinstance(shape, Capsule | Hull | Mesh):
+        raise InputError(
+            f"cell: {what}: expected a solid of kerfpath.cell, got {type(shape).__name__}; "
+            "mesh_of(mesh, unit) makes one of a mesh of another package"
+        )
 
 
 def _stands(

@@ -1,19 +1,21 @@
-"""Mesh files as solids. An STL file does not say its unit, so the caller must."""
+"""Meshes of files and of other packages as solids. They do not say their unit: the caller must."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Ints
+from kerfpath._arrays import Array, Ints, floats, integers, require_one_of
 from kerfpath._extras import imported
 from kerfpath.apart import call_apart
 from kerfpath.cell._mesh import SAME, Mesh, size_of, weld
 from kerfpath.errors import InputError
 
-__all__ = ["UNITS", "close_surface", "read_stl", "read_surface"]
+__all__ = ["UNITS", "close_surface", "mesh_of", "read_stl", "read_surface"]
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Metres in each unit."""
@@ -21,6 +23,18 @@ UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)")
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
+
+
+class TriangleMesh(Protocol):
+    """What trimesh and others call a mesh."""
+
+    @property
+    def vertices(self) -> ArrayLike:
+        """(V, 3)."""
+
+    @property
+    def faces(self) -> ArrayLike:
+        """(F, 3), vertices of each triangle."""
 
 
 def read_stl(path: str | Path, unit: str) -> Mesh:
@@ -38,6 +52,36 @@ def read_stl(path: str | Path, unit: str) -> Mesh:
             f"{', '.join(UNITS)}, got {unit!r}"
         )
     return close_surface(*_stl(_bytes(path), path.name), UNITS[unit], path.name)
+
+
+def mesh_of(mesh: TriangleMesh, unit: str, name: str = "mesh") -> Mesh:
+    """Return the solid in a mesh of another package, such as trimesh, that is in memory.
+
+    Parameters
+    ----------
+    mesh : with `vertices` (V, 3) and `faces` (F, 3)
+        Nothing else of it is looked at: neither a unit nor a pose that it may have.
+    unit : {"mm", "cm", "m", "in"}
+        Of its vertices.
+    name : str
+        What messages call it.
+
+    Raises
+    ------
+    InputError
+        An unknown unit, no such mesh, faces of more than three corners, a number that is not
+        finite, or what `Mesh` refuses.
+    """
+    require_one_of(unit, f"{name}: unit", UNITS)
+    try:
+        given, faces = mesh.vertices, mesh.faces
+    except AttributeError:
+        raise InputError(
+            f"{name}: expected a mesh with vertices and faces, got {type(mesh).__name__}"
+        ) from None
+    vertices = floats(given, f"{name} vertices", (None, 3))
+    triangles = integers(faces, f"{name} faces", (None, 3))
+    return close_surface(vertices, triangles, UNITS[unit], name)
 
 
 def close_surface(vertices: Array, triangles: Ints, scale: Array | float, name: str) -> Mesh:
