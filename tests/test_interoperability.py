@@ -11,6 +11,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pandas as pd
 import pinocchio as pin
+import plotly.graph_objects as go
 import pytest
 from ruamel.yaml import YAML
 from tests.post.external_cells import moving_plan
@@ -20,6 +21,7 @@ from kerfpath import InputError, Tilt, robot
 from kerfpath.job.output._files import trajectory_text
 from kerfpath.post import joint_trajectory, post
 from kerfpath.post.ros import RosSettings
+from kerfpath.report._motion import cutting_speed, joint_positions, limit_shares
 from programs import arc, frames, hand_plan
 
 PAGE = (ROOT / "docs" / "interoperability.md").read_text(encoding="utf-8")
@@ -260,6 +262,29 @@ def test_names_are_text_in_notebooks_and_nothing_else(plain):
     named = replace(named, proof=replace(plain.proof, statement=mean))
     for html in (named._repr_html_(), named.robot._repr_html_()):
         assert "script" not in Cells(html).tags
+
+
+# Figures.
+
+
+@pytest.mark.parametrize(("what", "drawn"), [("joints", 7), ("limits", 14), ("speed", 1)])
+def test_a_plan_draws_itself_as_reports_draw_it(arm, what, drawn):
+    plan = carried(arm)
+    figure = plan.plot(what)
+    assert isinstance(figure, go.Figure)
+    assert len(figure.data) == drawn
+    own = {"joints": joint_positions, "limits": limit_shares, "speed": cutting_speed}[what]
+    assert figure.to_json() == own(plan).to_json()
+
+
+def test_another_figure_is_refused_and_a_missing_library_said(plain, monkeypatch):
+    with pytest.raises(InputError, match="plot: expected one of joints, limits, speed, got 'all'"):
+        plain.plot("all")
+    for name in [name for name in sys.modules if name.startswith("kerfpath.report")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    with pytest.raises(InputError, match=r"reports: plotly is needed .* 'kerfpath\[report\]'"):
+        plain.plot()
 
 
 # The page.

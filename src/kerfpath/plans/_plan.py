@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -28,6 +28,7 @@ from kerfpath.tilt import tilt_frames
 
 if TYPE_CHECKING:
     import pandas
+    from plotly.graph_objects import Figure
 
 __all__ = ["Plan", "has_room", "on_turns"]
 
@@ -295,6 +296,22 @@ class Plan:
             The extra `programs` is not installed; a program that its preflight refuses.
         """
         return dict(import_module("kerfpath.post").joint_trajectory([self]))
+
+    def plot(self, what: Literal["joints", "limits", "speed"] = "joints") -> Figure:
+        """Return a figure, as reports have it: plotly's, to show, change or save.
+
+        Parameters
+        ----------
+        what : {"joints", "limits", "speed"}
+            Each joint over time with its limits, deg or mm; joint speeds and accelerations over
+            time, % of their limits; the speed along the contour, m/min.
+
+        Raises
+        ------
+        InputError
+            The extra `report` is not installed; another word.
+        """
+        return import_module("kerfpath.report").plot(self, what)
 
     def _repr_html_(self) -> str:
         """Return a small table for notebooks: the joints, their way, and shares of their limits."""

@@ -12,6 +12,7 @@ from kerfpath.report._layout import render_layout
 from kerfpath.report._layout_entry import LayoutEntry
 from kerfpath.report._look import reason_colours
 from kerfpath.report._map import feasibility_map, hidden_postures, shown_postures
+from kerfpath.report._motion import plot
 from kerfpath.report._page import render
 from kerfpath.report._section import ContourSection, add_clearance
 from kerfpath.report._table_page import render_table
@@ -25,6 +26,7 @@ __all__ = [
     "add_clearance",
     "feasibility_map",
     "hidden_postures",
+    "plot",
     "reason_colours",
     "render",
     "render_drawing",

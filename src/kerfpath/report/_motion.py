@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from kerfpath._arrays import Array
+from kerfpath._arrays import Array, require_one_of
 from kerfpath.plans import Plan
 from kerfpath.report._look import (
     FAINT,
@@ -25,7 +25,7 @@ from kerfpath.report._look import (
 )
 from kerfpath.robots import posture_name
 
-__all__ = ["cutting_speed", "joint_positions", "limit_shares", "posture_runs"]
+__all__ = ["cutting_speed", "joint_positions", "limit_shares", "plot", "posture_runs"]
 
 ROW, GAP, TOP, BOTTOM = 130, 36, 48, 48
 SHARE_ROW, SHARE_TOP = 210, 74
@@ -284,3 +284,12 @@ def _axis(kind: str, panel: int) -> str:
 
 def _rounded(value: float, unit: str) -> str:
     return f"{round(float(value), 2):.6g}{unit}".replace("-", "\N{MINUS SIGN}")
+
+
+_FIGURES = {"joints": joint_positions, "limits": limit_shares, "speed": cutting_speed}
+
+
+def plot(plan: Plan, what: str = "joints") -> go.Figure:
+    """Return a figure of a plan, see `Plan.plot`."""
+    require_one_of(what, "plot", _FIGURES)
+    return _FIGURES[what](plan)
