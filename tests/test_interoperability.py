@@ -184,6 +184,8 @@ def test_a_model_of_other_joints_is_refused(plain, arm):
     model = pin.buildModelFromXML(plain.robot.to_urdf())
     with pytest.raises(InputError, match=r"model: expected .* got one with no rail, table; pinocc"):
         railed.to_pinocchio(model)
+    with pytest.raises(InputError, match=r"expected a pinocchio.Model, got str"):
+        plain.to_pinocchio("arm.urdf")
     with pytest.raises(InputError, match="got one with 8 degrees of freedom"):
         plain.to_pinocchio(pin.buildModelFromXML(railed.robot.to_urdf()))
 

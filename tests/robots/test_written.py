@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 import pytest
+from tests.urdf.test_urdf import described
 
 from commands import assert_refused, run
 from conftest import ROOT
@@ -76,6 +77,17 @@ def test_a_robot_of_the_library_is_the_same_again(tmp_path, name):
         assert again.acceleration is None
     else:
         np.testing.assert_array_equal(again.acceleration, known.acceleration)
+
+
+@pytest.mark.parametrize("name", ["abb_irb4600_60_205", "ur_ur10e"])
+def test_a_described_robot_is_written_from_its_own_frames(tmp_path, name):
+    gauge = np.random.default_rng(8)
+    known = Robot.from_urdf(described(tmp_path, whole(name), gauge=gauge))
+    again = read_back(tmp_path, known)
+    np.testing.assert_allclose(again.chain.origins, known.chain.origins, atol=SAME)
+    np.testing.assert_array_equal(again.chain.axes, known.chain.axes)
+    q = random_joints(known)
+    np.testing.assert_allclose(again.forward(q), known.forward(q), atol=SAME)
 
 
 def test_jerks_and_torques_are_written_where_they_are_known(tmp_path):

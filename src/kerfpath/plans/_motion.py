@@ -56,8 +56,10 @@ def in_model(motion: JointMotion, names: Sequence[str], model: Any) -> JointMoti
     Raises
     ------
     InputError
-        A joint that the model has not, or another.
+        No model; a joint that it has not, or another.
     """
+    if not hasattr(model, "existJointName"):
+        raise InputError(f"model: expected a pinocchio.Model, got {type(model).__name__}")
     missing = [name for name in names if not model.existJointName(name)]
     if missing or model.nv != len(names):
         what = f"no {', '.join(missing)}" if missing else f"{model.nv} degrees of freedom"

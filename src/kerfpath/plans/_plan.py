@@ -224,7 +224,7 @@ class Plan:
 
         Columns are named as in trajectory.csv, in SI: contour, node, kind, t_s; s_m, the way along
         the contour; the joints, q1_rad and on, then external axes by their names (`rail_m`,
-        `table_rad`); x_m, y_m, z_m, axis_x, axis_y, axis_z, the tool in the robot base; gamma_rad;
+        `table_rad`); x_m, y_m, z_m, axis_x, axis_y, axis_z, as `points` and `axes`; gamma_rad;
         lead_rad and lean_rad, where a tilt was asked for; posture; speed_m_s, that of the tip on
         its way to the next node, which the last has not: NaN.
         """
