@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 import pytest
+from tests.robots.test_five_axes import ARM
 from tests.urdf.test_urdf import described
 
 from commands import assert_refused, run
@@ -88,6 +89,13 @@ def test_a_described_robot_is_written_from_its_own_frames(tmp_path, name):
     np.testing.assert_array_equal(again.chain.axes, known.chain.axes)
     q = random_joints(known)
     np.testing.assert_allclose(again.forward(q), known.forward(q), atol=SAME)
+
+
+def test_a_five_axis_arm_is_written_though_only_others_read_it(tmp_path):
+    q = random_joints(ARM)
+    np.testing.assert_allclose(as_pinocchio_has_it(ARM, q), ARM.forward(q), atol=SAME)
+    with pytest.raises(InputError, match="expected 6 or 7 joints"):
+        read_back(tmp_path, ARM)
 
 
 def test_jerks_and_torques_are_written_where_they_are_known(tmp_path):

@@ -7,6 +7,7 @@ from kerfpath.cell._caveats import caveats as caveats
 from kerfpath.cell._caveats import odd_sizes as odd_sizes
 from kerfpath.cell._cell import Cell as Cell
 from kerfpath.cell._checker import CollisionChecker as CollisionChecker
+from kerfpath.cell._glb import glb_of as glb_of
 from kerfpath.cell._head import CuttingHead as CuttingHead
 from kerfpath.cell._head import MeshHead as MeshHead
 from kerfpath.cell._links import link_bodies as link_bodies
