@@ -33,6 +33,29 @@ head = "laser-head-45"
 """
 """The first tables of a job with the robot of the demo, axes 4 and 6 endless."""
 
+RAIL_AND_TABLE = """\
+[[robot.external]]
+name = "rail"
+kind = "linear"
+carries = "robot"
+axis = [0, 1, 0]
+lower_mm = -400
+upper_mm = 400
+velocity_mm_s = 1000
+acceleration_mm_s2 = 1500
+
+[[robot.external]]
+name = "table"
+kind = "rotary"
+carries = "part"
+axis = [0, 0, 1]
+point_mm = [1200, 0, 500]
+endless = true
+velocity_deg_s = 90
+acceleration_deg_s2 = 180
+
+"""
+"""A rail under the robot and a table under the part, of the demo."""
 HEAD = f"""\
 {ENDLESS_AND_HEAD}[part]
 file = "b_pillar.step"

@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import pytest
 
-from jobs import CONTOURS, DEMO, HEAD, SMALL, WHOLE
+from jobs import CONTOURS, DEMO, HEAD, RAIL_AND_TABLE, SMALL, WHOLE
 from kerfpath.errors import InputError
 from kerfpath.job import prepare, program_texts, python_script, read_job, run_job
 
@@ -76,28 +76,7 @@ acceleration_deg_s2 = 240
 """
 """A positioner of the library."""
 
-CARRIED = """
-[[robot.external]]
-name = "rail"
-kind = "linear"
-carries = "robot"
-axis = [0, 1, 0]
-lower_mm = -400
-upper_mm = 400
-velocity_mm_s = 1000
-acceleration_mm_s2 = 1500
-
-[[robot.external]]
-name = "table"
-kind = "rotary"
-carries = "part"
-axis = [0.1, 0, 1]
-point_mm = [1200, 0, 500]
-endless = true
-velocity_deg_s = 90
-acceleration_deg_s2 = 180
-
-"""
+CARRIED = RAIL_AND_TABLE.replace("axis = [0, 0, 1]", "axis = [0.1, 0, 1]")
 UNITS = '[program.rapid]\nmechanical_units = ["TRACK", "STATION"]\n'
 TURNED = QUICK.replace("[tool]", CARRIED + "[tool]").replace("spacing_mm = 1", "spacing_mm = 2")
 TURNED += UNITS

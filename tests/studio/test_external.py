@@ -6,34 +6,13 @@ from functools import reduce
 import numpy as np
 import pytest
 
+from jobs import RAIL_AND_TABLE
 from kerfpath.job import prepare, read_job
 from kerfpath.robots import chain_of
 from kerfpath.studio._scene import scene_of
 from studio.talk import QUICK, serving, talking, write_job
 from studio.test_session import last, matrix
 
-AXES = """\
-[[robot.external]]
-name = "rail"
-kind = "linear"
-carries = "robot"
-axis = [0, 1, 0]
-lower_mm = -400
-upper_mm = 400
-velocity_mm_s = 1000
-acceleration_mm_s2 = 1500
-
-[[robot.external]]
-name = "table"
-kind = "rotary"
-carries = "part"
-axis = [0, 0, 1]
-point_mm = [1200, 0, 500]
-endless = true
-velocity_deg_s = 90
-acceleration_deg_s2 = 180
-
-"""
 CELL = """
 [cell]
 near_miss_mm = 2
@@ -49,7 +28,7 @@ xyz_mm = [1200, 900, 50]
 """
 TURNED = (
     re.sub(r'\[\[contour\]\]\npick = "skin/hole11".*?\n\n', "", QUICK, flags=re.DOTALL)
-    .replace("[tool]", AXES + "[tool]")
+    .replace("[tool]", RAIL_AND_TABLE + "[tool]")
     .replace("gamma_step_deg = 3", "gamma_step_deg = 6\nweights = [1, 1, 1, 1, 1, 1, 0.1, 0.1]")
     .replace("spacing_mm = 1", "spacing_mm = 2")
 )
