@@ -13,7 +13,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner import fastest_speed, layered_graph, node_interval
 
-__all__ = ["GAMMA_STEP", "ROBOTS", "Cut", "cut"]
+__all__ = ["GAMMA_STEP", "ROBOTS", "Cut", "contour", "cut", "head", "posed"]
 
 ROBOTS = {
     "abb_irb2400_155": "cybertech_8_to_20kg",
@@ -93,7 +93,7 @@ def contour(rng: np.random.Generator, reach: float) -> Contour:
     z = half * rng.uniform(0, 0.3) * np.sin(rng.integers(1, 4) * t + _phase(rng))
     lean = [_field(rng, t, np.radians(15)) for _ in range(2)]
     normal = np.stack([lean[0], lean[1], np.ones_like(t)], axis=1)
-    T = _posed(rng, reach)
+    T = posed(rng, reach)
     points = np.stack([x, y, z], axis=1) @ T[:3, :3].T + T[:3, 3]
     dense = Contour(points, -normal @ T[:3, :3].T, closed=closed)
     return dense.resample(count=int(rng.integers(60, 81)))
@@ -133,7 +133,7 @@ def _field(rng: np.random.Generator, t: Array, size: float) -> Array:
     return np.asarray(np.tan(size) * rng.uniform(0, 1) * waves / np.abs(waves).max())
 
 
-def _posed(rng: np.random.Generator, reach: float) -> Array:
+def posed(rng: np.random.Generator, reach: float) -> Array:
     """Return the pose of a part in front of the robot, tilted by up to 30 deg in any direction."""
     around, tilt, towards, spin = rng.uniform([-0.8, 0, 0, 0], [0.8, np.pi / 6, 6.28, 6.28])
     axis = np.array([np.cos(towards), np.sin(towards), 0.0])

@@ -23,6 +23,7 @@ include_patterns = [
     "*.md",
     "docs/**.md",
     "benchmarks/*.md",
+    "benchmarks/public/README.md",
     "examples/*/README.md",
     "src/kerfpath/studio/README.md",
 ]

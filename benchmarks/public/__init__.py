@@ -1,0 +1,1 @@
+"""The public benchmark set: instances, the best motions known, and a checker on numpy alone."""
