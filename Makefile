@@ -37,6 +37,8 @@ bench: .venv/bench.stamp
 
 figures: .venv/run.stamp
 	$(BIN)/python examples/feasibility_map.py
+	$(BIN)/python examples/idea.py
+	$(BIN)/python examples/comfort.py
 	$(BIN)/python examples/known_against_proposed.py
 	$(BIN)/python examples/techniques.py
 

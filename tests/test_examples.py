@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
+import idea
 import known_against_proposed as example
 import no_path
 import operations
@@ -190,3 +191,30 @@ def test_no_path_shows_every_way_out(capsys):
     on_grid, off = said.split("dipped off the grid")
     assert "passes a singularity" in on_grid
     assert "warning" not in off
+
+
+@pytest.mark.usefixtures("certifier_at_work")
+def test_the_pictures_of_the_idea_are_drawn_and_those_kept_show_the_same(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(idea, "PICTURES", tmp_path / "idea")
+    idea.main()
+    paper, grid, best, bound = map(float, re.findall(r"\d+\.\d+", capsys.readouterr().out))
+    assert bound <= best < grid <= paper
+    kept = ROOT / "docs" / "idea"
+    names = [f"{i}.svg" for i in range(1, 6)]
+    assert sorted(file.name for file in kept.iterdir()) == names
+    for name in names:
+        drawn, before = (ET.parse(folder / name).getroot() for folder in (tmp_path / "idea", kept))
+        assert len(list(drawn.iter())) == len(list(before.iter())) > 5
+        words, numbers = zip(*map(words_and_numbers, (drawn, before)), strict=True)
+        assert words[0] == words[1]
+        # Costs to two places, of searches whose sums another machine may round otherwise.
+        np.testing.assert_allclose(*numbers, rtol=5e-3)
+
+
+def words_and_numbers(picture):
+    """What a picture says: without its numbers, and these."""
+    text = " ".join(element.text for element in picture.iter() if element.text)
+    number = r"-?\d+(?:\.\d+)?"
+    return re.sub(number, "#", text), [float(found) for found in re.findall(number, text)]
