@@ -9,6 +9,7 @@ import pytest
 from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan, refiner
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
+from kerfpath.planner import _quickest
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._quickest import quick_motions
 from kerfpath.planner._task import task_of
@@ -105,7 +106,7 @@ def test_the_fastest_speed_is_that_of_the_quickest_motion(arm, tool, placement, 
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("share", [1.02, 3.0])
+@pytest.mark.parametrize("share", [1.02, 3.0, 20.0])
 def test_a_refusal_says_with_what_a_motion_was_found(seed, share, arm, space):
     nodes = drawn(seed)
     fastest = fastest_speed(nodes, arm, refine=True, **space)
@@ -123,6 +124,26 @@ def test_a_refusal_says_with_what_a_motion_was_found(seed, share, arm, space):
         # All that fastest_speed tries was tried, and the figures are rounded to 4 digits.
         assert needed.speed * share == pytest.approx(1, rel=2e-3)
     assert errors(plan(nodes, arm, speed=needed.speed * speed, **space)) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_a_hopeless_speed_a_motion_is_found_without_the_exact_search(
+    seed, arm, space, monkeypatch
+):
+    nodes = drawn(seed)
+    fastest = fastest_speed(nodes, arm, refine=True, **space)
+
+    def no_search(problem):
+        raise AssertionError("the exact search may take minutes here")
+
+    monkeypatch.setattr(_quickest, "find_least_interval", no_search)
+    monkeypatch.setattr(_quickest, "MOST_EDGES", 0)
+    with pytest.raises(NoFeasiblePath) as caught:
+        plan(nodes, arm, speed=20 * fastest.speed, **space)
+    needed = caught.value.relaxation.speed * 20
+    # It keeps the limits, so that it is no quicker than the quickest; how near it comes is luck.
+    assert 0.3 < needed < 1.001
+    assert errors(plan(nodes, arm, speed=needed * fastest.speed, **space)) == []
 
 
 @pytest.mark.parametrize("kind", ["rail", "positioner"])

@@ -8,16 +8,19 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._closed import at_any_gamma, with_relaxation
 from kerfpath.planner._dip import plan_slowed
-from kerfpath.planner._quickest import quick_motions
+from kerfpath.planner._quickest import quick_motions, slow_motions
 from kerfpath.planner._refined import plan_off_grid, plan_slowly, refine_plan
 from kerfpath.planner._task import PlanningTask
 from kerfpath.planner._words import ON_THIS_GRID, limits_named
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import posture_name
-from kerfpath.search import SearchProblem, find_shortest
+from kerfpath.search import SearchProblem, find_shortest, velocity_allows
 
 __all__ = ["plan_on_grid"]
 
+HOPELESS = 4.0
+"""Multiple of the node interval in which no path on the grid keeps the velocities: no motion is as
+quick as asked for, and how quick one can be is not worth minutes."""
 TOO_SLOW, NEARLY = 2.0, 1.15
 """Multiples of the node interval from which a proof that there is no motion is tried before the
 next one: of the fastest path on the grid, and of quicker motions."""
@@ -109,8 +112,10 @@ def _from_quickest(
         raise _judged(broken, task, begin) from None
     judged, best = None, None
     begin("search for the quickest motion")
+    hopeless = not velocity_allows(task.problem, HOPELESS * task.dt)
+    motions = slow_motions if hopeless else quick_motions
     try:
-        for tried, best in enumerate(quick_motions(task, finder)):
+        for tried, best in enumerate(motions(task, finder)):
             made = plan_slowly(task, best, finder) if best.is_enough(task.dt) else None
             if made is not None:
                 return made

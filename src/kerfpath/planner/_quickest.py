@@ -13,9 +13,25 @@ from kerfpath.planner._clear import ClearSearch
 from kerfpath.planner._task import PlanningTask
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Binding, quicken
-from kerfpath.search import ContinuousPath, ContinuousSearch, Effort, find_least_interval
+from kerfpath.search import (
+    ContinuousPath,
+    ContinuousSearch,
+    Effort,
+    LeastInterval,
+    edges_allowed,
+    find_least_interval,
+    find_slow_path,
+)
 
-__all__ = ["QuickMotion", "alike", "clear_paths", "quick_motions", "quicker", "wide"]
+__all__ = [
+    "QuickMotion",
+    "alike",
+    "clear_paths",
+    "quick_motions",
+    "quicker",
+    "slow_motions",
+    "wide",
+]
 
 RUNGS = (1.06, 1.0, 1.1)
 """Multiples of the speed reached at which beams look for a motion that is quicker still. Where no
@@ -26,6 +42,8 @@ WIDE, MOST_STATES = 1600, 5_000_000
 """States of each layer that are kept in a wide search, and of all layers."""
 ALIKE = (1.1, 0.5)
 """When two of them are alike."""
+MOST_EDGES = 2e7
+"""Edges up to which the exact search for the fastest path takes no more than some ten seconds."""
 SLACK = 1e-6
 """Share of the interval that is left free, so that the motion keeps the limits after rounding."""
 SAME_VALLEY = 0.05
@@ -78,10 +96,8 @@ def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMoti
         No path on the grid is clear at any speed.
     """
     task = _without_aim(task)
-    least = finder.find(find_least_interval, task.problem)
-    path = _at(task, least.dt).plan(least.index, 0.0, _claim())
-    at = Binding(least.joint, least.node, least.limit)
-    best = QuickMotion(plan=path, at=at, on_grid=least.dt)
+    best = _along(task, finder.find(find_least_interval, task.problem))
+    path = best.plan
     yield best
     if not task.robot.family.free_rotation:
         return
@@ -100,6 +116,30 @@ def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMoti
                     best = faster
                     yield best
         rung = 0 if best.dt < (1 - GAIN) * before else rung + 1
+
+
+def slow_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotion]:
+    """Yield motions of a task that is asked for much too fast: the quickest if they are soon found.
+
+    Where the velocities leave very many edges in the time that a path takes: the shortest path by
+    the velocities alone, and what gamma off the grid makes of it. Raises as `quick_motions`.
+    """
+    slow = _without_aim(task)
+    path = finder.find(find_slow_path, slow.problem)
+    if edges_allowed(slow.problem, path.dt) <= MOST_EDGES:
+        yield from quick_motions(task, finder)
+        return
+    task, best = slow, _along(slow, path)
+    yield best
+    if task.robot.family.free_rotation:
+        yield quicker(task, finder, best.plan, best)
+
+
+def _along(task: PlanningTask, least: LeastInterval) -> QuickMotion:
+    """Return the motion along a path on the grid."""
+    path = _at(task, least.dt).plan(least.index, 0.0, _claim())
+    at = Binding(least.joint, least.node, least.limit)
+    return QuickMotion(plan=path, at=at, on_grid=least.dt)
 
 
 def _without_aim(task: PlanningTask) -> PlanningTask:

@@ -24,5 +24,8 @@ from kerfpath.search._relax import find_relaxations as find_relaxations
 from kerfpath.search._shortest import LayeredPath as LayeredPath
 from kerfpath.search._shortest import find_shortest as find_shortest
 from kerfpath.search._shortest import shortest_path as shortest_path
+from kerfpath.search._slow import edges_allowed as edges_allowed
+from kerfpath.search._slow import find_slow_path as find_slow_path
+from kerfpath.search._slow import velocity_allows as velocity_allows
 from kerfpath.search._slowed import SlowedPath as SlowedPath
 from kerfpath.search._slowed import find_slowed as find_slowed

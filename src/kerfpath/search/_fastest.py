@@ -16,7 +16,15 @@ from kerfpath.search._exact import quickest_path
 from kerfpath.search._layers import Layers, require_joined, sort_layers
 from kerfpath.search._problem import SearchProblem, refuse_ends, refuse_torque
 
-__all__ = ["LeastInterval", "aim_at_least_time", "find_least_interval", "quickest", "times_asked"]
+__all__ = [
+    "LeastInterval",
+    "aim_at_least_time",
+    "binding",
+    "find_least_interval",
+    "first_guess",
+    "quickest",
+    "times_asked",
+]
 
 _LAYERS_SAMPLED = 8
 """Layers whose nearest pairs give the first guess of the interval; any guess ends right."""
@@ -76,12 +84,12 @@ def find_least_interval(problem: SearchProblem) -> LeastInterval:
     layers = problem.layers
     require_joined(layers)
     v, a = problem.limits.velocity.usable, problem.limits.acceleration.usable
-    aim, ceiling = aim_at_least_time(1 / v, a), _guess(layers, v)
+    aim, ceiling = aim_at_least_time(1 / v, a), first_guess(layers, v)
     while True:
         # Edges that take longer than the ceiling are not looked at: right if a path keeps it.
         found = quickest(layers, aim, ceiling * v, ceiling)
         if found is not None:
-            return _binding(layers, found[0], v, a)
+            return binding(layers, found[0], v, a)
         ceiling *= 2
 
 
@@ -121,7 +129,7 @@ def times_asked(path: Array, endless: Bools, velocity: Array, acceleration: Arra
     return [np.abs(dq) / velocity, np.sqrt(np.abs(np.diff(dq, axis=0)) / acceleration)]
 
 
-def _guess(layers: Layers, v: Array) -> float:
+def first_guess(layers: Layers, v: Array) -> float:
     """Return a node interval to begin with: twice what the nearest vertices of some layers need."""
     q, start, least = layers.q, layers.start, 0.0
     for k in np.unique(np.linspace(0, len(start) - 3, _LAYERS_SAMPLED).astype(int)):
@@ -134,7 +142,7 @@ def _guess(layers: Layers, v: Array) -> float:
     return 2 * least or 1e-6
 
 
-def _binding(layers: Layers, index: Ints, v: Array, a: Array) -> LeastInterval:
+def binding(layers: Layers, index: Ints, v: Array, a: Array) -> LeastInterval:
     """Measure a path: its least interval, and what asks for it."""
     path = layers.q[layers.start[:-1] + index]
     fast, sharp = times_asked(path, layers.endless, v, a)

@@ -1,0 +1,93 @@
+"""A path for speeds far below those asked for, by first-order recursions alone.
+
+The exact search for the least interval remembers edges. Where nodes have to be far apart in time
+the velocity leaves nearly all of them, and it takes minutes; a recursion over vertices does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.kernels.metric import increments_between
+from kerfpath.limits import AccelerationLimit
+from kerfpath.search._fastest import LeastInterval, binding, first_guess
+from kerfpath.search._layers import require_joined
+from kerfpath.search._problem import SearchProblem
+from kerfpath.search._shortest import LayeredPath, find_shortest
+
+__all__ = ["edges_allowed", "find_slow_path", "velocity_allows"]
+
+LAYERS_SAMPLED, VERTICES_SAMPLED = 16, 64
+"""Layers, and vertices of each, by which edges are counted."""
+ROUNDING = 1e-9
+"""Share of an interval by which a path that needs just that much may be longer."""
+
+
+def velocity_allows(problem: SearchProblem, dt: float) -> bool:
+    """Return whether a path keeps (5), whatever it accelerates, with dt s from node to node."""
+    try:
+        find_shortest(_first_order(problem, dt))
+    except NoFeasiblePath:
+        return False
+    return True
+
+
+def find_slow_path(problem: SearchProblem) -> LeastInterval:
+    """Return the shortest path that keeps (5) in the least interval in which any path does.
+
+    And the interval in which it keeps (6), too: no path keeps both in less than it would without
+    (6), but one may in less than this.
+
+    Raises
+    ------
+    NoFeasiblePath
+        An empty layer, or closed vertices and shut edges that leave no path; says where.
+    """
+    require_joined(problem.layers)
+    v, a = problem.limits.velocity.usable, problem.limits.acceleration.usable
+    quickest, dt = None, first_guess(problem.layers, v)
+    while quickest is None:
+        try:
+            quickest = find_shortest(_slowest_step(problem, dt))
+        except NoFeasiblePath:
+            dt *= 2
+    least = quickest.cost * (1 + ROUNDING) or dt
+    path: LayeredPath = find_shortest(_first_order(problem, least))
+    return binding(problem.layers, path.index, v, a)
+
+
+def edges_allowed(problem: SearchProblem, dt: float) -> float:
+    """Return about how many edges keep (5) with dt s from node to node: by some of them."""
+    q, start = problem.q, problem.start
+    most = problem.limits.velocity.per_interval(dt)
+    pairs = np.diff(start)[:-1] * np.diff(start)[1:]
+    looked_at, kept = 0, 0
+    for k in np.unique(np.linspace(0, len(pairs) - 1, LAYERS_SAMPLED).astype(int)):
+        here, there = (q[start[i] : start[i + 1]] for i in (k, k + 1))
+        for j in range(0, len(there), max(1, len(there) // VERTICES_SAMPLED)):
+            step = np.abs(increments_between(there[j], here, problem.endless))
+            kept += int((step <= most).all(axis=1).sum())
+            looked_at += len(here)
+    return float(pairs.sum()) * kept / max(looked_at, 1)
+
+
+def _first_order(problem: SearchProblem, dt: float) -> SearchProblem:
+    """Return the problem of the shortest path at an interval, by the velocities alone."""
+    free = AccelerationLimit(bound=np.full(len(problem.weights), np.inf))
+    return replace(
+        problem.free(),
+        dt=dt,
+        limits=replace(problem.limits, acceleration=free),
+        metric="manhattan",
+        objective="sum",
+        weights=1 / problem.limits.velocity.usable,
+        method="paper",
+    )
+
+
+def _slowest_step(problem: SearchProblem, dt: float) -> SearchProblem:
+    """Return the problem of the path whose longest step, s at the velocities, is least."""
+    return replace(_first_order(problem, dt), metric="chebychev", objective="max")
