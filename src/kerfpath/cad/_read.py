@@ -59,9 +59,9 @@ def read(
     ----------
     path : str, Path or shape
         .step, .stp, .iges, .igs, .dxf; a table: .csv, .tsv or .txt; a tool path: .apt, .aptsource,
-        .cl or .cls. Or a shape of OCP in memory, what has one as `.wrapped` (build123d, CadQuery),
-        or a list of these: faces, or edges. It is copied, and read in this process, where OCCT may
-        crash on what is damaged.
+        .cl or .cls; a program of a machine: .h, .mpf, .nc, .spf or .tap. Or a shape of OCP in
+        memory, what has one as `.wrapped` (build123d, CadQuery), or a list of these: faces, or
+        edges. It is copied, and read in this process, where OCCT may crash on what is damaged.
     unit : str, optional
         What the numbers in the file mean, instead of what its header says: um, mm, cm, dm, m, km,
         mil, in or ft. A shape says none: its numbers are taken for mm.
@@ -169,6 +169,10 @@ def _drawn(kind: str, path: Path, content: bytes, asked: _Asked, progress: Progr
         from kerfpath.cad._apt import read_apt
 
         return read_apt(path, content, unit, gap, axis)
+    if kind == "NC program":
+        from kerfpath.cad._nc import read_nc
+
+        return read_nc(path, content, unit, gap, axis)
     require_extra("cad", f"{path}: reading {kind}")
     if kind == "DXF":
         from kerfpath.cad._dxf import read_dxf
@@ -251,5 +255,10 @@ _KINDS = {
     ".aptsource": "tool path",
     ".cl": "tool path",
     ".cls": "tool path",
+    ".h": "NC program",
+    ".mpf": "NC program",
+    ".nc": "NC program",
+    ".spf": "NC program",
+    ".tap": "NC program",
 }
 _EXPECTED = f"a drawing ({', '.join(_KINDS)})"

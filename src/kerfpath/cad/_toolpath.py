@@ -22,7 +22,16 @@ from kerfpath.cad._units import LARGEST, MM, UNITS_MM
 from kerfpath.contour import angle_between
 from kerfpath.errors import InputError
 
-__all__ = ["Move", "ToolPath", "Triple", "finite", "lines_of", "part_of_tool_path", "unit_axis"]
+__all__ = [
+    "Move",
+    "Tip",
+    "ToolPath",
+    "Triple",
+    "finite",
+    "lines_of",
+    "part_of_tool_path",
+    "unit_axis",
+]
 
 Triple = tuple[float, float, float]
 ALONG = float(np.radians(1.0))
@@ -67,6 +76,50 @@ class ToolPath:
     notes: Sequence[str]
 
     __repr__ = short_repr
+
+
+class Tip:
+    """The tip of a tool as a program for a machine moves it: what a block leaves out stays."""
+
+    def __init__(self) -> None:
+        self.moves: list[Move] = []
+        self._place: dict[str, float] = {}
+        self._axis: Triple | None = None
+
+    def go(self, line: int, *, feed: bool, place: dict[str, float], axis: Triple | None) -> None:
+        """Move to a place of coordinates "X", "Y", "Z", some of them or none.
+
+        Raises
+        ------
+        InputError
+            At feed, a coordinate that was never said.
+        """
+        self._place |= place
+        self._axis = axis or self._axis
+        unknown = [name for name in "XYZ" if name not in self._place]
+        if unknown and feed:
+            raise InputError(f"line {line}: a move at feed, and {unknown[0]} was not said before")
+        if unknown:
+            self.moves.append(Move(line=line, kind="away"))
+            return
+        point = self._place["X"], self._place["Y"], self._place["Z"]
+        kind: Literal["feed", "rapid"] = "feed" if feed else "rapid"
+        self.moves.append(Move(line=line, kind=kind, point=point, axis=self._axis))
+
+    def go_away(self, line: int) -> None:
+        """Move to a place that is not said in the part."""
+        self._place, self._axis = {}, None
+        self.moves.append(Move(line=line, kind="away"))
+
+    def forget(self, line: int) -> None:
+        """Take places for unknown from here on, as those before mean something else."""
+        if self.moves:
+            self.go_away(line)
+
+    @property
+    def has_places(self) -> bool:
+        """Whether a place in the part was said."""
+        return any(move.point is not None for move in self.moves)
 
 
 def lines_of(content: bytes) -> list[str]:

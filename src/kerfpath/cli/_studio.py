@@ -18,7 +18,7 @@ SHIPPED = ("b_pillar.toml", "b_pillar.step")
 """The demo job and its part, which are copied so that they can be changed."""
 DRAWINGS = (
     *(".step", ".stp", ".iges", ".igs", ".dxf", ".csv", ".tsv", ".txt"),
-    *(".apt", ".aptsource", ".cl", ".cls"),
+    *(".apt", ".aptsource", ".cl", ".cls", ".h", ".mpf", ".nc", ".spf", ".tap"),
 )
 
 
