@@ -550,3 +550,15 @@ def test_the_axis_of_a_lead_turns_on_into_the_cut():
     joint = cut.kinds.index("cut")
     assert rate[joint] == pytest.approx(rate[joint - 1], rel=0.05)
     assert rate[:joint].min() > 0.5 * rate[joint]
+
+
+def test_corners_of_a_polygon_without_a_node_between_them() -> None:
+    points = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.06, 0], [0, 0.06, 0]])
+    square = Contour(points, np.tile([0.0, 0.0, -1.0], (4, 1)), closed=True)
+    rounded = round_corners(square, 0.002)
+    looped = loop_corners(square, 0.005, side="right")
+    # Each corner is cut short by its arc, or gains three quarters of a turn and its two tangents.
+    assert rounded.closed
+    assert looped.closed
+    assert rounded.length < square.length < looped.length
+    assert np.count_nonzero(np.diff((looped.kind == KINDS.index("loop")).astype(int)) == 1) == 4

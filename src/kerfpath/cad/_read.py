@@ -53,14 +53,15 @@ def read(
     columns: Columns | None = None,
     progress: Progress = no_progress,
 ) -> Part:
-    """Return the part that a drawing holds: STEP, IGES, DXF, a table of points; or a shape.
+    """Return the part that a drawing holds: STEP, IGES, DXF, points, a tool path; or a shape.
 
     Parameters
     ----------
     path : str, Path or shape
-        .step, .stp, .iges, .igs, .dxf, .csv, .tsv or .txt. Or a shape of OCP in memory, what has
-        one as `.wrapped` (build123d, CadQuery), or a list of these: faces, or edges. It is copied,
-        and read in this process, where OCCT may crash on what is damaged.
+        .step, .stp, .iges, .igs, .dxf; a table: .csv, .tsv or .txt; a tool path: .apt, .aptsource,
+        .cl or .cls; a program of a machine: .h, .mpf, .nc, .spf or .tap. Or a shape of OCP in
+        memory, what has one as `.wrapped` (build123d, CadQuery), or a list of these: faces, or
+        edges. It is copied, and read in this process, where OCCT may crash on what is damaged.
     unit : str, optional
         What the numbers in the file mean, instead of what its header says: um, mm, cm, dm, m, km,
         mil, in or ft. A shape says none: its numbers are taken for mm.
@@ -71,8 +72,8 @@ def read(
         Where the outer sides of sheets face, on the whole, in the part. Without it the outer side
         is the one that lies less deep in the part, of a flat sheet the one that faces up.
     axis : (3,), optional
-        The tool axis of drawings that have none: lines in space of a DXF, STEP or IGES file, or a
-        table without axes.
+        The tool axis of drawings that have none: lines in space of a DXF, STEP or IGES file, a
+        table without axes, or what of a tool path has none.
     columns : mapping of str to str or sequence of str, optional
         Of a table: how its header names x, y, z, nx, ...; or, without a header, what its columns
         are, in their order, "-" for one that is not used.
@@ -106,10 +107,10 @@ def read(
         raise InputError(f"{path}: expected {_EXPECTED} by its suffix, got {path.suffix!r}")
     if not content.strip():
         raise InputError(f"{path}: the file is empty; expected {_EXPECTED}")
-    if outer_towards is not None and kind in ("table", "DXF"):
+    if outer_towards is not None and kind not in ("STEP", "IGES"):
         raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
     if columns is not None and kind != "table":
-        raise InputError(f"{path}: columns: expected a table, got a drawing in {kind}")
+        raise InputError(f"{path}: columns: expected a table, got a {kind} file")
     return _drawn(kind, path, content, asked, progress)
 
 
@@ -164,6 +165,14 @@ def _drawn(kind: str, path: Path, content: bytes, asked: _Asked, progress: Progr
         from kerfpath.cad._table import read_table
 
         return read_table(path, content, unit, gap, axis=axis, columns=asked.columns)
+    if kind == "tool path":
+        from kerfpath.cad._apt import read_apt
+
+        return read_apt(path, content, unit, gap, axis)
+    if kind == "NC program":
+        from kerfpath.cad._nc import read_nc
+
+        return read_nc(path, content, unit, gap, axis)
     require_extra("cad", f"{path}: reading {kind}")
     if kind == "DXF":
         from kerfpath.cad._dxf import read_dxf
@@ -242,5 +251,14 @@ _KINDS = {
     ".csv": "table",
     ".tsv": "table",
     ".txt": "table",
+    ".apt": "tool path",
+    ".aptsource": "tool path",
+    ".cl": "tool path",
+    ".cls": "tool path",
+    ".h": "NC program",
+    ".mpf": "NC program",
+    ".nc": "NC program",
+    ".spf": "NC program",
+    ".tap": "NC program",
 }
 _EXPECTED = f"a drawing ({', '.join(_KINDS)})"

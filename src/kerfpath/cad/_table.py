@@ -13,10 +13,9 @@ import numpy as np
 from kerfpath._arrays import Array
 from kerfpath.cad._build import loop_of, part_without_faces
 from kerfpath.cad._cells import TableCells, cells_of
-from kerfpath.cad._part import Kind, Part
-from kerfpath.cad._sample import Points, vector_area
+from kerfpath.cad._part import Part
+from kerfpath.cad._pointwise import kind_of_points, trace_of_points
 from kerfpath.cad._units import LARGEST, MM, UNITS_MM
-from kerfpath.contour import angle_between
 from kerfpath.errors import InputError
 
 __all__ = ["read_table"]
@@ -37,12 +36,6 @@ EXPECTED = (
     "x y z, then nx ny nz (outward normal), axis_x axis_y axis_z (tool axis) or qx qy qz qw (pose, "
     "its z the tool axis)"
 )
-REPEATED = 1e-6
-"""Points that follow each other closer than this, mm, are one: they leave no direction."""
-TURNED = float(np.radians(2.0))
-"""Axes at one point that differ by less are one axis."""
-FLIP = float(np.radians(90.0))
-"""An axis that turns by more from one point to the next has flipped."""
 UNIT_QUATERNION = 1e-2
 """How far a quaternion's length may be from one: rounded digits pass, other columns fail."""
 
@@ -81,9 +74,9 @@ def read_table(
         loops = []
         for name, chosen in _contours(names, table):
             lines = np.array(table.lines)[chosen]
-            trace, repaired = _trace(points[chosen], normals[chosen], lines, gap / MM)
+            trace, repaired = trace_of_points(points[chosen], normals[chosen], lines, gap / MM)
             notes += [f"contour {name!r}: {what}" for what in repaired]
-            kind = _kind(trace)
+            kind = kind_of_points(trace)
             loops.append(
                 loop_of(name=name, face=name, kind=kind, trace=trace, surface="points", gap=gap)
             )
@@ -244,45 +237,3 @@ def _contours(columns: Sequence[str], table: TableCells) -> Iterator[tuple[str, 
         seen.add(name)
         yield name, slice(first, last)
         first = last
-
-
-def _trace(points: Array, normals: Array, lines: Array, gap: float) -> tuple[Points, list[str]]:
-    """Return the points without repeated ones, closed if they end where they began."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    turns = angle_between(normals[:-1], normals[1:])
-    repaired = []
-    again = steps <= REPEATED
-    if (bad := np.flatnonzero(again & (turns > TURNED))).size:
-        raise InputError(
-            f"line {lines[bad[0] + 1]}: the same point as line {lines[bad[0]]} with another axis; "
-            "a contour cannot turn on the spot"
-        )
-    if again.any():
-        first = int(np.argmax(again)) + 1
-        repaired.append(f"{again.sum()} repeated points left out, the first in line {lines[first]}")
-        keep = np.concatenate([[True], ~again])
-        points, normals, lines = points[keep], normals[keep], lines[keep]
-    if len(points) < 2:
-        raise InputError(f"line {lines[0]}: a contour needs at least 2 points, got {len(points)}")
-    for k, angle in enumerate(angle_between(normals[:-1], normals[1:])):
-        if angle > FLIP:
-            raise InputError(
-                f"line {lines[k + 1]}: the axis turns by {np.degrees(angle):.0f} deg from line "
-                f"{lines[k]}; turn it round, or add points between"
-            )
-    is_closed = len(points) > 3 and float(np.linalg.norm(points[-1] - points[0])) <= gap
-    if is_closed:
-        if angle_between(normals[-1:], normals[:1])[0] > TURNED:
-            raise InputError(
-                f"line {lines[-1]}: ends where it began, line {lines[0]}, but with another axis"
-            )
-        points, normals = points[:-1], normals[:-1]
-    return Points(points=points, normals=normals, is_closed=is_closed), repaired
-
-
-def _kind(trace: Points) -> Kind:
-    """Return how a closed line runs about its mean normal: an outer one counter-clockwise."""
-    if not trace.is_closed:
-        return "open"
-    area = vector_area(trace.points)
-    return "outer" if area @ trace.normals.mean(axis=0) >= 0 else "inner"

@@ -16,7 +16,10 @@ __all__ = ["open_studio"]
 
 SHIPPED = ("b_pillar.toml", "b_pillar.step")
 """The demo job and its part, which are copied so that they can be changed."""
-DRAWINGS = (".step", ".stp", ".iges", ".igs", ".dxf", ".csv", ".tsv", ".txt")
+DRAWINGS = (
+    *(".step", ".stp", ".iges", ".igs", ".dxf", ".csv", ".tsv", ".txt"),
+    *(".apt", ".aptsource", ".cl", ".cls", ".h", ".mpf", ".nc", ".spf", ".tap"),
+)
 
 
 def open_studio(job: Path | None, *, host: str, port: int, browser: bool) -> None:

@@ -146,7 +146,11 @@ def _begin_off_corners(contour: Contour) -> Contour:
             "corners before"
         )
     if 0 in contour.corners:
-        return start_at(contour, smoothest_start(contour))
+        begun = start_at(contour, smoothest_start(contour))
+        if 0 not in begun.corners:
+            return begun
+        side = int(np.argmax(np.diff(contour.s)))  # of a polygon, whose every node is a corner
+        return start_at(contour, float(contour.s[side : side + 2].mean()))
     return contour
 
 

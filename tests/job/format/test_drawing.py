@@ -122,3 +122,19 @@ def test_a_job_says_axis_and_columns_where_the_drawing_does_not(tmp_path: Path) 
     (tmp_path / "line.csv").write_text("0,0,0\n30,0,0\n30,5,1\n")
     path.write_text(text.format(more='unit = "mm"\naxis = [0, 0, -1]\ncolumns = ["x", "y", "z"]'))
     np.testing.assert_array_equal(read_job(path).read_part().bounding_box, part.bounding_box)
+
+
+def test_a_job_cuts_a_tool_path(tmp_path: Path) -> None:
+    (tmp_path / "trim.cls").write_text(
+        "TOOL PATH/TRIM\nRAPID\nGOTO/0,0,0,0,0,1\nGOTO/30,0,0\nGOTO/30,5,1\n"
+        "RAPID\nGOTO/0,9,0\nGOTO/9,9,0\n"
+    )
+    path = tmp_path / "job.toml"
+    text = JOB.replace("blank.dxf", "trim.cls").replace("0/outer", "cut1")
+    path.write_text(text.format(more='unit = "mm"'))
+    job = check_job(read_job(path))
+    assert [loop.name for loop in read_job(path).read_part().loops] == ["cut1", "cut2"]
+    assert job is not None
+    path.write_text(text.format(more=""))
+    with pytest.raises(InputError, match=r"trim\.cls: states no length unit"):
+        read_job(path).read_part()

@@ -1,0 +1,226 @@
+"""Programs of 5-axis machines in: the tool axis as a vector, and all that is refused."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kerfpath.cad import Part, read
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError
+
+SIEMENS = """\
+%_N_TRIM_MPF
+; trim of a flange
+N10 G40 G17 G710 G90 G94
+N20 MSG("TRIM (1)")
+N30 T="BEAM" D1
+N40 M6
+N50 G54 CYCLE832(0.01,3)
+N60 TRAORI
+N70 ORIWKS ORIVECT
+N80 G0 X0 Y0 Z5 A3=0 B3=0 C3=1
+N90 G1 Z0 F3000
+N100 X10.
+N110 X=10 Y20 B3=.1736482 C3=.9848078 (leaning)
+N120 X-0 M8
+N130 G0 Z50
+N140 TRAFOOF
+N150 G0 SUPA Z0 D0
+N160 M30
+"""
+HEIDENHAIN = """\
+0 BEGIN PGM TRIM MM
+1 BLK FORM 0.1 Z X-10 Y-10 Z-1
+2 ; trim of a flange
+3 TOOL CALL 1 Z S100
+4 CYCL DEF 32.0 TOLERANCE
+5 CYCL DEF 32.1 T0.01
+6 LN X+0 Y+0 Z+5 TX+0 TY+0 TZ+1 R0 FMAX M128
+7 L Z+0 F3000 M3
+8 L X+10 F3000
+9 LN X+10,0 Y+20 Z+0 TX+0 TY+0.1736482 TZ+0.9848078 F3000
+10 L X+0
+11 L Z+50 FMAX M129
+12 L Z-1 R0 FMAX M91
+13 STOP M30
+14 END PGM TRIM MM
+"""
+POINTS = [[0, 0, 0], [0.01, 0, 0], [0.01, 0.02, 0], [0, 0.02, 0]]
+LEAN = [0.0, -np.sin(np.pi / 18), -np.cos(np.pi / 18)]
+AXES = [[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], LEAN, LEAN]
+
+
+def program(folder: Path, text: str | bytes, *, name: str = "cut.nc", **options: object) -> Part:
+    file = folder / name
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read(file, **options)
+
+
+def siemens(contours: Sequence[Contour]) -> str:
+    lines = ["G710 G90", "TRAORI"]
+    for contour in contours:
+        for k, row in enumerate(np.hstack([contour.points * 1000, -contour.axes])):
+            words = zip(("X", "Y", "Z", "A3=", "B3=", "C3="), row, strict=True)
+            lines.append(
+                f"G{int(k > 0)} " + " ".join(f"{word}{value:.9f}" for word, value in words)
+            )
+    return "\n".join([*lines, "M30"])
+
+
+def heidenhain(contours: Sequence[Contour]) -> str:
+    lines = ["BEGIN PGM A MM", "M128"]
+    for contour in contours:
+        for k, row in enumerate(np.hstack([contour.points * 1000, -contour.axes])):
+            words = zip(("X", "Y", "Z", "TX", "TY", "TZ"), row, strict=True)
+            said = " ".join(f"{word}{value:+.9f}" for word, value in words)
+            lines.append(f"LN {said} F{'3000' if k else 'MAX'}")
+    return "\n".join(f"{k} {line}" for k, line in enumerate([*lines, "END PGM A MM"]))
+
+
+@pytest.mark.parametrize(("name", "text"), [("trim.mpf", SIEMENS), ("trim.h", HEIDENHAIN)])
+def test_the_cut_of_a_program(tmp_path: Path, name: str, text: str) -> None:
+    part = program(tmp_path, text, name=name)
+    (loop,) = part.loops
+    assert (loop.name, loop.kind, part.unit) == ("cut1", "open", "mm")
+    contour = part.contour("cut1", closed=False)
+    np.testing.assert_allclose(contour.points, POINTS, atol=1e-15)
+    # The file has seven decimals of the axis.
+    np.testing.assert_allclose(contour.axes, AXES, atol=1e-7)
+    assert "5 mm along the tool axis at its start" in part.notes[-1]
+    assert part.notes[0].startswith("words not used: ")
+    inches = {"G710": "G700", "TRIM MM": "TRIM INCH"}
+    for metric, inch in inches.items():
+        text = text.replace(metric, inch)
+    again = program(tmp_path, text, name=name)
+    assert again.unit == "in"
+    np.testing.assert_allclose(
+        again.contour("cut1", closed=False).points, 25.4 * np.array(POINTS), atol=1e-14
+    )
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1), st.booleans(), st.sampled_from([siemens, heidenhain]))
+def test_what_is_written_is_read(
+    tmp_path_factory: pytest.TempPathFactory, seed: int, closed: bool, written: object
+) -> None:
+    random = np.random.default_rng(seed)
+    contours = []
+    for _ in range(int(random.integers(1, 4))):
+        size = int(random.integers(4, 30))
+        steps = np.array([0.02, 0, 0]) + random.normal(size=(size, 3)) * 0.01
+        axes = np.array([0, 0, -2]) + np.cumsum(random.normal(size=(size, 3)) * 0.05, axis=0)
+        contours.append(Contour(np.cumsum(steps, axis=0), axes, closed=closed))
+    part = program(tmp_path_factory.mktemp("nc"), written(contours))
+    assert len(part.loops) == len(contours)
+    for loop, contour in zip(part.loops, contours, strict=True):
+        assert loop.closed == closed
+        again = part.contour(loop.name, closed=closed)
+        # Nine decimals of a mm, and of an axis, are what the file holds.
+        np.testing.assert_allclose(again.points, contour.points, atol=1e-12)
+        np.testing.assert_allclose(again.axes, contour.axes, atol=2e-9)
+
+
+def test_an_axis_where_the_program_says_none(tmp_path: Path) -> None:
+    text = "G21\nG0 X0 Y0 Z0\nG1 X10\nY20\n"
+    contour = program(tmp_path, text, name="cut.tap", axis=(0, 0, -1)).contour("cut1", closed=False)
+    np.testing.assert_array_equal(contour.axes, [[0, 0, -1]] * 3)
+    with pytest.raises(InputError, match="line 2: no tool axis is known here"):
+        program(tmp_path, text)
+
+
+S = "G710\nTRAORI\nG0 X0 Y0 Z0 A3=0 B3=0 C3=1\nG1 X10\nY20\n"
+H = "BEGIN PGM A MM\nLN X0 Y0 Z0 TX0 TY0 TZ1 FMAX M128\nL X10 F9\nL Y20\n"
+REFUSED = {
+    "no unit": (S.replace("G710\n", ""), "states no length unit; say it with unit="),
+    "a late unit": (S + "G700\n", "line 6: G700 after moves in another unit"),
+    "an arc": (S + "G2 X20 I5\n", "line 6: 'G2': a curve; let the CAM system write linear"),
+    "another arc": (S + "CIP X20 I1=5\n", "line 6: 'CIP': a curve"),
+    "increments": (S + "G91 X5\n", "line 6: 'G91': increments; write places"),
+    "an increment": (S + "X=IC(5)\n", "line 6: X=: expected a number"),
+    "a parameter": (S + "X=R1\n", "line 6: X=: expected a number"),
+    "a sum": (S + "X=5+R1\n", "line 6: X=: expected a number"),
+    "compensation": (S + "G41\n", "line 6: 'G41': the controller would move the path aside"),
+    "a rotary axis": (S + "G0 C90\n", "line 6: C: what a rotary axis or angle does is known with"),
+    "another rotary axis": (S + "X5 A=5\n", "line 6: A: what a rotary axis or angle does"),
+    "angles": (S + "X5 A2=5\n", "line 6: A2: what a rotary axis or angle does"),
+    "a moved origin": (S + "TRANS X10\n", "line 6: 'TRANS': it moves the points that follow"),
+    "a turned plane": (S + 'CYCLE800(1,"A")\n', "line 6: 'CYCLE800': it moves the points"),
+    "another offset": (S + "G55\n", "line 6: G55 after moves; write all of them in one system"),
+    "axes of the machine": (S + "ORIMKS\n", "line 6: 'ORIMKS': tool axes in the machine"),
+    "a vector without a transformation": (
+        S.replace("TRAORI\n", ""), "line 2: A3 B3 C3 without TRAORI, which gives them"
+    ),
+    "a vector of no length": (S + "X0 A3=0\n", "line 6: the tool axis is 0 0 0"),
+    "no transformation any more": (
+        S + "TRAFOOF\nG1 X5 Y5 Z5\n", "line 7: a move at feed from a place that is not known"
+    ),
+    "the machine's place": (S + "SUPA X5\n", "line 6: SUPA at feed: a place in the machine"),
+    "another machine's place": (S + "G53 X5\n", "line 6: G53 at feed: a place in the machine"),
+    "a cut from the tool change": (S + "M6\nX5 Y5 Z5\n", "line 7: a move at feed from a place"),
+    "a program that is called": (S + "M98 P5\n", "line 6: 'P': the word is not known"),
+    "a cycle called": (S + "M99\n", "line 6: M99: a program in another place is not read"),
+    "another program that is called": (S + "PART_TWO(1)\n", "line 6: 'PART_TWO': the word is not"),
+    "a loop": (S + "GOTOB A\n", "line 6: expected words as X1.5 .*, got 'A'"),
+    "an unknown G": (S + "G43.4 H1\n", "line 6: 'G43.4': the word is not known"),
+    "a skipped block": (S + "/X5\n", "line 6: a block that a switch of the machine may skip"),
+    "no words": (S + "X5 ?\n", r"line 6: expected words as X1\.5 or A3=0\.5, got ' \?'"),
+    "a number of two points": (S + "X1.5.2\n", "line 6: expected words"),
+    "X twice": (S + "X5 X6\n", "line 6: X twice in one block"),
+    "two motions": (S + "G0 G1 X5\n", "line 6: G0 and G1 in one block"),
+    "no motion": ("G710\nX5\n", "line 2: a place before any G0 or G1"),
+    "no Z": ("G710\nG1 X5 Y5\n", "line 2: a move at feed, and Z was not said before"),
+    "a dwell with X": (S + "G4 X5\n", "line 6: G4 with X, Y or Z"),
+    "a block after the end": (S + "M30\nX5\n", "line 7: a block after the end .* in line 6"),
+    "Heidenhain, no unit": (H.replace(" MM", ""), "line 1: expected one BEGIN PGM NAME MM or INCH"),
+    "Heidenhain, an arc": (H + "C X5 Y5 DR+\n", r"line 5: 'C X5 Y5 DR\+': a curve, or a move that"),
+    "Heidenhain, a rounding": (H + "RND R5\n", "line 5: 'RND R5': a curve, or a move that"),
+    "Heidenhain, increments": (H + "L IX+5\n", r"line 5: 'IX\+5': increments; write places"),
+    "Heidenhain, compensation": (H + "L X5 RL\n", "line 5: 'RL': the controller would move"),
+    "Heidenhain, a rotary axis": (H + "L B+5 FMAX\n", "line 5: B: what a rotary axis does"),
+    "Heidenhain, a parameter": (H + "L X+Q5\n", r"line 5: 'X\+Q5': it is not known, and may"),
+    "Heidenhain, a cycle": (H + "CYCL DEF 7.0 DATUM\n", "line 5: 'CYCL DEF 7.0 DATUM': it is not"),
+    "Heidenhain, a plane": (H + "PLANE SPATIAL SPA5\n", "line 5: 'PLANE SPATIAL SPA5': it is not"),
+    "Heidenhain, a cycle called": (H + "L X5 M99\n", "line 5: 'M99': it is not known"),
+    "Heidenhain, half a vector": (H + "LN X5 TX0 TZ1\n", "line 5: TX, TY and TZ belong together"),
+    "Heidenhain, no M128": (
+        H.replace(" M128", ""), "line 2: TX TY TZ without M128, which gives them a meaning"
+    ),
+    "Heidenhain, normals alone": (
+        H + "LN X5 NX0 NY0 NZ1\n", "line 5: NX NY NZ without TX TY TZ; expected the tool axis"
+    ),
+    "Heidenhain, a length": (H + "LN X5 TX0 TY0 TZ9\n", "line 5: a tool axis of length 9"),
+    "Heidenhain, the machine's place": (H + "L Z5 M91\n", "line 5: M91 at feed: a place in the"),
+    "Heidenhain, no tip any more": (
+        H + "M129\nL X5 Y5 Z5\n", "line 6: a move at feed from a place that is not known"
+    ),
+    "Heidenhain, X twice": (H + "L X5 X6\n", "line 5: X twice in one block"),
+    "Heidenhain, a block after the end": (H + "M30\nL X5\n", "line 6: a block after the end"),
+    "Heidenhain, an end beside an arc": (H + "C X5 Y5 M30\n", "line 5: 'C X5 Y5 M30': a curve"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", REFUSED)
+def test_every_fault_is_refused_in_one_line(tmp_path: Path, fault: str) -> None:
+    text, message = REFUSED[fault]
+    with pytest.raises(InputError, match=message) as error:
+        program(tmp_path, text)
+    assert str(error.value).startswith(str(tmp_path / "cut.nc: "))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("source", [SIEMENS, HEIDENHAIN])
+def test_damaged_programs_are_read_or_refused(tmp_path: Path, source: str) -> None:
+    random = np.random.default_rng(21)
+    for _ in range(200):
+        spoilt = bytearray(source.encode())
+        for place in random.integers(0, len(spoilt), 3):
+            spoilt[place] = random.integers(0, 256)
+        with contextlib.suppress(InputError):  # nothing else may come out
+            program(tmp_path, bytes(spoilt[: int(random.integers(1, len(spoilt)))]))
