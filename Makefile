@@ -20,6 +20,8 @@ check: .venv/dev.stamp
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/typos --format brief
+	$(BIN)/python docs/_ext/terms.py
 
 # The site, with every warning an error; then that no page of it asks another host for anything.
 SITE := build/docs

@@ -69,47 +69,7 @@ def test_the_drawing_of_the_house_has_the_layers_of_its_contract(container):
     assert drawn == [set(layer.split(" | ")) for layer in HOUSES[container]]
 
 
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
-NOT_USED = {
-    r"\b(air moves?|moves? through the air)\b": "transfer move",
-    r"\b(dips|dipped|dipping|a dip)\b": "feed reduction",
-    r"\b(told|tells?)\b": "said, printed, reported, listed",
-    r"\bled (to|out)\b": "moved to",
-    r"\bof a rail m\b": "a rail is in m",
-    r"\bgiv(e|es|ing) way\b": "relax a limit",
-    r"\b(unrolled|unwrapped)\b": "not wrapped",
-}
 GLOSSARY = (ROOT / "docs" / "glossary.md").read_text()
-
-
-def require_chosen_words(text, where):
-    """Code keeps its names: blocks, and spans between backticks, are left out."""
-    prose = re.sub(r"```.*?```|`[^`\n]*`|^ {4}.*$", "", text, flags=re.DOTALL | re.MULTILINE)
-    prose = re.sub(r"\s+", " ", prose)
-    for pattern, instead in NOT_USED.items():
-        found = re.search(rf".{{0,40}}{pattern}.{{0,40}}", prose, re.IGNORECASE)
-        assert found is None, f"{where}: {found[0]!r}; write {instead}"
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda f: str(f.relative_to(ROOT)))
-def test_a_page_uses_the_words_of_the_glossary(page):
-    require_chosen_words(page.read_text().partition("## Words that are not used")[0], page.name)
-
-
-def test_the_help_of_every_command_uses_the_words_of_the_glossary():
-    from typer.main import get_command
-
-    from kerfpath.cli._studies import app
-
-    for name, command in get_command(app).commands.items():
-        require_chosen_words(command.help or "", name)
-        for parameter in command.params:
-            require_chosen_words(getattr(parameter, "help", None) or "", f"{name} {parameter.name}")
-
-
-def test_the_glossary_lists_every_word_that_is_not_used():
-    words = GLOSSARY.partition("## Words that are not used")[2]
-    assert all(re.search(pattern, words) for pattern in NOT_USED)
 
 
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"`(kerfpath\.[\w.]+)`", GLOSSARY))))

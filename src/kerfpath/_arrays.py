@@ -34,7 +34,7 @@ Bools = NDArray[np.bool_]
 _A = TypeVar("_A", bound=NDArray[Any])
 
 WHOLE = 2.0**53
-"""Whole numbers from here on cannot be told apart as float64."""
+"""Whole numbers from here on are not distinct as float64."""
 _ROTATION_TOLERANCE = 1e-6
 """How far R^T R may be from the identity: seven printed decimals pass, a typo fails."""
 

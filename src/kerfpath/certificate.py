@@ -48,7 +48,7 @@ __all__ = [
 BASE = 72
 """Cells that the circle of gamma is divided into at level 0; each level divides them in two."""
 LIFTS = 8
-"""Parts of half a turn in which the place of a joint is written, to tell its turns apart."""
+"""Parts of half a turn in which the place of a joint is written, to distinguish its turns."""
 ALLOWANCE = 2e-4
 """Share of the plan's cost by which the bound that is stated stays below the one computed: another
 enclosure of the same joints may be a little wider."""

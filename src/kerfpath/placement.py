@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 ON_A_LINE = 0.05
-"""Points whose spread across their best line is a smaller share of that along it tell no frame."""
+"""Points that spread across their best line by a smaller share of its length fix no frame."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

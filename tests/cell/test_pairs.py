@@ -288,7 +288,7 @@ def test_links_that_touch_at_most_poses_by_a_skin_are_judged_but_for_it():
         return cell, cell.clear(q), np.abs(np.abs(q[:, 0]) - np.pi)
 
     sliding, clear, _ = turned(plate)
-    assert "but for 0.5 mm that they overlap by design" in sliding.unjudged["plate", "foot"]
+    assert "except for 0.5 mm that they overlap by design" in sliding.unjudged["plate", "foot"]
     assert clear.all()
     cell, clear, off = turned(plate, ([-0.13, -0.02, 0], [-0.09, 0.02, 0.03]))
     assert cell.depth == [5e-4]

@@ -2,7 +2,7 @@ MODULE cut_skin_outer
   ! Written by kerfpath for IRB 4600-60/2.05 (abb_irb4600_60_205).
   ! Complete the load of the tool: mass -1 stands for not known.
   ! The work object is the part in the robot's base, which is the world's, too.
-  ! Moves through the air have not been checked for collisions.
+  ! Transfer moves have not been checked for collisions.
   ! switchOff is for the events STOP and QSTOP: enter it there. A stop switches
   ! the laser off only then; the safety circuit of the cell has to, too.
   ! To begin at a contour, set nFirst to its number and move PP to Main.

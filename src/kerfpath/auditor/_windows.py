@@ -16,7 +16,7 @@ __all__ = ["window_checks"]
 SLACK = 1e-6
 """rad: what two kinematics and the digits of the ends of a window leave, and far below a degree."""
 ON_IT = 1e-9
-"""m: a node at the end of a stretch, but for rounding, is on it."""
+"""m: a node at the end of a stretch, except for rounding, is on it."""
 
 
 def window_checks(plan: Plan, tool: Array, *, slack: float = SLACK) -> list[Check]:

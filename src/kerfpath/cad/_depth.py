@@ -1,4 +1,4 @@
-"""How deep a side of a sheet lies inside it: what tells its outer side from its inner one.
+"""How deep a side of a sheet lies inside it: what distinguishes its outer side from its inner one.
 
 Seen along the outward normal, nothing of a channel lies beyond its outside, and all of the channel
 beyond its inside. Holes, countersinks and flanges change that little, unlike the length of the rims
@@ -29,7 +29,7 @@ __all__ = ["depth_of", "joined", "patches_of", "weighed"]
 GRID = 5
 """Patches in either direction of a face that is not plane."""
 ACCURACY = 1e-2
-"""Relative accuracy of areas: they tell sheets from blocks, and are not shown."""
+"""Relative accuracy of areas: they distinguish sheets from blocks, and are not shown."""
 EDGE = 1e-9
 """What lies this close to an edge, in the surface's own parameters, lies on it."""
 CHUNK = 256

@@ -29,7 +29,7 @@ THIN = 0.2
 """A sheet is thinner than this part of the square root of its area."""
 EVEN, UNSURE = 0.01, 0.1
 """By how much two sides differ in depth, as a share of both together: below the first, they are
-told apart by where they face; below the second, a note says that it is not certain."""
+distinguished by where they face; below the second, a note says that it is not certain."""
 FLATNESS = 1e-3
 """Sides that lie less deep in a sheet than this part of the square root of its area are flat."""
 LEANING = 0.05

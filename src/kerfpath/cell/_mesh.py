@@ -224,5 +224,5 @@ def _require_closed(triangles: Ints, name: str) -> None:
     if count := np.count_nonzero(open_):
         raise InputError(
             f"{name}: the surface is not closed, {count} of its {len(edges)} edges have a triangle "
-            "on one side only; what is inside cannot be told, so mend the mesh"
+            "on one side only; its inside is not known, so mend the mesh"
         )

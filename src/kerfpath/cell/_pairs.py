@@ -5,7 +5,7 @@ capsules are drawn too thick. What is so by design is so whatever the joints do:
 at poses spread over whole turns of all joints, limits ignored, and never depend on what a cell asks
 for. A pair that is apart at any pose is judged. Where it is never as far apart as asked, it keeps
 nearly the most that a pose leaves it. Links that touch at every pose do so by their maker's design.
-A head is not the maker's: where it touches a link at every pose it is judged as well, but for the
+A head is not the maker's: where it touches a link at every pose it is judged, too, except for the
 depth of that overlap, by which one of the two is shaved; so is any pair that touches at most poses
 by a skin's depth.
 """
@@ -63,7 +63,7 @@ freed by a skin where it does; of all, so many where a head touches a link at ev
 ARCS = 72
 """Pieces of a turn that a proof for a whole one begins with."""
 FAIR = 0.1
-"""m beyond what is required: farther is not told apart."""
+"""m beyond what is required: greater distances are not distinguished."""
 BY_DESIGN = "they touch at every pose tried, by design"
 """Why links, and a head that cannot be judged otherwise, are not judged."""
 MEANT = "they may touch"
@@ -168,7 +168,7 @@ def say_kept_all_round(
     said = (
         ""
         if not design.depth
-        else f", but for {design.depth * 1e3:g} mm that they overlap by design"
+        else f", except for {design.depth * 1e3:g} mm that they overlap by design"
     )
     less = "" if needed[0] >= asked or design.depth else f" of {asked * 1e3:g} mm"
     return f"they keep {needed[0] * 1e3:.3g} mm{less} at every angle of {chain.say(a)}{said}"

@@ -19,7 +19,7 @@ __all__ = ["Capsule", "Hull", "Shape", "box", "box_between", "frustum", "surface
 RING = 24
 """Corners of the polygon drawn around a circle; it juts out by less than 1 % of the radius."""
 SAME = 1e-7
-"""m: corners that differ by this are the same, but for rounding."""
+"""m: corners that differ by this are the same, except for rounding."""
 
 MOST_NEIGHBOURS = 254
 """Of a corner of a convex solid in coal, which counts them in a byte."""

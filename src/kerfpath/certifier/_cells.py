@@ -77,7 +77,7 @@ class CellSet:
         return np.rint(self.center * (LIFTS / np.pi)).astype(np.int8)
 
     def flipped(self, joint: int, middle: float) -> CellSet:
-        """Return the cells with the wrist turned over, see `Robot.flip`, but for constant turns."""
+        """Return the cells with the wrist turned over (`Robot.flip`), except for constant turns."""
         center, slope, bend = self.center.copy(), self.slope.copy(), self.bend.copy()
         center[:, joint] = 2 * middle - center[:, joint]
         slope[:, joint] *= -1

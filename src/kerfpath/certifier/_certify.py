@@ -38,7 +38,7 @@ STALLED = 0.5
 CARE = 0.05
 """Share of the cost beyond the cheapest step up to which steps are bounded with care."""
 FINE = 3
-"""Level below which cells are too coarse to tell whether it is further nodes, or (6), they lack."""
+"""Level below which cells are too coarse to show whether they lack further nodes, or (6)."""
 NEAR = 0.9
 """Share of what is wanted from which (6) may be what is left."""
 DEEPEST = 12
@@ -48,7 +48,7 @@ MOST_PAIRS, MOST_PER_NODE = 10_000_000, 60_000
 MOST_CELLS = 2_000_000
 """Cells of a stage after which it is left at that: some 2 GB."""
 CLEARLY, USUAL_LEVEL, WIDER = 0.02, 3, 2.0
-"""Share of its cost by which the motions through a cell of that level are dearer than the plan
+"""Share of its cost by which the motions through a cell of that level cost more than the plan
 where it drops out, four times as much a level coarser: whoever checks the certificate has
 enclosures of his own, and may find less. The curvature is taken so much wider, too. Where nobody
 does: `SAME`, rounding."""

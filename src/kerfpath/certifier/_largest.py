@@ -1,8 +1,8 @@
-"""The bound of the objective "max" (15): what the dearest step of any motion costs at least.
+"""The bound of the objective "max" (15): what the costliest step of any motion costs at least.
 
 A motion that costs at most c has no step that costs more. That no motion has such steps only is
-proved as for any other limit (`_nopath`), about the step that is the plan's dearest; the largest c
-for which it is proved bounds the cost from below.
+proved as for any other limit (`_nopath`), about the costliest step of the plan; the largest c for
+which it is proved bounds the cost from below.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from kerfpath.progress import Progress
 __all__ = ["largest_step_bound"]
 
 ABOUT = 12
-"""Nodes on either side of the dearest step that are looked at: of more, cells stay too coarse."""
+"""Nodes on either side of the costliest step that are looked at: of more, cells stay too coarse."""
 CLOSE = 0.5
 """Share of the gap asked for to which the largest cost that is proved is found."""
 SHARES = (0.5, 0.75, 0.9, 0.95)
@@ -38,7 +38,7 @@ ROUNDED = 1e-15
 def largest_step_bound(
     plan: Plan, steps: Steps, gap: float, spent: Callable[[], bool], progress: Progress
 ) -> tuple[float, int]:
-    """Return a lower bound on the dearest step of any motion along a plan's contour, and the tests.
+    """Return a lower bound on the costliest step of any motion along a contour, and the tests.
 
     Parameters
     ----------

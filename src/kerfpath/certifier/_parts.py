@@ -30,7 +30,7 @@ from kerfpath.certifier._steps import Steps
 __all__ = ["DEAREST", "NARROW", "Parts"]
 
 SAME = 1e-9
-"""Share of the cost by which motions are dearer than the plan where they drop out: rounding."""
+"""Share of the cost by which motions cost more than the plan where they drop out: rounding."""
 CARE = 0.05
 """Share of the cost beyond the cheapest step up to which steps are bounded with care."""
 STALLED, AGAIN = 0.1, 1

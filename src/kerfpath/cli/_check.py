@@ -76,7 +76,8 @@ def _show_cell(cell: Cell) -> None:
     table(["body", "kind", "moves with", "box mm", "shape", "pairs"], rows, numbers=["pairs"])
     for warning in odd_sizes(cell):
         out.print(f"warning: {escape(warning)}")
-    out.print(f"{len(cell.pairs)} pairs are judged; all keep {cell.near_miss * 1e3:g} mm, but for:")
+    kept = f"{cell.near_miss * 1e3:g} mm"
+    out.print(f"{len(cell.pairs)} pairs are judged; all keep {kept}, except for:")
     rules = zip(cell.pair_names, cell.asked, cell.required, cell.depth, cell.own, strict=True)
     for (a, b), asked, required, depth, own in rules:
         if own or required < asked or depth > 0:

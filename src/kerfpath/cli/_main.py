@@ -152,9 +152,9 @@ def speed(
 ) -> None:
     """Find the fastest constant cutting speed of each contour, and what binds where.
 
-    The column on the grid is exact on the graph that the job describes (its spacing, gamma step,
+    The column on the grid is exact on the graph that the job describes (its spacing, rotation step,
     limits and eta), and clear in its cell, if it has one. The column refined has the speed with
-    gamma moved off the grid from there, if the job refines; what binds belongs to that
+    the rotation moved off the grid from there, if the job refines; what binds belongs to that
     speed. Both keep the limits at the nodes; the column as run has a speed at which the program
     keeps them between the nodes, too, if the job asks for it. The speeds in the job play no part.
 

@@ -218,9 +218,9 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
     table(columns, rows, numbers=columns[1:-1], whole=["audit"], spare=spare)
     out.print(
         "run s: how long it takes from rest to rest, corners rounded and every joint limit kept; "
-        "cost: what is minimised; grid: the best on the gamma grid, before the refinement; "
-        "bound: no motion that keeps the limits at the nodes costs less, at any gamma, posture and "
-        "turn; gap: at most so much of the cost lies above the best motion; "
+        "cost: what is minimised; grid: the best on the grid of rotations, before the refinement; "
+        "bound: no motion that keeps the limits at the nodes costs less, at any rotation, posture "
+        "and turn; gap: at most so much of the cost lies above the best motion; "
         "vel, acc: highest share of a joint's velocity and acceleration limit; chord: largest "
         "distance of the CAD curve from the chords between nodes; step: largest turn of the tool "
         "axis from node to node"

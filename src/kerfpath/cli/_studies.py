@@ -51,7 +51,10 @@ def pareto(
         ),
     ] = None,
     refine: Annotated[
-        bool, typer.Option("--refine", help="Refine a picked plan of the grid: move gamma off it.")
+        bool,
+        typer.Option(
+            "--refine", help="Refine a picked plan of the grid: move its rotation off it."
+        ),
     ] = False,
     strict: Strict = False,
     scheduler: Scheduler = None,

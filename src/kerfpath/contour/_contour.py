@@ -194,7 +194,7 @@ class Contour:
         speed: ArrayLike | None = None,
         keep: ArrayLike = (),
     ) -> Contour:
-        """Sample the contour anew, uniformly in arc length or in time (Eq. 1).
+        """Sample the contour again, uniformly in arc length or in time (Eq. 1).
 
         Give exactly one of `spacing`, `count`, `tolerance` (with or without `axis_tolerance`), or
         `dt` together with `speed`. The ends are always nodes; with `spacing` or `dt` corners and

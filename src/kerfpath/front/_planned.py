@@ -123,7 +123,7 @@ def _require_ranges(options: PlanOptions, windowed: list[int]) -> None:
     why = ""
     comfort = options.comfort
     if comfort is not None and comfort.limits is not None and comfort.limits.cost:
-        why = "the limits of joints cost something near by, which a window would narrow"
+        why = "the limits of joints cost something close to it, which a window would narrow"
     elif options.rotation is not None and np.isfinite(options.rotation[windowed]).any():
         why = "the rotation of a joint with a window is limited"
     if why:

@@ -129,7 +129,7 @@ class Gap:
 
     @property
     def key(self) -> tuple[int, int, int]:
-        """What tells gaps apart, whatever the front is by then."""
+        """What distinguishes gaps, whatever the front is by then."""
         better, worse = self.better, self.worse
         return (self.criterion, *((-1, -1) if better is None else (better.number, worse.number)))
 

@@ -67,7 +67,7 @@ class Steps(NamedTuple):
     metric: int
     minimax: bool
     cap: float
-    """Distance from which on a step is dearer, see `OVER_CAP`."""
+    """Distance from which on a step costs more, see `OVER_CAP`."""
     low: Array
     """(n,) rad"""
     high: Array

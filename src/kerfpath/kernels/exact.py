@@ -44,7 +44,7 @@ from kerfpath.kernels.torque import TorqueRoom, torque_excess, torque_room
 __all__ = ["RecursionResult", "count_closing", "recursion", "trace"]
 
 LEAPT = -2
-"""Parent of a state that a step beyond `aim.velocity` has led to, from anywhere."""
+"""Parent of a state that a step beyond `aim.velocity` has reached, from anywhere."""
 
 
 class RecursionResult(NamedTuple):

@@ -11,7 +11,7 @@ a over b to c keep (6) only if
     |B_i - f B_r| <= a_i + |f| a_r + w(a) + 2 w(b) + w(c),    B = D_bc - D_ab.
 
 With f = 0 both are tests of one joint. With f = s_i / s_r, r the joint that gamma moves most, what
-is not known of gamma drops out but for curvature: they tell what no choice of gamma can mend.
+is not known of gamma drops out except for curvature: they show what no choice of gamma can mend.
 """
 
 from __future__ import annotations

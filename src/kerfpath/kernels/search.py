@@ -58,7 +58,7 @@ class SortedLayers(NamedTuple):
     turn: Array
     """(n,): 2 pi for endless joints, infinity for the others."""
     after: Ints
-    """(K,): a path may break off at layer after[k], an earlier one, and begin anew at layer k, for
+    """(K,): a path may break off at layer after[k], an earlier one, and begin again at layer k, for
     the cost up to there; -1: it may not."""
     shut_from: Ints
     """(N+1,): edges that are shut lead from vertex p to shut[shut_from[p]:shut_from[p+1]];"""

@@ -3,7 +3,7 @@
 Rails and tables are slow beside the arm, and a grid of their values would quantise what they may
 accelerate, as it would that of joint 3 of a seven-axis arm, which is treated as one of them. So the
 best ways through coarse samples are found; a course is the smoothest curve that stays near one.
-Gamma is planned anew along it, and both together are refined by the true kinematics.
+Gamma is planned again along it, and both together are refined by the true kinematics.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""feed="dip": the paths to slow down, the least time one takes, and where the speed dips."""
+"""feed="dip": the paths to slow down, the least time one takes, and where the speed is reduced."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_LOOKS = 20
 
 
 def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Plan:
-    """Return a plan that keeps the speed asked for wherever its path lets it, and dips elsewhere.
+    """Return a plan at the speed asked for wherever its path lets it, and slower elsewhere.
 
     On the grid two paths are worth their least times under all limits: the one that loses the least
     time, priced above all distances, if each step had to be slow on its own, and the best one

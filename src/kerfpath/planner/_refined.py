@@ -79,7 +79,7 @@ def plan_slowly(task: PlanningTask, quick: QuickMotion, finder: ClearSearch) -> 
     """
     asked = task.settings
     begun = replace(quick.plan, settings=asked, time=task.times)
-    claim = "the quickest motions led to it"
+    claim = "the quickest motions gave it"
     cost = path_cost(
         begun.increments, asked.weights, asked.metric, asked.objective, begun.node_cost
     )

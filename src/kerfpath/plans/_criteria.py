@@ -1,4 +1,4 @@
-"""What is said of a plan: what is proved, where its speed dips, and its criteria."""
+"""What is said of a plan: what is proved, where its speed is reduced, and its criteria."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class CalledFormatter(Formatter):
         clear = "proved clear in the planned cell"
         checked = clear if program.air_checked else "not checked for collisions"
         for_robot = f"kerfpath, for {plain(program.robot.model)}"
-        moves = f"Moves through the air: {checked}."
+        moves = f"Transfer moves: {checked}."
         for remark in (for_robot, moves, *program.caveats, *about):
             yield from self.comment(remark)
         for name, T in zip((frame, tool), controller_frames(program), strict=True):

@@ -142,7 +142,7 @@ class Formatter(ABC):
         return [
             f"Written by kerfpath for {plain(robot.model)} ({plain(robot.id)}).",
             *about,
-            f"Moves through the air have {checked}.",
+            f"Transfer moves have {checked}.",
             *self.program.caveats,
         ]
 

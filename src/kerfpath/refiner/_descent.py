@@ -23,7 +23,7 @@ __all__ = ["Descent", "MotionState"]
 MOST_PROGRAMS = 60
 """Of one descent; it ends long before where it converges."""
 CORRECTIONS = 3
-"""Times that a step is solved again through the joints it really led to, before it is shortened."""
+"""Times that a step is solved again through the joints it reached, before it is shortened."""
 CONVERGED = 1e-4
 """Relative gain that the model promises below which a descent has converged."""
 SMALLEST_RADIUS = 1e-7

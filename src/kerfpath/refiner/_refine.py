@@ -33,7 +33,7 @@ SAME_INTERVAL = 1e-4
 FIRST_STEPS = 2
 """Grid steps that gamma may move by in the first iteration; what is gained sets it from then on."""
 REPAIR = 0.2
-"""Share of the cost by which once a limit beyond the limits is taken to make a motion dearer."""
+"""Share of its cost that a motion is taken to cost more where it breaks a limit by that limit."""
 CLOSE = 3e-5
 """Share of what motions cost at least by which one may cost more and is left as it is: a third of
 the gain below which a descent ends."""
@@ -203,7 +203,7 @@ def _ends_held(descent: Descent, start: MotionState) -> Descent:
 
 
 def promise(plan: Plan) -> float:
-    """Return what the refinement of a plan may come to: its cost, dearer by what limits it breaks.
+    """Return what the refinement of a plan may come to: its cost, and more for limits it breaks.
 
     By the true kinematics; infinite out of reach and out of a range.
     """

@@ -161,7 +161,7 @@ def _placement(entry: LayoutEntry) -> list[str]:
     parts = [
         "<section><h2>The placement</h2>",
         '<p class="caption">Offsets from where the job has things, along the axes of the robot '
-        "base. The part turns about the middle of its contours, and fixtures go with it but for "
+        "base. The part turns about the middle of its contours, and fixtures go with it except for "
         "the standing ones. Where the best one is at the end of a range, a wider range may hold a "
         "better one.</p>",
         table((("Variable", ""), ("From", ""), ("To", ""), (what, "")), rows),

@@ -75,7 +75,7 @@ def joint_colours(robot: Robot) -> tuple[str, ...]:
 
 
 def base_layout(height: int, **more: Any) -> go.Layout:
-    """Return a calm white layout of `height` px, without plotly's default template."""
+    """Return a plain white layout of `height` px, without plotly's default template."""
     look: dict[str, object] = {
         "template": go.layout.Template(),
         "height": height,

@@ -182,7 +182,7 @@ class Limited(Burden):
         )
 
     def turn_limits(self) -> turns.JointLimits:
-        """Return the limits by which turns of solutions are told: a `given` joint is on its own.
+        """Return the limits that distinguish turns of solutions: a `given` joint is on its own.
 
         Raises
         ------
@@ -276,8 +276,8 @@ class Limited(Burden):
         if number > turns.MOST_TURNS:
             raise InputError(
                 f"robot {self.id!r}: its limits leave {number:g} combinations of turns, at most "
-                f"{turns.MOST_TURNS} are told apart; call joints that turn without end endless, or "
-                "narrow their limits"
+                f"{turns.MOST_TURNS} are distinguished; call joints that turn without end endless, "
+                "or narrow their limits"
             )
 
     def _require_order(self) -> None:

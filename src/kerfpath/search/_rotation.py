@@ -1,8 +1,8 @@
 """Limits on how far endless joints turn away from where a path begins (hoses and cables).
 
-A limited joint is unrolled: it no longer counts modulo 2 pi, and each vertex stands once for each
-turn inside the limit. The first layer keeps one copy, on turn 0. Only joints that a best path would
-turn too far are unrolled: a best path that keeps the other limits anyway is the best within all.
+A limited joint is not wrapped: it no longer counts modulo 2 pi, and each vertex is there once for
+each turn inside the limit. The first layer keeps one copy, on turn 0. Only joints that a best path
+would turn too far are taken so: one that keeps the other limits anyway is the best within all.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def too_far(path: Array, endless: Bools, rotation: Array) -> Bools:
 def best_within_rotation(
     layers: Layers, aim: Aim, rotation: Array, unroll: Bools, *, closed: bool
 ) -> tuple[Bools, tuple[Ints, float] | None]:
-    """Return the joints unrolled in the end, and the best path that keeps `rotation` (n,) rad.
+    """Return the joints not wrapped in the end, and the best path that keeps `rotation` (n,) rad.
 
     `unroll` (n,) says which joints to begin with, K >= 2. The path is the vertices (K,) and the
     cost; None where the limits of the joints unrolled leave none.
@@ -145,7 +145,7 @@ def _best(layers: Layers, aim: Aim, rotation: Array, *, closed: bool) -> tuple[I
 
 
 def unroll(layers: Layers, rotation: Array, velocity: Array) -> tuple[Layers, Ints]:
-    """Return the graph with its limited joints unrolled, and which of its layer each vertex is.
+    """Return the graph with its limited joints not wrapped, and which of its layer each vertex is.
 
     Vertices that are too far from wherever a path begins are left out, and half a turn goes the way
     that it goes in the graph alone, where `velocity` (n,) rad lets a joint take one.

@@ -44,7 +44,7 @@ class Page:
 
 
 class Hub:
-    """All open pages, and what the next one is told at first."""
+    """All open pages, and what the next one gets at first."""
 
     def __init__(self) -> None:
         self._pages: set[Page] = set()
@@ -55,7 +55,7 @@ class Hub:
         return len(self._pages)
 
     def open(self) -> Page:
-        """Return a new page, which is told all that there is."""
+        """Return a new page, which gets all that there is."""
         page = Page()
         for kind in LAST:
             if kind in self._last:
@@ -71,7 +71,7 @@ class Hub:
         self._pages.discard(page)
 
     def say(self, message: Message) -> None:
-        """Tell every page, and the ones to come."""
+        """Send to every page, and the ones to come."""
         kind, text = str(getattr(message, "type", "")), message.model_dump_json()
         contour = getattr(message, "contour", None)
         key: object = kind

@@ -14,7 +14,7 @@ from kerfpath.studio._numbers import Message
 __all__ = ["Kept"]
 
 MOST_KEPT = 8
-"""Jobs that are kept at a time: more could not be told apart, and each has its motions."""
+"""Jobs that are kept at a time: more could not be distinguished, and each has its motions."""
 
 Plans = dict[str, dict[str, PlanMessage]]
 """Plans by their contours and by their names."""

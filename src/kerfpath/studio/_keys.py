@@ -73,7 +73,7 @@ def graph_key(job: Job, nodes: Contour, external: Array | None = None) -> str:
 
 
 def cut_key(job: Job, request: CutRequest) -> str:
-    """Return the key of what comes of a contour, but for the bound of its plan."""
+    """Return the key of what comes of a contour, except for the bound of its plan."""
     source = dict(job.source)
     for name in ("contour", "sequence", "layout", "program"):
         source.pop(name, None)

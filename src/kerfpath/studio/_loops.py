@@ -12,7 +12,7 @@ from kerfpath.studio._numbers import flat
 __all__ = ["part_message"]
 
 MOST_LOOPS = 3000
-"""Loops that a page is told of, the longest: no picture shows more of them apart."""
+"""Loops that a page gets, the longest: no picture shows more of them apart."""
 FINEST = 2e-5
 """m: no chord of a line that is drawn need be nearer to its curve."""
 SHARE = 2e-3

@@ -36,7 +36,7 @@ KINDS = {
 """What a loss is coloured by; others are "other"."""
 
 UNITS = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
-"""By what values are multiplied to be told, and the unit that they then have."""
+"""By what values are multiplied to be sent, and the unit that they then have."""
 
 
 def map_id(graph: LayeredGraph) -> str:

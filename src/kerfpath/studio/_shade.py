@@ -24,7 +24,7 @@ __all__ = ["shade_message", "shades_of"]
 CLEARANCE = ShadeName(by="clearance", words="clearance", unit="m")
 TURNS = ShadeName(by="turns", words="turns of the joints", unit="")
 BAND, RESOLUTION = 0.1, 5e-3
-"""m: clearance is told up to here, so closely."""
+"""m: clearance is sent up to here, so closely."""
 NODES_AT_ONCE = 32
 """Nodes of which the clearance is found between two looks at whether that is still wanted."""
 MOST, CLOSED, NONE = 253, 254, 255

@@ -9,7 +9,7 @@ __all__ = ["ways_of"]
 
 
 def ways_of(cut: CutResult, index: int) -> list[Option]:
-    """Return what may be changed where a cut has no plan: first what has led to one.
+    """Return what may be changed where a cut has no plan: first what has given one.
 
     Parameters
     ----------

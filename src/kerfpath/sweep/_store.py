@@ -74,7 +74,7 @@ class Store:
             self._base.executescript(TABLES)
         if self._number("PRAGMA application_id") != APPLICATION:
             raise InputError(f"{self._path}: {REASONS[sqlite3.SQLITE_NOTADB]}")
-        again = "name another store, and the sweep is done anew"
+        again = "name another store, and the sweep is done again"
         if (schema := self._number("PRAGMA user_version")) != SCHEMA:
             raise InputError(
                 f"{self._path}: a store of schema {schema}, this kerfpath writes {SCHEMA}: {again}"
@@ -137,7 +137,7 @@ class Store:
         """Return the error for a row that is no result."""
         return InputError(
             f"{self._path}: the store is damaged, result {str(key)[:16]!r} is none; name another "
-            "store, and the sweep is done anew"
+            "store, and the sweep is done again"
         )
 
     def __enter__(self) -> Store:

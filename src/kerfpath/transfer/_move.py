@@ -156,7 +156,7 @@ def _bounds(robot: Robot, ends: Array) -> tuple[Array, Array]:
     if beyond.any():
         joint = int(np.flatnonzero(beyond.any(axis=0))[0])
         name = robot.joint_names[joint]
-        raise InputError(f"air move: {name} of an end is beyond its limits")
+        raise InputError(f"transfer move: {name} of an end is beyond its limits")
     return np.minimum(low, ends.min(axis=0)), np.maximum(high, ends.max(axis=0))
 
 

@@ -21,8 +21,8 @@ CONTROL_CODE	= 00000000 00000000;
 /MN
    1:  ! kerfpath, for M-20iD/25 = ;
    2:  ! M-20/25-18D ;
-   3:  ! Moves through the air: not ;
-   4:  ! checked for collisions. ;
+   3:  ! Transfer moves: not checked for ;
+   4:  ! collisions. ;
    5:  ! CUT_SKIN_OUTER_OFF as BG logic ;
    6:  ! switches off at a stop. ;
    7:  ! The cell's safety has to switch ;

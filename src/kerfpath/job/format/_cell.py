@@ -38,7 +38,7 @@ __all__ = ["cell_of_job", "with_map"]
 SIZES = (
     "nozzle_length_mm", "nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm",
 )  # fmt: skip
-"""Keys of [cell.head] that are arguments of the head, but for their unit."""
+"""Keys of [cell.head] that are arguments of the head, except for their unit."""
 SAME = 1e-6
 """m: corners of neighbouring faces that are one; CAD systems keep to less."""
 
@@ -173,7 +173,7 @@ def _solid(job: Job, table: CellTable, part: Part) -> Mesh:
             job.path,
             ("cell", "sheet_mm"),
             f"{job.part_file.name} is drawn as a surface, not as a closed solid: what is inside "
-            "cannot be told; add sheet_mm = its thickness in mm, behind the surface as the beam "
+            "is not known; add sheet_mm = its thickness in mm, behind the surface as the beam "
             "sees it, or part = false to leave it out of the cell",
         )
     if not is_open and table.sheet_mm is not None:

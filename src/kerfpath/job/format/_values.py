@@ -54,7 +54,7 @@ def fault(
 
 
 def fault_in_words(said: str, where: tuple[str | int, ...] = ()) -> PydanticCustomError:
-    """Return an error that says `said`, a whole line but for its place, at `where` from here."""
+    """Return an error that says `said`, a whole line except for its place, at `where` from here."""
     return PydanticCustomError(FAULT, "{said}", {"said": said, "where": where})
 
 

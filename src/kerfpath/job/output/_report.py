@@ -106,7 +106,7 @@ def _sampling(found: Departure) -> list[tuple[str, str]]:
     """Return how far the nodes leave what they sample, in words."""
     against = {
         "CAD curve": "the CAD curve",
-        "points of the drawing": "the lines through the points of the drawing, which tell no more",
+        "points of the drawing": "the lines through the points of the drawing, which show no more",
         "path as cut": "the path as cut, which is not the drawn one",
     }
     rows = [

@@ -13,7 +13,7 @@ __all__ = ["cell_lines", "has_files"]
 SIZES = (
     "nozzle_length_mm", "nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm",
 )  # fmt: skip
-"""Keys of [cell.head] that are arguments of the head, but for their unit."""
+"""Keys of [cell.head] that are arguments of the head, except for their unit."""
 SAME = 1e-6
 """m: as jobs weld the corners of the part."""
 

@@ -14,7 +14,7 @@ from kerfpath.robots import Robot
 __all__ = ["SAME", "recompute"]
 
 SAME = 1e-7
-"""Relative, or absolute below 1 (m, rad, s): two machines reckon alike far better."""
+"""Relative, or absolute below 1 (m, rad, s): two machines agree far better."""
 SAME_POSTURE = 1e-5
 """rad: what an inverse near a singularity loses; postures lie much farther apart."""
 NO_TILT = 1e-9

@@ -26,14 +26,14 @@ from kerfpath.planner import (
 __all__ = ["Remedy", "find_remedy", "opens_without_windows"]
 
 GIVE = (0.0, 2e-3, 1e-2, 3e-2)
-"""Relative amounts by which a value gives way until a plan is found with it."""
+"""Relative amounts by which a value is relaxed until a plan is found with it."""
 Share = Literal["eta_velocity", "eta_acceleration"]
 """Keys of a job for the share of a limit that may be used."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Remedy:
-    """What opens the way, in figures that a job takes; each alone has led to a plan.
+    """What opens the way, in figures that a job takes; each alone has given a plan.
 
     Parameters
     ----------

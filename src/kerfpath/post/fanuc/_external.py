@@ -3,7 +3,7 @@
 What carries the robot are extended axes of its group, E1 and on, integrated: X to Z are those of
 the tip in the world, wherever the robot stands. What carries the part are the joints of group 2,
 the leader, and COORD on a motion has the tip go straight against it. Positions stay in the user
-frame, which stands still: that of the part with all axes at 0. So they tell where the tip is once
+frame, which stands still: that of the part with all axes at 0. So they say where the tip is once
 the part has been moved, and each belongs to the values of group 2 beside it. The layout is that of
 controllers' own listings with extended axes and a second group.
 """

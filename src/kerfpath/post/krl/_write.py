@@ -57,7 +57,7 @@ HEAD = ("&ACCESS RVP", "&REL 1")
 NEW_LINE = "\r\n"
 """The controllers run Windows."""
 MOST_ROUTINES = 254
-"""Local routines that a file may have, but for the one that switches off."""
+"""Local routines that a file may have, except the one that switches off."""
 LINES_OF_A_FILE = 5
 """HEAD, DEF and END of its first routine, and the empty line at its end."""
 FIRST = "first_contour"
@@ -74,7 +74,7 @@ ANGLES: Final = "ZYX"
 
 
 def opening_lines(settings: KrlSettings) -> list[str]:
-    """Return the statements that a main routine makes before it calls others, but for frames."""
+    """Return the statements that a main routine makes before it calls others, except for frames."""
     turning_deg_s = number(settings.turning_speed_deg_s, 1)
     numbered = (("TOOL", settings.tool_number), ("BASE", settings.base_number))
     return [

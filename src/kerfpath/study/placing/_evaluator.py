@@ -1,4 +1,4 @@
-"""Tests of a placement on the grid that grow dearer: each but the last gives a bound, all proved.
+"""Tests of a placement on the grid, the fast ones first: each but the last gives a proved bound.
 
 - Reach: the layers of every `EVERY`-th node alone, with all their poses. A node without a pose, or
   in a cell without a clear one, ends it: every path visits every node.

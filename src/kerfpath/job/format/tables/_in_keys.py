@@ -1,4 +1,4 @@
-"""What messages tell to do in Python, in the words of a job."""
+"""What messages advise to do in Python, in the words of a job."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ IN_KEYS = {
     "choose base= or tip=": "choose base or tip",
     "axis_3_limits=": "axis_3_deg",
 }
-"""What messages about descriptions tell to do, and what that is in a job."""
+"""What messages about descriptions advise to do, and what that is in a job."""
 
 
 def in_keys(said: str, words: Mapping[str, str] = IN_KEYS) -> str:

@@ -190,7 +190,7 @@ class RobotTable(Table):
             if self.model
             else f"{self.urdf} does not state them"
             if self.urdf
-            else "lengths do not tell them"
+            else "lengths do not determine them"
         )
         for name, value in zip(LIMITS, (known.lower, known.upper, known.velocity), strict=False):
             if value is None and getattr(self, name) is None:
