@@ -156,6 +156,9 @@ def test_a_path_from_anywhere_begins_at_its_first_point(tmp_path: Path) -> None:
     part = path(tmp_path, PLAIN.replace("FROM/0,0,1\nRAPID\n", ""))
     assert part.contour("cut1", closed=False).length == pytest.approx(1.016)
     assert "contour 'cut1' begins in line 3: no place before it" in part.notes
+    # FROM is no move: the next GOTO is the rapid one.
+    part = path(tmp_path, PLAIN.replace("FROM/0,0,1\nRAPID\n", "RAPID\nFROM/-5,0,0\n"))
+    assert part.contour("cut1", closed=False).length == pytest.approx(1.016)
     # From a place that is said the first move belongs to the cut.
     part = path(tmp_path, PLAIN.replace("FROM/0,0,1\nRAPID\n", "FROM/-5,0,0\n"))
     assert part.contour("cut1", closed=False).length == pytest.approx(1.143)
@@ -239,6 +242,7 @@ REFUSED = {
     "two systems": (
         f"MSYS/0,0,0,1,0,0,0,1,0\n{GOOD}MSYS/0,0,5,1,0,0,0,1,0\n", "line 7: another MSYS"
     ),
+    "a word of the controller": (GOOD + "PREFUN/41\n", "line 6: 'PREFUN/41': words for the contr"),
     "an unknown word": (GOOD + "WARP/9\n", "line 6: 'WARP/9': the word is not known, and may"),
     "a modal rapid": (GOOD + "RAPID/ON\n", "line 6: 'RAPID/ON': the word is not known"),
     "a rapid feed rate": (GOOD + "FEDRAT/RAPID\n", "line 6: 'FEDRAT/RAPID': the word is not"),

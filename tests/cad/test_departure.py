@@ -246,3 +246,15 @@ def test_a_contour_that_is_not_on_the_loop_is_refused_in_one_line(sheet: Part) -
     led = lead_in(drawn, 0.004)
     with pytest.raises(InputError, match="in the scrap throughout"):
         sheet.departure(name, led.part(0, 3, "tangent"))
+
+
+def test_loops_in_the_scrap_longer_than_the_cut(tmp_path: Path) -> None:
+    (tmp_path / "square.csv").write_text(
+        "x_mm,y_mm,z_mm,nx,ny,nz\n0,0,0,0,0,1\n50,0,0,0,0,1\n50,50,0,0,0,1\n0,50,0,0,0,1\n"
+        "0,0,0,0,0,1\n"
+    )
+    part = read(tmp_path / "square.csv")
+    looped = loop_corners(part.contour("contour"), 0.02, side="right").resample(spacing=0.005)
+    assert looped.length > 2 * part.loops[0].length
+    for way in (looped, reverse(looped)):
+        assert part.departure("contour", way).chord_error < 1e-12

@@ -26,7 +26,7 @@ TEXTS = ("PARTNO", "PPRINT", "REMARK", "TPRINT")
 HARMLESS = (
     "AUXFUN", "CLAMP", "CLDIST", "COOLNT", "CUTTER", "DELAY", "DISPLY", "DWELL", "FEDRAT",
     "INTOL", "LEADER", "LINTOL", "MACHIN", "MODE", "OFSTNO", "OPSTOP", "OUTTOL", "PAINT",
-    "PREFUN", "SELCTL", "SELECT", "SEQNO", "SPINDL", "STOP", "TLDATA", "TOLER", "TOOLNO",
+    "SELCTL", "SELECT", "SEQNO", "SPINDL", "STOP", "TLDATA", "TOLER", "TOOLNO",
 )  # fmt: skip
 """Words that move nothing."""
 BEGINS = ("END-OF-PATH", "LOAD", "LOADTL", "TOOL PATH")
@@ -43,6 +43,9 @@ REFUSED = {
     **dict.fromkeys(
         ("COPY", "ORIGIN", "ROTABL", "ROTATE", "ROTHED", "TRACUT", "TRANS"),
         "it moves the points that follow; write them where they are in the part",
+    ),
+    **dict.fromkeys(
+        ("INSERT", "PREFUN"), "words for the controller alone, which may change the path"
     ),
     **dict.fromkeys(
         ("CYCLE", "GODLTA", "RETRCT"), "a motion that is not written out; write it as GOTO"
@@ -156,7 +159,7 @@ class _Reader:
         if len(numbers) == 6:
             self._axis = self._direction(where, numbers[3:])
         is_feed = word == "GOTO" and not self._is_rapid
-        self._is_rapid = False
+        self._is_rapid = self._is_rapid and word == "FROM"
         self.moves.append(
             Move(
                 line=line, kind="feed" if is_feed else "rapid", point=_triple(numbers),

@@ -91,7 +91,7 @@ def departure(trace: Trace, contour: Contour, tolerance: float) -> Departure:
     cells = _cells(trace.curves)
     at = _places(cells, contour.points / MM, nodes, beside, contour.name)
     around = cells.s[-1] if trace.is_closed else np.inf
-    length = (contour.s[nodes[-1]] - contour.s[nodes[0]]) / MM
+    length = float(np.diff(contour.s)[_chords(contour)].sum()) / MM
     at = _unroll_places(at, around, length, beside, contour.name)
     return _measure_chords(cells, at, nodes, contour, against)
 
@@ -271,7 +271,7 @@ def _unroll_places(at: Array, around: float, length: float, tolerance: float, na
     around : float mm
         Length of the loop, infinite for an open one.
     length : float mm
-        Of the contour, by which its direction is found.
+        Of the contour but for what runs in the scrap, by which its direction is found.
     tolerance : float mm
         Steps back that are only inaccurate are none.
     name : str

@@ -10,6 +10,7 @@ from kerfpath.cell._checker import CollisionChecker as CollisionChecker
 from kerfpath.cell._glb import glb_of as glb_of
 from kerfpath.cell._head import CuttingHead as CuttingHead
 from kerfpath.cell._head import MeshHead as MeshHead
+from kerfpath.cell._links import allowed_pairs as allowed_pairs
 from kerfpath.cell._links import link_bodies as link_bodies
 from kerfpath.cell._links import link_capsules as link_capsules
 from kerfpath.cell._map import Clearances as Clearances

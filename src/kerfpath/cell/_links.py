@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
@@ -16,8 +16,9 @@ from kerfpath.errors import InputError
 from kerfpath.robots import CarriedChain, Robot, chain_of, model_chain
 from kerfpath.urdf import LinkBody as Described
 
-__all__ = ["link_bodies", "link_capsules"]
+__all__ = ["allowed_pairs", "link_bodies", "link_capsules"]
 
+Pair = tuple[str, str]
 Line = tuple[str, int, tuple[float, ...], tuple[float, ...], float]
 """Name, frame of the model, start and end in it (m), radius (m)."""
 
@@ -45,22 +46,49 @@ def link_bodies(robot: Robot, *, hulls: bool = True) -> tuple[Body, ...]:
         A mesh that cannot be read, is empty or too large or small, or is not closed where it must
         be; an arm without length.
     """
-    found: list[Body] = []
+    found = [
+        Body(
+            name=name,
+            shape=_shape(described, hulls),
+            frame=_frame(robot, described),
+            kind="robot",
+            approximate=described.kind == "mesh" and hulls,
+        )
+        for name, described in _named(robot)
+    ]
+    held = {body.frame for body in found}
+    return (*found, *(body for body in link_capsules(robot) if body.frame not in held))
+
+
+def allowed_pairs(robot: Robot, links: Mapping[Pair, str]) -> dict[Pair, str]:
+    """Return the pairs of bodies of `link_bodies(robot)` that pairs of links are, for `may_touch`.
+
+    A link without a body in the description has no pair, though a capsule may stand for it.
+
+    Parameters
+    ----------
+    robot : Robot
+    links : mapping of (link, link) to str
+        By their names in the description, and why they may touch; see `kerfpath.urdf.read_srdf`.
+    """
+    bodies: dict[str, list[str]] = {}
+    for name, described in _named(robot):
+        bodies.setdefault(described.link, []).append(name)
+    return {
+        (a, b): why
+        for (one, two), why in links.items()
+        for a in bodies.get(one, [])
+        for b in bodies.get(two, [])
+    }
+
+
+def _named(robot: Robot) -> Iterator[tuple[str, Described]]:
+    """Yield the bodies of a description by the names of their links, numbered from the second."""
     count: Counter[str] = Counter()
     for described in robot.bodies:
         count[described.link] += 1
         number = count[described.link]
-        found.append(
-            Body(
-                name=described.link if number == 1 else f"{described.link} {number}",
-                shape=_shape(described, hulls),
-                frame=_frame(robot, described),
-                kind="robot",
-                approximate=described.kind == "mesh" and hulls,
-            )
-        )
-    held = {body.frame for body in found}
-    return (*found, *(body for body in link_capsules(robot) if body.frame not in held))
+        yield described.link if number == 1 else f"{described.link} {number}", described
 
 
 def link_capsules(robot: Robot) -> tuple[Body, ...]:

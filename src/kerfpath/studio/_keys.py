@@ -87,7 +87,8 @@ def _stamps(job: Job) -> list[object]:
     """Return what tells another content of the files that a job names from the one before."""
     folder, source = job.path.parent, job.source
     cell = source.get("cell", {})
-    named = [source["robot"].get("urdf"), cell.get("head", {}).get("file")]
+    named = [source["robot"].get(key) for key in ("urdf", "srdf")]
+    named += [cell.get("head", {}).get("file")]
     named += [fixture.get("file") for fixture in cell.get("fixture", [])]
     return [_stamp(job.part_file), *(_stamp(folder / name) for name in named if name)]
 

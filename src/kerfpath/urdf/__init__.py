@@ -15,5 +15,6 @@ from kerfpath.urdf._description import read_urdf as read_urdf
 from kerfpath.urdf._inertia import ChainInertia as ChainInertia
 from kerfpath.urdf._inertia import joined as joined
 from kerfpath.urdf._inertia import require_tensor as require_tensor
+from kerfpath.urdf._srdf import read_srdf as read_srdf
 from kerfpath.urdf._write import urdf_text as urdf_text
 from kerfpath.urdf._xml import Joint as Joint

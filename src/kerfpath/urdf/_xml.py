@@ -14,7 +14,7 @@ from kerfpath._arrays import Array, freeze
 from kerfpath._repr import short_repr
 from kerfpath.errors import InputError
 
-__all__ = ["Joint", "Tree", "child", "numbers", "pose_of", "read_tree"]
+__all__ = ["Joint", "Tree", "child", "numbers", "pose_of", "read_root", "read_tree"]
 
 XACRO = ("{http://www.ros.org/wiki/xacro}", "{http://wiki.ros.org/xacro}")
 FINE = np.pi / 12
@@ -94,7 +94,7 @@ def read_tree(path: Path, snap: float) -> Tree:
     InputError
         Not XML or not a description, names twice or missing, a link with two parents, a loop.
     """
-    root = _root(path)
+    root = read_root(path, "robot description (URDF)")
     links: dict[str, ElementTree.Element] = {}
     for link in root.findall("link"):
         name = _attribute(link, "name", "a link", path)
@@ -125,10 +125,17 @@ def read_tree(path: Path, snap: float) -> Tree:
     )
 
 
-def _root(path: Path) -> ElementTree.Element:
+def read_root(path: Path, what: str) -> ElementTree.Element:
+    """Return the element <robot> of a file; `what` it should be is said where it is not.
+
+    Raises
+    ------
+    InputError
+        No file, no XML, a document type, macros, another first element.
+    """
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):
-            raise InputError("is no file; expected a robot description (URDF)")
+            raise InputError(f"is no file; expected a {what}")
         root = ElementTree.fromstring(
             path.read_bytes(), parser=ElementTree.XMLParser(target=_NoDoctype())
         )
@@ -137,14 +144,14 @@ def _root(path: Path) -> ElementTree.Element:
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise InputError(f"{path}: expected an XML robot description (URDF), {error}") from None
+        raise InputError(f"{path}: expected an XML {what}, {error}") from None
     if any(element.tag.startswith(XACRO) for element in root.iter()):
         raise InputError(
             f"{path}: holds xacro macros; expand them first, with 'xacro {path.name} > robot.urdf'"
         )
     if root.tag != "robot":
         raise InputError(
-            f"{path}: expected a URDF, whose first element is <robot>, got <{root.tag}>"
+            f"{path}: expected a {what}, whose first element is <robot>, got <{root.tag}>"
         )
     return root
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
@@ -19,6 +19,7 @@ from kerfpath.cell import (
     Mesh,
     MeshHead,
     Shape,
+    allowed_pairs,
     box,
     cell_of,
     edges_of,
@@ -32,6 +33,7 @@ from kerfpath.job.format._poses import pose
 from kerfpath.job.format._read import Job
 from kerfpath.job.format._refusals import refusal_at
 from kerfpath.job.format.tables import CellTable, FixtureTable, given
+from kerfpath.urdf import read_srdf
 
 __all__ = ["cell_of_job", "with_map"]
 
@@ -89,7 +91,8 @@ def cell_of_job(job: Job, part: Part) -> Cell | None:
     for i, names in enumerate(table.may_touch):
         _require_known(job, bare, names, ("cell", "may_touch", i))
     own = {_two(p.between): p.near_miss_mm / 1000 for p in table.pair if p.near_miss_mm is not None}
-    touching = {_two(names): MEANT for names in table.may_touch}
+    touching = _described_as_touching(job, {frozenset(pair) for pair in own})
+    touching |= {_two(names): MEANT for names in table.may_touch}
     touching |= {_two(p.between): p.allowed for p in table.pair if p.allowed is not None}
     with _at(job, "cell"):
         return replace(bare, near_miss_of={**bare.near_miss_of, **own}, may_touch=touching)
@@ -108,6 +111,27 @@ def with_map(job: Job) -> Job:
             job.path, ("cell",), "expected a [cell] for the collision map, got none; add one"
         )
     return replace(job, cell=job.cell.model_copy(update={"map": True}))
+
+
+def _described_as_touching(
+    job: Job, judged: Container[frozenset[str]]
+) -> dict[tuple[str, str], str]:
+    """Return the pairs that the SRDF of the robot disables, but for those that the job judges."""
+    robot = job.source["robot"]
+    if "srdf" not in robot:
+        return {}
+    assert job.cell is not None
+    if job.cell.links == "capsules":
+        raise refusal_at(
+            job.path,
+            ("cell", "links"),
+            "expected the links of the description, which srdf in [robot] is about, got "
+            '"capsules"; remove one of both',
+        )
+    folder = job.path.parent
+    with _at(job, "robot", "srdf"):
+        pairs = allowed_pairs(job.robot, read_srdf(folder / robot["srdf"], folder / robot["urdf"]))
+    return {pair: why for pair, why in pairs.items() if frozenset(pair) not in judged}
 
 
 @contextmanager

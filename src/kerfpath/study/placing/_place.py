@@ -270,5 +270,5 @@ def _named_files(file: Any) -> list[tuple[Any, str]]:
     tables = [file["part"], cell.get("head", {}), *cell.get("fixture", [])]
     packages = robot.get("packages", {})
     found = [(table, "file") for table in tables if "file" in table]
-    found += [(robot, "urdf")] if "urdf" in robot else []
+    found += [(robot, key) for key in ("urdf", "srdf") if key in robot]
     return found + [(packages, name) for name in packages]

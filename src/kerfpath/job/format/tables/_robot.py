@@ -51,7 +51,7 @@ __all__ = ["RobotTable"]
 CONTROLLER = ("manufacturer", "axis_3", "axis_3_deg")
 SOURCES = {
     "model": (),
-    "urdf": ("base", "tip", "mount", "part", "packages", "snap_deg", *CONTROLLER),
+    "urdf": ("base", "tip", "mount", "part", "packages", "snap_deg", "srdf", *CONTROLLER),
     "kinematics": ("geometry_mm", "sign", "offset_deg", *CONTROLLER),
 }
 """The three ways to say which robot, and the keys that belong to each."""
@@ -70,6 +70,9 @@ class RobotTable(Table):
         Text | None,
         AfterValidator(existing("the robot's description")),
         key("the path of the robot's description", '"arm.urdf"'),
+    ] = None
+    srdf: Annotated[
+        Text | None, AfterValidator(existing("the SRDF")), key("the path of its SRDF", '"arm.srdf"')
     ] = None
     base: Annotated[Text | None, key("a link of the description", '"base_link"')] = None
     tip: Annotated[Text | None, key("a link of the description", '"tool0"')] = None
