@@ -38,7 +38,7 @@ Out = Annotated[
 ]
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
 Strict = Annotated[
-    bool, typer.Option("--strict", help="Refuse a program where it would only be warned of.")
+    bool, typer.Option("--strict", help="Refuse a program that would only give a warning.")
 ]
 
 
@@ -107,9 +107,9 @@ def plan(
 ) -> None:
     """Plan and audit every contour of a job; write plan, trajectory, report and program.
 
-    The files go to the folder JOB-plan in the current one unless --out names another. A program is
-    written only if every contour has a plan that passes its audit, and not with language = "none".
-    With a cell in the job the motions are clear of collisions along the contours.
+    The files go to the folder JOB-plan unless --out names another. The program is written only if
+    every contour has a plan that passes its audit; with language = "none" there is no program.
+    If the job has a cell, the motions along the contours are free of collisions.
 
     Example: kerfpath plan door.toml --out door
     """
@@ -122,10 +122,11 @@ def plan(
 def check(job: JobArgument, as_json: Json = False) -> None:
     """Read a job without planning it: the bodies and pairs of its cell, and how contours begin.
 
-    Every fault that is known before planning is listed, with its key; the exit code is then 2.
+    The command lists every fault that can be found before planning, with its key; the exit code is
+    then 2.
 
-    The column clear counts the poses at the first node that keep every near-miss distance; the
-    column clearance has the least distance of the best of them, over the pairs that keep
+    The column clear counts the poses at the first node that keep every near-miss distance. The
+    column clearance is the least distance of the best of these poses, over the pairs that keep
     near_miss_mm.
 
     Example: kerfpath check door.toml
@@ -150,13 +151,14 @@ def speed(
     job: JobArgument,
     as_json: Json = False,
 ) -> None:
-    """Find the fastest constant cutting speed of each contour, and what binds where.
+    """Find the fastest constant cutting speed of each contour, and what limits it where.
 
     The column on the grid is exact on the graph that the job describes (its spacing, rotation step,
-    limits and eta), and clear in its cell, if it has one. The column refined has the speed with
-    the rotation moved off the grid from there, if the job refines; what binds belongs to that
-    speed. Both keep the limits at the nodes; the column as run has a speed at which the program
-    keeps them between the nodes, too, if the job asks for it. The speeds in the job play no part.
+    limits and eta), and free of collisions in its cell, if it has one. The column refined has the
+    speed after the rotation was moved off the grid, if the job refines; the limit shown belongs to
+    that speed. Both keep the limits at the nodes. The column as run has a speed at which the
+    program keeps them between the nodes, too, if the job asks for it. The speeds in the job have no
+    effect.
 
     Example: kerfpath speed door.toml
     """
@@ -210,8 +212,8 @@ def contours(
 ) -> None:
     """List the loops of a drawing, by the names that jobs pick them by.
 
-    Check the bounding box first: it shows a wrong unit in the file's header. A job takes a loop by
-    pick = "NAME" in its table [[contour]].
+    Check the bounding box first: it shows a wrong unit in the file's header. A job picks a loop
+    with pick = "NAME" in a table [[contour]].
 
     Example: kerfpath contours door.step --html door.html
     """
@@ -242,8 +244,8 @@ def robots(
 ) -> None:
     """List the library, or show a robot, rail or positioner of it with limits and their sources.
 
-    A job takes a robot by model = "ID" in its table [robot], an axis of a rail or positioner by
-    model = "ID" in a table [[robot.external]].
+    A job uses a robot with model = "ID" in its table [robot], and an axis of a rail or positioner
+    with model = "ID" in a table [[robot.external]].
 
     Example: kerfpath robots abb_irb4600_60_205
     """

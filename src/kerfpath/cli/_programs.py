@@ -63,8 +63,8 @@ def post(
 ) -> None:
     """Write the robot program of a plan, after auditing it again.
 
-    Names, retract, zone and so on come from the table [program] of the job that the plan was made
-    from, or of --job; its table [program.LANGUAGE] has the settings of a language.
+    Names, retract, zone and so on come from the table [program] of the job from which the plan was
+    made, or of --job. The table [program.LANGUAGE] has the settings of a language.
 
     Example: kerfpath post door/plan.json --language rapid -o door.mod
 
@@ -95,14 +95,14 @@ def audit(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a plan or a program again, by kinematics that share nothing with the planner.
+    """Check a plan or a program again, with kinematics that share nothing with the planner.
 
-    A plan is compared with its job, drawing and cell where --job names them. Without --job the
-    path between the nodes is compared with the straight lines between them.
+    With --job a plan is compared with its job, drawing and cell. Without --job the path between the
+    nodes is compared with the straight lines between them.
 
-    A program needs its job. The audit reads its text, also where a person has edited it, takes
-    the targets through the robot's kinematics and checks the motion as that of a plan; it compares
-    frames, speeds, postures, turns, switches and waits with those of the job.
+    A program needs its job. The audit reads the text of the program, edited or not, computes the
+    joints at its targets and checks the motion like that of a plan; it compares frames, speeds,
+    postures, turns, switches and waits with those of the job.
 
     Example: kerfpath audit door/plan.json --job door.toml
 
@@ -121,10 +121,10 @@ def compare(
     job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job of both programs.")],
     as_json: Json = False,
 ) -> None:
-    """Say in words what differs between two programs, in the same language or in two.
+    """Describe in words how two programs differ, in the same language or in two.
 
     Contours are matched by their paths, targets by their places. Each kind of difference has a
-    line with its count, the largest one, file and line. Exit code 0: the same, 1: not.
+    line with its count, the largest one, file and line. Exit code 0: no difference, 1: some.
 
     Example: kerfpath compare door/door.mod edited.mod --job door.toml
     """
@@ -151,8 +151,8 @@ def touch_up(
 
     Moved targets keep tip and tool axis as taught, and the path fades back to the planned one; the
     rotation about the beam is planned again, in the posture of the plan. The files are those of
-    kerfpath plan and go to the folder PROGRAM-touched in the current one unless --out names
-    another; the audit is that of the touched-up path.
+    kerfpath plan and go to the folder PROGRAM-touched unless --out names another; the audit is
+    that of the touched-up path.
 
     Example: kerfpath touch-up edited.mod --job door.toml --plan door/plan.json --out door-2
     """
@@ -173,7 +173,8 @@ def script(
     """Write a job as a Python script that does the same by the public functions.
 
     The script reads the drawing, plans each contour with the options of the job, audits, and writes
-    the program. It belongs beside the drawing. What it has no lines for is refused, as an order.
+    the program. Keep it beside the drawing. Jobs with features that a script cannot express, such
+    as an order, are refused.
 
     Example: kerfpath script door.toml -o door.py
     """

@@ -21,7 +21,7 @@ Scheduler = Annotated[
 Processes = Annotated[
     int | None, typer.Option(help="Local processes that do the work; default: one per core.")
 ]
-Seed = Annotated[int, typer.Option(help="Seed of all that is random.")]
+Seed = Annotated[int, typer.Option(help="Seed of all random choices.")]
 
 
 @app.command()
@@ -61,19 +61,19 @@ def pareto(
     processes: Processes = None,
     as_json: Json = False,
 ) -> None:
-    """Find plans of a contour that weigh its criteria differently, none better than another in all.
+    """Find plans of a contour with different trade-offs, none better than another in all criteria.
 
     The criteria are displacement, range, velocity, acceleration, speed, time (from home_deg in
     [sequence]), clearance (in the cell), wrist, elbow, shoulder, limits, manipulability,
     and displacement_J, increment_J, range_J of joint J. Every second run is over continuous
-    rotation, the others find the proved optimum on its grid, all of them with method = "exact".
-    Every plan is audited. pareto.json and pareto.html go to the folder JOB-pareto in the current
-    one unless --out names another. After a stop, even kill -9, the same command continues.
+    rotation; the others find the proved optimum on its grid, as all runs do with method = "exact".
+    Every plan is audited. pareto.json and pareto.html go to the folder JOB-pareto unless --out
+    names another. After a stop, even kill -9, the same command continues.
 
     Example: kerfpath pareto door.toml --criteria displacement,velocity,range_6 --runs 200
 
-    With --pick nothing is searched: the whole job is planned, with that contour as picked, and
-    plan, report and program go to the folder plan-N in that folder.
+    With --pick nothing is searched: the whole job is planned with the picked plan of that contour,
+    and plan, report and program go to the folder plan-N in that folder.
 
     Example: kerfpath pareto door.toml --pick balanced
     """
@@ -102,8 +102,8 @@ def batch(
 ) -> None:
     """Plan, audit and write many jobs, each as `kerfpath plan` does, on all cores or a cluster.
 
-    The files of door.toml go to the folder door in the one that --out names (kerfpath-batch). The
-    row of a job that is refused or has no plan has the reason, and the other jobs go on.
+    The files of door.toml go to the folder door in the one that --out names (kerfpath-batch). If a
+    job is refused or has no plan, its row has the reason, and the other jobs continue.
 
     Results are kept in batch.sqlite there: the same command after Ctrl-C or a power cut plans only
     jobs that are new or have changed, and writes files that are missing. On a cluster every worker
@@ -139,7 +139,7 @@ def layout(
         int | None, typer.Option(help="Number of placements to try; default: 240.")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(help="Seed of all that is random; default: 0.")
+        int | None, typer.Option(help="Seed of all random choices; default: 0.")
     ] = None,
     tolerance_mm: Annotated[
         float | None, typer.Option(help="Tolerance of lengths, over which the worst value counts.")
@@ -172,8 +172,8 @@ def layout(
     at the speeds in the job. Placements that cannot cut every contour come after all that can.
 
     An estimate over continuous rotation orders the placements. Those that come near the best are
-    planned; others are proved to be no faster, where that can be proved, or left to their estimate:
-    the command prints how many. With method = "exact" in the job all of it is on its grid.
+    planned. Others are proved to be no faster, if that can be proved, or judged by their estimate
+    alone; the command prints how many. With method = "exact" in the job everything is on its grid.
 
     The variables are offsets in the robot base: x_mm, y_mm, z_mm, yaw_deg, tilt_x_deg, tilt_y_deg
     of the part with its fixtures; base_x_mm, base_y_mm, base_z_mm, base_yaw_deg of the robot's
@@ -181,7 +181,7 @@ def layout(
     from the table [layout] of the job; by default x_mm and y_mm vary by 200 mm, yaw_deg by 30 deg.
 
     layout.json, layout.html and placed.toml, the job with its new numbers, go to the folder
-    JOB-layout in the current one unless --out names another. After a stop, even kill -9, the same
+    JOB-layout unless --out names another. After a stop, even kill -9, the same
     command continues. Exit code 1: no placement is feasible; the command prints why.
 
     Example: kerfpath layout door.toml
@@ -192,7 +192,7 @@ def layout(
 
     Then: kerfpath plan door-layout/placed.toml
 
-    With --robots nothing is moved: every robot of the library takes the place of the job's own.
+    With --robots nothing is moved: every robot of the library replaces that of the job in turn.
     robots.json and robots.html list reach, fastest speed of each contour and margin over the speeds
     of the job, the best robot first. Exit code 1: no robot is as fast as the job asks.
 
@@ -239,8 +239,8 @@ def studio(
     host: Annotated[
         str,
         typer.Option(
-            help="Address to listen at. At any but this machine's own, whoever opens it needs the "
-            "token in the address that is printed; what is sent can be read on the way."
+            help="Address to listen at. If other machines can reach it, the page opens only with "
+            "the token in the printed address, and what is sent can be read on the way."
         ),
     ] = "127.0.0.1",
     browser: Annotated[
