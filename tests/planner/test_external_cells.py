@@ -105,3 +105,31 @@ def test_a_cell_of_another_rail_is_refused(along_a_wall, arm, tool):
         plan(contour, longer, cell=cell, **options)
     with pytest.raises(InputError, match="other external axes"):
         plan(contour, arm, cell=cell, **options)
+
+
+def test_ends_that_are_apart_begin_with_the_best_and_lie_far_from_each_other():
+    from types import SimpleNamespace
+
+    from kerfpath.planner._coarse import DEARER, ELSEWHERE, FARTHEST, apart
+
+    rng = np.random.default_rng(8)
+    counts, samples = (6, 9), 18
+    coarse = SimpleNamespace(counts=counts, places=np.zeros((54, 2)))
+    robot = SimpleNamespace(free=np.array([0, 1]), endless=np.array([False, True]))
+    value = 100 + rng.uniform(0, 20, (54, samples, 4))
+    value[rng.random(value.shape) < 0.3] = np.inf
+    ends = apart(coarse, robot, value, 5)
+    costs = [value[end] for end in ends]
+    assert len(ends) == 5
+    assert costs == sorted(costs)
+    assert costs[0] == value.min()
+    assert costs[-1] <= (1 + DEARER) * costs[0]
+    for i, (x, g, p) in enumerate(ends):
+        for x2, g2, p2 in ends[:i]:
+            far = np.abs(np.array(divmod(x, 9)) - divmod(x2, 9))
+            far[1] = min(far[1], 9 - far[1])
+            turn = abs(g - g2)
+            turn = min(turn, samples - turn) * 2 * np.pi / samples
+            assert p != p2 or turn >= ELSEWHERE or (far > FARTHEST).any()
+    assert apart(coarse, robot, value, 1) == ends[:1]
+    assert apart(coarse, robot, np.full_like(value, np.inf), 3) == []

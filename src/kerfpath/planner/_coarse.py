@@ -21,7 +21,17 @@ from kerfpath.planner._graph import layered_graph
 from kerfpath.planner._task import PlanningTask
 from kerfpath.robots import Robot
 
-__all__ = ["Coarse", "Style", "clear_way", "coarse_places", "reached", "sampled", "steps_of"]
+__all__ = [
+    "Coarse",
+    "End",
+    "Style",
+    "apart",
+    "clear_way",
+    "coarse_places",
+    "reached",
+    "sampled",
+    "steps_of",
+]
 
 FEW_NODES, NODES = 9, 41
 """Nodes at which the axes are sampled: as many as leave them time for a step, within these."""
@@ -35,6 +45,10 @@ FARTHEST = 2
 TURN = np.radians(40)
 """rad that gamma turns by at most."""
 
+ELSEWHERE = np.radians(60)
+"""rad of gamma from which two ends are apart; or more than `FARTHEST` steps of an axis."""
+DEARER = 0.1
+"""What another end may cost beyond the best, relative."""
 ROUNDS = 16
 """Ways looked at for one whose samples are all clear in the cell."""
 ABOUT = 2
@@ -46,6 +60,17 @@ class Style(NamedTuple):
 
     square: float
     axes: float
+
+
+End = int | tuple[int, int, int] | None
+"""Where a way is to end: at a place, at a place, gamma and posture, or where it is best."""
+
+
+class Reached(NamedTuple):
+    """What reaching each sample (X, m, P) of the last node costs, and from where: (M, X, m, P)."""
+
+    value: Array
+    back: Ints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -137,12 +162,16 @@ def clear_way(
     task: PlanningTask,
     style: Style,
     clear: Callable[[Array], Bools],
-    end: int | None,
+    known: Reached,
+    end: End,
 ) -> Ints:
-    """Return the best way whose samples are clear, or the last one tried; as `_best_way`."""
+    """Return the places (M,) of the best way whose samples are clear, or of the last one tried.
+
+    `known` is what is reached as far as it is known what is clear.
+    """
     graph, counts = coarse.graph, coarse.counts
     cells = np.stack(np.unravel_index(np.arange(len(coarse.places)), counts), axis=-1)
-    way = _best_way(coarse, task, style, end)
+    way = _way_to(known, end)
     for _ in range(ROUNDS):
         hit = np.flatnonzero(~clear(graph.q[_vertices(coarse, way)]))
         if not hit.size:
@@ -156,7 +185,7 @@ def clear_way(
         at = np.concatenate(looked)
         coarse.closed[at] = ~clear(graph.q[at])
         try:
-            way = _best_way(coarse, task, style, end)
+            way = _way_to(reached(coarse, task, style), end)
         except NoFeasiblePath:
             break
     return way[:, 0]
@@ -174,14 +203,16 @@ def _vertices(coarse: Coarse, way: Ints) -> Ints:
     return np.array(found)
 
 
-def _best_way(coarse: Coarse, task: PlanningTask, style: Style, end: int | None) -> Ints:
+def _way_to(known: Reached, end: End) -> Ints:
     """Return the place, gamma and posture (M, 3) of each sampled node on the best way.
 
-    To a place at the last of them, if `end` says one and it is reached.
+    To that end, if it is reached.
     """
-    value, back = reached(coarse, task, style)
+    value, back = known
     if end is not None and np.isfinite(value[end]).any():
-        value[np.arange(len(value)) != end] = np.inf
+        there = np.full_like(value, np.inf)
+        there[end] = value[end]
+        value = there
     at = int(np.argmin(value))
     path = [at]
     for k in range(len(back) - 1, 0, -1):
@@ -190,7 +221,7 @@ def _best_way(coarse: Coarse, task: PlanningTask, style: Style, end: int | None)
     return np.stack(np.unravel_index(path[::-1], value.shape), axis=1).astype(np.int64)
 
 
-def reached(coarse: Coarse, task: PlanningTask, style: Style) -> tuple[Array, Ints]:
+def reached(coarse: Coarse, task: PlanningTask, style: Style) -> Reached:
     """Return what reaching each sample (X, m, P) of the last node costs, and from where: (M, ...).
 
     Raises
@@ -218,7 +249,28 @@ def reached(coarse: Coarse, task: PlanningTask, style: Style) -> tuple[Array, In
         raise NoFeasiblePath(
             _stuck(coarse, robot, 0), node=-1, proved=False, counts=graph.counts(0)
         )
-    return value, back
+    return Reached(value, back)
+
+
+def apart(coarse: Coarse, robot: Robot, value: Array, count: int) -> list[End]:
+    """Return samples of the last node that are far from each other, the best first.
+
+    Up to `count` of those (X, m, P) that cost little more than the best.
+    """
+    samples, counts = value.shape[1], np.array(coarse.counts)
+    cells = np.stack(np.unravel_index(np.arange(len(coarse.places)), coarse.counts), axis=-1)
+    turns, endless = np.arange(samples), robot.endless[robot.free]
+    left, most = value.copy(), (1 + DEARER) * value.min()
+    ends: list[End] = []
+    while len(ends) < count and np.isfinite(least := left.min()) and least <= most:
+        place, gamma, posture = (int(i) for i in np.unravel_index(np.argmin(left), left.shape))
+        ends.append((place, gamma, posture))
+        far = np.abs(cells - cells[place])
+        far = np.where(endless, np.minimum(far, counts - far), far)
+        turn = np.abs(turns - gamma)
+        beside = np.minimum(turn, samples - turn) * 2 * np.pi / samples < ELSEWHERE
+        left[(far <= FARTHEST).all(axis=1)[:, None] & beside, posture] = np.inf
+    return ends
 
 
 def _layer(coarse: Coarse, robot: Robot, k: int) -> CoarseLayer:

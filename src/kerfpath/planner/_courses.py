@@ -23,11 +23,20 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.kernels.metric import increments, wrap
 from kerfpath.options import PlanOptions
 from kerfpath.planner._clear import ClearSearch
-from kerfpath.planner._coarse import Coarse, Style, clear_way, reached, sampled, steps_of
+from kerfpath.planner._coarse import (
+    Coarse,
+    End,
+    Style,
+    apart,
+    clear_way,
+    reached,
+    sampled,
+    steps_of,
+)
 from kerfpath.planner._task import PlanningTask, task_of
 from kerfpath.robots import Robot
 
-__all__ = ["along_a_course", "courses", "external_course"]
+__all__ = ["STYLES", "along_a_course", "courses", "external_course"]
 
 SLOW, SLOWLY = 1e-6, 1e6
 """m/s and s from node to node: so slow that no limit binds."""
@@ -90,11 +99,13 @@ def courses(
     task: PlanningTask,
     styles: tuple[Style, ...] = STYLES,
     clear: Callable[[Array], Bools] = lambda q: np.ones(len(q), np.bool_),
+    ends: int = 1,
 ) -> Iterator[Array]:
     """Yield courses (K, E) rad or m of what poses leave free, that which promises most first.
 
-    With `clear`, which says of joint vectors (B, n) whether they are clear (B,), ways lead through
-    clear samples, as far as some rounds of looking at those on them and about them bring it.
+    In the first style to some `ends` that are apart. With `clear`, which says of joint vectors
+    (B, n) whether they are clear (B,), ways lead through clear samples, as far as some rounds of
+    looking at those on them and about them bring it.
 
     Raises
     ------
@@ -104,29 +115,30 @@ def courses(
     coarse, robot = sampled(task), task.robot
     known: list[Array] = []
     for style in styles:
-        for end in _ends(coarse, task, style) if style is styles[0] else (None,):
-            try:
-                path = clear_way(coarse, task, style, clear, end)
-            except NoFeasiblePath:
-                if not known:
-                    raise
-                break
+        try:
+            found = reached(coarse, task, style)
+        except NoFeasiblePath:
+            if not known:
+                raise
+            continue
+        first = style is styles[0]
+        for end in _ends(coarse, robot, found.value, ends) if first else (None,):
+            path = clear_way(coarse, task, style, clear, found, end)
             course = _smooth(coarse, robot, path, len(task.contour))
             if not any(np.allclose(course, other, atol=1e-3) for other in known):
                 known.append(course)
                 yield course
 
 
-def _ends(coarse: Coarse, task: PlanningTask, style: Style) -> list[int | None]:
-    """Return the places that courses are to end at, the best first; None: the best of all.
+def _ends(coarse: Coarse, robot: Robot, value: Array, count: int) -> list[End]:
+    """Return where courses are to end, the best first; None: where it is best.
 
-    An arm's own joint that is free has many valleys, whose depths the samples hardly tell apart;
-    where there are external axes, too, there are too many places to look for them.
+    An arm's own joint that is free has many valleys, whose depths the samples hardly tell apart.
     """
-    if len(coarse.counts) > 1 or task.robot.externals:
-        return [None]
-    least = reached(coarse, task, style)[0].min(axis=(1, 2))
-    beside = np.pad(least, 1, mode="wrap" if task.robot.endless[task.robot.free[0]] else "edge")
+    if robot.externals:
+        return apart(coarse, robot, value, count)
+    least = value.min(axis=(1, 2))
+    beside = np.pad(least, 1, mode="wrap" if robot.endless[robot.free[0]] else "edge")
     lowest = np.isfinite(least) & (least <= beside[:-2]) & (least <= beside[2:])
     places = np.flatnonzero(lowest)
     return [None, *places[np.argsort(least[places], kind="stable")][1:VALLEYS].tolist()]

@@ -16,9 +16,9 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import PlanOptions
 from kerfpath.planner._clear import ClearSearch
-from kerfpath.planner._coarse import coarse_places
+from kerfpath.planner._coarse import Style, coarse_places
 from kerfpath.planner._continuous import claimed, clear_motion, plan_continuous
-from kerfpath.planner._courses import courses
+from kerfpath.planner._courses import STYLES, courses
 from kerfpath.planner._graph import layered_graph
 from kerfpath.planner._quickest import QuickMotion, quicker
 from kerfpath.planner._task import PlanningTask, task_of
@@ -33,6 +33,10 @@ SAME = 1e-3
 """Relative difference of costs up to which two motions count as the same optimum."""
 ALIKE = 1e-3
 """rad or m: courses that are nowhere farther apart are one."""
+CHEAPEST = Style(0.0, 1.0)
+"""What a plan is to be good for: its cost alone."""
+ENDS, MOST_NODES = 4, 1600
+"""Ends to which such courses are looked for, fewer over very many nodes: nodes of all of them."""
 RUNGS = (1.25, 1.06)
 """Multiples of the speed reached at which courses are looked for that are quicker still."""
 
@@ -106,8 +110,11 @@ def _plans(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]
         return [plan_continuous(still, finder.of(still), begin)]
     nominal = _nominal(task, finder, begin)
     known = None if nominal is None else nominal.course
-    ways = courses(task, clear=finder.clear) if known is None else iter([known])
-    tried = _along(ways, task, finder, begin, nominal)
+    ends = int(np.clip(MOST_NODES // len(task.contour), 1, ENDS))
+    # What is cheapest to a rail is not what an elbow swings over best.
+    styles = (CHEAPEST, *STYLES) if task.robot.externals else STYLES
+    ways = courses(task, styles, finder.clear, ends) if known is None else iter([known])
+    tried = _along(ways, task, finder, begin, nominal, least=ends)
     if tried.plans:
         return tried.plans
     failed = tried.failed
@@ -157,8 +164,12 @@ def _along(
     finder: ClearSearch,
     begin: Callable[[str], None],
     known: Plan | None = None,
+    least: int = 1,
 ) -> _Tried:
-    """Return what the arm's motions along some courses come to, with axes and gamma refined."""
+    """Return what the arm's motions along some courses come to, with axes and gamma refined.
+
+    At `least` so many motions are made before two that are one optimum are enough.
+    """
     tried = _Tried([] if known is None else [known], [], [])
     for course in ways:
         few = task.along(course).sampled(max(task.settings.gamma_step, GAMMA_STEP))
@@ -174,7 +185,7 @@ def _along(
         made, best = replace(claimed(found, there), settings=task.settings), tried.best
         tried.plans.append(made)
         same = best is not None and abs(made.cost - best.cost) <= SAME * best.cost
-        if same and task.robot.family.given is None:
+        if same and len(tried.plans) >= least and task.robot.family.given is None:
             break  # two courses have led to one optimum; those of an elbow have twins, mirrored
     return tried
 
