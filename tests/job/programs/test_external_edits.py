@@ -28,7 +28,7 @@ def subjects(folder):
 def test_there_is_one_in_every_language_that_says_external_axes(subjects):
     assert tuple(subjects) == LANGUAGES
     q = np.array([move.q for move in subjects["rapid"].program.moves])
-    assert (np.ptp(q[:, 6:], axis=0) > [0.05, 0.1]).all()  # m and rad: both move
+    assert (np.ptp(q[:, 6:], axis=0) > [0.05, 0.05]).all()  # m and rad: both move
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
