@@ -56,10 +56,14 @@ ABOUT = 2
 
 
 class Style(NamedTuple):
-    """What a course is to be good for: prices of speed squared, and of the axes' own moves."""
+    """What a course is to be good for: prices of speed squared, and of the axes' own moves.
+
+    To so many ends, where there are external axes.
+    """
 
     square: float
     axes: float
+    ends: int = 1
 
 
 End = int | tuple[int, int, int] | None

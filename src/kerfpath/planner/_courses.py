@@ -99,13 +99,11 @@ def courses(
     task: PlanningTask,
     styles: tuple[Style, ...] = STYLES,
     clear: Callable[[Array], Bools] = lambda q: np.ones(len(q), np.bool_),
-    ends: int = 1,
 ) -> Iterator[Array]:
     """Yield courses (K, E) rad or m of what poses leave free, that which promises most first.
 
-    In the first style to some `ends` that are apart. With `clear`, which says of joint vectors
-    (B, n) whether they are clear (B,), ways lead through clear samples, as far as some rounds of
-    looking at those on them and about them bring it.
+    With `clear`, which says of joint vectors (B, n) whether they are clear (B,), ways lead through
+    clear samples, as far as some rounds of looking at those on them and about them bring it.
 
     Raises
     ------
@@ -121,8 +119,7 @@ def courses(
             if not known:
                 raise
             continue
-        first = style is styles[0]
-        for end in _ends(coarse, robot, found.value, ends) if first else (None,):
+        for end in _ends(coarse, robot, found.value, style, valleys=style is styles[0]):
             path = clear_way(coarse, task, style, clear, found, end)
             course = _smooth(coarse, robot, path, len(task.contour))
             if not any(np.allclose(course, other, atol=1e-3) for other in known):
@@ -130,13 +127,15 @@ def courses(
                 yield course
 
 
-def _ends(coarse: Coarse, robot: Robot, value: Array, count: int) -> list[End]:
+def _ends(coarse: Coarse, robot: Robot, value: Array, style: Style, *, valleys: bool) -> list[End]:
     """Return where courses are to end, the best first; None: where it is best.
 
-    An arm's own joint that is free has many valleys, whose depths the samples hardly tell apart.
+    An arm's own joint that is free has many `valleys`, whose depths the samples hardly tell apart.
     """
     if robot.externals:
-        return apart(coarse, robot, value, count)
+        return apart(coarse, robot, value, style.ends)
+    if not valleys:
+        return [None]
     least = value.min(axis=(1, 2))
     beside = np.pad(least, 1, mode="wrap" if robot.endless[robot.free[0]] else "edge")
     lowest = np.isfinite(least) & (least <= beside[:-2]) & (least <= beside[2:])

@@ -33,10 +33,8 @@ SAME = 1e-3
 """Relative difference of costs up to which two motions count as the same optimum."""
 ALIKE = 1e-3
 """rad or m: courses that are nowhere farther apart are one."""
-CHEAPEST = Style(0.0, 1.0)
-"""What a plan is to be good for: its cost alone."""
 ENDS, MOST_NODES = 4, 1600
-"""Ends to which such courses are looked for, fewer over very many nodes: nodes of all of them."""
+"""Ends to which the cheapest courses are looked for, fewer over very many nodes."""
 RUNGS = (1.25, 1.06)
 """Multiples of the speed reached at which courses are looked for that are quicker still."""
 
@@ -110,11 +108,11 @@ def _plans(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]
         return [plan_continuous(still, finder.of(still), begin)]
     nominal = _nominal(task, finder, begin)
     known = None if nominal is None else nominal.course
-    ends = int(np.clip(MOST_NODES // len(task.contour), 1, ENDS))
+    cheapest = Style(0.0, 1.0, int(np.clip(MOST_NODES // len(task.contour), 1, ENDS)))
     # What is cheapest to a rail is not what an elbow swings over best.
-    styles = (CHEAPEST, *STYLES) if task.robot.externals else STYLES
-    ways = courses(task, styles, finder.clear, ends) if known is None else iter([known])
-    tried = _along(ways, task, finder, begin, nominal, least=ends)
+    styles = (*STYLES[:1], cheapest, *STYLES[1:]) if task.robot.externals else STYLES
+    ways = courses(task, styles, finder.clear) if known is None else iter([known])
+    tried = _along(ways, task, finder, begin, nominal, least=1 + cheapest.ends)
     if tried.plans:
         return tried.plans
     failed = tried.failed
