@@ -110,11 +110,17 @@ def test_a_cell_of_another_rail_is_refused(along_a_wall, arm, tool):
 def test_ends_that_are_apart_begin_with_the_best_and_lie_far_from_each_other():
     from types import SimpleNamespace
 
-    from kerfpath.planner._coarse import DEARER, ELSEWHERE, FARTHEST, apart
+    from kerfpath.planner._coarse import DEARER, ELSEWHERE, FARTHEST, Coarse, apart
 
     rng = np.random.default_rng(8)
     counts, samples = (6, 9), 18
-    coarse = SimpleNamespace(counts=counts, places=np.zeros((54, 2)))
+    coarse = Coarse(
+        nodes=np.arange(2),
+        places=np.zeros((54, 2)),
+        counts=counts,
+        graph=None,
+        closed=np.zeros(0, bool),
+    )
     robot = SimpleNamespace(free=np.array([0, 1]), endless=np.array([False, True]))
     value = 100 + rng.uniform(0, 20, (54, samples, 4))
     value[rng.random(value.shape) < 0.3] = np.inf

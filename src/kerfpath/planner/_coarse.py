@@ -103,6 +103,19 @@ class Coarse:
 
     __repr__ = short_repr
 
+    @property
+    def cells(self) -> Ints:
+        """Which value of each axis the places have, (X, E)."""
+        places = np.arange(len(self.places))
+        return np.stack(np.unravel_index(places, self.counts), axis=-1).astype(np.int64)
+
+    def steps_from(self, place: int, robot: Robot) -> Ints:
+        """Return how many steps of each axis all places are from one, (X, E)."""
+        cells = self.cells
+        far = np.abs(cells - cells[place])
+        around = np.minimum(far, np.array(self.counts) - far)
+        return np.asarray(np.where(robot.endless[robot.free], around, far))
+
 
 def coarse_places(robot: Robot) -> Array:
     """Return a coarse grid (X, E) of the values of what a pose leaves free, rad or m."""
@@ -173,8 +186,7 @@ def clear_way(
 
     `known` is what is reached as far as it is known what is clear.
     """
-    graph, counts = coarse.graph, coarse.counts
-    cells = np.stack(np.unravel_index(np.arange(len(coarse.places)), counts), axis=-1)
+    graph = coarse.graph
     way = _way_to(known, end)
     for _ in range(ROUNDS):
         hit = np.flatnonzero(~clear(graph.q[_vertices(coarse, way)]))
@@ -183,9 +195,8 @@ def clear_way(
         looked = []
         for k in hit:
             own = np.arange(graph.start[k], graph.start[k + 1])
-            far = np.abs(cells[graph.variant[own]] - cells[way[k, 0]])
-            far = np.where(task.robot.endless[task.robot.free], np.minimum(far, counts - far), far)
-            looked.append(own[(far <= ABOUT).all(axis=1) & ~coarse.closed[own]])
+            about = np.all(coarse.steps_from(way[k, 0], task.robot) <= ABOUT, axis=1)
+            looked.append(own[about[graph.variant[own]] & ~coarse.closed[own]])
         at = np.concatenate(looked)
         coarse.closed[at] = ~clear(graph.q[at])
         try:
@@ -261,19 +272,16 @@ def apart(coarse: Coarse, robot: Robot, value: Array, count: int) -> list[End]:
 
     Up to `count` of those (X, m, P) that cost little more than the best.
     """
-    samples, counts = value.shape[1], np.array(coarse.counts)
-    cells = np.stack(np.unravel_index(np.arange(len(coarse.places)), coarse.counts), axis=-1)
-    turns, endless = np.arange(samples), robot.endless[robot.free]
+    samples = value.shape[1]
     left, most = value.copy(), (1 + DEARER) * value.min()
     ends: list[End] = []
     while len(ends) < count and np.isfinite(least := left.min()) and least <= most:
         place, gamma, posture = (int(i) for i in np.unravel_index(np.argmin(left), left.shape))
         ends.append((place, gamma, posture))
-        far = np.abs(cells - cells[place])
-        far = np.where(endless, np.minimum(far, counts - far), far)
-        turn = np.abs(turns - gamma)
+        near = np.all(coarse.steps_from(place, robot) <= FARTHEST, axis=1)
+        turn = np.abs(np.arange(samples) - gamma)
         beside = np.minimum(turn, samples - turn) * 2 * np.pi / samples < ELSEWHERE
-        left[(far <= FARTHEST).all(axis=1)[:, None] & beside, posture] = np.inf
+        left[near[:, None] & beside, posture] = np.inf
     return ends
 
 
@@ -295,8 +303,7 @@ def _nearby(coarse: Coarse, task: PlanningTask, parts: int, style: Style) -> Nea
     velocity = options.eta_v * robot.speed_limits()[0]
     reach = [range(-FARTHEST, FARTHEST + 1) if n > 1 else range(1) for n in counts]
     moves = np.stack(np.meshgrid(*reach, indexing="ij"), axis=-1).reshape(-1, len(counts))
-    cells = np.stack(np.unravel_index(np.arange(len(coarse.places)), counts), axis=-1)
-    there = cells[:, None] + moves
+    there = coarse.cells[:, None] + moves
     endless = robot.endless[free]
     there = np.where(endless, there % counts, there)
     inside = ((there >= 0) & (there < counts)).all(axis=2)

@@ -133,7 +133,7 @@ def _ends(coarse: Coarse, robot: Robot, value: Array, style: Style, *, valleys: 
     An arm's own joint that is free has many `valleys`, whose depths the samples hardly tell apart.
     """
     if robot.externals:
-        return apart(coarse, robot, value, style.ends)
+        return [None, *apart(coarse, robot, value, style.ends)[1:]]
     if not valleys:
         return [None]
     least = value.min(axis=(1, 2))
