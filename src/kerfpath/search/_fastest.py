@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -23,11 +24,14 @@ __all__ = [
     "find_least_interval",
     "first_guess",
     "quickest",
+    "sampled_steps",
     "times_asked",
 ]
 
 _LAYERS_SAMPLED = 8
 """Layers whose nearest pairs give the first guess of the interval; any guess ends right."""
+_VERTICES_SAMPLED = 64
+"""Vertices of a layer that stand for all of them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,15 +135,19 @@ def times_asked(path: Array, endless: Bools, velocity: Array, acceleration: Arra
 
 def first_guess(layers: Layers, v: Array) -> float:
     """Return a node interval to begin with: twice what the nearest vertices of some layers need."""
-    q, start, least = layers.q, layers.start, 0.0
-    for k in np.unique(np.linspace(0, len(start) - 3, _LAYERS_SAMPLED).astype(int)):
-        here, there = (q[start[i] : start[i + 1]] for i in (k, k + 1))
-        nearest = np.full(len(here), np.inf)
-        for j in range(0, len(there), max(1, len(there) // 64)):
-            step = np.abs(increments_between(there[j], here, layers.endless))
-            nearest = np.minimum(nearest, (step / v).max(axis=1))
-        least = max(least, float(nearest.min()))
+    least = 0.0
+    for steps in sampled_steps(layers, _LAYERS_SAMPLED):
+        least = max(least, min(float((step / v).max(axis=1).min()) for step in steps))
     return 2 * least or 1e-6
+
+
+def sampled_steps(layers: Layers, count: int) -> Iterator[Iterator[Array]]:
+    """Yield for some `count` layers the steps (m, n) rad from all vertices to each of some next."""
+    q, start = layers.q, layers.start
+    for k in np.unique(np.linspace(0, len(start) - 3, count).astype(int)):
+        here, there = (q[start[i] : start[i + 1]] for i in (k, k + 1))
+        some = there[:: max(1, len(there) // _VERTICES_SAMPLED)]
+        yield (np.abs(increments_between(vertex, here, layers.endless)) for vertex in some)
 
 
 def binding(layers: Layers, index: Ints, v: Array, a: Array) -> LeastInterval:

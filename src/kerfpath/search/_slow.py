@@ -11,17 +11,16 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.kernels.metric import increments_between
 from kerfpath.limits import AccelerationLimit
-from kerfpath.search._fastest import LeastInterval, binding, first_guess
+from kerfpath.search._fastest import LeastInterval, binding, first_guess, sampled_steps
 from kerfpath.search._layers import require_joined
 from kerfpath.search._problem import SearchProblem
 from kerfpath.search._shortest import LayeredPath, find_shortest
 
 __all__ = ["edges_allowed", "find_slow_path", "velocity_allows"]
 
-LAYERS_SAMPLED, VERTICES_SAMPLED = 16, 64
-"""Layers, and vertices of each, by which edges are counted."""
+LAYERS_SAMPLED = 16
+"""Layers by which edges are counted."""
 ROUNDING = 1e-9
 """Share of an interval by which a path that needs just that much may be longer."""
 
@@ -61,17 +60,14 @@ def find_slow_path(problem: SearchProblem) -> LeastInterval:
 
 def edges_allowed(problem: SearchProblem, dt: float) -> float:
     """Return about how many edges keep (5) with dt s from node to node: by some of them."""
-    q, start = problem.q, problem.start
+    sizes = np.diff(problem.start)
     most = problem.limits.velocity.per_interval(dt)
-    pairs = np.diff(start)[:-1] * np.diff(start)[1:]
     looked_at, kept = 0, 0
-    for k in np.unique(np.linspace(0, len(pairs) - 1, LAYERS_SAMPLED).astype(int)):
-        here, there = (q[start[i] : start[i + 1]] for i in (k, k + 1))
-        for j in range(0, len(there), max(1, len(there) // VERTICES_SAMPLED)):
-            step = np.abs(increments_between(there[j], here, problem.endless))
+    for steps in sampled_steps(problem.layers, LAYERS_SAMPLED):
+        for step in steps:
             kept += int((step <= most).all(axis=1).sum())
-            looked_at += len(here)
-    return float(pairs.sum()) * kept / max(looked_at, 1)
+            looked_at += len(step)
+    return float((sizes[:-1] * sizes[1:]).sum()) * kept / max(looked_at, 1)
 
 
 def _first_order(problem: SearchProblem, dt: float) -> SearchProblem:
