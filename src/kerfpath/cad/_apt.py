@@ -8,6 +8,7 @@ from pathlib import Path
 from kerfpath._arrays import Array
 from kerfpath.cad._part import Part
 from kerfpath.cad._toolpath import (
+    UNKNOWN,
     Move,
     ToolPath,
     Triple,
@@ -76,9 +77,7 @@ def _tool_path(lines: Sequence[str]) -> ToolPath:
     reader = _Reader()
     for line, word, rest in _statements(lines):
         reader.take(line, word, rest)
-    if reader.unused:
-        reader.notes.append(f"words not used: {', '.join(sorted(reader.unused))}")
-    return ToolPath(moves=reader.moves, unit=reader.unit, notes=reader.notes)
+    return ToolPath(moves=reader.moves, unit=reader.unit, notes=reader.notes, unused=reader.unused)
 
 
 def _statements(lines: Sequence[str]) -> Iterator[tuple[int, str, str]]:
@@ -221,5 +220,4 @@ def _refusal(word: str, rest: str) -> str:
     asked = f"{word[:40]}/{rest[:20]}" if rest else word[:40]
     if "=" in word or "=" in rest:
         return f"{asked!r} defines geometry; expected a cutter-location file, of numbers alone"
-    unknown = "the word is not known, and may change the path"
-    return f"{asked!r}: {REFUSED.get(word.partition(',')[0], unknown)}"
+    return f"{asked!r}: {REFUSED.get(word.partition(',')[0], UNKNOWN)}"

@@ -46,8 +46,7 @@ def klartext_path(lines: Sequence[str]) -> ToolPath:
         text = re.sub(r"^\s*\d+\b", "", line.upper().partition(";")[0]).strip()
         if text:
             program.take(number, f"line {number}", text)
-    notes = [f"words not used: {', '.join(sorted(program.unused))}"] if program.unused else []
-    return ToolPath(moves=program.tip.moves, unit=program.unit, notes=notes)
+    return ToolPath(moves=program.tip.moves, unit=program.unit, unused=program.unused)
 
 
 class _Program:

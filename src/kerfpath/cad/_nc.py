@@ -9,7 +9,15 @@ from pathlib import Path
 from kerfpath._arrays import Array
 from kerfpath.cad._klartext import is_klartext, klartext_path
 from kerfpath.cad._part import Part
-from kerfpath.cad._toolpath import Tip, ToolPath, Triple, lines_of, part_of_tool_path, unit_axis
+from kerfpath.cad._toolpath import (
+    UNKNOWN,
+    Tip,
+    ToolPath,
+    Triple,
+    lines_of,
+    part_of_tool_path,
+    unit_axis,
+)
 from kerfpath.errors import InputError
 
 __all__ = ["read_nc"]
@@ -88,10 +96,7 @@ def _siemens_path(lines: Sequence[str]) -> ToolPath:
         for name, value in _words(number, text):
             block.add(name, value)
         program.take(block)
-    notes = program.notes
-    if program.unused:
-        notes.append(f"words not used: {', '.join(sorted(program.unused))}")
-    return ToolPath(moves=program.tip.moves, unit=program.unit, notes=notes)
+    return ToolPath(moves=program.tip.moves, unit=program.unit, unused=program.unused)
 
 
 def _words(line: int, text: str) -> Iterator[tuple[str, str]]:
@@ -149,7 +154,6 @@ class _Program:
     def __init__(self) -> None:
         self.tip = Tip()
         self.unit = ""
-        self.notes: list[str] = []
         self.unused: set[str] = set()
         self._feed: bool | None = None
         self._is_oriented = False
@@ -201,9 +205,8 @@ class _Program:
             elif keyword in HARMLESS:
                 self.unused.add(keyword)
             elif keyword not in MACHINE and not (keyword == "CYCLE800" and arguments == "()"):
-                unknown = "the word is not known, and may change the path"
                 raise InputError(
-                    f"{block.where}: {keyword[:40]!r}: {REFUSED.get(keyword, unknown)}"
+                    f"{block.where}: {keyword[:40]!r}: {REFUSED.get(keyword, UNKNOWN)}"
                 )
         return "SUPA" in block.keywords
 
@@ -225,8 +228,7 @@ class _Program:
         elif f"G{g:g}" in (*AWAY, *MACHINE):
             return True
         elif g not in HARMLESS_G and g != 4:
-            unknown = "the word is not known, and may change the path"
-            raise InputError(f"{where}: 'G{g:g}': {REFUSED_G.get(g, unknown)}")
+            raise InputError(f"{where}: 'G{g:g}': {REFUSED_G.get(g, UNKNOWN)}")
         return False
 
     def _away(self, block: _Block) -> None:
@@ -257,4 +259,4 @@ def _word_refusal(name: str) -> str:
             f"{name}: what a rotary axis or angle does is known with the kinematics of the machine "
             "alone; let the CAM system write the tool axis as a vector (A3= B3= C3=), or as APT"
         )
-    return f"{name!r}: the word is not known, and may change the path"
+    return f"{name!r}: {UNKNOWN}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -23,6 +23,7 @@ from kerfpath.contour import angle_between
 from kerfpath.errors import InputError
 
 __all__ = [
+    "UNKNOWN",
     "Move",
     "Tip",
     "ToolPath",
@@ -34,6 +35,8 @@ __all__ = [
 ]
 
 Triple = tuple[float, float, float]
+UNKNOWN = "the word is not known, and may change the path"
+"""Why a word is refused that no reader knows."""
 ALONG = float(np.radians(1.0))
 """A move that leaves the tool axis by less cuts nothing beside its start: approach or retract."""
 UNIT_AXIS = 1e-2
@@ -69,11 +72,12 @@ class Move:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolPath:
-    """The moves of a file, the unit that it states ("" for none), and what it holds besides."""
+    """The moves of a file, the unit that it states ("" for none), notes, and words not used."""
 
     moves: Sequence[Move]
     unit: str
-    notes: Sequence[str]
+    notes: Sequence[str] = ()
+    unused: Collection[str] = ()
 
     __repr__ = short_repr
 
@@ -189,6 +193,8 @@ def part_of_tool_path(
     if not (unit or tool_path.unit):
         raise InputError(f"states no length unit; say it with unit= one of {', '.join(UNITS_MM)}")
     notes = list(tool_path.notes)
+    if tool_path.unused:
+        notes.append(f"words not used: {', '.join(sorted(tool_path.unused))}")
     if unit and tool_path.unit and unit != tool_path.unit:
         notes.append(f"unit {unit} as asked; the file says {tool_path.unit}")
     if axis is not None and all(move.axis for move in tool_path.moves if move.kind == "feed"):
