@@ -57,7 +57,7 @@ EXTERNAL = {"rail": 12, "table": 12, "rail-and-table": 6}
 """Instances with external axes, of one robot."""
 CARRIED = "abb_irb4600_60_205"
 
-_Drawn = tuple[Contour, float]
+_Drawn = tuple[Robot, Contour, float]
 
 
 def draw(only: str = "") -> Iterator[str]:
@@ -86,12 +86,8 @@ def _arm(model: str, *, endless: bool) -> Robot:
 
 def _written(name: str, family: str, arm: Robot, drawn: Callable[..., Any]) -> str:
     rng = np.random.default_rng([2026, *name.encode()])
-    each = arm
-    if family in EXTERNAL:
-        each, cut, speed = drawn(rng, arm, family)
-    else:
-        cut, speed = drawn(rng, arm, name)
-    (INSTANCES / f"{name}.json").write_text(_text(name, family, each, cut, speed))
+    machine, cut, speed = drawn(rng, arm, name)
+    (INSTANCES / f"{name}.json").write_text(_text(name, family, machine, cut, speed))
     return name
 
 
@@ -144,7 +140,7 @@ def _task(arm: Robot) -> dict[str, Any]:
     return {"robot": arm, "tool": head(), "placement": np.eye(4)}
 
 
-def _reached(drawn: Callable[[], Contour], arm: Robot, **asked: Any) -> _Drawn:
+def _reached(drawn: Callable[[], Contour], arm: Robot, **asked: Any) -> tuple[Contour, float]:
     """Return the first contour drawn that the robot can cut, and its fastest speed, m/s."""
     while True:
         cut = drawn()
@@ -156,7 +152,7 @@ def _reached(drawn: Callable[[], Contour], arm: Robot, **asked: Any) -> _Drawn:
 
 def _random(rng: np.random.Generator, arm: Robot, _: str) -> _Drawn:
     cut, fastest = _reached(lambda: _in_front(rng, arm), arm, **COARSE)
-    return cut, fastest * rng.uniform(*SHARES)
+    return arm, cut, fastest * rng.uniform(*SHARES)
 
 
 def _in_front(rng: np.random.Generator, arm: Robot) -> Contour:
@@ -179,7 +175,7 @@ def _of_part(rng: np.random.Generator, arm: Robot, name: str) -> _Drawn:
         return Contour(points, shape.axes @ turn.T, closed=True).resample(count=count)
 
     cut, fastest = _reached(placed, arm, **COARSE)
-    return cut, fastest * rng.uniform(*SHARES)
+    return arm, cut, fastest * rng.uniform(*SHARES)
 
 
 @cache
@@ -197,7 +193,7 @@ def _levelled(up: Array) -> Array:
 def _too_fast(rng: np.random.Generator, arm: Robot, _: str) -> _Drawn:
     cut, _speed = _reached(lambda: _in_front(rng, arm), arm, **COARSE)
     fastest = fastest_speed(cut, **_task(arm), gamma_step=np.radians(1), refine=True)
-    return cut, fastest.speed * TOO_FAST
+    return arm, cut, fastest.speed * TOO_FAST
 
 
 def _out_of_reach(rng: np.random.Generator, arm: Robot, _: str) -> _Drawn:
@@ -212,22 +208,22 @@ def _out_of_reach(rng: np.random.Generator, arm: Robot, _: str) -> _Drawn:
             plan(cut, **_task(arm), speed=fastest / 2, options=PlanOptions(certify=None))
         except NoFeasiblePath as refusal:
             if refusal.closed is not None and refusal.closed.limit == "pose":
-                return cut, fastest / 2
+                return arm, cut, fastest / 2
 
 
-def _external(rng: np.random.Generator, arm: Robot, family: str) -> tuple[Robot, Contour, float]:
+def _external(rng: np.random.Generator, arm: Robot, name: str) -> _Drawn:
     """Return a robot with rail, table or both; a wavy line or a ring; and a speed."""
     each, point = arm, np.array([1.3, 0.0, rng.uniform(0.4, 0.8)])
-    if "rail" in family:
+    if "rail" in name:
         each = each.on_rail([0, 1, 0], lower=-1.2, upper=1.2, velocity=1.5, acceleration=3.0)
-    if "table" in family:
+    if "table" in name:
         each = each.with_positioner(
             [0, 1, 0], point, name="chuck", lower=-np.pi, upper=np.pi, endless=True,
             velocity=3.0, acceleration=6.0,
         )  # fmt: skip
 
     def drawn() -> Contour:
-        shape = _ring(rng) if "table" in family else _wavy(rng)
+        shape = _ring(rng) if "table" in name else _wavy(rng)
         cut = shape.resample(count=int(rng.integers(60, 81)))
         return Contour(cut.points + point, cut.axes, closed=cut.closed)
 

@@ -102,7 +102,7 @@ def _outside(planner: str, python: str, left: list[str]) -> Iterator[dict[str, A
     """Yield the answers of a planner of another project, each from a process of its own."""
     environ = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1]), "OMP_NUM_THREADS": "1"}
     for name in left:
-        command = [python, "-W", "ignore", "-m", f"{_OUTSIDE}", planner, name]
+        command = [python, "-W", "ignore", "-m", "benchmarks.public.outside", planner, name]
         try:
             done = subprocess.run(
                 command, capture_output=True, text=True, timeout=LONGEST, env=environ, check=False
@@ -115,9 +115,6 @@ def _outside(planner: str, python: str, left: list[str]) -> Iterator[dict[str, A
             yield _silent(planner, name, "", f"exit {done.returncode}")
             continue
         yield json.loads(done.stdout.splitlines()[-1])
-
-
-_OUTSIDE = "benchmarks.public.outside"
 
 
 def _silent(planner: str, name: str, settings: str, why: str) -> dict[str, Any]:
@@ -146,9 +143,7 @@ def _best(name: str, known: dict[str, Any]) -> dict[str, Any]:
     task, best = instance(name), {"instance": name, "cost": None, "bound": None} | known
     for file in sorted(ANSWERS.glob(f"*/{name}.json")):
         said = json.loads(file.read_text())
-        by = said["planner"]
-        if by in PLANNERS:
-            by = f"kerfpath {version('kerfpath')}, {by}" if by != "kerfpath" else _SELF
+        by = _named(said["planner"])
         if said["q"] is not None and not (verdict := check(task, said["q"])).faults:
             # A bound of the same plan on another machine differs by rounding.
             if best["cost"] is None or verdict.cost < best["cost"] - 1e-9:
@@ -166,7 +161,11 @@ def _best(name: str, known: dict[str, Any]) -> dict[str, Any]:
     return best
 
 
-_SELF = f"kerfpath {version('kerfpath')}"
+def _named(planner: str) -> str:
+    """Return a planner's name, with the version of this package for one of its own."""
+    if planner not in PLANNERS:
+        return planner
+    return f"kerfpath {version('kerfpath')}" + (f", {planner}" if planner != "kerfpath" else "")
 
 
 def _lines(data: dict[str, Any]) -> str:

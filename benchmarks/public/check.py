@@ -23,7 +23,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["INSTANCES", "KNOWN", "Instance", "Verdict", "check", "forward", "instance", "names"]
+__all__ = [
+    "INSTANCES",
+    "KNOWN",
+    "Instance",
+    "Verdict",
+    "check",
+    "forward",
+    "instance",
+    "names",
+    "turned",
+]
 
 Array = NDArray[np.float64]
 
@@ -182,13 +192,13 @@ def forward(task: Instance, q: Array) -> Array:
         if axis["kind"] == "linear":
             moved[:, :3, 3] = x[:, None] * along
         else:
-            moved[:, :3, :3] = _turned(along, x)
+            moved[:, :3, :3] = turned(along, x)
             moved[:, :3, 3] = point - moved[:, :3, :3] @ point
         T[axis["carries"]] = T[axis["carries"]] @ moved
     reached = np.linalg.inv(T["part"]) @ T["robot"]
     for origin, about, angle in zip(task.origins, task.turns, q[:, :arm].T, strict=True):
         turn = np.tile(np.eye(4), (len(q), 1, 1))
-        turn[:, :3, :3] = _turned(about, angle)
+        turn[:, :3, :3] = turned(about, angle)
         reached = reached @ origin @ turn
     return np.asarray(reached @ task.flange @ task.tool)
 
@@ -218,7 +228,7 @@ def check(task: Instance, q: Array) -> Verdict:
     )
 
 
-def _turned(axis: Array, angle: Array) -> Array:
+def turned(axis: Array, angle: Array) -> Array:
     """Return rotations (K, 3, 3) about a unit axis (3,) by angles (K,): Rodrigues' formula."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

@@ -8,8 +8,9 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from benchmarks.public.check import Array, Instance, check
+from benchmarks.public.check import Array, Instance, check, turned
 
 __all__ = ["Joint", "followed", "joints", "least_bad", "put_right", "ranges", "starts", "urdf"]
 
@@ -152,8 +153,7 @@ def _error(task: Instance, q: Array, points: Array, axes: Array) -> tuple[Array,
         if joint.linear:
             p = p + x * along
             continue
-        cross, x = np.cross(np.eye(3), joint.axis), x[..., None]
-        R = R @ (np.eye(3) + np.sin(x) * cross + (1 - np.cos(x)) * (cross @ cross))
+        R = R @ turned(joint.axis, x[:, 0])
     end = task.flange @ task.tool
     tip, z = p + R @ end[:3, 3], R @ end[:3, 2]
     J = np.zeros((len(q), 6, q.shape[1]))
@@ -167,12 +167,8 @@ def _error(task: Instance, q: Array, points: Array, axes: Array) -> tuple[Array,
 
 
 def _placed(T: Array) -> str:
-    yaw, pitch = np.arctan2(T[1, 0], T[0, 0]), np.arctan2(-T[2, 0], np.hypot(T[0, 0], T[1, 0]))
-    if np.hypot(T[0, 0], T[1, 0]) > 1e-9:
-        roll = np.arctan2(T[2, 1], T[2, 2])
-    else:
-        roll, yaw = np.arctan2(-T[1, 2], T[1, 1]), 0.0
-    return f'<origin xyz="{_row(T[:3, 3])}" rpy="{_row(np.array([roll, pitch, yaw]))}"/>'
+    angles = Rotation.from_matrix(T[:3, :3]).as_euler("xyz", suppress_warnings=True)
+    return f'<origin xyz="{_row(T[:3, 3])}" rpy="{_row(angles)}"/>'
 
 
 def _row(values: Array) -> str:
