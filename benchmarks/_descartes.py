@@ -1,8 +1,7 @@
 """Tesseract's Descartes planner on the benchmark's poses, in a process of its own.
 
-The wheel brings neither robots nor plugin lists, so both are written here: a URDF and SRDF of the
-arm, without geometry unless solids are given, and lists that point at the wheel's own libraries,
-whose names carry a hash.
+The wheel brings no robots, so a URDF and SRDF of the arm are written here, without geometry unless
+solids are given.
 """
 
 from __future__ import annotations
@@ -26,8 +25,6 @@ from kerfpath import Robot
 from kerfpath._arrays import Array, Ints
 
 __all__ = ["NotRun", "Solid", "Solved", "Task", "solve"]
-
-NAMESPACE, PROFILE = "DescartesMotionPlannerTask", "benchmark"
 
 
 class NotRun(Exception):
@@ -122,56 +119,33 @@ def _edges_gigabytes(task: Task) -> float:
 
 
 def _solve_here(task: Task) -> Solved:
-    from tesseract_robotics import tesseract_command_language as language
-    from tesseract_robotics import tesseract_common as common
-    from tesseract_robotics import tesseract_environment as environments
-    from tesseract_robotics import tesseract_motion_planners as planners
-    from tesseract_robotics import tesseract_motion_planners_descartes as descartes
+    from benchmarks import _tesseract
 
-    with tempfile.TemporaryDirectory() as folder:
-        plugins = Path(folder) / "plugins.yaml"
-        plugins.write_text(_plugins(task.robot))
-        contacts = Path(folder) / "contacts.yaml"
-        contacts.write_text(_contacts())
-        urdf, srdf = _urdf(task, Path(folder)), _srdf(task, plugins, contacts)
-        environment = environments.Environment()
-        if not environment.init(urdf, srdf, common.GeneralResourceLocator()):
-            raise NotRun("its environment refused the URDF, SRDF or plugin list")
-    info = common.ManipulatorInfo()
-    info.manipulator, info.manipulator_ik_solver = "manipulator", "OPWInvKin"
-    info.working_frame, info.tcp_frame = "base_link", "tool0"
-    info.tcp_offset = common.Isometry3d(task.tool)
-
-    profile = descartes.DescartesDefaultPlanProfileD()
-    profile.target_pose_fixed = False
-    profile.target_pose_sample_axis = np.array([0.0, 0.0, 1.0])
-    profile.target_pose_sample_min, profile.target_pose_sample_max = -np.pi, np.pi
-    # Both ends are sampled: one sample more than ours, the last the same as the first.
-    profile.target_pose_sample_resolution = 2 * np.pi / task.samples * (1 + 1e-9)
-    profile.enable_collision = profile.enable_edge_collision = bool(task.solids)
-    # Else poses that nobody checked count as colliding.
-    profile.allow_collision = not task.solids
-    profiles = language.ProfileDictionary()
-    profiles.addProfile(NAMESPACE, PROFILE, descartes.cast_DescartesPlanProfileD(profile))
-
-    program = language.CompositeInstruction()
-    program.setManipulatorInfo(info)
-    for H in task.frames:
-        waypoint = language.CartesianWaypoint(common.Isometry3d(np.array(H)))
-        move = language.MoveInstruction(
-            language.CartesianWaypointPoly_wrap_CartesianWaypoint(waypoint),
-            language.MoveInstructionType_LINEAR,
-            PROFILE,
-            info,
+    robot, ends = task.robot, {"base": "base_link", "tip": "tool0"}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        named = _tesseract.plugins(
+            folder,
+            **ends,
+            lengths=robot.geometry,
+            offsets=robot.offset.tolist(),
+            signs=robot.sign.tolist(),
         )
-        program.appendMoveInstruction(language.MoveInstructionPoly_wrap_MoveInstruction(move))
-    request = planners.PlannerRequest()
-    request.instructions, request.env, request.profiles = program, environment, profiles
+        environment = _tesseract.environment(_urdf(task, folder), _srdf(task, named))
+    if environment is None:
+        raise NotRun("its environment refused the URDF, SRDF or plugin list")
+    request = _tesseract.request(
+        environment,
+        **ends,
+        tool=task.tool,
+        frames=list(task.frames),
+        samples=task.samples,
+        collisions=bool(task.solids),
+    )
 
     def one_plan() -> None:
-        planner = descartes.DescartesMotionPlannerD(NAMESPACE)
         wall, cpu = perf_counter(), process_time()
-        responses[:] = [planner.solve(request)]
+        responses[:] = [_tesseract.solved(request)]
         seconds.append(perf_counter() - wall)
         busy.append((process_time() - cpu) / seconds[-1])
 
@@ -185,16 +159,9 @@ def _solve_here(task: Task) -> Solved:
     response = responses[0]
     if not response.successful:
         raise NotRun(f"it found no plan ({response.message})")
-    rows = []
-    for instruction in response.results.flatten():
-        # Each wrapper must outlive the next: chained calls read freed memory.
-        moved = language.InstructionPoly_as_MoveInstructionPoly(instruction)
-        reached = moved.getWaypoint()
-        state = language.WaypointPoly_as_StateWaypointPoly(reached)
-        rows.append(np.array(state.getPosition(), dtype=float).ravel())
     return Solved(
         seconds=seconds[1:],
-        q=np.array(rows),
+        q=_tesseract.waypoints(response),
         peak_megabytes=peak,
         cores_busy=float(np.median(busy[1:])),
     )
@@ -239,7 +206,7 @@ def _stl(vertices: Array, triangles: Ints) -> bytes:
     return bytes(80) + np.uint32(len(triangles)).tobytes() + facets.tobytes()
 
 
-def _srdf(task: Task, plugins: Path, contacts: Path) -> str:
+def _srdf(task: Task, named: str) -> str:
     judged = {frozenset(pair) for pair in task.apart}
     names = [solid.name for solid in task.solids]
     may_touch = "".join(
@@ -247,66 +214,8 @@ def _srdf(task: Task, plugins: Path, contacts: Path) -> str:
         for a, b in combinations(names, 2)
         if frozenset((a, b)) not in judged
     )
-    return (
-        '<robot name="arm" version="1.0.0"><group name="manipulator">'
-        '<chain base_link="base_link" tip_link="tool0"/></group>'
-        f'<kinematics_plugin_config filename="file://{plugins}"/>'
-        f'<contact_managers_plugin_config filename="file://{contacts}"/>{may_touch}</robot>'
-    )
-
-
-def _libraries(pattern: str) -> tuple[Path, list[str]]:
-    """Return where the wheel keeps its libraries, and those that match, as its lists name them."""
-    import tesseract_robotics
-
-    libraries = Path(tesseract_robotics.__file__).parent.parent / "tesseract_robotics.libs"
-    found = sorted(libraries.glob(f"libtesseract_{pattern}.so"))
-    if not found:
-        raise NotRun(f"its wheel has no {pattern} in {libraries}")
-    return libraries, [f.name.removeprefix("lib").removesuffix(".so") for f in found]
-
-
-def _contacts() -> str:
-    libraries, found = _libraries("collision_bullet_factor*")
-    text = f"contact_manager_plugins:\n  search_paths:\n    - {libraries}\n  search_libraries:\n"
-    text += "".join(f"    - {name}\n" for name in found)
-    for kind in ("Discrete", "Cast"):
-        group = "discrete" if kind == "Discrete" else "continuous"
-        manager = f"Bullet{kind}BVHManager"
-        text += (
-            f"  {group}_plugins:\n    default: {manager}\n    plugins:\n"
-            f"      {manager}:\n        class: {manager}Factory\n"
-        )
-    return text
-
-
-def _plugins(robot: Robot) -> str:
-    libraries, found = _libraries("kinematics_*_factor*")
-    names = "".join(f"    - {name}\n" for name in found)
-    lengths = "".join(f"              {k}: {float(v)!r}\n" for k, v in robot.geometry.items())
-
-    def group(kind: str, plugin: str, factory: str, params: str = "") -> str:
-        return (
-            f"  {kind}:\n    manipulator:\n      default: {plugin}\n      plugins:\n"
-            f"        {plugin}:\n          class: {factory}\n          config:\n"
-            f"            base_link: base_link\n            tip_link: tool0\n{params}"
-        )
-
-    opw = (
-        f"            params:\n{lengths}"
-        f"              offsets: {_list(robot.offset)}\n"
-        f"              sign_corrections: {[int(s) for s in robot.sign]}\n"
-    )
-    return (
-        f"kinematic_plugins:\n  search_paths:\n    - {libraries}\n  search_libraries:\n{names}"
-        + group("fwd_kin_plugins", "KDLFwdKinChain", "KDLFwdKinChainFactory")
-        + group("inv_kin_plugins", "OPWInvKin", "OPWInvKinFactory", opw)
-    )
+    return f'<robot name="arm" version="1.0.0">{named}{may_touch}</robot>'
 
 
 def _row(values: Array) -> str:
     return " ".join(repr(float(v)) for v in values)
-
-
-def _list(values: Array) -> str:
-    return "[" + ", ".join(repr(float(v)) for v in values) + "]"
