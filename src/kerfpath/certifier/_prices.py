@@ -15,7 +15,7 @@ from scipy import sparse
 from kerfpath._arrays import Array
 from kerfpath.certifier._steps import Steps
 from kerfpath.kernels.metric import MANHATTAN, rho
-from kerfpath.kernels.reduced import tangent
+from kerfpath.kernels.reduced import tangents
 
 __all__ = ["limit_prices"]
 
@@ -98,8 +98,7 @@ def _metric(u: Array, moved: _Rows, steps: Steps) -> tuple[Array, _Rows]:
     The Manhattan metric has none between its kinks; that of the others is guessed.
     """
     step, slope = steps.over(1), np.empty_like(u)
-    for row, out in zip(u, slope, strict=True):
-        tangent(row, step, out)
+    tangents(u, step, slope)
     if steps.metric == MANHATTAN:
         return slope.ravel(), sparse.csr_array((moved.shape[1],) * 2)
     length = np.array([rho(row, steps.weight, steps.metric) for row in u])

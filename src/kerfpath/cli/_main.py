@@ -139,7 +139,7 @@ def check(job: JobArgument, as_json: Json = False) -> None:
     part = drawing_of(read)
     if not as_json:
         show_drawing(part)
-    compile_kernels()
+    compile_kernels(read.robot.kinematics)
     with busy("looking at the cell"):
         checked = check_job(read, part)
     show_check(checked, as_json=as_json)
@@ -166,7 +166,7 @@ def speed(
     from kerfpath.job import fastest_speeds, read_job
 
     read = read_job(job)
-    compile_kernels()
+    compile_kernels(read.robot.kinematics)
     with progress_bars("contours") as progress:
         answers = fastest_speeds(read, progress=progress)
     if not show_speeds(answers, as_json=as_json):

@@ -133,8 +133,9 @@ def pick_plan(
     pick = read_pick(folder, job_file, which)
     to = folder / f"plan-{pick.number}"
     require_folder(to)
-    require_language(read_job(job_file))
-    compile_kernels()
+    job = read_job(job_file)
+    require_language(job)
+    compile_kernels(job.robot.kinematics)
     with progress_bars() as progress:
         part, outcome = plan_picked(job_file, pick, refine=refine, progress=progress)
     if not as_json:

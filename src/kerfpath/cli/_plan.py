@@ -65,7 +65,7 @@ def plan_job(
     if not as_json:
         show_drawing(part)
     prepared = prepare(job, part)
-    compile_kernels()
+    compile_kernels(job.robot.kinematics)
     require_foreseen(prepared)
     with progress_bars() as progress:
         outcome = run_prepared(prepared, progress=progress)

@@ -223,13 +223,13 @@ def busy(what: str) -> Iterator[None]:
         yield
 
 
-def compile_kernels() -> None:
-    """Compile the kernels if this copy never has, and say so then."""
+def compile_kernels(kinematics: str = "opw") -> None:
+    """Compile the kernels for a kinematic family before the first run, and print that."""
     from kerfpath.job import is_compiled, warm_up
 
-    if is_compiled():
+    if is_compiled(kinematics):
         return
     if not (quiet.is_set() or errors.is_terminal):
         errors.print("kerfpath: compiling the kernels, first run only")
     with busy("compiling the kernels, first run only"):
-        warm_up()
+        warm_up(kinematics)

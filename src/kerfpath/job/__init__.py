@@ -4,6 +4,8 @@ from kerfpath._extras import require_extra
 
 require_extra("programs", "jobs")
 
+from kerfpath.compiling import is_compiled as is_compiled
+from kerfpath.compiling import warm_up as warm_up
 from kerfpath.job.as_run import AsRun as AsRun
 from kerfpath.job.format import VARIABLES as VARIABLES
 from kerfpath.job.format import Candidate as Candidate
@@ -70,10 +72,8 @@ from kerfpath.job.run import cut_candidate as cut_candidate
 from kerfpath.job.run import fastest_along as fastest_along
 from kerfpath.job.run import fastest_speeds as fastest_speeds
 from kerfpath.job.run import foresee as foresee
-from kerfpath.job.run import is_compiled as is_compiled
 from kerfpath.job.run import measured as measured
 from kerfpath.job.run import order_cuts as order_cuts
 from kerfpath.job.run import require_foreseen as require_foreseen
 from kerfpath.job.run import run_job as run_job
 from kerfpath.job.run import run_prepared as run_prepared
-from kerfpath.job.run import warm_up as warm_up

@@ -15,9 +15,9 @@ M_dist, M_ind         out_dist and out_before: cost and best predecessor
 ====================  ===============================================================
 """
 
-from kerfpath.kernels._jit import is_compiled
+from kerfpath.kernels._jit import CACHE
 
-__all__ = ["EQUATIONS", "is_compiled"]
+__all__ = ["CACHE", "EQUATIONS"]
 
 EQUATIONS = {
     1: "kerfpath.contour._contour:Contour.resample",

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_inline, jit_part
 from kerfpath.kernels.continuous import (
     RELAXED,
     Steps,
@@ -77,7 +77,7 @@ def advance(
     Where no step keeps (6), those that keep the least multiple of it in `RELAXED` are taken.
     """
     (K, B), n = out.at.shape, len(acceleration)
-    x, before = np.empty((B, n)), np.zeros((B, n))
+    x, before, change = np.empty((B, n)), np.zeros((B, n)), np.empty(n)
     offers = _Offers(
         np.empty(64 * B), np.empty(64 * B), np.empty(64 * B, np.int64),
         np.empty(64 * B, np.int64), np.empty(64 * B), np.empty((64 * B, n)),
@@ -86,14 +86,17 @@ def advance(
     for b in range(out.size[0]):
         p = first[b]
         out.at[0, b], out.share[0, b], out.parent[0, b], out.cost[0, b] = p, 0.0, -1, cost[p]
-        x[b] = targets.q[p]
+        for i in range(n):
+            x[b, i] = targets.q[p, i]
     for k in range(1, K):
-        made = 0
+        made = np.int64(0)
         for relaxed in RELAXED:
             free = np.inf if k == 1 else relaxed
+            for i in range(n):
+                change[i] = free * acceleration[i]
             for b in range(out.size[k - 1]):
                 made = _offer(
-                    targets, steps, cost, tail, free * acceleration, k, b, x[b], before[b],
+                    targets, steps, cost, tail, change, k, b, x[b], before[b],
                     out.cost[k - 1, b], made, offers,
                 )  # fmt: skip
             if made > 0:
@@ -104,15 +107,17 @@ def advance(
     return len(out.at)
 
 
-@jit
+@jit_part
 def _offer(
     targets: Targets, steps: Steps, cost: Array, tail: Array, change: Array, k: int, b: int,
     x: Array, before: Array, so_far: float, made: int, offers: _Offers,
 ) -> int:  # fmt: skip
     """Add the steps of one state into layer k to the offers; returns how many there are."""
     n, joint = len(x), targets.joint
-    a, d = np.empty(n), np.empty(n)
-    low, high = np.maximum(steps.low, before - change), np.minimum(steps.high, before + change)
+    a, d, low, high = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    for i in range(n):
+        low[i] = max(steps.low[i], before[i] - change[i])
+        high[i] = min(steps.high[i], before[i] + change[i])
     boxed = Steps(steps.weight, steps.metric, steps.minimax, steps.cap, low, high)
     begin, end = targets.begin[k], targets.begin[k + 1]
     margin, turning = targets.half[k] + 2 * LIMIT_TOLERANCE, targets.endless[joint]
@@ -153,7 +158,26 @@ def _offer(
     return made
 
 
-@jit
+@jit_inline
+def _sift(heap: Ints, total: Array, root: int, size: int) -> None:
+    """Let the entry at `root` of a binary heap sink to its place: least total first, then index.
+
+    A heap, because only the first few of thousands are taken; and numpy's sorting, compiled here,
+    would cost the first run seconds.
+    """
+    while True:
+        least = root
+        for child in range(2 * root + 1, min(2 * root + 3, size)):
+            one, other = heap[child], heap[least]
+            if total[one] < total[other] or (total[one] == total[other] and one < other):
+                least = child
+        if least == root:
+            return
+        heap[root], heap[least] = heap[least], heap[root]
+        root = least
+
+
+@jit_part
 def _keep(
     offers: _Offers, made: int, acceleration: Array, k: int, x: Array, before: Array,
     alike: Alike, out: Beam,
@@ -161,7 +185,13 @@ def _keep(
     """Keep the best offers of those that are not alike as the states of layer k."""
     B, n = x.shape
     from_x, kept = x.copy(), 0
-    for o in np.argsort(offers.total[:made]):
+    heap = np.arange(made)
+    for root in range(made // 2 - 1, -1, -1):
+        _sift(heap, offers.total, root, made)
+    for left in range(made - 1, -1, -1):
+        o = heap[0]
+        heap[0] = heap[left]
+        _sift(heap, offers.total, np.int64(0), left)
         known = False
         for b in range(kept):
             if out.at[k, b] != offers.at[o] or abs(out.share[k, b] - offers.share[o]) > alike.share:
@@ -176,8 +206,9 @@ def _keep(
             continue
         out.at[k, kept], out.share[k, kept] = offers.at[o], offers.share[o]
         out.parent[k, kept], out.cost[k, kept] = offers.parent[o], offers.cost[o]
-        before[kept] = offers.increment[o]
-        x[kept] = from_x[offers.parent[o]] + offers.increment[o]
+        for i in range(n):
+            before[kept, i] = offers.increment[o, i]
+            x[kept, i] = from_x[offers.parent[o], i] + offers.increment[o, i]
         kept += 1
         if kept == B:
             break

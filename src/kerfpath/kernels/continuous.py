@@ -23,7 +23,7 @@ from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import EUCLID, MANHATTAN, increment, wrap_angle
 from kerfpath.kernels.search import first_from
 
-__all__ = ["OVER_CAP", "Targets", "join_samples", "sort_targets", "values_to_go"]
+__all__ = ["OVER_CAP", "Targets", "join_samples", "fill_keys", "values_to_go"]
 
 SAME_VALUE = 1e-9
 """Relative gap between a value and its bound below which a minimum over t has been found."""
@@ -85,15 +85,17 @@ def join_samples(
     rad. A layer is ordered by variant and sample. There are no more targets than vertices.
     """
     count, joined = 0, np.zeros(len(q), np.bool_)
+    place = np.empty(len(q), np.int64)
+    for v in range(len(q)):
+        place[v] = variant[v] * samples + sample[v]
     for k in range(len(start) - 1):
         out_begin[k] = count
         a, b = start[k], start[k + 1]
-        place = variant[a:b].astype(np.int64) * samples + sample[a:b]
         for v in range(a, b):
             following = sample[v] + 1 if sample[v] + 1 < samples else 0
             wanted = variant[v] * samples + following
-            w, nearest, best = a + np.searchsorted(place, wanted), widest, -1
-            while samples > 1 and w < b and place[w - a] == wanted:
+            w, nearest, best = first_from(place, a, b, wanted), widest, -1
+            while samples > 1 and w < b and place[w] == wanted:
                 if posture[w] == posture[v]:
                     far = _farthest(q, v, w, endless)
                     if far <= nearest:
@@ -120,8 +122,8 @@ def _farthest(q: Array, v: int, w: int, endless: Bools) -> float:
 
 
 @jit
-def sort_targets(targets: Targets) -> None:
-    """Fill keys and half widths, and sort the targets of each layer by their key."""
+def fill_keys(targets: Targets) -> None:
+    """Fill the keys of the targets and the half widths of the layers."""
     i = targets.joint
     turning = targets.endless[i]
     for k in range(len(targets.begin) - 1):
@@ -134,10 +136,6 @@ def sort_targets(targets: Targets) -> None:
             targets.key[s] = wrap_angle(middle) if turning else middle
             half = max(half, abs(d) / 2)
         targets.half[k] = half
-        order = np.argsort(targets.key[a:b], kind="mergesort")
-        targets.key[a:b] = targets.key[a:b][order]
-        targets.one[a:b] = targets.one[a:b][order]
-        targets.other[a:b] = targets.other[a:b][order]
 
 
 @jit_inline
@@ -304,7 +302,7 @@ def values_to_go(targets: Targets, steps: Steps, cost: Array, out_tail: Array) -
     K, n = len(targets.start) - 1, len(steps.low)
     a, d = np.empty(n), np.empty(n)
     for k in range(K - 2, -1, -1):
-        hint, alive = -1, False
+        hint, alive = np.int64(-1), False
         for p in range(targets.start[k], targets.start[k + 1]):
             out_tail[p] = np.inf
             if cost[p] == np.inf:

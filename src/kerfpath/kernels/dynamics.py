@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.kernels._jit import jit, jit_inline, jit_part
 
 __all__ = ["ArmBodies", "Posed", "fill_torque", "pose_arm", "room_for", "torques"]
 
@@ -56,7 +56,7 @@ class Posed(NamedTuple):
     """(n, 3) N m: about its joint."""
 
 
-@jit
+@jit_part
 def room_for(n: int) -> Posed:
     """Return room for an arm of n joints."""
     frame = np.empty((n + 1, 3, 3))

@@ -14,8 +14,10 @@ from __future__ import annotations
 from math import atan2, ceil, cos, inf, pi, sin, sqrt
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit, jit_inline, smaller
+from kerfpath.kernels._jit import jit, jit_inline, jit_part, smaller
 from kerfpath.kernels.intervals import (
     DOWN,
     EPS,
@@ -64,6 +66,9 @@ NONE, SMOOTH, BOX = 0, 1, 2
 ANGLE_ERROR = 1e-14
 """What the offset (of 1 rad) and the removal of whole turns add to an error, rad: the model's
 angles are below 16 rad, and each of three operations errs by half a unit in the last place."""
+
+X, Y, Z, CENTER = np.int64(0), np.int64(1), np.int64(2), np.int64(3)
+"""Rows and columns of a frame. Of a bare 0 numba compiles a `turned` of its own, of 1 the next."""
 
 
 class Frames(NamedTuple):
@@ -116,11 +121,11 @@ def turned(frames: Frames, node: int, i: int, j: int, k: float, s: float, h: flo
 @jit_inline
 def turned_point(frames: Frames, node: int, i: int, k: float, s: float, h: float) -> Jet:
     """Return coordinate i of the wrist centre in the base."""
-    f = turned(frames, node, i, 3, k, s, h)
+    f = turned(frames, node, i, CENTER, k, s, h)
     return shift(f, frames.base[node, i, 3], frames.base_radius[node, i, 3])
 
 
-@jit
+@jit_part
 def side(rr: Jet, d: Jet, b: float, front: float, h: float) -> Jet:
     """Angle atan2(-b, front d) by which the arm stands beside the line to the wrist centre.
 
@@ -149,7 +154,7 @@ def side(rr: Jet, d: Jet, b: float, front: float, h: float) -> Jet:
     return settled(Jet(v, ev, g, eg, rv, rg, s, rs), h)
 
 
-@jit
+@jit_part
 def lean(c2: float, k: float, bend: Jet, reach: Jet, h: float) -> Jet:
     """Angle atan2(k sin bend, c2 + k cos bend) of a link k, bent by 0 to pi, behind a link c2.
 
@@ -180,7 +185,7 @@ def lean(c2: float, k: float, bend: Jet, reach: Jet, h: float) -> Jet:
     return settled(Jet(v, ev, d, ed, rv, rd, s, rs), h)
 
 
-@jit
+@jit_part
 def _wrap(angle: float) -> float:
     """Bring an angle into (-pi, pi], to rounding."""
     return angle - 2.0 * pi * ceil((angle - pi) / (2.0 * pi))
@@ -215,7 +220,7 @@ def _write(
         out.radius[at] = smaller(f.rv * UP + error, pi * UP)
 
 
-@jit
+@jit_part
 def write_posture(
     out: Curves,
     cell: int,
@@ -234,7 +239,7 @@ def write_posture(
         _write(out, cell, posture, joint, angles[joint], sign[joint], offset[joint], h)
 
 
-@jit
+@jit_part
 def wrist_sine(c: Jet, x: Jet, y: Jet) -> tuple[float, float, float, float]:
     """Sine of the angle in [0, pi] with cosine c where x^2 + y^2 is its square.
 
@@ -252,7 +257,7 @@ def wrist_sine(c: Jet, x: Jet, y: Jet) -> tuple[float, float, float, float]:
     return s, es, rs, low
 
 
-@jit
+@jit_part
 def _postures(
     arm: OpwArm,
     q1: Jet,
@@ -296,19 +301,19 @@ def _postures(
         write_posture(out, cell, first + wrist, angles, arm.sign, arm.offset, h)
 
 
-@jit
+@jit_part
 def _enclose(
     arm: OpwArm, frames: Frames, node: int, gamma: float, h: float, cell: int, out: Curves
 ) -> None:
     """Write all postures of one cell."""
     k, s = cos(gamma), sin(gamma)
-    x0, x1 = turned(frames, node, 0, 0, k, s, h), turned(frames, node, 1, 0, k, s, h)
-    y0, y1 = turned(frames, node, 0, 1, k, s, h), turned(frames, node, 1, 1, k, s, h)
-    z0, z1 = turned(frames, node, 0, 2, k, s, h), turned(frames, node, 1, 2, k, s, h)
-    x2, y2 = turned(frames, node, 2, 0, k, s, h), turned(frames, node, 2, 1, k, s, h)
-    z2 = turned(frames, node, 2, 2, k, s, h)
-    px, py = turned_point(frames, node, 0, k, s, h), turned_point(frames, node, 1, k, s, h)
-    z = shift(turned_point(frames, node, 2, k, s, h), -arm.c1, 0.0)
+    x0, x1 = turned(frames, node, X, X, k, s, h), turned(frames, node, Y, X, k, s, h)
+    y0, y1 = turned(frames, node, X, Y, k, s, h), turned(frames, node, Y, Y, k, s, h)
+    z0, z1 = turned(frames, node, X, Z, k, s, h), turned(frames, node, Y, Z, k, s, h)
+    x2, y2 = turned(frames, node, Z, X, k, s, h), turned(frames, node, Z, Y, k, s, h)
+    z2 = turned(frames, node, Z, Z, k, s, h)
+    px, py = turned_point(frames, node, X, k, s, h), turned_point(frames, node, Y, k, s, h)
+    z = shift(turned_point(frames, node, Z, k, s, h), -arm.c1, 0.0)
     rr = add(mul(px, px, h), mul(py, py, h))
     dd = shift(rr, -arm.b * arm.b, EPS * arm.b * arm.b)
     for i in range(8):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import copysign, cos, pi, sin
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_part
 from kerfpath.kernels.enclosure import (
     NONE,
     Curves,
@@ -44,7 +44,7 @@ from kerfpath.kernels.ur import UrArm
 __all__ = ["enclose_all"]
 
 
-@jit
+@jit_part
 def _elbows(
     arm: UrArm,
     x: Jet,
@@ -80,18 +80,18 @@ def _elbows(
         write_posture(out, cell, first + 2 * elbow, angles, arm.sign, arm.offset, h)
 
 
-@jit
+@jit_part
 def _enclose(
     arm: UrArm, frames: Frames, node: int, gamma: float, h: float, cell: int, out: Curves
 ) -> None:
     """Write all postures of one cell."""
     k, s = cos(gamma), sin(gamma)
-    x0, x1 = turned(frames, node, 0, 0, k, s, h), turned(frames, node, 1, 0, k, s, h)
-    y0, y1 = turned(frames, node, 0, 1, k, s, h), turned(frames, node, 1, 1, k, s, h)
-    z0, z1 = turned(frames, node, 0, 2, k, s, h), turned(frames, node, 1, 2, k, s, h)
-    z2 = turned(frames, node, 2, 2, k, s, h)
-    px, py = turned_point(frames, node, 0, k, s, h), turned_point(frames, node, 1, k, s, h)
-    height = shift(turned_point(frames, node, 2, k, s, h), -arm.d1, 0.0)
+    x0, x1 = turned(frames, node, X, X, k, s, h), turned(frames, node, Y, X, k, s, h)
+    y0, y1 = turned(frames, node, X, Y, k, s, h), turned(frames, node, Y, Y, k, s, h)
+    z0, z1 = turned(frames, node, X, Z, k, s, h), turned(frames, node, Y, Z, k, s, h)
+    z2 = turned(frames, node, Z, Z, k, s, h)
+    px, py = turned_point(frames, node, X, k, s, h), turned_point(frames, node, Y, k, s, h)
+    height = shift(turned_point(frames, node, Z, k, s, h), -arm.d1, 0.0)
     rr = add(mul(px, px, h), mul(py, py, h))
     square = arm.d4 * arm.d4
     dd = shift(rr, -square, EPS * square)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.kernels._jit import jit, jit_inline, jit_part
 from kerfpath.kernels.limits import (
     acceleration_excess,
     acceleration_time,
@@ -70,7 +70,7 @@ class RecursionResult(NamedTuple):
     """The record is whole."""
 
 
-@jit
+@jit_part
 def _begin(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, k: int, cost: float
 ) -> tuple[States, float]:
@@ -165,7 +165,7 @@ def _braking_time(dq: Array, aim: Aim) -> float:
     return sqrt(least)
 
 
-@jit
+@jit_part
 def _add_leaps(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, k: int, before: States,
     states: States, width: int,
@@ -245,7 +245,7 @@ def _fill_states(
     return i, count, lowest
 
 
-@jit
+@jit_part
 def _extend(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, k: int, states: States,
     width: int,
@@ -279,7 +279,7 @@ def _extend(
     return group_by_vertex(unsorted, begin, end, width), lowest
 
 
-@jit
+@jit_part
 def _next(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, k: int, states: States,
     least: Array, width: int,

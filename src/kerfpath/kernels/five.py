@@ -26,7 +26,7 @@ from math import atan2, cos, pi, sin
 import numpy as np
 
 from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_part
 from kerfpath.kernels.frames import location
 from kerfpath.kernels.kinematics import ON_AXIS, POSTURES, OpwArm, forward, inverse, wrap
 
@@ -42,7 +42,7 @@ STEPS = 60
 ZERO = 1e-15
 
 
-@jit
+@jit_part
 def _turned(
     arm: OpwArm, H: Array, T_tip_end: Array, psi: float, L: Array, T: Array, q: Array, reach: Bools
 ) -> None:
@@ -57,13 +57,13 @@ def _turned(
     inverse(arm, T, q, reach)
 
 
-@jit
+@jit_part
 def _g(arm: OpwArm, q: Array) -> float:
     """Return sin q5 sin q6 of one solution (6,) of the OPW arm."""
     return sin(arm.sign[4] * q[4] - arm.offset[4]) * sin(q[5])
 
 
-@jit
+@jit_part
 def _zero(
     arm: OpwArm,
     H: Array,
@@ -96,7 +96,7 @@ def _zero(
     return abs(gb) < ON_AXIS
 
 
-@jit
+@jit_part
 def _end(
     arm: OpwArm,
     H: Array,
@@ -119,7 +119,7 @@ def _end(
     return inside, g
 
 
-@jit
+@jit_part
 def _dip(
     arm: OpwArm,
     H: Array,
@@ -151,7 +151,7 @@ def _dip(
     return psi, g
 
 
-@jit
+@jit_part
 def _keep(
     arm: OpwArm, q: Array, branch: int, nearest: float, out_q: Array, out_reach: Bools
 ) -> None:
@@ -173,7 +173,7 @@ def _keep(
             return
 
 
-@jit
+@jit_part
 def _solve(arm: OpwArm, H: Array, T_tip_end: Array, out_q: Array, out_reach: Bools) -> None:
     """All postures (16, 5) of a tip frame H (4, 4); rows out of reach are left at zero."""
     L, T, q = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((POSTURES, 6))

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_part
 from kerfpath.kernels.kinematics import wrap
 
 __all__ = ["EXACT", "POSTURES", "GeneralArm", "follow_all", "forward_all", "sort_in"]
@@ -52,7 +52,7 @@ class GeneralArm(NamedTuple):
     """(4, 4) m."""
 
 
-@jit
+@jit_part
 def _turn(v: Array, along: Array, s: float, c: float) -> None:
     """Turn the vector v (3,) about a direction by the angle of this sine and cosine."""
     x, y, z = v
@@ -63,7 +63,7 @@ def _turn(v: Array, along: Array, s: float, c: float) -> None:
     v[2] = c * z + s * (a * y - b * x) + d * e
 
 
-@jit
+@jit_part
 def _turn_about(v: Array, place: Array, along: Array, s: float, c: float) -> None:
     """Turn the point v (3,) about a line."""
     for r in range(3):
@@ -73,7 +73,7 @@ def _turn_about(v: Array, place: Array, along: Array, s: float, c: float) -> Non
         v[r] += place[r]
 
 
-@jit
+@jit_part
 def _chain(arm: GeneralArm, q: Array, out_place: Array, out_along: Array, out_T: Array) -> None:
     """Axes (6, 3) and tip pose (4, 4) of the arm at q (6,): the last joint turns first."""
     out_place[:], out_along[:], out_T[:] = arm.place, arm.along, arm.tip
@@ -87,7 +87,7 @@ def _chain(arm: GeneralArm, q: Array, out_place: Array, out_along: Array, out_T:
         _turn_about(out_T[:3, 3], place, along, s, c)
 
 
-@jit
+@jit_part
 def _jacobian(place: Array, along: Array, T: Array, out_J: Array) -> None:
     """Speeds (6, 6) of the tip, linear over angular, that each joint gives it."""
     for i in range(6):
@@ -98,7 +98,7 @@ def _jacobian(place: Array, along: Array, T: Array, out_J: Array) -> None:
             out_J[r + 3, i] = along[i, r]
 
 
-@jit
+@jit_part
 def _pose_error(T: Array, now: Array, out_e: Array) -> float:
     """Largest entry by which a pose is off T, and the way there (6,), linear over angular."""
     off = 0.0
@@ -113,7 +113,7 @@ def _pose_error(T: Array, now: Array, out_e: Array) -> float:
     return off
 
 
-@jit
+@jit_part
 def _solve_pose(arm: GeneralArm, T: Array, q: Array, place: Array, along: Array, J: Array) -> bool:
     """Bring q (6,) onto the pose T (4, 4); whether it got there. Axes and Jacobian are left."""
     now, e = np.empty((4, 4)), np.empty(6)
@@ -130,7 +130,7 @@ def _solve_pose(arm: GeneralArm, T: Array, q: Array, place: Array, along: Array,
     return bool(off <= EXACT)
 
 
-@jit
+@jit_part
 def _posture(place: Array, along: Array, J: Array) -> int:
     """Posture 0 to 15 of an arm whose axes (6, 3) lie so."""
     speeds = np.empty((3, 3))
@@ -144,7 +144,7 @@ def _posture(place: Array, along: Array, J: Array) -> int:
     return int(8 * other + 4 * shoulder + 2 * elbow + wrist)
 
 
-@jit
+@jit_part
 def _known(q: Array, rows: Array, reach: Bools) -> bool:
     """Whether q (6,) is among the rows (P, 6) that are solutions."""
     for mu in range(len(rows)):

@@ -16,7 +16,7 @@ from __future__ import annotations
 from math import atan2, cos, inf, pi, sin, sqrt
 from typing import NamedTuple
 
-from kerfpath.kernels._jit import jit, jit_inline, smaller
+from kerfpath.kernels._jit import jit_inline, jit_part, smaller
 
 __all__ = [
     "DOWN",
@@ -181,7 +181,7 @@ def mul(a: Jet, b: Jet, h: float) -> Jet:
     return settled(Jet(v, ev, d, ed, rv, rd, s, rs), h)
 
 
-@jit
+@jit_part
 def root(g: Jet, low: float, h: float) -> Jet:
     """Square root of a jet where it is not negative; it is nowhere below low."""
     high = (g.v + g.rv) * UP
@@ -229,7 +229,7 @@ def _rate(
     return plus(m1, r1, -m2, r2)
 
 
-@jit
+@jit_part
 def angle(y: Jet, x: Jet, low: float, h: float) -> Jet:
     """Angle atan2(y, x) of two jets, x^2 + y^2 being nowhere below low.
 
@@ -263,7 +263,7 @@ def angle(y: Jet, x: Jet, low: float, h: float) -> Jet:
     return settled(Jet(v, ev, d, ed, rv, rd, s, rs), h)
 
 
-@jit
+@jit_part
 def arc(c: Jet, sine: float, es: float, rs: float, low: float, h: float) -> Jet:
     """Angle in [0, pi] whose cosine is c and whose sine is `sine` +- es, over the cell +- rs.
 
@@ -289,7 +289,7 @@ def _arccos(c: float) -> float:
     return atan2(sqrt((1.0 - c) * (1.0 + c)), c)
 
 
-@jit
+@jit_part
 def arc_between(c: Jet, h: float) -> Jet:
     """Angle in [0, pi] whose cosine is c, where c is inside [-1, 1]; beyond, its nearest end."""
     first = _arccos(max(-1.0, min(1.0, (c.v + c.rv) + EPS))) - 2.0 * LIBM
@@ -307,7 +307,7 @@ def arc_between(c: Jet, h: float) -> Jet:
     return Jet(f.v, f.ev, f.d, f.ed, rv, f.rd, f.s, f.rs)
 
 
-@jit
+@jit_part
 def _circular(k: float, s: float, q: Jet, h: float) -> Jet:
     """Return f with f(0) = k, f' = -s q' and f'' = -s q'' - f q'^2: k, s = cos, sin or so."""
     if not q.rv < 1.0:

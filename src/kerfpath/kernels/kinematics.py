@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_part
 from kerfpath.kernels.frames import location
 
 __all__ = [
@@ -54,7 +54,7 @@ class OpwArm(NamedTuple):
     offset: Array
 
 
-@jit
+@jit_part
 def forward(arm: OpwArm, q: Array, out_T: Array) -> None:
     """Pose of the flange in the robot base, the product of the link transforms (Eq. 3).
 
@@ -88,7 +88,7 @@ def forward(arm: OpwArm, q: Array, out_T: Array) -> None:
     out_T[3, 0], out_T[3, 1], out_T[3, 2], out_T[3, 3] = 0.0, 0.0, 0.0, 1.0
 
 
-@jit
+@jit_part
 def wrap(angle: float) -> float:
     """Bring an angle of (-3 pi, 3 pi) into (-pi, pi]."""
     if angle > pi:
@@ -96,7 +96,7 @@ def wrap(angle: float) -> float:
     return angle + 2.0 * pi if angle <= -pi else angle
 
 
-@jit
+@jit_part
 def _wrist(
     arm: OpwArm, R: Array, s1: float, k1: float, s23: float, k23: float, out_q: Array
 ) -> None:
@@ -121,7 +121,7 @@ def _wrist(
     out_q[1, 5] = wrap(out_q[0, 5] + pi)
 
 
-@jit
+@jit_part
 def inverse(arm: OpwArm, T: Array, out_q: Array, out_reach: Bools) -> None:
     """All postures of a flange pose, Q = f^-1(L, mu) in (-pi, pi] (Eq. 4).
 
@@ -180,8 +180,12 @@ def forward_all(arm: OpwArm, q: Array, out_T: Array) -> None:
 @jit
 def inverse_all(arm: OpwArm, T: Array, out_q: Array, out_reach: Bools) -> None:
     """All postures (B, 8, 6) of flange poses (B, 4, 4)."""
+    pose = np.empty((4, 4))
     for i in range(len(T)):
-        inverse(arm, T[i], out_q[i], out_reach[i])
+        for r in range(4):
+            for c in range(4):
+                pose[r, c] = T[i, r, c]
+        inverse(arm, pose, out_q[i], out_reach[i])
 
 
 @jit

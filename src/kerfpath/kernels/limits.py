@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 from kerfpath._arrays import Array
-from kerfpath.kernels._jit import jit_inline
+from kerfpath.kernels._jit import jit_equation, jit_inline
 
 __all__ = [
     "LIMIT_TOLERANCE",
@@ -26,7 +26,7 @@ def exceeds(size: float, bound: float) -> bool:
     return size > bound + LIMIT_TOLERANCE
 
 
-@jit_inline
+@jit_equation
 def velocity_excess(dq: Array, bound: Array) -> int:
     """First joint with |q_k - q_{k-1}| > eta_v dq^(v), or -1: the test f_v (Eq. 5).
 
@@ -38,7 +38,7 @@ def velocity_excess(dq: Array, bound: Array) -> int:
     return -1
 
 
-@jit_inline
+@jit_equation
 def acceleration_excess(dq: Array, dq_before: Array, bound: Array) -> int:
     """First joint with |q_k - 2 q_{k-1} + q_{k-2}| > eta_a dq^(a), or -1: the test f_a (Eq. 6).
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit_inline
+from kerfpath.kernels._jit import jit, jit_inline
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, increment
 from kerfpath.kernels.search import first_from
 
@@ -34,6 +34,7 @@ __all__ = [
     "least_ahead",
     "near",
     "tangent",
+    "tangents",
     "window",
 ]
 
@@ -140,6 +141,13 @@ def tangent(D: Array, step: Step, out_y: Array) -> None:
         else:
             y = step.weight[i] * step.weight[i] * D[i] / total if total > 0 else 0.0
         out_y[i] = y + step.tilt[i]
+
+
+@jit
+def tangents(u: Array, step: Step, out_y: Array) -> None:
+    """Fill a slope of the cost of each of the steps u (m, n), tilt included."""
+    for k in range(len(u)):
+        tangent(u[k], step, out_y[k])
 
 
 @jit_inline

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_part
 from kerfpath.kernels.kinematics import ON_AXIS, REACH, wrap
 
 __all__ = ["SrsArm", "forward_all", "inverse_all"]
@@ -39,7 +39,7 @@ class SrsArm(NamedTuple):
     offset: Array
 
 
-@jit
+@jit_part
 def _turn_z(R: Array, angle: float) -> None:
     """Turn the frame R (3, 3) about its own z-axis."""
     c, s = cos(angle), sin(angle)
@@ -48,7 +48,7 @@ def _turn_z(R: Array, angle: float) -> None:
         R[i, 0], R[i, 1] = c * x + s * y, c * y - s * x
 
 
-@jit
+@jit_part
 def _turn_y(R: Array, angle: float) -> None:
     """Turn the frame R (3, 3) about its own y-axis."""
     c, s = cos(angle), sin(angle)
@@ -57,7 +57,7 @@ def _turn_y(R: Array, angle: float) -> None:
         R[i, 0], R[i, 2] = c * x - s * z, c * z + s * x
 
 
-@jit
+@jit_part
 def forward(arm: SrsArm, q: Array, out_T: Array) -> None:
     """Pose of the end in the foot: joints turn about z, y, z, y, z, y and z, one after another."""
     R = out_T[:3, :3]
@@ -75,7 +75,7 @@ def forward(arm: SrsArm, q: Array, out_T: Array) -> None:
             out_T[i, 3] += length * R[i, 2]
 
 
-@jit
+@jit_part
 def _wrist(arm: SrsArm, T: Array, F: Array, out_q: Array) -> None:
     """Fill joints 5 to 7 of both wrist postures, out_q (2, 7), for the forearm's frame F (3, 3)."""
     x, y, z = 0.0, 0.0, 0.0
@@ -96,7 +96,7 @@ def _wrist(arm: SrsArm, T: Array, F: Array, out_q: Array) -> None:
     out_q[1, 6] = wrap(out_q[0, 6] + pi)
 
 
-@jit
+@jit_part
 def inverse(arm: SrsArm, T: Array, q3: float, out_q: Array, out_reach: Bools) -> None:
     """All postures of a pose of the end with joint 3 at q3, the others in (-pi, pi].
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit_part
 from kerfpath.kernels.torque import TorqueRoom
 
 __all__ = ["EVERY", "Scratch", "States", "group_by_vertex", "joined_states", "with_more_room"]
@@ -50,7 +50,7 @@ class Scratch(NamedTuple):
     torque: TorqueRoom
 
 
-@jit
+@jit_part
 def with_more_room(old: NDArray[_T]) -> NDArray[_T]:
     """Return a copy with room for as many again."""
     new = np.empty((2 * len(old), *old.shape[1:]), old.dtype)
@@ -58,7 +58,7 @@ def with_more_room(old: NDArray[_T]) -> NDArray[_T]:
     return new
 
 
-@jit
+@jit_part
 def joined_states(one: States, two: States) -> States:
     """Return the states of the one and then those of the other, not in order."""
     return States(
@@ -70,7 +70,7 @@ def joined_states(one: States, two: States) -> States:
     )
 
 
-@jit
+@jit_part
 def group_by_vertex(states: States, a: int, b: int, width: int) -> States:
     """Group states by their vertex a..b-1, cheapest first; ties keep the order of their making.
 

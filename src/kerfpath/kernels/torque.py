@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Ints, freeze
-from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.kernels._jit import jit, jit_inline, jit_part
 from kerfpath.kernels.dynamics import ArmBodies, Posed, fill_torque, pose_arm, room_for
 
 __all__ = [
@@ -66,7 +66,7 @@ class TorqueRoom(NamedTuple):
     """(n,): and torques."""
 
 
-@jit
+@jit_part
 def torque_room(n: int) -> TorqueRoom:
     """Return room for an arm of n joints."""
     vertex = np.full(1, -1)

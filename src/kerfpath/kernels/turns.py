@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_part
 from kerfpath.losses import Loss
 
 __all__ = [
@@ -56,7 +56,7 @@ class JointLimits(NamedTuple):
     """(m,)"""
 
 
-@jit
+@jit_part
 def _broken_coupling(q: Array, turn: Ints, limits: JointLimits) -> int:
     """Reason code of the first coupling that q + 2 pi turn breaks, or 0."""
     n = len(q)
@@ -71,7 +71,7 @@ def _broken_coupling(q: Array, turn: Ints, limits: JointLimits) -> int:
     return ADMITTED
 
 
-@jit
+@jit_part
 def admissible_turns(q: Array, limits: JointLimits, out_turn: Ints) -> tuple[int, int]:
     """Fill out_turn (MOST_TURNS, n) with every admissible turn of q (n,) in (-pi, pi].
 
@@ -88,11 +88,14 @@ def admissible_turns(q: Array, limits: JointLimits, out_turn: Ints) -> tuple[int
                 below = limits.lower[i] - (q[i] + 2.0 * pi * last[i])
                 above = q[i] + 2.0 * pi * first[i] - limits.upper[i]
                 return 0, (LOW if below <= above else HIGH) + 2 * i
-    turn, count, reason = first.copy(), 0, ADMITTED
+    turn, count, reason = np.empty(n, np.int64), 0, ADMITTED
+    for i in range(n):
+        turn[i] = first[i]
     while True:
         broken = _broken_coupling(q, turn, limits)
         if broken == ADMITTED:
-            out_turn[count] = turn
+            for i in range(n):
+                out_turn[count, i] = turn[i]
             count += 1
         else:
             reason = broken
@@ -155,6 +158,6 @@ def fill_admissible(
                 for t in range(count):
                     for i in range(n):
                         out_q[v, i] = q[k, j, mu, i] + 2.0 * pi * turn[t, i]
-                    out_turn[v] = turn[t]
+                        out_turn[v, i] = turn[t, i]
                     out_sample[v], out_posture[v] = j, mu
                     v += 1

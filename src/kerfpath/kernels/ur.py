@@ -20,7 +20,7 @@ from math import atan2, copysign, cos, sin, sqrt
 from typing import NamedTuple
 
 from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import jit
+from kerfpath.kernels._jit import jit, jit_part
 from kerfpath.kernels.kinematics import ON_AXIS, REACH, wrap
 
 __all__ = ["UrArm", "forward", "forward_all", "inverse", "inverse_all"]
@@ -39,7 +39,7 @@ class UrArm(NamedTuple):
     offset: Array
 
 
-@jit
+@jit_part
 def forward(arm: UrArm, q: Array, out_T: Array) -> None:
     """Pose of the flange in the robot base, the product of the link transforms written out."""
     q1 = arm.sign[0] * q[0] - arm.offset[0]
@@ -70,7 +70,7 @@ def forward(arm: UrArm, q: Array, out_T: Array) -> None:
     out_T[3, 0], out_T[3, 1], out_T[3, 2], out_T[3, 3] = 0.0, 0.0, 0.0, 1.0
 
 
-@jit
+@jit_part
 def _free_wrist(arm: UrArm, x: float, y: float, side: float) -> tuple[float, float]:
     """Return sine and cosine of theta where axes 4 and 6 are parallel and theta is free.
 
@@ -92,7 +92,7 @@ def _free_wrist(arm: UrArm, x: float, y: float, side: float) -> tuple[float, flo
     return (cosine * x - sine * y) / D, -(cosine * y + sine * x) / D
 
 
-@jit
+@jit_part
 def _elbow(
     arm: UrArm, x: float, y: float, front: float, theta: float, out_q: Array, out_reach: Bools
 ) -> None:
@@ -116,7 +116,7 @@ def _elbow(
         out_reach[2 * elbow] = True
 
 
-@jit
+@jit_part
 def inverse(arm: UrArm, T: Array, out_q: Array, out_reach: Bools) -> None:
     """All postures of a flange pose, in (-pi, pi].
 

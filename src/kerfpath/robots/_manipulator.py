@@ -32,7 +32,7 @@ class Manipulator(Limited):
         rows = floats(q.reshape(-1, q.shape[-1]) if q.ndim else q, "q", (None, self.joints))
         T = np.empty((len(rows), 4, 4))
         n = self.family.joints
-        self.family.forward_all(self.arm(), np.ascontiguousarray(rows[:, :n]), T)
+        self.family.forward_all(self.arm(), np.array(rows[:, :n], order="C"), T)
         if self._placed:
             T = self.T_base_foot @ T @ self.T_end_flange
         if self.externals:
@@ -199,7 +199,7 @@ class Manipulator(Limited):
         size = (len(node), self.postures)
         curves = Curves(np.zeros(size, np.uint8), *np.zeros((5, *size, self.joints)))
         balls = ball_frames(frames, T_flange_tip, foot, end, wrist)
-        self.family.enclose_all(self.arm(), balls, node, gamma, half, curves)
+        self.family.enclose_all(self.arm(), balls, node, np.array(gamma), half, curves)
         return Enclosure(**{k: freeze(a) for k, a in curves._asdict().items()})
 
     def arm(self) -> Any:
@@ -214,7 +214,7 @@ class Manipulator(Limited):
         self._require_alone()
         if self._placed:
             T = np.linalg.inv(self.T_base_foot) @ T @ np.linalg.inv(self.T_end_flange)
-        return np.ascontiguousarray(T)
+        return np.array(T, order="C")
 
     def given_of(self, q: Array) -> Array | None:
         """Return the angles (B,) of the joint that the inverse takes of q (B, n), if it does."""

@@ -53,14 +53,14 @@ def solutions_within(q: Array, reach: Bools, limits: turns.JointLimits) -> Solut
     B, P, n = q.shape
     q, reach = q[:, None], reach[:, None]  # one node a pose, one sample of gamma
     count, reason = np.empty(B, np.int64), np.empty(reach.shape, np.uint8)
-    turns.count_admissible(q, reach, np.ones(P, np.bool_), limits, count, reason)
+    turns.count_admissible(q, reach, freeze(np.ones(P, np.bool_)), limits, count, reason)
     total = int(count.sum())
-    found, turn = np.empty((total, n)), np.empty((total, n), np.int64)
-    sample, posture = np.empty(total, np.int64), np.empty(total, np.int64)
+    found, turn = np.empty((total, n)), np.empty((total, n), np.int8)
+    sample, posture = np.empty(total, np.int32), np.empty(total, np.int8)
     turns.fill_admissible(q, reason, limits, found, sample, posture, turn)
     return Solutions(
         q=freeze(found),
         pose=freeze(np.repeat(np.arange(B), count)),
-        posture=freeze(posture),
-        turn=freeze(turn),
+        posture=freeze(posture.astype(np.int64)),
+        turn=freeze(turn.astype(np.int64)),
     )

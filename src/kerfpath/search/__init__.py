@@ -9,6 +9,7 @@ from kerfpath.search._continuous import Effort as Effort
 from kerfpath.search._continuous import GammaSamples as GammaSamples
 from kerfpath.search._fastest import LeastInterval as LeastInterval
 from kerfpath.search._fastest import find_least_interval as find_least_interval
+from kerfpath.search._first_run import compile_search as compile_search
 from kerfpath.search._interrupted import InterruptedPath as InterruptedPath
 from kerfpath.search._interrupted import Piece as Piece
 from kerfpath.search._interrupted import find_interrupted as find_interrupted

@@ -141,7 +141,7 @@ class ContinuousSearch:
         self._problem, self._cost = problem, np.ascontiguousarray(layers.cost)
         self._steps = Steps(
             problem.aim.weight, problem.aim.metric, problem.aim.minimax, np.inf,
-            np.ascontiguousarray(-velocity), np.ascontiguousarray(velocity),
+            -velocity, np.array(velocity),
         )  # fmt: skip
         self._targets = _targets(
             np.ascontiguousarray(layers.q), layers.start, layers.endless, samples, velocity
@@ -297,5 +297,9 @@ def _targets(
         half = np.abs(across).max(axis=0, initial=0.0) / 2
         pairs += (np.abs(away) <= velocity + half).sum(axis=(0, 1))
     targets = targets._replace(joint=int(np.argmin(pairs)))
-    kernel.sort_targets(targets)
-    return targets
+    kernel.fill_keys(targets)
+    layer = np.repeat(np.arange(K), np.diff(begin))
+    order = np.lexsort((targets.key, layer))
+    return targets._replace(
+        key=targets.key[order], one=targets.one[order], other=targets.other[order]
+    )

@@ -250,9 +250,10 @@ class Planning:
         self.prepared = prepared
         self._show_scene(prepared, revision)
         self._ready(prepared, revision)
-        if not is_compiled():
+        kinematics = prepared.job.robot.kinematics
+        if not is_compiled(kinematics):
             self._say(ProgressMessage(busy=True, label="compiling the kernels, first run only"))
-            warm_up()
+            warm_up(kinematics)
         run = Run(self._bench, prepared, revision, self._say, stop)
         tried = run.contours(first, partial(self._took, motion_key(job), revision))
         self._look_ahead(prepared, revision, run)

@@ -17,5 +17,3 @@ from kerfpath.job.run._run import run_prepared as run_prepared
 from kerfpath.job.run._speeds import ContourSpeed as ContourSpeed
 from kerfpath.job.run._speeds import fastest_along as fastest_along
 from kerfpath.job.run._speeds import fastest_speeds as fastest_speeds
-from kerfpath.job.run._warm_up import is_compiled as is_compiled
-from kerfpath.job.run._warm_up import warm_up as warm_up

@@ -1,0 +1,36 @@
+"""A small search that compiles the kernels of the search over continuous gamma."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfpath._arrays import freeze
+from kerfpath.limits import Limits
+from kerfpath.search._continuous import ContinuousSearch, Effort, GammaSamples
+from kerfpath.search._problem import SearchProblem
+
+__all__ = ["compile_search"]
+
+
+def compile_search() -> None:
+    """Search three nodes of four samples each, which compiles the kernels of `ContinuousSearch`."""
+    nodes, samples, joints = 3, 4, 6
+    sample = np.tile(np.arange(samples), nodes)
+    q = np.zeros((nodes * samples, joints))
+    q[:, -1] = sample
+    ones = np.ones(joints)
+    problem = SearchProblem(
+        q=freeze(q),
+        start=freeze(np.arange(0, len(q) + 1, samples)),
+        dt=1.0,
+        limits=Limits.of(ones, ones),
+        endless=ones > 0,
+    )
+    on_grid = GammaSamples(
+        sample=sample,
+        variant=np.zeros_like(sample),
+        posture=np.zeros_like(sample),
+        samples=samples,
+    )
+    for _ in ContinuousSearch(problem, on_grid).paths(Effort(4, (0.1, 0.1))):
+        pass
