@@ -39,6 +39,7 @@ def _compile_poses(kinematics: str) -> None:
     increments = np.diff(graph.q, axis=0)
     for distance in (total_distance, maximum_distance):
         distance(increments, graph.q[0], MANHATTAN)
+        distance(graph.q, graph.q[0], MANHATTAN)
 
 
 def _compile_search(_kinematics: str) -> None:

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from from_python import from_python
 from kerfpath import plan
 from kerfpath.certificate import cell_bounds
 from kerfpath.certifier import _certify as course
@@ -13,9 +14,9 @@ from kerfpath.certifier._bends import cross_bends
 from kerfpath.certifier._prices import limit_prices
 from kerfpath.certifier._stage import solve_stage
 from kerfpath.certifier._steps import Steps
+from kerfpath.kernels import outer
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN
-from kerfpath.kernels.outer import bent_by
 
 METRICS = ("manhattan", "euclid", "chebychev")
 SPEED = 0.96
@@ -159,7 +160,7 @@ def through_pairs(packed, steps, result, most):
     ending = [np.flatnonzero(to == a) for a in range(len(packed.half))]
     origin = np.repeat(np.arange(len(packed.half)), np.diff(begin))
     first, last = packed.start[1], packed.start[-2]
-    D = np.empty((2, len(bound)))
+    D, bent_by = np.empty((2, len(bound))), from_python(outer.bent_by)
 
     def follows(e, f):
         return bent_by(packed, step, bound, lead, origin[e], to[e], to[f], D) < 0

@@ -6,10 +6,12 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from kerfpath.kernels import intervals
+from from_python import all_of
+from kerfpath.kernels import intervals as kernels
 from kerfpath.kernels.intervals import Jet
 
 mp.mp.dps = 40
+intervals = all_of(kernels)
 
 
 def random_balls(rng, count):

@@ -11,19 +11,19 @@ import pytest
 from tests.search.posed import problem_of
 
 import naive
+from from_python import from_python
 from kerfpath import NoFeasiblePath, shortest_path
-from kerfpath.kernels import exact, to_go
-from kerfpath.kernels.limits import velocity_time
-from kerfpath.kernels.search import (
-    LostTime,
-    distance,
-    fill_increment,
-    is_shut,
-    late_cost,
-    shut_edges,
-)
+from kerfpath.kernels import exact, limits, to_go
+from kerfpath.kernels import search as kernel
+from kerfpath.kernels.search import LostTime
 from kerfpath.search._exact import NO_SEAM, best_allowed
 from kerfpath.search._layers import sort_layers
+
+distance, fill_increment, is_shut, late_cost, shut_edges = map(
+    from_python,
+    (kernel.distance, kernel.fill_increment, kernel.is_shut, kernel.late_cost, kernel.shut_edges),
+)
+velocity_time = from_python(limits.velocity_time)
 
 
 def graph(rng, **sizes):

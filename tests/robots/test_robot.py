@@ -4,9 +4,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from from_python import from_python
 from kerfpath import InputError, robot
+from kerfpath.kernels import turns
 from kerfpath.kernels.frames import location
-from kerfpath.kernels.turns import MOST_TURNS, admissible_turns
 from kerfpath.robots import (
     FAMILIES,
     Coupling,
@@ -228,7 +229,8 @@ def test_every_turn_inside_the_limits_is_a_solution_of_its_own():
 def test_turns_agree_with_trying_them_all():
     rng = np.random.default_rng(5)
     every = np.indices([7] * 6).reshape(6, -1).T - 3
-    room = np.empty((MOST_TURNS, 6), np.int64)
+    room = np.empty((turns.MOST_TURNS, 6), np.int64)
+    admissible_turns = from_python(turns.admissible_turns)
     empty = 0
     for _ in range(60):
         lower = rng.uniform(-12, -2, 6)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import platform
 from collections.abc import Callable
 from contextlib import suppress
 from functools import update_wrapper
@@ -45,7 +44,6 @@ VECTOR_FLAGS = {"nnan", "nsz"}
 """Floating-point freedoms that let the least of many vectorise: no NaN, which the border refuses,
 and no care for the sign of zero. Infinity stays, and sums keep their order: the same to the bit,
 however many numbers an instruction takes."""
-
 
 
 def _cache_folder() -> Path:

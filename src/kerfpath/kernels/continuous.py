@@ -23,7 +23,7 @@ from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import EUCLID, MANHATTAN, increment, wrap_angle
 from kerfpath.kernels.search import first_from
 
-__all__ = ["OVER_CAP", "Targets", "join_samples", "fill_keys", "values_to_go"]
+__all__ = ["OVER_CAP", "Targets", "fill_keys", "join_samples", "values_to_go"]
 
 SAME_VALUE = 1e-9
 """Relative gap between a value and its bound below which a minimum over t has been found."""

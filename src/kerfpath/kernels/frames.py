@@ -7,7 +7,7 @@ from math import atan2, sqrt
 import numpy as np
 
 from kerfpath._arrays import Array
-from kerfpath.kernels._jit import jit, jit_inline, jit_part
+from kerfpath.kernels._jit import jit, jit_equation, jit_inline
 
 __all__ = ["closing_twist", "location", "rotation_minimising_x", "tangent_x"]
 
@@ -92,7 +92,7 @@ def closing_twist(n: Array, x: Array) -> float:
     return atan2(sine, _dot(last, first))
 
 
-@jit_part
+@jit_equation
 def location(H: Array, cos_gamma: float, sin_gamma: float, out_L: Array) -> None:
     """Turn a task frame about its own z-axis, L_k = H_k R_z(gamma) (Eq. 2).
 

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import either, jit, jit_inline, jit_vector, larger, smaller
+from kerfpath.kernels._jit import either, jit, jit_equation, jit_inline, jit_vector, larger, smaller
 
 __all__ = [
     "CHEBYCHEV",
@@ -61,7 +61,7 @@ def wrap(q: _X) -> _X:
 _short_way, wrap_angle = jit_inline(_short), jit_inline(wrap)
 
 
-@jit_inline
+@jit_equation
 def increment(dq: float, endless: bool) -> float:
     """Smallest representative of a joint difference, min over p of dq + 2 pi p (Eq. 13)."""
     return _short_way(dq) if endless else dq
