@@ -279,7 +279,7 @@ def test_the_course_of_another_technique_is_dotted_with_what_it_comes_to(mapped,
         technique
         | {"method": "paper", "s": [], "gamma": [], "posture": [], "cost": None}
         | {"peak_velocity": [], "peak_acceleration": [], "statement": "no edge from node 3"}
-        | {"notes": ["It does not look at collisions in the cell."]}
+        | {"notes": ["It ignores collisions in the cell."]}
     )
     until(page, lambda: "finds no path" in legend.inner_text())
     legend.locator("summary").click()
