@@ -40,7 +40,7 @@ export function topBar(store, connection, extras) {
     set("open-program", live);
     set("export", live);
     byId("file").textContent = job?.name ?? "Opening the job";
-    byId("saved").textContent = !job ? "" : job.saved ? "saved" : "not saved; kept beside the job file";
+    byId("saved").textContent = !job ? "" : job.saved ? "saved" : "not saved; kept beside the job";
     document.title = job
       ? `${job.saved ? "" : "• "}${job.name} – kerfpath studio`
       : "kerfpath studio";

@@ -25,7 +25,7 @@ const EVALUATIONS = 64;
 /** @type {Record<string, {words: string, value: string}>} */
 const GOALS = {
   speed: { words: "Fastest speed of the slowest contour", value: "m/min" },
-  margin: { words: "Least ratio of fastest to requested speed", value: "times the requested speed" },
+  margin: { words: "Least ratio of fastest to requested speed", value: "times requested speed" },
   motion: { words: "Least displacement of the joints", value: "displacement" },
 };
 

@@ -62,7 +62,7 @@ export function comparePanel(store, connection, player, view) {
     keeping = connection.send({ type: "keep" });
   }
 
-  /** Take the list of kept plans: compare with the one just kept here, and drop one that is gone. */
+  /** Take the list of kept plans: compare with one just kept here, and drop one that is gone. */
   function heard() {
     const entry = store.kept.find(({ id }) => id === chosen);
     if (keeping && store.kept.length) choose(store.kept[store.kept.length - 1]);

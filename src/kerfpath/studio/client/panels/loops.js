@@ -16,7 +16,7 @@ export function loopsSheet(store, connection) {
   const opener = byId("open-loops", HTMLButtonElement);
   const rows = el("div", { class: "rows" });
   const words = el("input", { type: "search", placeholder: "Find by name", "aria-label": "Find" });
-  const [onlyUncut, inside] = ["Only loops not cut", "Also the inner side of the sheet"].map((label) => {
+  const [onlyUncut, inside] = ["Only uncut loops", "Also inner side of the sheet"].map((label) => {
     const box = el("input", { type: "checkbox", onchange: draw });
     return { box, label: el("label", {}, box, label) };
   });

@@ -94,6 +94,6 @@ export function noPath(answer, connection, view) {
     ...(answer.relaxations?.length && answer.remedy
       ? [el("p", { class: "quiet" }, answer.remedy)]
       : []),
-    el("details", {}, el("summary", {}, "Full message"), el("p", { class: "quiet" }, answer.statement)),
+    el("details", {}, el("summary", {}, "Details"), el("p", { class: "quiet" }, answer.statement)),
   ];
 }

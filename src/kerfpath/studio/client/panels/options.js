@@ -178,9 +178,7 @@ export function optionsPanel(store, connection) {
       el(
         "p",
         {},
-        best === null
-          ? "No feasible speed was found. "
-          : `Fastest: ${fixed(best, 2)} m/min. `,
+        best === null ? "No feasible speed was found. " : `Fastest: ${fixed(best, 2)} m/min. `,
         el("span", { class: "quiet" }, binds && `Binding limit: ${binds}`),
       ),
       ...(edits.length
