@@ -43,7 +43,7 @@ def exports_of(result: JobResult, *, settled: bool) -> list[Export]:
     if not result.passed:
         program = "a contour has no plan that passes its audit, or a transfer move is missing"
     elif result.job.program.language == "none":
-        program = 'the job has language = "none" in [program]; choose a language under Program'
+        program = 'the job has language = "none" in [program]; set a language there'
     files = "" if settled else WAIT
     script = script_refusal(result.job, [cut.request for cut in result.cuts])
     return [
