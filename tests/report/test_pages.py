@@ -368,14 +368,14 @@ def test_scene_draws_moves_between_contours_and_marks_in_their_measure(
     plate = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0.0]]), [[0, 1, 2]]
     way = np.array([[0, 0, 0.1], [0.1, 0, 0.2]])
     figure = scene([section], plate, moves=[way, way + 0.1])
-    moves = [trace for trace in figure.data if (trace.name or "").startswith("move ")]
+    moves = [trace for trace in figure.data if (trace.name or "").startswith("transfer move ")]
     np.testing.assert_allclose(moves[0].x, [0, 100])
     np.testing.assert_allclose(moves[1].z, [200, 300])
     extent = np.linalg.norm(np.ptp(section.path.points * 1e3, axis=0))
     (cone,) = [trace for trace in figure.data if trace.type == "cone"]
     assert cone.sizeref == pytest.approx(0.3 * extent)  # and not 0.03 of the plate's 12.7 m
-    assert "moves between contours" in render("Part", [section], moves=[way])
-    assert "moves between contours" not in render("Part", [section])
+    assert "transfer moves" in render("Part", [section], moves=[way])
+    assert "transfer moves" not in render("Part", [section])
 
 
 def test_audit_table_speaks_millimetres_degrees_and_per_cent() -> None:

@@ -161,7 +161,7 @@ def test_the_map_is_that_along_the_plan_and_so_are_its_poses(planned):
     made = last(heard, "plan", contour="hole 10")
     page.say("map", contour="hole 10")
     seen = page.until("map", contour="hole 10")
-    assert seen["external"] == "Along the plan's course of rail and table."
+    assert seen["external"] == "The map has rail and table where the plan has them."
     q = rows(made)
     for node in (0, len(q) // 2, len(q) - 1):
         gamma, posture = made["gamma"][node], made["posture"][node]

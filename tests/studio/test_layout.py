@@ -124,6 +124,6 @@ def test_a_change_of_the_job_stops_the_search(heard):
 
 def test_what_cannot_be_done_is_an_answer(heard):
     assert "not planned yet" in heard["early"]["message"]
-    assert "look for it again" in heard["gone"]["message"]
-    assert "move it again" in heard["other"]["message"]
+    assert "search again" in heard["gone"]["message"]
+    assert "repeat the move" in heard["other"]["message"]
     assert heard["no speed"]["about"] == "fastest"

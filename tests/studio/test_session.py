@@ -119,7 +119,7 @@ def test_the_program_is_played_in_its_order_without_a_gap(planned):
     segments = program["segments"]
     kinds = [segment["kind"] for segment in segments]
     assert kinds == ["approach", "cut", "retract", "move", "approach", "cut", "retract"]
-    assert "nothing has looked" in program["notes"][0]
+    assert "have not been checked for collisions" in program["notes"][0]
     clock, here = 0.0, None
     for segment in segments:
         made = plans.get(segment["plan"], segment)
@@ -229,7 +229,7 @@ def test_a_place_of_the_map_says_the_pose_and_its_reason(planned):
             # Joints are said to a nanoradian, at an arm of metres.
             assert tip == pytest.approx(contour["points"][3 * node : 3 * node + 3], abs=1e-7)
         if found["kinds"][code] == "joint":
-            assert " deg, it goes from " in said["reason"]
+            assert " deg, its limits are " in said["reason"]
         seen.add(found["kinds"][code])
     assert "admitted" in seen
     page.say("reason", contour="slot", node=10**5, gamma=0, posture=0)
@@ -360,11 +360,11 @@ def test_no_path_says_why_and_its_relaxations_open_the_way(studio):
     assert soon["statement"]
     program = page.until("program", revision=2)
     assert program["segments"] == []
-    assert "slot has no plan" in program["notes"][0]
+    assert "no plan for slot" in program["notes"][0]
     found = page.until("nopath", contour="slot")
     assert found["relaxations"]
     labels = [option["label"] for option in found["relaxations"]]
-    assert labels[0].startswith("slower: ")
+    assert labels[0].startswith("cut slower: ")
     page.done(2)
     page.say("relax", contour="slot", index=0)
     made = page.until("plan", contour="slot", revision=3, passed=True)

@@ -1,4 +1,4 @@
-"""Self-contained HTML pages: on a job, a drawing, a Pareto set, a layout; or a table alone."""
+"""Self-contained HTML pages of a job, a drawing, a Pareto set, a layout, or a single table."""
 
 from kerfpath._extras import require_extra
 

@@ -26,7 +26,7 @@ MOST = 12
 
 
 def poses_shown(plans: Sequence[Plan]) -> list[tuple[str, Array]]:
-    """Return a few poses, each with its words and joints (n,) rad: starts, and middles if few."""
+    """Return poses as (label, joints (n,) rad or m): starts of plans, and middles if few."""
     nodes = [(plan, k) for plan in plans for k in (0, len(plan.q) // 2)]
     if len(nodes) > MOST:
         nodes = nodes[::2]
@@ -36,10 +36,10 @@ def poses_shown(plans: Sequence[Plan]) -> list[tuple[str, Array]]:
 def add_cell(
     figure: go.Figure, cell: Cell, T_base_part: Array, poses: Sequence[tuple[str, Array]]
 ) -> None:
-    """Draw a cell into a figure in the part's frame, mm, and a slider over the poses.
+    """Add a cell to a figure, in the part's frame and mm, with a slider over the poses.
 
-    The part itself is left to the figure; without poses, so are robot and head. Where external axes
-    carry the part it stays where it is drawn, and what they do not carry moves about it.
+    The part itself is not drawn; without poses, neither are robot and head. If external axes carry
+    the part, it stays where it is drawn, and the bodies that they do not carry move around it.
     """
     T_part_base = np.asarray(np.linalg.inv(T_base_part), dtype=np.float64)
     before = len(figure.data)
@@ -71,7 +71,7 @@ def add_cell(
             "args": ["visible", [True] * before + [False] * (len(figure.data) - before)],
         }
     )
-    # The step in use is named above the slider; the names of all would run into each other.
+    # Only the current step is named, above the slider; the names of all steps would overlap.
     look: dict[str, object] = {
         "currentvalue": {"prefix": "Shown: ", "font": {"size": 13, "color": INK}},
         "font": {"size": 1, "color": "white"},
@@ -87,10 +87,10 @@ def add_cell(
 
 
 def _size(figure: go.Figure) -> dict[str, float]:
-    """Return the sides of the box around the scene, to one scale, such that it fills the figure."""
+    """Return the sides of the box around the scene, to one scale, so that it fills the figure."""
     sides = {}
     for axis in "xyz":
-        # Lines break, and the cursor waits, at what is no number.
+        # Breaks in lines and the unset cursor are NaN.
         drawn = [np.array(t[axis], np.float64) for t in figure.data if t.visible is not False]
         points = np.concatenate(drawn)
         sides[axis] = float(np.ptp(points[np.isfinite(points)]))

@@ -1,4 +1,4 @@
-"""The page of a drawing: the part with every loop and its name."""
+"""The page of a drawing: the part with all loops and their names."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ class DrawnLoop:
     name : str
     kind : "outer", "inner" or "open"
     points : (K, 3) m
-        Along the loop; of a closed one the first repeated at the end.
+        Points along the loop; a closed loop repeats the first one at the end.
     facts : str
-        What a pointer on it is shown.
+        Hover text.
     fault : bool
-        Drawn as one that cannot be cut.
+        Whether it is drawn as a loop that cannot be cut.
     aside : bool
-        Hidden at first: a piece of a skin, or around the thickness of a sheet.
+        Whether it is hidden at first: a piece of a skin, or around the thickness of a sheet.
     """
 
     name: str
@@ -76,9 +76,9 @@ def render_drawing(
     body = [
         header("Drawing", title, facts=facts, notes=notes),
         "<section><h2>Loops by name</h2>",
-        '<p class="caption">Part frame, all axes to the same scale. Names stand at the start of '
-        "each loop. Drag to turn, scroll to zoom, point at a loop for its size; click in the "
-        "legend to hide and show.</p>",
+        '<p class="caption">Part frame, all axes to the same scale. Each name is at the start of '
+        "its loop. Drag to turn, scroll to zoom, point at a loop to see its size, and click in "
+        "the legend to hide or show loops.</p>",
         figures.place(_figure(loops, mesh), "scene"),
         "</section>",
     ]
@@ -114,10 +114,10 @@ def _figure(loops: Sequence[DrawnLoop], mesh: tuple[ArrayLike, ArrayLike]) -> go
 
 
 def _view(points: Array) -> dict[str, object]:
-    """Return a scene around `points` (m) to scale, seen from above for a flat drawing."""
+    """Return a scene around `points` (m), to scale; a flat drawing is seen from above."""
     low, high = points.min(axis=0) * 1e3, points.max(axis=0) * 1e3
     size = float((high - low).max())
-    # An axis without length would leave plotly no scale.
+    # plotly has no scale for an axis of zero length.
     half = np.maximum((high - low) * 0.55, 0.05 * size)
     middle, is_flat = (low + high) / 2, bool(high[2] - low[2] < 1e-3 * size)
     look = {"eye": {"x": 0.0, "y": 0.0, "z": 1.3}, "up": {"x": 0.0, "y": 1.0, "z": 0.0}}

@@ -19,19 +19,19 @@ class FrontAxis:
     Parameters
     ----------
     name : str
-        As the job calls it.
+        Name of the criterion in the job.
     words : str
-        As a reader does.
+        Name of the criterion on the page.
     unit : str
-        Of the values. Those in m, rad, m/s and share are shown in mm, deg, m/min and %, others as
-        they are.
+        Unit of the values. Values in m, rad, m/s and share are shown in mm, deg, m/min and %, all
+        others unchanged.
     sense : float
-        1 where less is better, -1 where more is.
+        1 if less is better, -1 if more is better.
 
     Raises
     ------
     InputError
-        Another sense.
+        The sense is neither 1 nor -1.
     """
 
     name: str
@@ -45,7 +45,7 @@ class FrontAxis:
         """Require a known sense."""
         if self.sense not in (1.0, -1.0):
             raise InputError(
-                f"axis {self.name}: expected sense 1 (less is better) or -1 (more is), "
+                f"axis {self.name}: expected sense 1 (less is better) or -1 (more is better), "
                 f"got {self.sense!r}"
             )
 
@@ -63,7 +63,7 @@ class FrontAxis:
 
     @property
     def unit_and_arrow(self) -> str:
-        """The unit, and an arrow to the better end."""
+        """The shown unit with an arrow in the better direction."""
         return f"{self.shown[1]} {'↓' if self.sense > 0 else '↑'}".strip()
 
 
@@ -74,11 +74,11 @@ class FrontPlan:
     Parameters
     ----------
     number : int
-        What it is picked by.
+        Number by which it is picked.
     values : (C,) tuple of float
-        Its criteria, in the units of the axes.
+        Criteria of the plan, in the units of the axes.
     asked : tuple of (what, value)
-        What its run was asked for, in words.
+        Settings of its run, in words.
     """
 
     number: int

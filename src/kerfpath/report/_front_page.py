@@ -1,4 +1,4 @@
-"""The page of a Pareto set: linked views of its plans, to compare them and to pick one."""
+"""The page of a Pareto set: linked views for comparing its plans and picking one."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from kerfpath.report._tables import number, table, td
 __all__ = ["render_front"]
 
 NUMBER = "{number}"
-_BEATEN = " Grey points were beaten: some plan is as good in every criterion and better in one."
+_BEATEN = " Grey points are dominated: some plan is as good in every criterion and better in one."
 AXIS_WIDTH = 112
 """Least distance of parallel axes, px: the height of a line of a label."""
 
@@ -47,37 +47,37 @@ def render_front(
     axes : sequence of FrontAxis
         The criteria, at least one; the first two are plotted first, coloured by the third.
     plans : sequence of FrontPlan
-        At least one, in the order of the table.
+        At least one plan, in the order of the table.
     dominated : (D, C)
-        Criteria of feasible plans that others beat.
+        Criteria of feasible plans that others dominate.
     marks : mapping of str to int
-        Numbers of plans that stand out, by what they are, as "least displacement".
+        Numbers of remarkable plans by their labels, such as "least displacement".
     facts : sequence of (what, value)
     notes : sequence of str
     command : str
-        What writes a plan, "{number}" standing for its number.
+        Command that writes a plan, with "{number}" in place of its number.
     job_text : str
         The job file as read.
 
     Raises
     ------
     InputError
-        No axis or plan, values that do not fit the axes or are not finite, names or numbers given
-        twice, a mark of no plan, a command without the number.
+        There is no axis or plan, values do not match the axes or are not finite, a name or number
+        occurs twice, a mark has the number of no plan, or the command lacks "{number}".
     """
     values, beaten = _shown_values(axes, plans, dominated, marks, command)
     figures = Figures()
     views = [
         f"<section><h2>{'Criteria in pairs' if len(axes) > 1 else 'The criterion'}</h2>",
-        '<p class="caption">A point is a plan: click it to pick it. Dark colours are the '
-        f"better ones.{_BEATEN if len(beaten) else ''}</p>",
+        '<p class="caption">Each point is a plan; click a point to pick its plan. Darker colours '
+        f"are better.{_BEATEN if len(beaten) else ''}</p>",
         _choices(axes),
         figures.place(scatter(axes), "front-scatter"),
         "</section>",
         *(_parallel_part(axes, values, figures) if len(axes) > 1 else ()),
         "<section><h2>Plans</h2>",
-        '<p class="caption">Click a head to sort; ↓ less is better, ↑ more is better, the best of '
-        "each criterion bold. Click a row, or press Enter on it, to pick its plan.</p>",
+        '<p class="caption">Click a heading to sort; ↓ less is better, ↑ more is better, the best '
+        "value of each criterion is bold. Click a row, or press Enter on it, to pick its plan.</p>",
         _plan_table(axes, plans, values, marks),
         "</section>",
     ]
@@ -123,7 +123,7 @@ def _shown_values(
 def _decimals(column: Array) -> int:
     """Return the number of decimals that shows a thousandth of the spread of values."""
     size, largest = float(np.ptp(column)), float(np.abs(column).max())
-    if size < 1e-9 * largest:  # rounding
+    if size < 1e-9 * largest:  # only rounding errors differ
         size = largest
     return max(0, 2 - math.floor(math.log10(size or 1.0)))
 
@@ -134,12 +134,12 @@ def _parallel_part(axes: Sequence[FrontAxis], values: Array, figures: Figures) -
     width = AXIS_WIDTH * len(axes) + 40
     return [
         "<section><h2>All criteria at once</h2>",
-        '<p class="caption">A line is a plan. On every axis better is at the bottom: where more is '
-        "better (↑) the axis runs downwards. Drag along an axis to keep the plans in a range, "
-        "click on the axis to let it go; drag a name to move its axis.</p>",
+        '<p class="caption">Each line is a plan. On every axis better is at the bottom: if more is '
+        "better (↑), the axis points down. Drag along an axis to show only plans in a range, "
+        "click on the axis to remove the range; drag a name to move its axis.</p>",
         '<p class="kept"><span role="status"></span>'
         '<button type="button" hidden>Show all</button></p>',
-        # Labels begin where plotly has room for two lines.
+        # plotly places labels as if they had two lines.
         f'<div class="wide"><div style="min-width:{width}px;--lift:{1.3 * (2 - lines):.1f}em">',
         figures.place(parallel(axes, values, labels), "front-parallel"),
         "</div></div>",
@@ -152,8 +152,8 @@ def _choices(axes: Sequence[FrontAxis]) -> str:
     none = [(-1, "none")]
     every = [(i, criterion.words) for i, criterion in enumerate(axes)]
     boxes = (
-        ("x", "Across", every, 0),
-        ("y", "Upwards", every if len(axes) > 1 else none, min(1, len(axes) - 1) or -1),
+        ("x", "Horizontal", every, 0),
+        ("y", "Vertical", every if len(axes) > 1 else none, min(1, len(axes) - 1) or -1),
         ("colour", "Colour", every + none, 2 if len(axes) > 2 else -1),
     )
     parts = []
@@ -177,7 +177,7 @@ def _plan_table(
             f"{escape(criterion.words)}</button>"
         )
         heads.append((button, escape(criterion.unit_and_arrow)))
-    heads.append(("Stands out", ""))
+    heads.append(("Remarks", ""))
     decimals = [_decimals(column) for column in values.T]
     best = values == (values * _sense(axes)).min(axis=0) * _sense(axes)
     rows = []
@@ -215,8 +215,8 @@ def _panel(axes: Sequence[FrontAxis], marks: Mapping[str, int]) -> str:
             '<h2 aria-live="polite"></h2>',
             f'<table class="values">{rows}</table>',
             '<p class="ends"><span>best</span><span>worst of the set</span></p>',
-            '<div class="asked"><h4>Its run asked for</h4><dl></dl></div>',
-            "<h4>To write it</h4><pre></pre>",
+            '<div class="asked"><h4>Settings of its run</h4><dl></dl></div>',
+            "<h4>Command that writes it</h4><pre></pre>",
             '<button type="button" class="copy">Copy the command</button>',
             "</div></aside>",
         ]

@@ -33,7 +33,7 @@ LABEL_LOOK = {
     "font": {"size": 12, "color": INK},
     "bgcolor": "rgba(255, 255, 255, 0.85)",
 }
-"""Look of the names of marked plans."""
+"""Style of the labels of marked plans."""
 LABEL = 16
 """Number of characters in a line of an axis label."""
 
@@ -69,7 +69,7 @@ def scatter(axes: Sequence[FrontAxis]) -> go.Figure:
 
 
 def axis_labels(axes: Sequence[FrontAxis]) -> list[list[str]]:
-    """Return the lines of each axis label, equally many for all; the first ones may be empty."""
+    """Return the lines of each axis label, padded with empty lines at the top to equal counts."""
     labels = [
         [
             *textwrap.wrap(criterion.words, LABEL, max_lines=3, placeholder=" …"),
@@ -84,7 +84,7 @@ def axis_labels(axes: Sequence[FrontAxis]) -> list[list[str]]:
 def parallel(
     axes: Sequence[FrontAxis], values: Array, labels: Sequence[Sequence[str]]
 ) -> go.Figure:
-    """Return the parallel axes of the plans' values (P, C): better is at the bottom."""
+    """Return parallel axes of the plans' values (P, C), with the better end at the bottom."""
     top = 24 + 17 * len(labels[0])
     figure = go.Figure(layout=base_layout(350 + top))
     dimensions = []

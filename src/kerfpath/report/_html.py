@@ -48,7 +48,7 @@ _LEAN = '<script src="plotly.js"></script>'
 
 
 class Figures:
-    """The figures of a page: each is packed once, and drawn when it first comes into view."""
+    """The figures of a page: each is packed once, and drawn when its section is first opened."""
 
     def __init__(self) -> None:
         self.data: list[str] = []
@@ -56,7 +56,7 @@ class Figures:
     def place(self, figure: go.Figure, kind: str) -> str:
         """Pack `figure` and return the element that it is drawn into."""
         number = len(self.data) + 1
-        # A map of 1500 x 360 x 8 codes has long runs: deflated, a report with many stays small.
+        # A map of 1500 x 360 x 8 codes has long runs: compression keeps a report with many small.
         packed = base64.b64encode(zlib.compress(figure.to_json().encode(), 9)).decode()
         self.data.append(
             f'<script type="application/octet-stream" id="figure-{number}">{packed}</script>'
@@ -78,7 +78,7 @@ def header(
 ) -> str:
     """Return the head of a page: its kind, title, verdict (HTML), facts and notes.
 
-    `tools` (HTML) stand beside the title.
+    `tools` (HTML) is placed beside the title.
     """
     parts = [
         "<header>",
@@ -102,7 +102,7 @@ def facts_list(facts: Sequence[tuple[str, str]]) -> str:
 
 
 def job_part(text: str) -> str:
-    """Return the job file in an element that opens; empty without one."""
+    """Return the job file in a collapsible element; empty without a text."""
     if not text:
         return ""
     return (
@@ -114,7 +114,7 @@ def job_part(text: str) -> str:
 def page(title: str, body: Sequence[str], figures: Figures, *, also: str = "") -> str:
     """Return a self-contained page: its body in pieces of HTML, and the figures in it.
 
-    `also` names a style sheet and a script that the page has besides those of every page.
+    `also` names a style sheet and a script that are added to those of every page.
     """
     names = ("page", also) if also else ("page",)
     return _SKELETON.format(
@@ -128,12 +128,12 @@ def page(title: str, body: Sequence[str], figures: Figures, *, also: str = "") -
 
 
 def without_library(text: str) -> str:
-    """Return a page without the drawing library, which is most of it, for storage."""
+    """Return a page without the drawing library, which is most of its size, for storage."""
     return text.replace(_library(), _LEAN)
 
 
 def with_library(text: str) -> str:
-    """Return the page that `without_library` shortened, with the library again."""
+    """Return a page shortened by `without_library` with the library restored."""
     return text.replace(_LEAN, _library())
 
 

@@ -13,27 +13,27 @@ __all__ = ["render_layout"]
 
 GOALS = {
     "speed": "fastest speed of the slowest contour",
-    "margin": "least margin of a contour over its speed",
+    "margin": "least ratio of fastest to requested speed",
     "motion": "least total displacement of the joints",
 }
 STATUSES = {
     "feasible": "feasible",
-    "speed": "a speed asked for cannot be held",
+    "speed": "a requested speed is not feasible",
     "collision": "a collision that no path avoids",
     "unreachable": "a node that no admissible pose reaches",
 }
 STAGES = {
-    "reach": "reach: poses of every eighth node",
-    "stretch": "stretches that bind, solved exactly",
+    "reach": "test of reach at every eighth node",
+    "stretch": "critical stretches, solved exactly",
     "exact": "all contours, solved exactly",
     "estimate": "an estimate alone",
-    "proved": "a proof that no motion is faster than at the best one",
+    "proved": "a proof that no motion is faster than in the best placement",
     "planned": "planned over continuous gamma",
 }
 
-DOTS = " Small dots are the placements tried, wherever the other variables were then."
+DOTS = " Small dots are the placements that were tried, at any value of the other variables."
 LONGEST = 160
-"""Number of characters of a reason that are shown."""
+"""Largest number of characters of a reason that are shown."""
 
 
 def render_layout(entry: LayoutEntry, *, job_text: str = "") -> str:
@@ -69,13 +69,14 @@ def render_layout(entry: LayoutEntry, *, job_text: str = "") -> str:
 
 def _dots(entry: LayoutEntry) -> str:
     if entry["off_grid"]:
-        return "what it comes to by an estimate. Filled ones were planned"
-    return "what it can come to at best, as far as was found out. Filled ones were solved exactly"
+        return "its height is the estimated value. Filled ones were planned"
+    return "its height is the bound on its value. Filled ones were solved exactly"
 
 
 def _foot(entry: LayoutEntry) -> str:
-    lost = "Infeasible placements stand at the foot. " if entry["reasons"] else ""
-    return lost + (f"From {entry['evolved']} on they are the map's." if entry["map"] else "")
+    lost = "Infeasible placements are at the bottom. " if entry["reasons"] else ""
+    of_map = f"Placements from {entry['evolved']} on belong to the map." if entry["map"] else ""
+    return lost + of_map
 
 
 def _value(entry: LayoutEntry, value: float | None) -> str:
@@ -93,10 +94,10 @@ def _verdict(entry: LayoutEntry) -> tuple[str, str]:
         return FAIL, f"None of {len(entry['tried'])} placements is feasible"
     result = f"{GOALS[entry['goal']].capitalize()}: {_value(entry, best['value'])}"
     if best["gain"] is None:
-        return PASS, f"{result}; where the job has it, it is not feasible ({shipped['status']})"
+        return PASS, f"{result}; the placement of the job is infeasible ({shipped['status']})"
     if best["gain"] <= 0:
-        return WARN, f"{result}, as the job has it: none of those tried is better"
-    return PASS, f"{result}, {best['gain'] * 100:.1f} % better than where the job has it"
+        return WARN, f"{result}, in the placement of the job: no other that was tried is better"
+    return PASS, f"{result}, {best['gain'] * 100:.1f} % better than in the placement of the job"
 
 
 def _facts(entry: LayoutEntry) -> list[tuple[str, str]]:
@@ -107,22 +108,22 @@ def _facts(entry: LayoutEntry) -> list[tuple[str, str]]:
         ("Planned" if entry["off_grid"] else "Solved exactly", f"{exact} of {tried}"),
     ]
     if entry["best"] is not None:
-        facts.append(("As the job has it", _value(entry, entry["shipped"]["value"])))
+        facts.append(("Placement of the job", _value(entry, entry["shipped"]["value"])))
         facts.append(("Claim", _claim(entry)))
     if entry["tolerance"]:
         spans = ", ".join(f"{name} ±{size:g}" for name, size in entry["tolerance"].items())
-        facts.append(("The worst within", f"{spans}, one at a time"))
+        facts.append(("Worst case within", f"{spans}, one at a time"))
     if entry["standing"]:
-        facts.append(("Standing", ", ".join(entry["standing"])))
+        facts.append(("Fixtures that do not move", ", ".join(entry["standing"])))
     return facts
 
 
 def _claim(entry: LayoutEntry) -> str:
     if entry["proved"]:
-        return "the best of those tried, proved"
+        return "proved: the best of the placements that were tried"
     others = _value(entry, entry["open_bound"])
     if not entry["off_grid"]:
-        return f"others may come to {others}"
+        return f"others may reach {others}"
     return (
         f"the best of those planned; {entry['estimated']} others are judged by an estimate alone, "
         f"at best {others}, which proves nothing"
@@ -132,10 +133,10 @@ def _claim(entry: LayoutEntry) -> str:
 def _notes(entry: LayoutEntry) -> list[str]:
     notes = []
     if entry["default_ranges"]:
-        notes.append("Nobody said what may vary: these ranges are a default.")
+        notes.append("The job has no ranges in [layout]: these are the default ranges.")
     best = entry["best"]
     if entry["goal"] == "margin" and best is not None and best["value"] < 1:
-        notes.append("Some contour cannot be cut at the speed asked for, even there.")
+        notes.append("Even in the best placement, a contour cannot be cut at its requested speed.")
     if best is None and entry["reasons"]:
         why = entry["reasons"][0]
         where = f" {why['contour']}, node {why['node']}:" if why["contour"] else ""
@@ -160,10 +161,10 @@ def _placement(entry: LayoutEntry) -> list[str]:
         )
     parts = [
         "<section><h2>The placement</h2>",
-        '<p class="caption">Offsets from where the job has things, along the axes of the robot '
-        "base. The part turns about the middle of its contours, and fixtures go with it except for "
-        "the standing ones. Where the best one is at the end of a range, a wider range may hold a "
-        "better one.</p>",
+        '<p class="caption">Offsets from the placement of the job, along the axes of the robot '
+        "base. The part turns about the middle of its contours. Fixtures move with it, except any "
+        "that are listed above. If the best value is at the end of a range, a wider range may "
+        "contain a better one.</p>",
         table((("Variable", ""), ("From", ""), ("To", ""), (what, "")), rows),
     ]
     if best:
@@ -184,7 +185,7 @@ def _contours(entry: LayoutEntry) -> list[str]:
     motion = entry["goal"] == "motion"
     unit = "displacement" if motion else "m/min"
     heads = [("Contour", ""), ("As the job has it", unit), ("Best", unit), ("Change", "%")]
-    heads += [] if motion else [("What binds, before", ""), ("after", "")]
+    heads += [] if motion else [("Binding limit, before", ""), ("after", "")]
     rows = []
     for contour in entry["contours"]:
         sides = [contour["before"], contour["after"]]
@@ -209,8 +210,8 @@ def _contours(entry: LayoutEntry) -> list[str]:
 
 def _how(entry: LayoutEntry) -> str:
     if entry["off_grid"]:
-        return "Over continuous gamma, the best motion found of each"
-    return "On the job's own grid, each solved to its own optimum"
+        return "Best motion found over continuous gamma"
+    return "Optimum of each contour on the grid of the job"
 
 
 def _binds(side: ContourSide | None) -> str:
@@ -226,11 +227,11 @@ def _map(entry: LayoutEntry, figures: Figures) -> list[str]:
     others = [name for name in entry["ranges"] if name not in drawn["variables"]]
     held = f", {' and '.join(others)} as in the best placement" if others else ""
     over = f"{' and '.join(drawn['variables'])}{held}"
-    comes = "comes to, mostly by estimates," if entry["off_grid"] else "can come to at best"
+    known = "Value of the goal, mostly estimated," if entry["off_grid"] else "Bound on the goal"
     return [
         "<section><h2>Map</h2>",
-        f'<p class="caption">What the goal {comes} over {over}; elsewhere why nothing '
-        f"can be cut there.{DOTS if drawn['y'] else ''}</p>",
+        f'<p class="caption">{known} over {over}; infeasible placements show the reason.'
+        f"{DOTS if drawn['y'] else ''}</p>",
         figures.place(placement_map(entry, drawn), "placements"),
         "</section>",
     ]
@@ -259,6 +260,6 @@ def _tallies(entry: LayoutEntry) -> str:
     ]
     if reasons:
         heads = [("", ""), ("Contour", ""), ("Node, most often", ""), ("Placements", "")]
-        why_not = table([*heads, ("Such as", "")], reasons, text_columns=(0, 1, 4))
-        parts += ["<h4>Why not</h4>", why_not]
+        why_not = table([*heads, ("Example", "")], reasons, text_columns=(0, 1, 4))
+        parts += ["<h4>Reasons of infeasible placements</h4>", why_not]
     return "\n".join(parts)

@@ -1,7 +1,7 @@
-"""The data of layout.json, key by key: `kerfpath.study` writes them, the page and the command read.
+"""The data of layout.json: `kerfpath.study` writes them, the page and the command read them.
 
-Keys of a class whose `total` is False are there only where there is something to say. Offsets are
-in the unit at the end of each variable's name; values are in `unit` of the goal.
+Classes with ``total=False`` have optional keys. Offsets are in the unit at the end of each
+variable's name; values are in the `unit` of the goal.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ Goal = Literal["speed", "margin", "motion"]
 
 
 class _Reason(TypedDict, total=False):
-    """Why a placement is infeasible, and where; `progress` says how far its test got."""
+    """The reason why a placement is infeasible, and where; `progress` is how far its test got."""
 
     reason: str
     contour: str
@@ -24,14 +24,17 @@ class _Reason(TypedDict, total=False):
 
 
 class _Shipped(_Reason):
-    """The placement as the job has it."""
+    """The placement of the job itself."""
 
     status: str
     value: float | None
 
 
 class _Best(TypedDict):
-    """The best placement; `gain` over the job's own is a share, `numbers` are keys of the job."""
+    """The best placement.
+
+    `gain` over the job's placement is a share; `numbers` has keys of the job and their new values.
+    """
 
     offsets: dict[str, float]
     value: float
@@ -42,8 +45,7 @@ class _Best(TypedDict):
 class TriedPlacement(_Reason):
     """A placement that was tried.
 
-    `bound` is the best that it may still come to, `estimate` about what it comes to over continuous
-    gamma.
+    `bound` is a value that it cannot beat, `estimate` its approximate value over continuous gamma.
     """
 
     offsets: dict[str, float]
@@ -55,7 +57,7 @@ class TriedPlacement(_Reason):
 
 
 class ContourSide(TypedDict, total=False):
-    """The value of one contour in one placement, and what binds it."""
+    """The value of one contour in one placement, and the limit that binds."""
 
     value: float
     at_least: float
@@ -74,7 +76,7 @@ class _Contour(TypedDict):
 
 
 class _Tally(TypedDict):
-    """Infeasible placements for the same status and contour, with the most common node."""
+    """Count of infeasible placements with the same status and contour; `node` is the commonest."""
 
     status: str
     contour: str | None
@@ -93,7 +95,7 @@ class MapSquare(_Reason):
 
 
 class LayoutMap(TypedDict):
-    """Placements over two variables, or over the only one, where `y` is empty."""
+    """Placements over two variables; `y` is empty if there is only one variable."""
 
     variables: list[str]
     x: list[float]
@@ -104,9 +106,10 @@ class LayoutMap(TypedDict):
 class LayoutEntry(TypedDict):
     """All of layout.json.
 
-    With `off_grid` values are those of plans over continuous gamma, of as many placements as there
-    were `exact_searches`, and `open_bound` is the best estimate of those that are only `estimated`;
-    `estimate_error` are the least and the largest share of its estimate that a plan came to.
+    With `off_grid`, values are those of plans over continuous gamma, for `exact_searches`
+    placements. `open_bound` is then the best estimate of the placements that have only an estimate
+    (`estimated`), and `estimate_error` the least and the largest ratio of a plan's value to its
+    estimate.
     """
 
     schema: int
@@ -140,7 +143,7 @@ class LayoutEntry(TypedDict):
 
 
 def promise(goal: Goal, placement: TriedPlacement | MapSquare) -> float | None:
-    """Return what a placement is worth as far as is known: value, or bound or estimate."""
+    """Return the value of a placement, else the tighter one of bound and estimate, else None."""
     if placement["value"] is not None:
         return placement["value"]
     known = [v for v in (placement["bound"], placement["estimate"]) if v is not None]

@@ -1,4 +1,4 @@
-"""The figures on the page of a layout: the map of placements, and the course of the search."""
+"""The figures on the page of a layout: the map of placements, and the progress of the search."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ __all__ = ["convergence", "placement_map"]
 
 HEIGHT = 560
 WHY = {"unreachable": "#b4bac4", "collision": "#f2b8b5", "speed": "#f8d9a0"}
-"""Colours of placements that are not feasible, by status."""
+"""Colours of infeasible placements, by status."""
 SCALE = [[0.0, "#f3f8e6"], [0.35, "#bfe0c4"], [0.7, "#4fa897"], [1.0, "#0b5c58"]]
-WORDS = {"speed": "m/min", "margin": "times asked", "motion": "displacement"}
+WORDS = {"speed": "m/min", "margin": "times requested speed", "motion": "displacement"}
 
 
 def placement_map(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
-    """Return what is known over the first two variables, or the only one, and those tried."""
+    """Return the map over the first two variables, or the only one, with the tried placements."""
     return _plane(entry, drawn) if drawn["y"] else _line(entry, drawn)
 
 
@@ -42,7 +42,7 @@ def _hover(entry: LayoutEntry, square: MapSquare) -> str:
         return f"{square['status']}<br>{where}{square.get('reason', '')[:90]}"
     known = promise(entry["goal"], square)
     if known is None:
-        return "feasible as far as is known"
+        return "feasible as far as known"
     how = "at least" if entry["goal"] == "motion" else "at most"
     if square["value"] is not None:
         how = "planned:" if entry["off_grid"] else "exactly"
@@ -97,7 +97,7 @@ def _plane(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
 
 
 def _half(values: list[float]) -> float:
-    """Return half the distance of even values."""
+    """Return half the step of evenly spaced values."""
     return (values[1] - values[0]) / 2 if len(values) > 1 else 1.0
 
 

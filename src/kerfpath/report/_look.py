@@ -30,14 +30,14 @@ __all__ = [
 INK, QUIET, FAINT, GRID = "#1d2530", "#5b6675", "#98a1ad", "#e6e9ee"
 ACCENT, ALERT, CHOSEN = "#0b6b66", "#b3261e", "#e8590c"
 SCALE = ("#440154", "#414487", "#2a788e", "#22a884", "#7ad151")
-"""Viridis up to four fifths: what is lighter is lost on white."""
+"""Viridis up to four fifths; lighter colours do not show on white."""
 
-# Six hues, and a light and a dark shade of each, found by a search that keeps all pairs apart
-# for normal, protan and deutan sight (Machado, Oliveira, Fernandes 2009; CIELAB distance 12).
+# Six hues with a light and a dark shade each, from a search in which all pairs differ by a CIELAB
+# distance of 12 for normal, protan and deutan sight (Machado, Oliveira, Fernandes 2009).
 JOINT_COLOURS = ("#0061cc", "#f4a918", "#0ea069", "#df5ac2", "#f05d16", "#55bdff")
 SEVENTH_COLOUR = "#8a8d00"
 EXTERNAL_COLOURS = ("#6b4fbb", "#7a5c3e", "#5b6675")
-"""Of external axes, which have their names beside their lines."""
+"""Colours of external axes, whose lines also have names."""
 _LOW = ("#4089d9", "#fce3b4", "#6bc5a3", "#f6ceed", "#f6a076", "#86d0ff")
 _HIGH = ("#003875", "#be8313", "#09603f", "#c34fa9", "#742d0b", "#2f688d")
 _REASONS = {
@@ -56,10 +56,10 @@ FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, s
 
 
 def reason_colours(reasons: Sequence[Reason]) -> tuple[str, ...]:
-    """Return one colour per reason: a joint's light shade below its limits, dark above them.
+    """Return one colour per reason: the joint's light shade below its limits, dark above them.
 
-    Clearances run from green to orange. Reasons without a colour of their own (couplings, low and
-    high) take two greys in turn.
+    Clearances run from green to orange. Reasons without their own colour (couplings, low and
+    high) alternate between two greys.
     """
     greys, spare = cycle(_OTHER_REASONS), cycle(_SPARE)
     return tuple(

@@ -1,4 +1,4 @@
-"""The feasibility map: node times gamma, one panel per posture, coloured by the reason of loss."""
+"""The feasibility map: gamma over nodes, one panel per posture, coloured by reason of loss."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from kerfpath.robots import posture_name
 __all__ = ["chosen_line", "feasibility_map", "hidden_postures", "shown_postures"]
 
 ROW, GAP, TOP, BOTTOM = 150, 34, 48, 50
-"""Height of a panel, of the space between two, and of the margins (the upper with buttons), px."""
+"""Height of a panel, of the gap between two, and of the margins (buttons at the top), px."""
 
 HALF_TURN = 180.0
-"""End of the map, deg; it begins at its negative."""
+"""End of the map, deg; the map begins at -180 deg."""
 
 
 def feasibility_map(
@@ -42,21 +42,22 @@ def feasibility_map(
 ) -> go.Figure:
     """Return the feasibility map of a layered graph, with the chosen gamma drawn on it.
 
-    One panel for each posture that has an admitted candidate; in it one pixel for each node
-    (horizontal) and gamma (vertical), coloured by what became of that candidate. The panels share
-    their axes, so that zooming one zooms all.
+    It has one panel for each posture with an admitted candidate, and in a panel one pixel for each
+    node (horizontal) and gamma (vertical), coloured by the reason of that candidate. The panels
+    share their axes: zooming one zooms all.
 
     Parameters
     ----------
     graph : LayeredGraph
         Its `reason_by_gamma` is drawn.
     plan : Plan, optional
-        Its gamma is drawn as a line on the posture in use, broken where the posture changes; where
-        gamma passes 180 deg it leaves at one edge and comes in at the other.
+        Its gamma is drawn as a line on the posture in use, interrupted where the posture changes.
+        Where gamma passes 180 deg, the line leaves at one edge and enters at the other.
     s : (K,) m, optional
-        Arc length of the nodes, for the hover text; default: the plan's.
+        Arc length of the nodes, for the hover text; default: that of the plan.
     marks : sequence of (float, str)
-        Nodes to mark, as where the path breaks, and what to write beside the first.
+        Nodes to mark, such as the one where the path breaks, with a text; only the first text is
+        shown.
 
     Returns
     -------
@@ -119,18 +120,18 @@ def feasibility_map(
 
 
 def shown_postures(graph: LayeredGraph) -> list[int]:
-    """Return the postures with an admitted candidate; if there is none, those worth a look."""
+    """Return the postures with an admitted candidate; else those with several reasons; else all."""
     every = range(graph.reason.shape[-1])
     kept = (Loss.ADMITTED, Loss.SPARE)
     codes = [c for c, why in enumerate(graph.reasons) if why.loss in kept]
     admitted = [mu for mu in every if np.isin(graph.reason_by_gamma[:, :, mu], codes).any()]
-    # Where one reason holds everywhere, a word says as much as a panel.
+    # A posture with the same reason everywhere needs no panel.
     mixed = [mu for mu in every if np.ptp(graph.reason_by_gamma[:, :, mu])]
     return admitted or mixed or list(every)
 
 
 def hidden_postures(graph: LayeredGraph) -> list[str]:
-    """Return a line for each posture without a panel: why its candidates were dropped."""
+    """Return a line for each posture without a panel, with the reasons of its candidates."""
     shown, left_out = shown_postures(graph), list[str]()
     for mu in range(graph.reason.shape[-1]):
         if mu in shown:
@@ -150,9 +151,9 @@ def hidden_postures(graph: LayeredGraph) -> list[str]:
 def chosen_line(plan: Plan, posture: int, parts: int = 1) -> list[tuple[Array, Array]]:
     """Return the chosen gamma on one posture as unbroken pieces of (node, gamma in deg).
 
-    A piece ends where the posture changes and where gamma passes 180 deg; there it goes on beyond
-    the edge to the next node, where the next piece comes from. A refined plan may divide the
-    intervals between the nodes into `parts`.
+    A piece ends where the posture changes or gamma passes 180 deg. In the latter case it continues
+    beyond the edge to the next node, and the next piece begins before the edge. A refined plan may
+    divide the intervals between the nodes into `parts`.
     """
     gamma = np.degrees(np.unwrap(plan.gamma))
     turn = np.round((np.degrees(plan.gamma) - gamma) / 360)
@@ -198,7 +199,7 @@ def _add_axes(figure: go.Figure, row: int, rows: int, height: int, nodes: int) -
 def _add_choice(figure: go.Figure, plan: Plan, posture: int, row: int, parts: int) -> None:
     pieces = chosen_line(plan, posture, parts)
     gap = np.array([np.nan])
-    # NaN only here: it is plotly's sign for a break in a line.
+    # plotly breaks a line at NaN.
     x = np.concatenate([part for piece in pieces for part in (piece[0], gap)])[:-1]
     y = np.concatenate([part for piece in pieces for part in (piece[1], gap)])[:-1]
     where = {"xaxis": _axis("x", row), "yaxis": _axis("y", row), "showlegend": False}

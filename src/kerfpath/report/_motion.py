@@ -1,7 +1,7 @@
 """Joint motion over time: positions, and speeds and accelerations as shares of their limits.
 
-``layout.meta["nodes"]`` of each figure says where on its horizontal axis every node lies, so that
-figures of one contour can share a cursor.
+``layout.meta["nodes"]`` of each figure has the position of every node on its horizontal axis, so
+that the figures of a contour can share a cursor.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ ROW, GAP, TOP, BOTTOM = 130, 36, 48, 48
 SHARE_ROW, SHARE_TOP = 210, 74
 SPEED_HEIGHT = 220
 LEAST_SPAN = {"rad": 1.0, "m": 10.0}
-"""Least height of a panel, deg or mm: a joint that hardly moves looks so."""
+"""Least height of a panel, deg or mm, so that small motions of a joint look small."""
 SHOWN = {"rad": (180 / np.pi, "°"), "m": (1e3, " mm")}
-"""By what a joint's values are multiplied to be shown, and their unit."""
+"""Factor from the SI unit of a joint to the unit that is shown, and that unit."""
 
 
 def posture_runs(plan: Plan) -> list[tuple[int, int, int]]:
@@ -45,9 +45,9 @@ def posture_runs(plan: Plan) -> list[tuple[int, int, int]]:
 
 
 def joint_positions(plan: Plan) -> go.Figure:
-    """Return a panel per joint: position over time, deg or mm, to the scale of its motion.
+    """Return a figure with a panel per joint: position over time, deg or mm, scaled to its motion.
 
-    Endless joints are not wrapped. The title of a panel has the distance to the joint limits.
+    Endless joints are not wrapped. The title of a panel shows the distance to the joint limits.
     """
     robot = plan.robot
     rows = (robot.joints + 1) // 2
@@ -138,7 +138,7 @@ def cutting_speed(plan: Plan) -> go.Figure:
 
 
 def limit_shares(plan: Plan) -> go.Figure:
-    """Return two panels: joint speeds and accelerations over time, % of their limits."""
+    """Return two panels: joint velocities and accelerations over time, in % of their limits."""
     height = SHARE_TOP + BOTTOM + 2 * SHARE_ROW + GAP
     figure = go.Figure(layout=base_layout(height, hovermode="x unified"))
     figure.update_layout(
@@ -212,7 +212,7 @@ def _lay_out(
     shapes: list[dict[str, object]],
     annotations: list[dict[str, object]],
 ) -> None:
-    """Give a figure all of its layout at once: piece by piece plotly takes three times as long."""
+    """Set the layout of a figure in one call; in several calls plotly takes three times as long."""
     layout = {"meta": {"nodes": np.round(nodes, 4).tolist()}, **axes}
     figure.update_layout(layout | {"shapes": shapes, "annotations": annotations}, overwrite=True)
 
@@ -222,7 +222,7 @@ def _posture_bands(
 ) -> tuple[list[dict[str, object]], list[dict[str, object]]]:
     """Return shapes that shade every second run of one posture, and names of the wide runs.
 
-    Other shapes come after them: later ones lie on top.
+    Other shapes come after them, because later ones are drawn on top.
     """
     shapes: list[dict[str, object]] = []
     annotations: list[dict[str, object]] = []
@@ -274,7 +274,7 @@ def _level(value: float, x: str, y: str, colour: str, dash: str) -> dict[str, ob
 
 
 def _short(values: Array) -> Any:
-    """Return `values` in single precision: seven digits are plenty for a screen."""
+    """Return `values` in single precision, whose seven digits are enough for a screen."""
     return values.astype(np.float32)
 
 
@@ -290,6 +290,18 @@ _FIGURES = {"joints": joint_positions, "limits": limit_shares, "speed": cutting_
 
 
 def plot(plan: Plan, what: str = "joints") -> go.Figure:
-    """Return a figure of a plan, see `Plan.plot`."""
+    """Return a figure of a plan, see `Plan.plot`.
+
+    Parameters
+    ----------
+    plan : Plan
+    what : "joints", "limits" or "speed"
+        Joint positions, shares of the joint limits, or the cutting speed.
+
+    Raises
+    ------
+    InputError
+        `what` is none of these.
+    """
     require_one_of(what, "plot", _FIGURES)
     return _FIGURES[what](plan)

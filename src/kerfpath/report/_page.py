@@ -1,4 +1,4 @@
-"""The HTML page: its skeleton, and the figures packed into it."""
+"""The page of a job: its contours with plans, maps, figures and audits."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ def render(
     mesh : (vertices (V, 3) m, triangles (F, 3)), optional
         The part, in the part frame.
     cell : Cell, optional
-        What stands around it, and robot and head, drawn at a few poses.
+        Fixtures, robot and head; robot and head are drawn at a few poses.
     moves : sequence of (m, 3) m
         Paths of the tool tip on the transfer moves, in the part frame.
     facts : sequence of (what, value)
         Rows such as ("Robot", "ABB IRB 4600-60/2.05").
     faults : sequence of str
-        Why the job is not to be cut although its contours are planned, and what to do.
+        Reasons not to cut the job although its contours are planned, and what to do.
     notes : sequence of str
         Warnings, shown at the top.
     job_text : str
@@ -90,20 +90,21 @@ def render(
 MOST_STEPS = 5
 """Failed contours named at the top; the others are listed below."""
 _SPARE = (
-    " Where nothing forbids it, the colour says how much more than the near-miss distances is kept;"
-    " pairs with a distance of their own, as nozzle and part, count as collisions alone."
+    " Where no limit is broken, the colour shows the clearance beyond the near-miss distance; pairs"
+    " with a distance of their own, such as nozzle and part, are only tested for collision."
 )
 _BOUND = (
     "Bound: no motion that keeps the velocity and acceleration limits at the nodes costs less, at "
-    "any gamma, in any posture and turn; this is proved. Gap: at most so much of the cost lies "
-    "above the best motion. Collisions, margins and closure only make the best motion cost more."
+    "any gamma, in any posture and turn; this is proved. Gap: largest share of the cost by which "
+    "the plan may exceed the best motion. Collisions, margins and closure can only raise the cost "
+    "of the best motion."
 )
-_AIR = " Thin red lines are the moves between contours; the table is in the order of cutting."
-_CELL = " The slider puts robot and head to a few poses; capsules stand in for links."
+_AIR = " Thin red lines are transfer moves; the table is in the order of cutting."
+_CELL = " The slider moves robot and head to a few poses; capsules represent links."
 
 
 def _bound_caption(sections: Sequence[ContourSection]) -> str:
-    """Return what the bounds in the table say; nothing where it has none."""
+    """Return the explanation of the bounds in the table; empty if it has none."""
     if all(section.plan is None or section.plan.proof.bound is None for section in sections):
         return ""
     return f'<p class="caption">{_BOUND}</p>'
@@ -150,8 +151,9 @@ def _contour(number: int, section: ContourSection, is_open: bool, figures: Figur
             _tables.audit_table(section.checks),
         ]
     parts += [
-        "<h4>What became of the candidates</h4>",
-        '<p class="caption">A candidate is one gamma in one posture at one node.</p>',
+        "<h4>Candidates</h4>",
+        '<p class="caption">Number of candidates that were admitted, or dropped for each reason. A '
+        "candidate is one gamma in one posture at one node.</p>",
         _tables.counts_table(section.mapped),
         "</details>",
     ]
@@ -162,16 +164,16 @@ def _map_part(section: ContourSection, figures: Figures) -> list[str]:
     graph, plan = section.mapped, section.plan
     marks = [(mark.node, mark.words) for mark in section.marks]
     figure = _map.feasibility_map(graph, plan, s=section.path.s, marks=marks)
-    # The page has a legend of its own, which wraps, and a hover text that knows the reason.
+    # The page has its own legend, which wraps, and a hover text with the reason.
     figure.update_layout(showlegend=False)
     figure.update_traces(hovertemplate=None, hoverinfo="none", selector={"type": "heatmap"})
     hidden = _map.hidden_postures(graph)
     others = "".join(f"<li>{escape(text)}</li>" for text in hidden)
     return [
         f"<h4>{'Feasibility' if section.clearance is None else 'Collision'} map</h4>",
-        '<p class="caption">Which rotations gamma about the beam the robot can take at each node, '
-        "one panel per posture (shoulder / elbow / wrist); elsewhere the colour says which limit "
-        f"forbids it.{'' if section.clearance is None else _SPARE}</p>",
+        '<p class="caption">Rotations gamma about the beam that the robot can take at each node, '
+        "one panel per posture (shoulder / elbow / wrist); elsewhere the colour shows the limit "
+        f"that forbids them.{'' if section.clearance is None else _SPARE}</p>",
         _tables.reason_legend(graph, _map.shown_postures(graph), has_plan=plan is not None),
         figures.place(figure, "map"),
         f'<ul class="others">{others}</ul>' if others else "",
@@ -181,7 +183,7 @@ def _map_part(section: ContourSection, figures: Figures) -> list[str]:
 def _failure(section: ContourSection) -> str:
     where = "" if section.broken_at is None else f" The path breaks at node {section.broken_at}."
     reason = section.failure or "The search found no admissible path."
-    remedy = f"<p>What would do: {escape(section.remedy)}.</p>" if section.remedy else ""
+    remedy = f"<p>What would help: {escape(section.remedy)}.</p>" if section.remedy else ""
     return (
         f'<div class="failure">{sign(FAIL, "No feasible path")}<p>{escape(reason)}</p>'
         f"<p>{escape(where.strip())}</p>{remedy}</div>"
@@ -189,7 +191,7 @@ def _failure(section: ContourSection) -> str:
 
 
 def _first_steps(sections: Sequence[ContourSection], faults: Sequence[str]) -> str:
-    """Return what to do first, where something failed: the first failed contours, and faults."""
+    """Return a list of what to do first: the first failed contours, and faults; or ""."""
     failed = [(i, section) for i, section in enumerate(sections) if section.failed]
     items = []
     for i, section in failed[:MOST_STEPS]:
@@ -210,7 +212,7 @@ def _remedy(section: ContourSection) -> str:
             return f"cut slower, or relax a limit: {section.remedy}"
         return section.failure or "relax the limits that the map shows"
     worst = section.errors[0]
-    return worst.advice or f"{worst.title} is beyond what is allowed; see its audit"
+    return worst.advice or f"{worst.title} exceeds its limit; see the audit"
 
 
 def _objective_line(plan: Plan) -> str:

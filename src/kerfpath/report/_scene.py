@@ -36,7 +36,7 @@ def scene(
     cell: Cell | None = None,
     moves: Sequence[ArrayLike] = (),
 ) -> go.Figure:
-    """Return the part (a mesh, m), its contours, cell and transfer moves, in mm, to one scale."""
+    """Return a figure in mm, to one scale, of the part (mesh in m), contours, cell and moves."""
     figure = go.Figure(layout=base_layout(HEIGHT, showlegend=False))
     corners = [section.path.points * 1e3 for section in sections]
     if mesh is not None:
@@ -97,7 +97,7 @@ def add_part(figure: go.Figure, vertices: Array, triangles: Any) -> None:
 
 def _add_contour(figure: go.Figure, section: ContourSection, number: int, size: float) -> None:
     path, name = section.path, escape(section.name)
-    # Lifted towards the nozzle by a hair, or the part's own surface would cover half of the line.
+    # Lift lines slightly towards the nozzle, or the part's surface would cover half of the line.
     points = path.points * 1e3 - path.axes * (0.002 * size)
     colour = ALERT if section.failed else ACCENT
     count = int(np.clip(path.length * 1e3 / (APART * size), *AXES_DRAWN))
@@ -158,8 +158,8 @@ def _add_move(figure: go.Figure, points: Array, number: int) -> None:
         **xyz(points),
         mode="lines",
         line={"color": ALERT, "width": 1.5},
-        hovertemplate=f"move {number}<extra></extra>",
-        name=f"move {number}",
+        hovertemplate=f"transfer move {number}<extra></extra>",
+        name=f"transfer move {number}",
     )
 
 
@@ -193,7 +193,7 @@ def _labels(sections: Sequence[ContourSection]) -> list[dict[str, object]]:
 def _camera(sections: Sequence[ContourSection], cell: Cell | None) -> dict[str, object]:
     """Return a camera on the side of the nozzle, a little above and beside the part.
 
-    Up is up in the cell; without one, of the part.
+    Its up direction is that of the cell, or of the part without a cell.
     """
     placed = None if cell is None else cell.T_base_part
     turn = np.eye(3) if placed is None else placed[:3, :3].T
@@ -211,7 +211,7 @@ def _camera(sections: Sequence[ContourSection], cell: Cell | None) -> dict[str, 
 
 
 def space_axis(name: str) -> dict[str, object]:
-    """Return the look of an axis in space."""
+    """Return the look of an axis of a 3-D scene."""
     return {
         "title": {"text": f"{name}, mm", "font": {"size": 12, "color": QUIET}},
         "tickfont": {"size": 10, "color": QUIET},
@@ -224,7 +224,13 @@ def space_axis(name: str) -> dict[str, object]:
 
 
 def checked(mesh: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Any]:
-    """Return a mesh (vertices, triangles) after checking its indices."""
+    """Return a mesh (vertices, triangles) after checking its indices.
+
+    Raises
+    ------
+    InputError
+        A triangle has the index of a vertex that does not exist.
+    """
     vertices = floats(mesh[0], "mesh vertices", (None, 3))
     triangles = integers(mesh[1], "mesh triangles", (None, 3))
     if triangles.size and not (triangles.min() >= 0 and triangles.max() < len(vertices)):

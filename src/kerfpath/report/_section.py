@@ -22,15 +22,15 @@ from kerfpath.plans import Plan
 __all__ = ["SPARE", "ContourSection", "Mark", "add_clearance"]
 
 SPARE = (0.25, 0.5, 1.0)
-"""Shares of the band of a clearance map up to which clearances have colours of their own."""
+"""Upper ends of the ranges of clearance that have colours, as shares of the map's band."""
 
 
 def add_clearance(graph: LayeredGraph, found: ClearanceMap) -> LayeredGraph:
     """Return the graph with the clearances of its candidates among the reasons.
 
-    A candidate that is not clear has the reason collision, one whose clearance is less than the
-    band of the map a range of clearances. The turns of a candidate have the same pose, so that
-    one of them is enough.
+    A candidate that is not clear gets the reason collision; one whose clearance is less than the
+    band of the map gets a range of clearances. All turns of a candidate have the same pose, so one
+    of them is enough.
     """
     steps = [1e3 * share * found.band for share in (0.0, *SPARE)]
     spare = [Reason(Loss.SPARE, f"{a:g} to {b:g} mm") for a, b in pairwise(steps)][::-1]
@@ -38,14 +38,14 @@ def add_clearance(graph: LayeredGraph, found: ClearanceMap) -> LayeredGraph:
     added = len(spare) + 1
     above = np.searchsorted(np.array(SPARE) * found.band, found.lower, side="right")
     layer = np.repeat(np.arange(len(graph.reason)), np.diff(graph.start))
-    # In this order the least code is the best of a gamma's variants.
+    # The codes are ordered so that the least one is the best of a gamma's variants.
     reason = np.where(graph.reason == 0, 0, graph.reason + added).astype(np.uint8)
     reason[layer, graph.candidate, graph.posture] = np.where(found.clear, len(SPARE) - above, added)
     return replace(graph, reason=reason, reasons=reasons)
 
 
 class Mark(NamedTuple):
-    """A place where a contour fails: a node of its map, the point (m) in the part, and why."""
+    """A place where a contour fails: node of its map, point in the part (m), and reason."""
 
     node: float
     point: Array
@@ -59,7 +59,7 @@ class ContourSection:
     Parameters
     ----------
     name : str
-        What the report calls the contour.
+        Name of the contour in the report.
     graph : LayeredGraph
         The layered graph that was searched.
     path : Contour
@@ -69,20 +69,21 @@ class ContourSection:
     checks : sequence of Check
         The audit's table; empty when the audit was not run.
     failure : str
-        Why there is no plan, in words.
+        Reason why there is no plan.
     remedy : str
-        What to do about it, in words.
+        Changes that would help.
     clearance : ClearanceMap, optional
-        How clear each vertex of the graph is in the cell.
+        Clearance of each vertex of the graph in the cell.
     broken_at : int, optional
         First node that no admissible path reaches (one after `NoFeasiblePath.node`), 0-based.
     sampling : sequence of (what, value)
-        How far the nodes leave what they sample, in rows such as ("Chord error", "0.01 mm").
+        Sampling errors of the nodes, in rows such as ("Chord error", "0.01 mm").
 
     Raises
     ------
     InputError
-        Graph and path differ in their number of nodes, or the plan does not divide their intervals.
+        Graph and path differ in their number of nodes, or the plan does not divide their intervals
+        into equal numbers of parts.
     """
 
     name: str
@@ -111,7 +112,7 @@ class ContourSection:
 
     @property
     def mapped(self) -> LayeredGraph:
-        """The graph, with the clearance of its vertices among the reasons where it is known."""
+        """The graph, with the clearance of its vertices among the reasons if it is known."""
         return self.graph if self.clearance is None else add_clearance(self.graph, self.clearance)
 
     @property

@@ -29,12 +29,14 @@ def render_table(
     Parameters
     ----------
     title, kind : str
-        Heading of the page, and what it is about.
+        Heading of the page, and the kind of page above it.
     heads : sequence of (title, unit)
     rows : sequence of sequence of str
-        A text for each head; all but those of `text_columns` stand to the right.
+        A text for each head.
+    text_columns : collection of int
+        Columns that are aligned left; the others are aligned right.
     caption : str
-        What stands above the table.
+        Text above the table.
     facts : sequence of (what, value)
     notes : sequence of str
     job_text : str

@@ -1,4 +1,4 @@
-"""The tables of the report, as HTML; every text from outside is escaped here."""
+"""The tables of the report as HTML; all texts from outside are escaped here."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def audit_table(checks: Sequence[Check]) -> str:
     rows = []
     for check in checks:
         state = PASS if check.ok else FAIL if check.level == "error" else WARN
-        # What to do is of interest only where something has to be done.
+        # Advice is shown only for a failed check.
         wanted = check.advice and not check.ok
         advice = f" <small>{escape(check.advice)}</small>" if wanted else ""
         words = {PASS: "passed", FAIL: "failed", WARN: "warning"}
@@ -166,7 +166,7 @@ def audit_table(checks: Sequence[Check]) -> str:
 
 
 def counts_table(graph: LayeredGraph) -> str:
-    """Return the counts of candidates, kept and dropped by reason, in per cent and as bars."""
+    """Return the counts of admitted candidates and of each reason, in per cent and as bars."""
     counts, colours = graph.counts(), reason_colours(graph.reasons)
     whole, rows = sum(counts.values()), []
     for word, count in counts.items():
@@ -249,7 +249,7 @@ def _chip(colour: str) -> str:
 def table(
     heads: Sequence[tuple[str, str]], rows: Sequence[str], text_columns: Sequence[int] = (0,)
 ) -> str:
-    """Return a table; `heads` are pairs of title and unit, all but `text_columns` flush right."""
+    """Return a table; `heads` are (title, unit), columns except `text_columns` align right."""
     head = ""
     for i, (title, unit) in enumerate(heads):
         side = "" if i in text_columns else ' class="n"'

@@ -37,11 +37,11 @@ function showScatter() {
   Object.assign(data[PLANS], { marker, selectedpoints: kept, text: FRONT.plans.map(inWords) });
   const layout = { ...SCATTER.layout, annotations: [], xaxis: axisOf(x, SCATTER.layout.xaxis, "←", "→") };
   if (y >= 0) layout.yaxis = axisOf(y, SCATTER.layout.yaxis, "↓", "↑");
-  // Where labels have room is known once the points are drawn.
+  // Labels are placed once the points are drawn.
   Plotly.react(SCATTER, data, layout).then(() => Plotly.relayout(SCATTER, { annotations: labels(data[PLANS]) }));
 }
 
-// The plans fill the plot; those that they beat are shown as far as they do not press them together.
+// The plans fill the plot; dominated ones extend an axis by at most half of the span on either side.
 function axisOf(i, axis, less, more) {
   const { title, sense } = FRONT.axes[i];
   const [plans, beaten] = [column(i), FRONT.dominated.map((values) => values[i])];
@@ -59,7 +59,7 @@ function inWords({ number, marks }, i) {
   return [`<b>Plan ${number}</b>`, ...marks, ...lines].join("<br>");
 }
 
-// The names of marked plans: each at the place around its point where it covers least.
+// Labels of marked plans; each is placed around its point where it covers least.
 function labels({ x, y }) {
   const { xaxis, yaxis } = SCATTER._fullLayout;
   const points = x.map((_, i) => [xaxis.d2p(x[i]), yaxis.d2p(y[i])]);
@@ -88,7 +88,7 @@ const PLACES = [18, 40, 75, 120].flatMap((r) =>
 
 // ---- Parallel axes
 
-// Lines have one width: the picked one is drawn as several side by side, in a colour above the scale.
+// All lines have one width: the picked one is several lines side by side, in a colour above the scale.
 function showParallel() {
   if (!isDrawn(PARALLEL)) return;
   const beside = picked < 0 ? [] : [-2, -1, 0, 1, 2];
@@ -105,7 +105,7 @@ function showParallel() {
   Plotly.restyle(PARALLEL, change);
 }
 
-// From 0, the best of the plans in a criterion, to 1, the worst.
+// The share of a plan in a criterion, from 0 (best plan) to 1 (worst plan).
 function share(values, i) {
   const losses = column(i).map((value) => value * FRONT.axes[i].sense);
   const [low, high] = [Math.min(...losses), Math.max(...losses)];
@@ -165,7 +165,7 @@ async function copy(button) {
     await navigator.clipboard.writeText(command.textContent);
     button.textContent = "Copied";
   } catch {
-    // Not every browser lets a page from a file do that: the reader does.
+    // Some browsers do not let a page from a file copy: the reader does.
     getSelection().selectAllChildren(command);
     button.textContent = "Selected: copy it with Ctrl+C";
   }
@@ -175,7 +175,7 @@ async function copy(button) {
 
 function sort(button) {
   const head = button.closest("th"), i = Number(button.dataset.sort);
-  // The better end comes first, and the other one by the next click.
+  // Sort the better end first; the next click reverses the order.
   const sense = i < 0 ? 1 : FRONT.axes[i].sense;
   const first = sense > 0 ? "ascending" : "descending";
   const other = sense > 0 ? "descending" : "ascending";
@@ -186,7 +186,7 @@ function sort(button) {
   BODY.append(...VALUES.map((_, k) => k).sort((a, b) => key(a) - key(b)).map((k) => ROWS[k]));
 }
 
-// One row takes part in the tab order; the arrows go on from it.
+// Only one row is in the tab order; arrow keys move to the others.
 BODY.addEventListener("focusin", ({ target }) => ROWS.forEach((row) => (row.tabIndex = row === target ? 0 : -1)));
 BODY.addEventListener("click", ({ target }) => pick(ROWS.indexOf(target.closest("tr"))));
 BODY.addEventListener("keydown", (event) => {

@@ -42,7 +42,7 @@ async function drawn(element) {
   }
 }
 
-// Words for the pixel under the pointer: a text per pixel would make the file many times larger.
+// The text for the pixel under the pointer; a text per pixel would make the file many times larger.
 function explain(element) {
   const { reasons, s_mm } = element.layout.meta;
   element.on("plotly_hover", ({ points: [point], event }) => {
@@ -77,8 +77,8 @@ document.querySelectorAll("details").forEach((section) => {
   section.addEventListener("toggle", () => section.open && drawIn(section));
 });
 window.addEventListener("hashchange", openTarget);
-// What is open is printed, at the width of the paper and no higher than a page. A scene in space is
-// not drawn again before the page is printed: what is on the screen is printed smaller.
+// Open sections are printed, at the width of the paper and no higher than a page. A 3-D scene is not
+// drawn again before the page is printed: its picture on the screen is scaled down.
 window.addEventListener("beforeprint", () => {
   for (const plot of document.querySelectorAll(".js-plotly-plot")) {
     if (plot.classList.contains("scene")) {

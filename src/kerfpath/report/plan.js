@@ -1,8 +1,8 @@
-// The figures of a contour share one cursor: the node that is pointed at in one figure is marked in
+// The figures of a contour share one cursor: the node under the pointer in one figure is marked in
 // all of them, and on the part.
 const SCENE = document.querySelector(".figure.scene");
 
-// What a point of a figure stands for: the number of the contour, and the share of its nodes before.
+// The contour number of a point of a figure, and its share of the way through the nodes.
 function pointed(plot, point) {
   if (plot === SCENE) {
     const contour = point.data.meta?.contour;
@@ -70,7 +70,7 @@ document.addEventListener("drawn", ({ target: plot }) => {
   plot.on("plotly_unhover", () => show(null, plot));
 });
 
-// Every contour is opened and drawn before the page is printed, and closed again behind it.
+// Every contour is opened and drawn before the page is printed, and closed again afterwards.
 document.querySelector(".whole")?.addEventListener("click", async ({ target: button }) => {
   const said = button.textContent;
   const closed = [...document.querySelectorAll("details:not([open])")];

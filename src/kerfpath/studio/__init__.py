@@ -1,3 +1,3 @@
-"""The studio: a job seen, decided and watched in a browser; the library does all the work."""
+"""The studio: show, edit and plan a job in a browser, with the functions of the library."""
 
 from kerfpath.studio._serve import serve as serve

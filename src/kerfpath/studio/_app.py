@@ -1,4 +1,4 @@
-"""The web application: one WebSocket, the page's own files, meshes, and files to take along."""
+"""The web application: one WebSocket, the files of the page, meshes, and downloads."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ CLIENT = Path(__file__).parent / "client"
 MODULES = sorted(
     file.relative_to(CLIENT).as_posix()
     for file in CLIENT.rglob("*.js")
-    if file.name != "early.js"  # no module
+    if file.name != "early.js"  # not a module
 )
 """The modules of the page."""
 KINDS = {
@@ -45,20 +45,20 @@ KINDS = {
     ".woff2": "font/woff2",
     ".txt": "text/plain; charset=utf-8",
 }
-"""The kinds of files of the page that are served, by their suffixes."""
+"""Media types of the page's files that are served, by suffix."""
 LONGEST = 12_000_000
-"""Bytes of a message: a job of the largest size, quoted."""
+"""Largest message in bytes: a job of the largest size, quoted as JSON."""
 MOST_LOOKS = 8
-"""Questions of a page that are answered at the same time; further ones wait."""
+"""Number of questions of a page that are answered at the same time; further ones wait."""
 MOST_SAID = 300
-"""Characters of what is said of a message that was not understood."""
+"""Largest number of characters in the error about an invalid message."""
 NO_TEXT = 1003
-"""Code by which a connection is closed that sends anything but text."""
+"""Close code of a connection that sends anything except text."""
 REPORT_POLICY = (
     "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; "
     "style-src 'unsafe-inline'; img-src data: blob:; font-src data:"
 )
-"""A report has its scripts in it: it is shown as a page from nowhere, which reaches nothing."""
+"""Policy of a report, which has inline scripts: a sandbox without origin and network access."""
 
 
 def application(document: Document, *, hosts: Iterable[str], token: str | None = None) -> Starlette:
@@ -69,9 +69,9 @@ def application(document: Document, *, hosts: Iterable[str], token: str | None =
     document : Document
         The job.
     hosts : iterable of str
-        Names, with ports, by which it may be asked for.
+        Allowed values of the Host header, with ports.
     token : str, optional
-        That whoever asks must bring.
+        Token that requests must have.
     """
     worker = _Worker(document)
 
@@ -103,7 +103,7 @@ def application(document: Document, *, hosts: Iterable[str], token: str | None =
 
 
 class _Worker:
-    """The session of a document, once it is imported: that takes a second, and the page loads."""
+    """The session of a document; its import takes a second, in which the page already loads."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
@@ -111,7 +111,7 @@ class _Worker:
         self._lock = asyncio.Lock()
 
     async def session(self) -> Session:
-        """Return it once it is there."""
+        """Return the session once it is imported."""
         async with self._lock:
             if self._session is None:
                 self._session = await asyncio.to_thread(_session_of, self._document)
@@ -135,7 +135,7 @@ async def _session(app: Starlette) -> Session:
 
 async def _index(request: Request) -> Response:
     html = (CLIENT / "index.html").read_text()
-    # All modules at once: each would else be asked for only when one that needs it has come.
+    # Preload all modules: otherwise each is requested only after one that imports it has loaded.
     links = "".join(f'<link rel="modulepreload" href="client/{quote(each)}">\n' for each in MODULES)
     page = html.replace("</head>", f"{links}</head>")
     return HTMLResponse(page, headers={"cache-control": "no-cache"})
@@ -187,7 +187,7 @@ async def _export(request: Request) -> Response:
         except KerfpathError as error:
             return PlainTextResponse(f"{error}\n", status_code=409)
     if name not in ("program", "plan.json", "trajectory.csv"):
-        return PlainTextResponse("there is nothing of this name\n", status_code=404)
+        return PlainTextResponse("there is no export of this name\n", status_code=404)
     try:
         if name == "program":
             from kerfpath.studio._exports import zipped
@@ -239,7 +239,7 @@ async def _socket(socket: WebSocket) -> None:
                 isinstance(ask, OfContour | PointOf | ReasonOf | TextOf)
                 and len(looking) < MOST_LOOKS
             ):
-                # What takes a while and changes nothing does not keep changes waiting.
+                # Slow questions that change nothing do not delay changes.
                 look = asyncio.create_task(session.hear(ask, page))
                 looking.add(look)
                 look.add_done_callback(looking.discard)
@@ -250,7 +250,7 @@ async def _socket(socket: WebSocket) -> None:
         for look in looking:
             look.cancel()
         sending.cancel()
-        # Where the page has gone in the middle of a message, that is all there is to say.
+        # Errors are expected here if the page has gone in the middle of a message.
         with suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
             await sending
 
@@ -261,9 +261,9 @@ async def _send(socket: WebSocket, page: Page) -> None:
 
 
 def _not_understood(error: ValidationError) -> str:
-    """Say in one line what was wrong with a message, nothing of it quoted."""
+    """Return in one line why a message is invalid, without quoting it."""
     first = error.errors(include_url=False, include_input=False)[0]
     if first["type"].startswith("union_tag"):
-        return "a message was not understood: there is none of its type"
+        return "a message was not understood: unknown type"
     where = "".join(f"{part}: " for part in first["loc"])
     return f"a message was not understood: {where}{first['msg']}"[:MOST_SAID]

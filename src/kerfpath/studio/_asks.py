@@ -1,4 +1,4 @@
-"""What a page may say to the server, see README.md beside this file."""
+"""Messages that a page may send to the server; README.md in this folder defines their keys."""
 
 from __future__ import annotations
 
@@ -37,36 +37,36 @@ __all__ = [
 
 _T = TypeVar("_T")
 MOST_KEYS = 6
-"""Parts of the path of a key: no job nests deeper."""
+"""Largest number of parts in the path of a key: no job nests deeper."""
 MOST_EDITS = 50
-"""Keys that change in one step: no table of a job has more."""
+"""Largest number of keys that change in one step: no table of a job has more."""
 MOST_WORDS = 200
-"""Characters of a name that a page sends: no contour is called by more."""
+"""Largest number of characters in a name: no contour has a longer one."""
 MOST_LOOPS = 500
-"""Loops that are added at once."""
+"""Largest number of loops that are added at once."""
 MOST_TEXT = 10_000_000
-"""Characters of a job, as its reader takes them."""
+"""Largest number of characters of a job, the limit of its reader."""
 
 
 FARTHEST = 1e5
-"""mm and deg: no placement is farther off."""
+"""Largest offset of a placement, mm or deg."""
 
 
 def _of_variables(table: dict[str, _T]) -> dict[str, _T]:
     """Return a table whose keys are variables of a layout."""
     if not table.keys() <= set(VARIABLES):
-        raise ValueError(f"expected variables of {', '.join(VARIABLES)}")
+        raise ValueError(f"expected variables out of {', '.join(VARIABLES)}")
     return table
 
 
 def _rising(span: tuple[float, float]) -> tuple[float, float]:
     if not span[0] < span[1]:
-        raise ValueError("expected the lower end of a range first")
+        raise ValueError("expected a range from a smaller to a larger value")
     return span
 
 
 class _Strict(BaseModel):
-    """A table of a message: nothing in it that is not meant, nothing changed in it."""
+    """A table of a message; it refuses unknown keys and cannot be changed."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
@@ -104,14 +104,14 @@ class Edits(_Strict):
 
 
 class Text(_Strict):
-    """Replace the whole job."""
+    """Replace the text of the job."""
 
     type: Literal["text"]
     text: Annotated[str, Field(max_length=MOST_TEXT)]
 
 
 class Plain(_Strict):
-    """What needs no more words: a step back or forward, plan again, stop."""
+    """A request without parameters: undo, redo, plan again, or stop."""
 
     type: Literal["undo", "redo", "plan", "cancel"]
 
@@ -124,14 +124,14 @@ class Save(_Strict):
 
 
 class OfContour(_Strict):
-    """What is asked of one contour."""
+    """A request about one contour."""
 
     type: Literal["focus", "map", "fastest"]
     contour: Words
 
 
 class ReasonOf(_Strict):
-    """Where the robot is at a node and gamma, and why it may not be."""
+    """Ask for the joints at a node and gamma, and the reason if they are lost."""
 
     type: Literal["reason"]
     contour: Words
@@ -141,7 +141,7 @@ class ReasonOf(_Strict):
 
 
 class ShadeOf(_Strict):
-    """What the map of a contour is shaded by; null: nothing, stop looking for it."""
+    """Ask for a quantity over the map of a contour; null stops its computation."""
 
     type: Literal["shade"]
     contour: Words
@@ -149,7 +149,7 @@ class ShadeOf(_Strict):
 
 
 class TechniqueOf(_Strict):
-    """The course of another technique along a contour; null: of none, stop looking for it."""
+    """Ask for the course of another technique along a contour; null stops its computation."""
 
     type: Literal["technique"]
     contour: Words
@@ -165,28 +165,28 @@ class Relax(_Strict):
 
 
 class Cut(_Strict):
-    """Loops of the part become contours of the job."""
+    """Make loops of the part contours of the job."""
 
     type: Literal["cut"]
     loops: Annotated[tuple[Words, ...], Field(min_length=1, max_length=MOST_LOOPS, strict=False)]
 
 
 class Leave(_Strict):
-    """A table of the job's contours is taken out of it."""
+    """Remove a [[contour]] table from the job."""
 
     type: Literal["leave"]
     index: Index
 
 
 class Keep(_Strict):
-    """Keep the job as it is, with its plans, to compare it later."""
+    """Keep the current job with its plans, to compare it later."""
 
     type: Literal["keep"]
     name: Words | None = None
 
 
 class Rename(_Strict):
-    """Call what is kept by another name."""
+    """Rename a kept job."""
 
     type: Literal["rename"]
     id: Index
@@ -194,14 +194,14 @@ class Rename(_Strict):
 
 
 class OfKept(_Strict):
-    """Go back to what is kept, or forget it."""
+    """Restore a kept job, or forget it."""
 
     type: Literal["restore", "forget"]
     id: Index
 
 
 class FrontOf(_Strict):
-    """Look for the Pareto set of a contour."""
+    """Search for the Pareto set of a contour."""
 
     type: Literal["front"]
     contour: Words
@@ -210,7 +210,7 @@ class FrontOf(_Strict):
 
 
 class PointOf(_Strict):
-    """The motion of a point of the Pareto set."""
+    """Ask for the motion of a point of the Pareto set."""
 
     type: Literal["point"]
     contour: Words
@@ -218,7 +218,7 @@ class PointOf(_Strict):
 
 
 class ReachOf(_Strict):
-    """What is in reach where the part, the robot or its head is moved by offsets."""
+    """Ask for the nodes out of reach with the part, the robot or its head moved by offsets."""
 
     type: Literal["reach"]
     offsets: Offsets
@@ -226,7 +226,7 @@ class ReachOf(_Strict):
 
 
 class Place(_Strict):
-    """Have the part, the robot or its head moved by offsets from where a scene has it."""
+    """Move the part, the robot or its head by offsets from their place in a scene."""
 
     type: Literal["place"]
     scene: Index
@@ -234,7 +234,7 @@ class Place(_Strict):
 
 
 class LayoutOf(_Strict):
-    """Look for the best placement."""
+    """Search for the best placement."""
 
     type: Literal["layout"]
     goal: Goal
@@ -244,14 +244,14 @@ class LayoutOf(_Strict):
 
 
 class Take(_Strict):
-    """Make a placement that the search has tried the job's."""
+    """Apply a placement that the search has tried to the job."""
 
     type: Literal["take"]
     number: Index
 
 
 class TextOf(_Strict):
-    """The program as text."""
+    """Ask for the text of the program."""
 
     type: Literal["program"]
     language: Words | None = None
@@ -281,17 +281,17 @@ Ask = (
     | Take
     | TextOf
 )
-"""What a page may say."""
+"""A message of a page."""
 
 _ASK: TypeAdapter[Ask] = TypeAdapter(Annotated[Ask, Field(discriminator="type")])
 
 
 def parse(text: str) -> Ask:
-    """Return what a page says.
+    """Return the message in a JSON text of a page.
 
     Raises
     ------
     pydantic.ValidationError
-        It is not one of the messages.
+        The text is not one of the messages.
     """
     return _ASK.validate_json(text)

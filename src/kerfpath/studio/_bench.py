@@ -1,4 +1,4 @@
-"""What is kept from one plan to the next: drawing, cell, nodes, layered graphs, what was cut."""
+"""Results that are kept from one plan to the next: drawing, cell, nodes, graphs and cuts."""
 
 from __future__ import annotations
 
@@ -27,29 +27,29 @@ from kerfpath.studio._scene import tables_of
 __all__ = ["Bench", "Kept"]
 
 MOST_VERTICES = 1_000_000
-"""Vertices of the graphs that each store keeps beyond those of the last two runs: some 70 MB."""
+"""Vertices of the graphs that each store keeps beyond those of the last two runs (about 70 MB)."""
 _T = TypeVar("_T")
 
 
 class _Used(Generic[_T]):
-    """A thing that is kept, and the round in which it was asked for last."""
+    """A kept object, and the round in which it was last used."""
 
     def __init__(self, thing: _T, last: int) -> None:
         self.thing, self.last = thing, last
 
 
 class Kept(Generic[_T]):
-    """Things by their keys; where they are many, those of early rounds are let go of.
+    """A cache that drops the oldest objects once they are too large together.
 
-    What the round that is on or the one before has asked for is kept in any case: a run asks for
-    the same things one after the other, and would find none of them if the eldest went.
+    Objects used in the current or the previous round are never dropped: a run uses the same
+    objects in the same order, and would find none of them if the oldest were dropped.
 
     Parameters
     ----------
     size : callable
-        Of one of them.
+        Returns the size of an object.
     most : int
-        Of all together, beyond which the eldest go.
+        Total size beyond which the oldest objects are dropped.
     """
 
     def __init__(self, size: Callable[[_T], int], most: int) -> None:
@@ -65,7 +65,7 @@ class Kept(Generic[_T]):
             self._round += 1
 
     def get(self, key: str) -> _T | None:
-        """Return a thing that is kept."""
+        """Return a kept object; None if there is none."""
         with self._lock:
             found = self._things.get(key)
             if found is None:
@@ -75,7 +75,7 @@ class Kept(Generic[_T]):
             return found.thing
 
     def put(self, key: str, thing: _T) -> None:
-        """Keep a thing."""
+        """Keep an object."""
         with self._lock:
             self._things[key] = _Used(thing, self._round)
             self._things.move_to_end(key)
@@ -88,29 +88,29 @@ class Kept(Generic[_T]):
 
 
 class Bench:
-    """What the plans of one job after another are made on."""
+    """The intermediate results that successive plans of a job share."""
 
     def __init__(self) -> None:
         self._part: tuple[str, Part] | None = None
         self._prepared: tuple[str, PreparedJob] | None = None
         self._graphs: Kept[LayeredGraph] = Kept(lambda graph: len(graph.q), MOST_VERTICES)
         self.cuts: Kept[tuple[CutResult, ...]] = Kept(_vertices, MOST_VERTICES)
-        """What came of contours, by `cut_key` and candidate."""
+        """Results of contours, by `cut_key` and candidate."""
         self.proved: Kept[CutResult] = Kept(lambda cut: len(cut.graph.q), MOST_VERTICES)
-        """The same with their bounds."""
+        """Results with their bounds."""
 
     def begin(self) -> None:
-        """Begin a run: what the ones before the last have used may go."""
+        """Begin a run: objects that only runs before the last one used may be dropped."""
         for kept in (self._graphs, self.cuts, self.proved):
             kept.begin()
 
     def prepared(self, job: Job) -> PreparedJob:
-        """Return a job with its drawing and cell read, of which what has not changed is kept.
+        """Return a job with its drawing and cell read; unchanged parts are used again.
 
         Raises
         ------
         InputError
-            As `kerfpath.job.prepare`.
+            As for `kerfpath.job.prepare`.
         """
         setup = setup_key(job)
         if self._prepared is not None and self._prepared[0] == setup:
@@ -123,12 +123,12 @@ class Bench:
         return made
 
     def part(self, job: Job) -> Part:
-        """Return what the drawing of a job holds.
+        """Return the content of a job's drawing.
 
         Raises
         ------
         InputError
-            It cannot be read.
+            The drawing cannot be read.
         """
         key = part_key(job)
         if self._part is None or self._part[0] != key:
@@ -142,7 +142,7 @@ class Bench:
         solved: Callable[[int], None] | None = None,
         external: Array | None = None,
     ) -> LayeredGraph:
-        """Return the layered graph of a job's nodes, external axes as in `Job.graph`."""
+        """Return the layered graph of a job's nodes; `external` is as in `Job.graph`."""
         key = graph_key(job, nodes, external)
         found = self._graphs.get(key)
         if found is None:
@@ -151,7 +151,7 @@ class Bench:
         return found
 
     def whole(self, job: Job, cuts: Sequence[CutResult]) -> tuple[Contour, LayeredGraph]:
-        """Return the nodes and the graph of a contour, of which cuts are pieces or which is one."""
+        """Return the nodes and the graph of a contour from its cut, or the cuts of its pieces."""
         one = cuts[0]
         if len(cuts) == 1:
             return one.candidate.nodes, one.graph
@@ -163,7 +163,7 @@ class Bench:
 
 
 def _pinned(request: CutRequest, job: Job, table: ContourTable) -> CutRequest:
-    """Return what is asked for a contour by a job of which options and windows are others."""
+    """Return the request of a contour with the options and windows of gamma of another job."""
     own = request.task.table.model_copy(update={"gamma_windows": table.gamma_windows})
     task = replace(request.task, table=own)
     return replace(request, task=task, options=task.asked(job.options))

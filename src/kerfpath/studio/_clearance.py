@@ -1,4 +1,4 @@
-"""How near the robot comes to what stands in its cell, along each plan: after it is found."""
+"""The distances of bodies in the cell along each plan, computed once it is found."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from kerfpath.studio._work import Stop
 __all__ = ["clearance_message"]
 
 AT_ONCE = 32
-"""Nodes that are measured between two looks at whether that is still wanted."""
+"""Number of nodes that are measured between two checks for a stop."""
 
 
 def clearance_message(
     cell: Cell, cut: CutResult, revision: int, stop: Stop
 ) -> ClearanceMessage | None:
-    """Return the nearest pair of bodies at each node of a cut that is planned, and its distance.
+    """Return the nearest pair of bodies at each node of a planned cut, and its distance.
 
-    Of all pairs that keep the near-miss distance of the cell. Those with one of their own, as the
-    nozzle and the part or neighbours in the arm, are always near: the plan keeps it, and nothing
-    could be told by them. None where there is no other pair.
+    Only pairs with the near-miss distance of the cell count. Pairs with a distance of their own,
+    such as the nozzle and the part or neighbours in the arm, are left out: they are always near,
+    and the plan keeps their distance. Return None if there is no other pair.
 
     Raises
     ------
     Superseded
-        Meanwhile something else was asked for.
+        Something else has been requested meanwhile.
     """
     assert cut.plan is not None
     q, general = cut.plan.unwrapped, ~cell.own

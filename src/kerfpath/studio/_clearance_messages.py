@@ -1,4 +1,4 @@
-"""What the server says of distances in the cell, see README.md beside this file."""
+"""Messages about distances in the cell; README.md in this folder defines their keys."""
 
 from __future__ import annotations
 

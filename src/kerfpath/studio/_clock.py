@@ -1,4 +1,4 @@
-"""The clock of a program: what the robot does when, from its first target to its last."""
+"""The clock of a program: its segments with their times, from the first target to the last."""
 
 from __future__ import annotations
 
@@ -23,40 +23,40 @@ __all__ = ["cycle_of", "program_message"]
 
 Kind = Literal["move", "approach", "pierce", "retract"]
 Timed = JointMove | LinearMove | Wait
-"""Steps that the timetable has."""
+"""Steps that have a time in the timetable."""
 RAMP = 9
-"""Points by which gaining speed is drawn."""
+"""Number of points that show the acceleration of a joint move."""
 STRAIGHT = 9
-"""Points by which a straight move along the tool axis is drawn: joints go all but evenly there."""
+"""Number of points that show a straight move along the tool axis; joint speeds hardly vary."""
 UNPLANNED = (
-    "The job has no [sequence]: between the contours the robot moves straight from joints to "
-    "joints, and nothing has looked whether that is clear."
+    "The job has no [sequence]: the transfer moves are straight joint motions, which have not been "
+    "checked for collisions."
 )
-NO_CELL = "The job has no [cell]: nothing has looked whether the moves between contours are clear."
+NO_CELL = "The job has no [cell]: the transfer moves have not been checked for collisions."
 
 
 class _Whose(TypedDict):
-    """Whose stretch of a program it is."""
+    """The contour that a stretch of a program belongs to."""
 
     contour: str
 
 
 def program_message(result: JobResult, revision: int) -> ProgramMessage:
-    """Return what the program of a result does, in its order, or why there is none.
+    """Return the segments of a result's program in its order, or the reason why there is none.
 
-    Times are those that the languages write which say any: of cuts as planned, of joint moves the
-    least that limits and air_speed leave them.
+    Times are those that programs contain, in languages with times: cuts take the planned time,
+    joint moves the least time that the limits and air_speed allow.
 
     Parameters
     ----------
     result : JobResult
     revision : int
-        Of the job that it is of.
+        Revision of the job.
     """
     missing = [cut.contour for cut in result.cuts if cut.plan is None]
     why = ""
     if missing:
-        why = f"There is no program: {', '.join(missing)} has no plan."
+        why = f"There is no program: no plan for {', '.join(missing)}."
     elif result.stuck is not None:
         why = f"There is no program: {result.stuck}."
     if not why:
@@ -68,7 +68,7 @@ def program_message(result: JobResult, revision: int) -> ProgramMessage:
 
 
 def cycle_of(message: ProgramMessage) -> Cycle | None:
-    """Return where the time of a program goes; None where there is none."""
+    """Return the shares of a program's time; None without a program."""
     if not message.segments:
         return None
     spent = {"cut": 0.0, "pierce": 0.0}
@@ -81,7 +81,7 @@ def cycle_of(message: ProgramMessage) -> Cycle | None:
 
 
 def _clock(result: JobResult, revision: int) -> ProgramMessage:
-    # Arcs lead by the same places in the same times: the nodes of the plans are shown.
+    # Arcs pass the same points at the same times: show the nodes of the plans instead.
     options = replace(result.job.program, arc_tolerance=None)
     program = options.program(result.plans, result.moves)
     segments = list(_segments(program, [cut for cut in result.cuts if cut.plan is not None]))
@@ -100,7 +100,7 @@ def _clock(result: JobResult, revision: int) -> ProgramMessage:
 
 
 def _segments(program: Program, cuts: Sequence[CutResult]) -> Iterator[Segment]:
-    """Yield the stretches of a program, a section of which is of each cut."""
+    """Yield the segments of a program, which has one section for each cut."""
     robot, clock = program.robot, iter(timetable(program))
     here, begin = program.moves[0].q, 0.0
     for section, cut in zip(program.sections, cuts, strict=True):
@@ -109,7 +109,7 @@ def _segments(program: Program, cuts: Sequence[CutResult]) -> Iterator[Segment]:
         whose: _Whose = {"contour": cut.contour}
         straight = [step for step in section.steps if isinstance(step, LinearMove)]
         into, out = straight[0], straight[-1]
-        # The moves of the path, which its plan has with all of their nodes, are one stretch.
+        # All moves of the path form one segment; its plan has all of the nodes.
         for step, end in islice(clock, sum(isinstance(s, Timed) for s in section.steps)):
             if isinstance(step, Wait):
                 rest = _stretch("pierce", begin, end, [0.0, end - begin], [here, here])
@@ -129,7 +129,7 @@ def _segments(program: Program, cuts: Sequence[CutResult]) -> Iterator[Segment]:
             else:
                 here = step.q
                 if step is not straight[-2]:
-                    continue  # the clock goes on to the end of the path
+                    continue  # the segment ends at the end of the path
                 yield Segment(kind="cut", begin=begin, end=end, plan=made.name, **whose)
             begin = end
 
@@ -139,13 +139,13 @@ def _stretch(kind: Kind, begin: float, end: float, time: ArrayLike, q: ArrayLike
 
 
 def _from_stop_to_stop(robot: Robot, one: Array, two: Array, took: float) -> tuple[Array, Array]:
-    """Return times (m,) and joints (m, n) of a joint move that gains speed, holds and loses it.
+    """Return times (m,) s and joints (m, n) of a joint move: accelerate, hold speed, decelerate.
 
-    The slowest joint gains it at its full acceleration, and the others go with it.
+    The slowest joint accelerates at its limit, and the others follow in proportion.
     """
     way = np.abs(two - one)
     gain = float((way / robot.speed_limits()[1]).max())
-    # Without gaining and losing speed it would take this long; half, where that is all it does.
+    # Duration at the held speed alone; half of `took` if the move only accelerates and brakes.
     even = (took + np.sqrt(max(took**2 - 4 * gain, 0.0))) / 2
     gaining = min(gain / even, took / 2)
     ramp = np.linspace(0.0, gaining, RAMP)
@@ -157,9 +157,9 @@ def _from_stop_to_stop(robot: Robot, one: Array, two: Array, took: float) -> tup
 
 
 def _straight(made: Plan, one: Array, two: Array, end: int) -> Array:
-    """Return joints (m, n) along the tool axis between two joint vectors, at an end of a plan."""
+    """Return joints (m, n) of a straight tip motion between two joint vectors, at a plan's end."""
     guess = one + np.linspace(0.0, 1.0, STRAIGHT)[:, None] * (two - one)
-    arm, n = made.robot.alone(), made.robot.family.joints  # external axes stand still
+    arm, n = made.robot.alone(), made.robot.family.joints  # external axes are at rest
     T = arm.forward(np.array([one, two])[:, :n])
     poses = np.repeat(T[:1], STRAIGHT, axis=0)
     poses[:, :3, 3] = np.linspace(T[0, :3, 3], T[1, :3, 3], STRAIGHT)

@@ -1,4 +1,4 @@
-"""What the server says for one to decide by, see README.md beside this file."""
+"""Messages about kept plans and Pareto sets; README.md in this folder defines their keys."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = [
 
 
 class KeptEntry(Message):
-    """A job that is kept to be compared."""
+    """A job that is kept for comparison."""
 
     id: int
     name: str
@@ -31,7 +31,7 @@ class KeptEntry(Message):
 
 
 class KeptMessage(Message):
-    """The jobs that are kept to be compared."""
+    """The jobs that are kept for comparison."""
 
     type: Literal["kept"] = "kept"
     plans: list[KeptEntry]
@@ -47,7 +47,7 @@ class AxisEntry(Message):
 
 
 class PointEntry(Message):
-    """A run of the planner, in the criteria; and what makes its plan the job's."""
+    """The criteria of a run of the planner, and the edits that make its plan the job's."""
 
     number: int
     values: list[float]
@@ -56,7 +56,7 @@ class PointEntry(Message):
 
 
 class FrontMessage(Message):
-    """The Pareto set of a contour, as far as it is found."""
+    """The points of a contour's Pareto set that have been found so far."""
 
     type: Literal["front"] = "front"
     revision: int
@@ -69,7 +69,7 @@ class FrontMessage(Message):
 
 
 class CandidateMessage(Message):
-    """The motion of a point of the Pareto set, which is not the job's."""
+    """The motion of a point of the Pareto set; it is not the plan of the job."""
 
     type: Literal["candidate"] = "candidate"
     contour: str

@@ -1,4 +1,4 @@
-"""The job as text: edited key by key with its comments kept, undone, redone, saved."""
+"""The text of the job: key-by-key edits that keep its comments, undo, redo and save."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from kerfpath.errors import InputError
 __all__ = ["Change", "Document", "Key", "with_values"]
 
 Key = tuple[str | int, ...]
-"""Where a value stands: names of tables and keys, and numbers of tables and elements."""
+"""The path to a value: names of tables and keys, and indices of tables and elements."""
 Change = tuple[Key, object]
 """A key and its new value; None removes it."""
 
 MOST_STEPS = 300
-"""Steps that can be undone."""
+"""Number of steps that can be undone."""
 DIGITS = 12
-"""Significant digits of a number that is written: sliders say 0.30000000000000004."""
+"""Significant digits of a written number: sliders send values like 0.30000000000000004."""
 
 
 class Document:
-    """The text of a job, with the texts before and after it, beside the file that it is of.
+    """The text of a job file with its undo history.
 
-    Every change is kept in a file beside the job at once, and found again there.
+    Every change is immediately written to a file beside the job, and restored from there.
 
     Parameters
     ----------
     path : Path
-        The job.
+        Path of the job file.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Document:
 
     @property
     def file(self) -> Path:
-        """The file that has this text: the job, or what is kept beside it."""
+        """The file that has this text: the job file, or the file beside it."""
         return self.path if self.saved else self.beside
 
     @property
@@ -79,12 +79,12 @@ class Document:
         return bool(self._after)
 
     def change(self, changes: Sequence[Change], gesture: str | None = None) -> None:
-        """Make changes, one step of undo; those of one key by one gesture are one step together.
+        """Make changes as one step of undo; changes of one key in one gesture share a step.
 
         Raises
         ------
         InputError
-            A key that cannot be there, a text that is no TOML, a folder that cannot be written to.
+            A key is not possible, the text is not valid TOML, or the folder is not writable.
         """
         same = None if gesture is None else (gesture, changes[0][0])
         made = with_values(self.text, changes)
@@ -92,12 +92,12 @@ class Document:
         self._gesture = same
 
     def replace(self, text: str) -> None:
-        """Take another text.
+        """Replace the text, as one step of undo.
 
         Raises
         ------
         InputError
-            A folder that cannot be written to.
+            The folder is not writable.
         """
         self._step_to(text)
 
@@ -110,18 +110,18 @@ class Document:
         self._shift(self._after, self._before)
 
     def save(self, *, over: bool = False) -> None:
-        """Write the job.
+        """Write the job file.
 
         Raises
         ------
         InputError
-            It has been changed by something else since it was read, and it is not to be written
-            `over`; it cannot be written.
+            The file has been changed since it was read and `over` is False, or it cannot be
+            written.
         """
         if not over and self.path.exists() and _read(self.path) != self._on_disk:
             raise InputError(
-                f"{self.path}: has been changed since it was read; save over it, or take a copy "
-                "and open the job again"
+                f"{self.path}: the file has been changed since it was read; save over it, or take "
+                "a copy and open the job again"
             )
         _write(self.path, self.text)
         self._on_disk = self.text
@@ -147,7 +147,7 @@ class Document:
         self._keep()
 
     def _keep(self) -> None:
-        """Have the text beside the job where the job has another one, and nothing where not."""
+        """Write the text beside the job file; remove that copy once the job is saved."""
         if not self.saved:
             _write(self.beside, self.text)
             return
@@ -156,23 +156,24 @@ class Document:
 
 
 def with_values(text: str, changes: Sequence[Change]) -> str:
-    """Return a TOML text with values changed, its comments and its other lines as they were.
+    """Return a TOML text with values changed; comments and all other lines stay unchanged.
 
     Parameters
     ----------
     text : str
     changes : sequence of (key, value)
-        None removes a key; tables on the way to one that are not there are made.
+        The value None removes a key. Missing tables on the path to a key are added.
 
     Raises
     ------
     InputError
-        A text that is no TOML, a key that leads through a value or to a table that is not there.
+        The text is not valid TOML, or a key leads through a value or to a table that does not
+        exist.
     """
     try:
         tables = tomlkit.parse(text)
     except TOMLKitError as error:
-        raise InputError(f"job: not valid TOML: {error}; correct the text, or undo") from None
+        raise InputError(f"job: not valid TOML: {error}; correct the text or undo") from None
     for key, value in changes:
         try:
             _set(tables, key, value)
@@ -200,7 +201,7 @@ def _set(tables: Any, key: Key, value: object) -> None:
 
 
 def _short(value: object) -> Any:
-    """Return a value as it is written: numbers to as many digits as they are meant with."""
+    """Return a value with its numbers rounded to `DIGITS` significant digits."""
     if isinstance(value, float):
         return float(f"{value:.{DIGITS}g}")
     if isinstance(value, list):
@@ -230,6 +231,6 @@ def _write(path: Path, text: str) -> None:
         write_whole({path: text.encode()})
     except OSError as error:
         raise InputError(
-            f"{path}: cannot be written ({error.strerror}); changes are kept beside the job: open "
-            "one in a folder that can be written to"
+            f"{path}: cannot be written ({error.strerror}); the studio keeps changes beside the "
+            "job file: open a job in a writable folder"
         ) from None

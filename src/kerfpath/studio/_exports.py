@@ -1,4 +1,4 @@
-"""What can be taken along: the job, the program in a language, plan, trajectory and report."""
+"""Exports: the job, the program in a language, plan, trajectory and report."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ from kerfpath.studio._numbers import flat
 __all__ = ["WAIT", "exports_of", "in_language", "program_text", "zipped"]
 
 
-WAIT = "what is proved of the plans is still to come"
+WAIT = "the bounds of the plans are still being computed"
 
 
 def exports_of(result: JobResult, *, settled: bool) -> list[Export]:
-    """Return what can be taken along of a result, and why the rest cannot.
+    """Return the exports of a result, with the reason why one is not available.
 
     Parameters
     ----------
     result : JobResult
     settled : bool
-        Whether nothing more is to be proved of its plans.
+        False while bounds of its plans are still to be computed.
     """
     program = ""
     if not result.passed:
-        program = "a contour has no plan that passes its audit, or no way leads to the next one"
+        program = "a contour has no plan that passes its audit, or a transfer move is missing"
     elif result.job.program.language == "none":
-        program = 'the job asks for none: language = "none" in [program]; ask for one by name'
+        program = 'the job has language = "none" in [program]; set a language there'
     files = "" if settled else WAIT
     script = script_refusal(result.job, [cut.request for cut in result.cuts])
     return [
@@ -57,12 +57,12 @@ def exports_of(result: JobResult, *, settled: bool) -> list[Export]:
 
 
 def in_language(result: JobResult, language: str | None) -> JobResult:
-    """Return a result whose job asks for a program in another language; None: in its own.
+    """Return the result with another language for its program; None keeps the job's own.
 
     Raises
     ------
     InputError
-        An unknown language, settings that do not fit it.
+        The language is unknown, or the settings of [program] do not fit it.
     """
     if language is None:
         return result
@@ -76,7 +76,7 @@ def in_language(result: JobResult, language: str | None) -> JobResult:
     except ValidationError as error:
         said = error.errors(include_url=False)[0]["msg"]
         raise InputError(f"program in {language}: {said}; correct [program]") from None
-    # The name is the job's, whatever the copy of it is called that was read.
+    # Keep the name of the job: the file that was read may be a copy with another name.
     job = result.job
     options = program_options(asked, job.program.name, job.tolerances)
     options = replace(options, language=language)
@@ -84,10 +84,10 @@ def in_language(result: JobResult, language: str | None) -> JobResult:
 
 
 def program_text(result: JobResult, texts: FileTexts, revision: int) -> ProgramTextMessage:
-    """Return the program of a result as its files say it, and what each line does when."""
+    """Return the program files of a result, with the time of each line."""
     faults = list(texts.faults)
     if not texts.program and not faults:
-        faults = ["there is no program: a contour has no plan that passes its audit"]
+        faults = ["no program: a contour has no plan that passes its audit"]
     places = program_places(result, {name: texts.files[name] for name in texts.program})
     said = {str(issue) for issue, _ in places.findings}
     return ProgramTextMessage(
@@ -122,12 +122,12 @@ def _finding(issue: ProgramIssue, line: Line | None) -> FindingEntry:
 
 
 def zipped(name: str, texts: FileTexts) -> File:
-    """Return the program as one file: as it is, or several in an archive.
+    """Return the program as one file, or as an archive if it has several files.
 
     Raises
     ------
     InputError
-        There is none.
+        There is no program.
     """
     if not texts.program:
         why = "; ".join(texts.faults) or "a contour has no plan that passes its audit"
@@ -138,6 +138,6 @@ def zipped(name: str, texts: FileTexts) -> File:
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for each in texts.program:
-            # The same program is the same archive: it has no time of its own.
+            # ZipInfo has a fixed time, so that the same program gives the same archive.
             archive.writestr(zipfile.ZipInfo(each), texts.files[each])
     return File(f"{name}.zip", "application/zip", packed.getvalue())

@@ -15,12 +15,22 @@ __all__ = ["fastest_message"]
 def fastest_message(
     prepared: PreparedJob, contour: str, index: int, revision: int
 ) -> FastestMessage:
-    """Return how fast a contour can be cut at a constant speed, and what binds.
+    """Return the fastest constant speed of a contour, and the limit that binds.
+
+    Parameters
+    ----------
+    prepared : PreparedJob
+    contour : str
+        Name of the contour.
+    index : int
+        Index of its [[contour]] table in the job.
+    revision : int
+        Revision of the job.
 
     Raises
     ------
     NoFeasiblePath
-        At no speed.
+        The contour cannot be cut at any speed.
     """
     job = prepared.job
     request = next(each for each in prepared.contours if each.task.name == contour)
@@ -30,7 +40,7 @@ def fastest_message(
         own = replace(job, options=request.options)
         found = fastest_along(own, nodes, prepared.cell, refine=leaves)
     except NoFeasiblePath as broken:
-        raise broken.with_message(f"{contour}: no speed: {broken}") from None
+        raise broken.with_message(f"{contour}: no speed is feasible: {broken}") from None
     speed = float(at_most(found.speed * 60))
     place = " ".join(f"{mm:.1f}" for mm in (nodes.points[found.node] * 1e3).tolist())
     return FastestMessage(

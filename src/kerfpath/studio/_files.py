@@ -1,4 +1,4 @@
-"""Files that a page takes along."""
+"""Files for download."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["File"]
 
 
 class File(NamedTuple):
-    """A file to take along: its name, what it is, and its content."""
+    """A file for download: its name, media type and content."""
 
     name: str
     kind: str

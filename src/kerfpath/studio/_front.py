@@ -1,4 +1,4 @@
-"""The Pareto set of a contour: runs as they come, and what makes the plan of one the job's."""
+"""The Pareto set of a contour: its runs, and the edits that make the plan of one the job's."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from kerfpath.study import problem_of_job
 __all__ = ["Fronts"]
 
 SHOWN_EVERY = 0.25
-"""s: how often a page hears of new points."""
+"""Least time between two messages about new points, s."""
 Say = Callable[[Message], None]
 State = Literal["running", "done", "stopped"]
 
 
 class _Point(NamedTuple):
-    """A run that has a plan, and the losses of it."""
+    """A run that has a plan, with its losses."""
 
     number: int
     run: Subproblem
@@ -58,14 +58,14 @@ class _Study(NamedTuple):
 
 
 class Fronts:
-    """Looks for the Pareto set of a contour, the newest that is asked for.
+    """Searches for the Pareto set of the contour that was requested last.
 
     Parameters
     ----------
     say : callable
         Takes messages, from any thread.
     failed : callable
-        Takes what went wrong, in a thread.
+        Takes the exception of a failed search; called in its thread.
     """
 
     def __init__(self, say: Say, failed: Callable[[BaseException], None]) -> None:
@@ -76,15 +76,15 @@ class Fronts:
     def look(
         self, prepared: PreparedJob, cut: CutResult, names: Sequence[str], runs: int, revision: int
     ) -> None:
-        """Begin to look for the set of a contour, in place of whatever was looked for."""
+        """Start the search for the set of a contour; it replaces a running search."""
         self._work.ask(partial(self._look, prepared, cut, names, runs, revision))
 
     def cancel(self) -> None:
-        """Stop; the points that are there stay."""
+        """Stop the search; the points that were found stay."""
         self._work.cancel()
 
     def close(self) -> None:
-        """Stop for good."""
+        """Stop the search, and end the thread."""
         self._work.close()
 
     def candidate(self, contour: str, number: int, graph: str) -> CandidateMessage:
@@ -98,7 +98,7 @@ class Fronts:
         study = self._study
         point = None if study is None else study.points.get(number)
         if study is None or point is None or study.cut.contour != contour:
-            raise InputError("point: there is no such point any more; look for the set again")
+            raise InputError("point: there is no such point any more; search for the set again")
         said = plan_message(
             replace(study.cut, plan=point.plan),
             point.plan,
@@ -120,7 +120,7 @@ class Fronts:
         revision: int,
         stop: Stop,
     ) -> None:
-        """Do the runs one after the other; each point is said as it comes."""
+        """Do the runs one after the other; send each point when it is found."""
         problem = problem_of_job(prepared.job, prepared.part, cut.contour, names, prepared.cell)
         study = _Study(revision, prepared, cut, problem.criteria, {}, runs)
         self._study, seldom = study, Seldom(SHOWN_EVERY)
@@ -149,7 +149,7 @@ class Fronts:
 
 
 def _message(study: _Study, done: int, state: State) -> FrontMessage:
-    """Return the points that are there."""
+    """Return the message about the points found so far."""
     points = list(study.points.values())
     best = np.zeros(0, dtype=bool)
     if points:
@@ -183,9 +183,9 @@ def _message(study: _Study, done: int, state: State) -> FrontMessage:
 
 
 def _edits(run: Subproblem, job: Job) -> list[EditEntry] | None:
-    """Return what makes the plan of a run the job's; None where a job cannot say it.
+    """Return the edits that make the plan of a run the job's; None if the job has no keys for them.
 
-    A job has no windows of joints, and no clearance that holds for one contour alone.
+    A job has no keys for windows of joints, or for a clearance of a single contour.
     """
     if run.windowed(job.robot.endless) or run.clearance:
         return None

@@ -1,4 +1,4 @@
-"""Who may talk to the server: from which host, from which page, and with which token."""
+"""Access to the server: allowed hosts, allowed origins, and the token."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PAGE = Path(__file__).parent / "client" / "index.html"
 
 
 def _import_map(page: bytes) -> str:
-    """Return the hash of the import map of a page, its one script that is in line."""
+    """Return the hash of a page's import map, its only inline script."""
     (text,) = re.findall(rb'<script type="importmap">(.*?)</script>', page, re.DOTALL)
     return f"'sha256-{b64encode(sha256(text).digest()).decode()}'"
 
@@ -33,7 +33,7 @@ POLICY = (
     "font-src 'self'; connect-src 'self'; media-src blob:; worker-src 'self'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'"
 )
-"""What a page may load: what this server serves, nothing else inline and nothing evaluated."""
+"""What a page may load: only files of this server, no other inline code, and no eval."""
 HEADERS = {
     "content-security-policy": POLICY,
     "x-content-type-options": "nosniff",
@@ -43,27 +43,28 @@ HEADERS = {
     "cross-origin-resource-policy": "same-origin",
 }
 REFUSED = 4403
-"""Code by which a WebSocket is closed that is refused."""
+"""Close code of a refused WebSocket."""
 
 
 class Guard:
     """Refuses requests for another host, from other sites, and without the token.
 
-    A page of another site cannot read what is served here, but a browser would send its requests
-    all the same, and open a WebSocket for it.
+    A page of another site cannot read the answers of this server, but a browser would still send
+    its requests and open a WebSocket for it.
 
     Parameters
     ----------
     app : ASGI application
     hosts : iterable of str
-        Names, with ports, by which the server is asked for.
+        Allowed values of the Host header, with ports.
     token : str or None
-        A request must bring it: in its query, once, or in a cookie. None: none is needed.
+        Token that the first request has in its query, and later ones in a cookie; None if no token
+        is required.
     """
 
     def __init__(self, app: ASGIApp, *, hosts: Iterable[str], token: str | None) -> None:
         self._app, self._hosts, self._token = app, frozenset(hosts), token
-        # Cookies know no ports: each server has one of its own.
+        # Cookies do not distinguish ports: each server needs a name of its own.
         own = "" if token is None else hashlib.sha256(token.encode()).hexdigest()[:8]
         self._cookie = f"kerfpath-studio-{own}"
 
@@ -79,7 +80,7 @@ class Guard:
         if not self._knows_token(headers):
             asked = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
             if scope["type"] == "http" and scope["path"] == "/" and self._is_token(asked):
-                # From now on the browser knows it, and the address does not show it any more.
+                # The cookie now holds the token, so that the address no longer shows it.
                 answer = RedirectResponse("/", status_code=303, headers=HEADERS)
                 answer.set_cookie(self._cookie, asked, httponly=True, samesite="strict")
                 await answer(scope, receive, send)
@@ -98,10 +99,10 @@ class Guard:
         await self._app(scope, receive, send_with_headers)
 
     def _refusal(self, headers: Headers) -> str:
-        """Return why a request is refused by its headers; "" where it is not."""
+        """Return the reason to refuse a request by its headers, or ""."""
         host = headers.get("host", "")
         if host not in self._hosts:
-            return f"this server is not {host!r:.60}"
+            return f"{host!r:.60} is not a name of this server"
         origin = headers.get("origin")
         if origin is not None and origin != f"http://{host}":
             return f"requests from {origin!r:.60} are not answered"
@@ -123,7 +124,7 @@ class Guard:
 
     async def _refuse(self, scope: Scope, receive: Receive, send: Send, why: str) -> None:
         if scope["type"] == "websocket":
-            await receive()  # it asks to be connected
+            await receive()  # the connection request
             await send({"type": "websocket.close", "code": REFUSED, "reason": why})
             return
         answer = PlainTextResponse(f"kerfpath: {why}\n", status_code=403, headers=HEADERS)

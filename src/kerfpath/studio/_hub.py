@@ -1,4 +1,4 @@
-"""The pages that are open: each gets what is said, the newest of its kind at once."""
+"""The open pages, and the newest message of each kind for them."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from kerfpath.studio._numbers import Message
 __all__ = ["Hub", "Page"]
 
 LAST = ("job", "part", "scene", "program", "outcome", "progress", "kept", "front", "layout")
-"""Kinds of messages of which a new page gets the last one; of plans the last of each contour."""
+"""Kinds of messages whose last one a new page gets; it also gets the last plans per contour."""
 
 
 class Page:
-    """One open page: what it has yet to be sent, of each kind no more than the newest.
+    """One open page with the messages that wait for it, only the newest of each kind.
 
-    A page that is asleep costs no more memory than one picture of it all.
+    A page that does not read holds no more memory than one full set of messages.
     """
 
     def __init__(self) -> None:
@@ -24,13 +24,13 @@ class Page:
         self._there = asyncio.Event()
 
     def put(self, key: object, text: str) -> None:
-        """Have a message sent, in place of one by the same key."""
+        """Queue a message; it replaces a waiting one with the same key."""
         self._waiting[key] = text
         self._waiting.move_to_end(key)
         self._there.set()
 
     def say(self, message: Message) -> None:
-        """Send an answer, in place of one of its kind about the same that has not been sent yet."""
+        """Queue an answer; it replaces a waiting one of the same kind about the same contour."""
         about = [getattr(message, name, None) for name in ("type", "contour", "about")]
         self.put(tuple(about), message.model_dump_json())
 
@@ -44,7 +44,7 @@ class Page:
 
 
 class Hub:
-    """All open pages, and what the next one gets at first."""
+    """All open pages, and the messages that a new page gets first."""
 
     def __init__(self) -> None:
         self._pages: set[Page] = set()
@@ -55,7 +55,7 @@ class Hub:
         return len(self._pages)
 
     def open(self) -> Page:
-        """Return a new page, which gets all that there is."""
+        """Return a new page; the last message of each kind is queued for it."""
         page = Page()
         for kind in LAST:
             if kind in self._last:
@@ -71,7 +71,7 @@ class Hub:
         self._pages.discard(page)
 
     def say(self, message: Message) -> None:
-        """Send to every page, and the ones to come."""
+        """Send a message to every page, and keep it for pages that open later."""
         kind, text = str(getattr(message, "type", "")), message.model_dump_json()
         contour = getattr(message, "contour", None)
         key: object = kind
@@ -87,12 +87,12 @@ class Hub:
             page.put(key, text)
 
     def keep_only(self, contours: list[str]) -> None:
-        """Forget what was said of contours that there are no more."""
+        """Forget the messages about contours that the job no longer has."""
         for gone in self._of_contour.keys() - set(contours):
             del self._of_contour[gone]
 
     def _keep(self, contour: str, kind: str, message: Message, text: str) -> object:
-        """Keep what is said of a contour: its plan or those of its pieces, or why it has none."""
+        """Keep a contour's plan, the plans of its pieces, or the reason why it has none."""
         name = kind if kind == "nopath" else f"plan {getattr(message, 'name', '')}"
         said = self._of_contour.setdefault(contour, OrderedDict())
         alone = kind == "nopath" or getattr(message, "pieces", 1) == 1 or "nopath" in said

@@ -1,4 +1,4 @@
-"""The job as a message: its text, its values with defaults, what they may be, what is wrong."""
+"""The message about the job: its text, values with defaults, allowed words, and errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from kerfpath.studio._numbers import flat
 __all__ = ["faults_of", "job_message"]
 
 _PLACE = re.compile(r"^.*?\.toml:(?:(\d+):)? ?(?:([a-z_][\w.]*): )?(.*)$", re.DOTALL)
-"""File, line, key and words of a message about a job."""
+"""File, line, key and text of an error message about a job."""
 _TABLE = re.compile(r"^[ \t]*\[\[[ \t]*contour[ \t]*\]\]")
 
 
@@ -33,18 +33,18 @@ def job_message(
     *,
     interval: float,
 ) -> JobMessage:
-    """Return the job as it is.
+    """Return the message about the current job.
 
     Parameters
     ----------
     document : Document
     job : Job or None
-        What its text says; None where that is not valid.
+        The job that the text describes; None if the text is not valid.
     contours : list of ContourName
-        Those that are cut.
+        The contours that are cut.
     faults : list of Fault
     interval : float s
-        From node to node of the first of them: what weights by default are of.
+        Interval of the nodes of the first contour; the default weights depend on it.
     """
     weights = None
     if job is not None:
@@ -66,7 +66,7 @@ def job_message(
 
 
 def faults_of(error: InputError, text: str) -> list[Fault]:
-    """Return what is wrong with a job, each with its key where the message has one."""
+    """Return the errors of a job, each with the key that its message names, if any."""
     lines = text.splitlines()
     return [_fault(said, lines) for said in (str(error), *error.others)]
 
@@ -89,7 +89,7 @@ def _values(job: Job) -> dict[str, object]:
 
 
 def _given(value: object, way: str = "") -> Iterator[str]:
-    """Yield the dotted keys of a job, tables before what is in them."""
+    """Yield the dotted keys of a job, each table before its entries."""
     if way:
         yield way
     entries = list[tuple[object, object]]()
@@ -103,7 +103,7 @@ def _given(value: object, way: str = "") -> Iterator[str]:
 
 @cache
 def _choices() -> dict[str, list[str]]:
-    """Return the words that each key takes which takes some of a few."""
+    """Return the allowed words of each key that takes one of a fixed list."""
     found: dict[str, list[str]] = {}
     _gather(JobFile, (), found)
     found["pareto.criteria"] = list(CRITERIA)
@@ -121,7 +121,7 @@ def _gather(table: type[BaseModel], way: tuple[str, ...], found: dict[str, list[
 
 
 def _words(annotation: Any) -> tuple[list[str], list[type[BaseModel]]]:
-    """Return the words that a type admits, and the tables in it."""
+    """Return the words that a type allows, and the tables in it."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [], [annotation]
     words, tables = list[str](), list[type[BaseModel]]()
@@ -136,6 +136,6 @@ def _words(annotation: Any) -> tuple[list[str], list[type[BaseModel]]]:
 
 
 def _postures(robot: Robot) -> list[str]:
-    """Return the words by which postures may be asked for, the widest first."""
+    """Return the names by which postures may be requested, the least specific first."""
     names = [name.split("/") for name in robot.family.postures]
     return list(dict.fromkeys("/".join(name[:n]) for n in (1, 2, 3) for name in names))

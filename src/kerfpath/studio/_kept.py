@@ -1,4 +1,4 @@
-"""Jobs that are kept to be compared: their texts, and the motions that were found for them."""
+"""Jobs that are kept for comparison: their texts, and the motions that were found for them."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from kerfpath.studio._numbers import Message
 __all__ = ["Kept"]
 
 MOST_KEPT = 8
-"""Jobs that are kept at a time: more could not be distinguished, and each has its motions."""
+"""Largest number of kept jobs: more could not be distinguished, and each holds its motions."""
 
 Plans = dict[str, dict[str, PlanMessage]]
-"""Plans by their contours and by their names."""
+"""Plans by contour, then by the name of the plan."""
 
 
 class _Copy(NamedTuple):
@@ -34,7 +34,7 @@ class _Copy(NamedTuple):
 
 
 class Kept:
-    """The jobs that are kept, and what is known of the one that is worked on."""
+    """The kept jobs, and the newest plans and outcome of the current one."""
 
     def __init__(self) -> None:
         self._now: Plans = {}
@@ -43,7 +43,7 @@ class Kept:
         self._count = 0
 
     def take(self, message: Message) -> bool:
-        """Take what is said of the job; return whether it concerns one that is kept."""
+        """Take a message about the job; return whether it concerns a kept job."""
         if isinstance(message, OutcomeMessage):
             self._outcome = message
             found = [one for one in self._copies.values() if one.revision == message.revision]
@@ -53,19 +53,19 @@ class Kept:
         if not isinstance(message, PlanMessage):
             return False
         _put(self._now, message)
-        # What is proved of a plan, and how joints turn on, comes later than the plan.
+        # The bound of a plan, and the turns of its joints, follow later than the plan.
         found = [one for one in self._copies.values() if one.revision == message.revision]
         for one in found:
             _put(one.plans, message)
         return bool(found)
 
     def keep(self, document: Document, name: str | None, metric: str, objective: str) -> None:
-        """Keep the job as it is now, by a name or by the next letter.
+        """Keep the current job under a name, by default the next letter.
 
         Raises
         ------
         InputError
-            It is not planned yet; as many are kept as can be; a name that is not one.
+            The job is not planned yet, `MOST_KEPT` jobs are kept already, or the name is blank.
         """
         now = document.revision
         plans = {
@@ -74,7 +74,7 @@ class Kept:
             if all(one.revision == now and one.checks is not None for one in pieces.values())
         }
         if not plans:
-            raise InputError("keep: the job as it is now is not planned yet; wait until it is")
+            raise InputError("keep: the current job is not planned yet; wait until it is")
         if len(self._copies) >= MOST_KEPT:
             raise InputError(f"keep: {MOST_KEPT} plans are kept already; forget one of them first")
         self._count += 1
@@ -91,49 +91,49 @@ class Kept:
         )
 
     def rename(self, number: int, name: str) -> None:
-        """Call one that is kept by another name.
+        """Rename a kept job.
 
         Raises
         ------
         InputError
-            There is none of this number; a name that is not one.
+            No kept job has this number, or the name is blank.
         """
         self._copies[number] = self._of(number)._replace(name=_words(name))
 
     def forget(self, number: int) -> None:
-        """Keep one no longer.
+        """Drop a kept job.
 
         Raises
         ------
         InputError
-            There is none of this number.
+            No kept job has this number.
         """
         del self._copies[self._of(number).id]
 
     def text(self, number: int) -> str:
-        """Return the text of a job that is kept.
+        """Return the text of a kept job.
 
         Raises
         ------
         InputError
-            There is none of this number.
+            No kept job has this number.
         """
         return self._of(number).text
 
     def plans(self, number: int) -> str:
-        """Return its plans as JSON.
+        """Return the plans of a kept job as a JSON list.
 
         Raises
         ------
         InputError
-            There is none of this number.
+            No kept job has this number.
         """
         found = self._of(number).plans.values()
         said = [plan.model_dump_json() for pieces in found for plan in pieces.values()]
         return f"[{','.join(said)}]"
 
     def message(self) -> KeptMessage:
-        """Return what is kept, without the motions."""
+        """Return the message that lists the kept jobs, without their motions."""
         return KeptMessage(
             plans=[
                 KeptEntry(
@@ -153,13 +153,13 @@ class Kept:
         )
 
     def keep_only(self, contours: list[str]) -> None:
-        """Forget what was said of contours that the job has no more."""
+        """Forget the plans of contours that the job no longer has."""
         self._now = {name: pieces for name, pieces in self._now.items() if name in set(contours)}
 
     def _of(self, number: int) -> _Copy:
         found = self._copies.get(number)
         if found is None:
-            raise InputError("there is no such plan; it has been forgotten")
+            raise InputError("there is no such plan any more; it has been forgotten")
         return found
 
     def _letter(self) -> str:
@@ -168,7 +168,7 @@ class Kept:
 
 
 def _put(plans: Plans, message: PlanMessage) -> None:
-    """Put a plan beside the other pieces of its contour, in place of those before."""
+    """Add a plan to the pieces of its contour; drop the pieces that it replaces."""
     held = plans.setdefault(message.contour, {})
     others = [one for one in held.values() if one.name != message.name]
     if message.pieces == 1 or any(one.revision != message.revision for one in others):
@@ -178,5 +178,5 @@ def _put(plans: Plans, message: PlanMessage) -> None:
 
 def _words(name: str) -> str:
     if not name.strip():
-        raise InputError('keep: expected a name, as "A" or "slower", got none')
+        raise InputError('keep: expected a name such as "A" or "slower", got none')
     return name.strip()

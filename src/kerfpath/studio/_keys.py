@@ -1,4 +1,4 @@
-"""What a plan depends on, said in short keys: what is kept from one plan to the next."""
+"""Hash keys of the inputs of each step of planning: equal keys allow results to be used again."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from kerfpath.job import CutRequest, Job
 __all__ = ["PROVING", "cut_key", "graph_key", "motion_key", "part_key", "setup_key"]
 
 PROVING = frozenset(("certify", "certify_gap_percent", "certify_seconds", "certificate"))
-"""Keys of [plan] that say what is proved of a motion that is found."""
+"""Keys of [plan] that only concern the proof for a motion that has been found."""
 LIGHT = PROVING | {
     "weights", "eta_velocity", "eta_acceleration", "metric", "objective", "method", "feed",
     "refine", "interruptions", "least_piece_mm",
 }  # fmt: skip
-"""Keys of [plan] that neither the nodes nor the layered graph depend on."""
+"""Keys of [plan] that change neither the nodes nor the layered graph."""
 PINS = "gamma_windows"
-"""Key of [[contour]] that neither the nodes nor their speed depend on."""
+"""Key of [[contour]] that changes neither the nodes nor their speed."""
 GRAPH = frozenset(["gamma_step_deg", "frames", "tilt_deg", "tilt_steps", "posture"])
 """Keys of [plan] that the layered graph depends on."""
 
 
 def part_key(job: Job) -> str:
-    """Return the key of what a job's drawing holds."""
+    """Return the key of the content of a job's drawing."""
     read = {k: v for k, v in job.source["part"].items() if k not in ("xyz_mm", "rpy_deg")}
     return _digest(read, _stamp(job.part_file))
 
 
 def setup_key(job: Job) -> str:
-    """Return the key of all that a job is prepared from: everything but `LIGHT` keys and pins."""
+    """Return the key of the inputs of a prepared job: everything except `LIGHT` keys and pins."""
     source = dict(job.source)
     source["plan"] = _but(source.get("plan", {}), LIGHT)
     source["contour"] = [_but(table, (PINS,)) for table in source["contour"]]
@@ -42,10 +42,10 @@ def setup_key(job: Job) -> str:
 
 
 def motion_key(job: Job) -> str:
-    """Return the key of all that a motion before must share with one that may begin from it."""
+    """Return the key that a motion must share with the previous one to start from it."""
     source = dict(job.source)
     source["plan"] = _but(source.get("plan", {}), LIGHT)
-    # Where nodes are laid by time, a speed makes other nodes.
+    # If nodes are spaced by time, another speed gives other nodes.
     source["contour"] = [
         _but(table, (PINS,) if "time_step_ms" in table else (PINS, "speed_m_min"))
         for table in source["contour"]
@@ -56,10 +56,10 @@ def motion_key(job: Job) -> str:
 
 
 def graph_key(job: Job, nodes: Contour, external: Array | None = None) -> str:
-    """Return the key of the layered graph of some nodes, external axes as in `Job.graph`."""
+    """Return the key of the layered graph of `nodes`; `external` is as in `Job.graph`."""
     source, options = job.source, job.options
     plan = {k: v for k, v in source.get("plan", {}).items() if k in GRAPH}
-    if job.robot.externals and external is None:  # the course that is taken depends on all of it
+    if job.robot.externals and external is None:  # the course of the axes depends on all of [plan]
         plan = _but(source.get("plan", {}), PROVING)
     tables = [source.get(name) for name in ("robot", "tool", "comfort")]
     arrays = [nodes.points, nodes.axes, nodes.s, job.placement]
@@ -73,18 +73,18 @@ def graph_key(job: Job, nodes: Contour, external: Array | None = None) -> str:
 
 
 def cut_key(job: Job, request: CutRequest) -> str:
-    """Return the key of what comes of a contour, except for the bound of its plan."""
+    """Return the key of the result of a contour, without the bound of its plan."""
     source = dict(job.source)
     for name in ("contour", "sequence", "layout", "program"):
         source.pop(name, None)
     source["plan"] = _but(source.get("plan", {}), PROVING)
-    # A table that picks several loops is asked for each of them by its name.
+    # A table that picks several loops makes one request for each of them, by its name.
     own = [request.task.name, request.task.pick, request.task.table.model_dump(mode="json")]
     return _digest(source, own, job.options.retract, _stamps(job))
 
 
 def _stamps(job: Job) -> list[object]:
-    """Return what tells another content of the files that a job names from the one before."""
+    """Return name, time and size of the files that a job names, to notice their changes."""
     folder, source = job.path.parent, job.source
     cell = source.get("cell", {})
     named = [source["robot"].get(key) for key in ("urdf", "srdf")]

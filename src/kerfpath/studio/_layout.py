@@ -1,4 +1,4 @@
-"""Other places of the part: what is in reach there, and the search for the best one."""
+"""Other placements of the part: the test of reach, and the search for the best one."""
 
 from __future__ import annotations
 
@@ -35,22 +35,22 @@ from kerfpath.study.placing import (
 __all__ = ["Layouts"]
 
 SHOWN = 20
-"""Placements that a page hears of, the best first."""
+"""Number of placements that a page gets, the best first."""
 SHOWN_EVERY = 0.25
-"""s: how often a page hears of new ones."""
+"""Least time between two messages about new placements, s."""
 Say = Callable[[Message], None]
 State = Literal["running", "done", "stopped"]
 
 
 class Layouts:
-    """Says what is in reach elsewhere, and looks for the best placement; the newest is done.
+    """Tests reach at placements and searches for the best one; only the newest request counts.
 
     Parameters
     ----------
     say : callable
         Takes messages, from any thread.
     failed : callable
-        Takes what went wrong, in a thread.
+        Takes the exception of failed work; called in its thread.
     """
 
     def __init__(self, say: Say, failed: Callable[[BaseException], None]) -> None:
@@ -61,11 +61,11 @@ class Layouts:
         self._stands: tuple[int, PreparedJob] | None = None
 
     def stands(self, prepared: PreparedJob, revision: int) -> None:
-        """Take the job of the scene that is said now, from which offsets count."""
+        """Take the job of the scene that is sent now; offsets refer to it."""
         self._stands = revision, prepared
 
     def reach(self, ask: ReachOf, answer: Say) -> None:
-        """Have an answer what is in reach, unless that of another place is asked for before.
+        """Answer which nodes are out of reach, unless a newer question comes first.
 
         Raises
         ------
@@ -97,44 +97,44 @@ class Layouts:
         self._hand.ask(work)
 
     def placed(self, ask: Place) -> list[Change]:
-        """Return what a job has to say so that everything is where offsets put it.
+        """Return the changes of the job that apply offsets.
 
         Raises
         ------
         InputError
-            There is no such scene, or another one by now.
+            There is no scene, or it has changed since.
         """
         scene, prepared = self._there()
         if scene != ask.scene:
-            raise InputError("place: the scene is another one by now; move it again")
+            raise InputError("place: the scene has changed meanwhile; repeat the move")
         return _changes(placement_of(prepared), ask.offsets)
 
     def look(self, prepared: PreparedJob, ask: LayoutOf, revision: int) -> None:
-        """Begin to look for the best placement, in place of whatever was looked for."""
+        """Start the search for the best placement; it replaces a running search."""
         self._search.ask(partial(self._look, prepared, ask, revision))
 
     def changes(self, number: int, revision: int) -> list[Change]:
-        """Return what makes a placement that was tried the job's.
+        """Return the changes of the job that apply a placement that was tried.
 
         Raises
         ------
         InputError
-            There is none, or the job has changed since.
+            There is no such placement, it is not feasible, or the job has changed since.
         """
         study = self._study
         if study is None or study.revision != revision or number >= len(study.trials):
-            raise InputError("take: there is no such placement any more; look for it again")
+            raise InputError("take: there is no such placement any more; search again")
         why = study.trials[number].result.infeasibility
         if why is not None:
-            raise InputError(f"take: nothing can be cut there: {why.reason}; take another one")
+            raise InputError(f"take: the placement is infeasible: {why.reason}; take another one")
         return _changes(study.placement, study.trials[number].offsets)
 
     def cancel(self) -> None:
-        """Stop the search; what it has found stays."""
+        """Stop the search; the placements that it found stay."""
         self._search.cancel()
 
     def close(self) -> None:
-        """Stop for good."""
+        """Stop all work, and end the threads."""
         self._search.close()
         self._hand.close()
 
@@ -144,7 +144,7 @@ class Layouts:
         return self._stands
 
     def _look(self, prepared: PreparedJob, ask: LayoutOf, revision: int, stop: Stop) -> None:
-        """Search, on a copy of the job: the job itself may be saved meanwhile."""
+        """Search on a copy of the job, as the job itself may be saved meanwhile."""
         folder = Path(tempfile.mkdtemp(prefix="kerfpath-layout-"))
         study: _Study | None = None
         try:
@@ -180,7 +180,7 @@ class Layouts:
 
 
 class _Study:
-    """The placements that one search has tried, as far as it is."""
+    """The placements that one search has tried so far."""
 
     def __init__(
         self, placement: Placement, ask: LayoutOf, revision: int, say: Say, stop: Stop
@@ -193,12 +193,12 @@ class _Study:
         self._seldom, self._at = Seldom(SHOWN_EVERY), ("", 0, 0)
 
     def progress(self, what: str, done: int, total: int, /) -> None:
-        """Take how far the search is, and stop it where that is asked for.
+        """Take the progress of the search, and stop it if requested.
 
         Raises
         ------
         Superseded
-            It is.
+            The search is asked to stop.
         """
         self._stop.check()
         self._at = what, done, total
@@ -206,13 +206,13 @@ class _Study:
             self.say("running")
 
     def found(self, trial: PlacementTrial) -> None:
-        """Take a placement of which more is known."""
+        """Take a placement that is new or of which more is known."""
         if trial not in self._numbers:
             self._numbers[trial] = len(self.trials)
             self.trials.append(trial)
 
     def say(self, state: State, end: Layout | None = None) -> None:
-        """Say how it stands."""
+        """Send the state of the search."""
         self.state = state
         label, done, total = self._at
         self._say(
@@ -233,7 +233,7 @@ class _Study:
         )
 
     def _rank(self, trial: PlacementTrial) -> tuple[int, float]:
-        """Return what is small for what is good: what was planned, estimates, what cannot be."""
+        """Return a sort key: planned placements first, then estimates, then infeasible ones."""
         result, sign = trial.result, 1 if self._ask.goal == "motion" else -1
         if result.infeasibility is not None:
             return 2, -result.infeasibility.progress
@@ -259,15 +259,16 @@ class _Study:
 
 
 def _said(end: Layout) -> str:
-    """Return what is known of the placements beside the best one, in words."""
+    """Return in words what is known of the placements other than the best one."""
     if end.best is None:
         why = end.nearest.result.infeasibility
-        return "No placement is feasible" + (f"; the nearest: {why.reason}" if why else "")
+        return "No placement is feasible" + (f"; the nearest fails: {why.reason}" if why else "")
     if end.proved:
-        return "Proved: no other of those tried is better."
-    return f"{end.estimated} of those tried were judged by an estimate alone, which proves nothing."
+        return "Proved: no other placement that was tried is better."
+    count = f"{end.estimated} of the placements that were tried"
+    return f"{count} were judged by an estimate alone, which proves nothing."
 
 
 def _changes(placement: Placement, offsets: Mapping[str, float]) -> list[Change]:
-    """Return what a job has to say so that everything is where offsets put it."""
+    """Return the changes of the job that apply offsets."""
     return list(changes_of(placement.job, placement.numbers(offsets)))

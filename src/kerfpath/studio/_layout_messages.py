@@ -1,4 +1,4 @@
-"""What the server says of other places of the part, see README.md beside this file."""
+"""Messages about other placements of the part; README.md in this folder defines their keys."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class OutOfReach(Message):
 
 
 class ReachMessage(Message):
-    """What the robot reaches at a placement."""
+    """The nodes of each contour that the robot cannot reach at a placement."""
 
     type: Literal["reach"] = "reach"
     revision: int
@@ -43,7 +43,7 @@ class TryEntry(Message):
 
 
 class LayoutMessage(Message):
-    """The search for the best placement, as far as it is."""
+    """The state of the search for the best placement."""
 
     type: Literal["layout"] = "layout"
     revision: int

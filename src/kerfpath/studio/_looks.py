@@ -1,4 +1,4 @@
-"""What pages ask to see of what is planned; it changes nothing."""
+"""Answers to the read-only questions of pages about planned contours."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ __all__ = ["Looks"]
 
 
 class Looks:
-    """Answers what pages ask of the plans that there are.
+    """Answers the questions of pages about the current plans.
 
-    What takes long is done in a thread for each page and kind: a newer look stops the one before.
+    Slow questions have a thread for each page and kind: a newer one stops the one before.
 
     Parameters
     ----------
     planning : Planning
     say : callable
-        Takes the answer for a page, from any thread.
+        Takes the page and the answer, from any thread.
     failed : callable
-        Takes the page, the kind of look, and what it raised; in that thread.
+        Takes the page, the kind of question and the exception; called in that thread.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Looks:
         Raises
         ------
         InputError
-            It is not planned yet.
+            The contour is not planned yet.
         """
         prepared, cuts, nodes, graph = self._planning.whole(contour)
         shades = shades_of(prepared.job, graph, prepared.cell)
@@ -57,12 +57,12 @@ class Looks:
         )
 
     def pose(self, ask: ReasonOf) -> PoseMessage:
-        """Return where the robot is at a place of a map.
+        """Return the joints of the robot at a place of a map.
 
         Raises
         ------
         InputError
-            It is not planned yet, or has no such place.
+            The contour is not planned yet, or the map has no such node or posture.
         """
         prepared, cuts, nodes, graph = self._planning.whole(ask.contour)
         K, _, postures = graph.reason.shape
@@ -77,7 +77,7 @@ class Looks:
         )  # fmt: skip
 
     def shade(self, page: Page, ask: ShadeOf, revision: int) -> None:
-        """Look for a quantity over a map, or for none any more."""
+        """Compute a quantity over a map; `by` None stops a running computation."""
         by = ask.by
         if by is None:
             self._cancel(page, ask.type)
@@ -92,7 +92,7 @@ class Looks:
         self._ask(page, ask.type, look)
 
     def technique(self, page: Page, ask: TechniqueOf) -> None:
-        """Look for the course of another technique, or for none any more."""
+        """Compute the course of another technique; `method` None stops a running computation."""
         method = ask.method
         if method is None:
             self._cancel(page, ask.type)
@@ -106,12 +106,12 @@ class Looks:
         self._ask(page, ask.type, look)
 
     def leave(self, page: Page) -> None:
-        """Stop for good what a page has asked for."""
+        """Stop the work of a page, and end its threads."""
         for key in [key for key in self._work if key[0] is page]:
             self._work.pop(key).close()
 
     def close(self) -> None:
-        """Stop for good."""
+        """Stop the work of all pages, and end the threads."""
         for page, _ in list(self._work):
             self.leave(page)
 

@@ -1,4 +1,4 @@
-"""The part as a message: its loops, to be cut or not, and whose its triangles are."""
+"""The message about the part: its loops, cut or not, and the face of each of its triangles."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from kerfpath.studio._numbers import flat
 __all__ = ["part_message"]
 
 MOST_LOOPS = 3000
-"""Loops that a page gets, the longest: no picture shows more of them apart."""
+"""Number of loops that a page gets, the longest ones: more could not be distinguished."""
 FINEST = 2e-5
-"""m: no chord of a line that is drawn need be nearer to its curve."""
+"""Least chord error of a drawn loop, m: smaller errors are not visible."""
 SHARE = 2e-3
-"""Of the length of a loop: how far the chords may be off it, so that small holes look round."""
+"""Chord error as a share of the length of the loop, so that small holes look round."""
 COARSEST = 2e-4
-"""m: the farthest that they may be off it."""
+"""Largest chord error of a drawn loop, m."""
 
 
 def part_message(job: Job, part: Part, revision: int) -> PartMessage:
-    """Return the loops of a part that can be picked, in the base, and the faces of its mesh.
+    """Return the pickable loops of a part, in the robot base, and the faces of its mesh.
 
-    Loops of faces that are pieces of a skin are left out, and those around the thickness of a
-    sheet: `Part.pick` leaves them out, too.
+    As in `Part.pick`, loops of the pieces of a skin and loops around the thickness of a sheet are
+    left out.
     """
     asked = [loop for loop in part.loops if not loop.skin and loop.side != "edge"]
     told = sorted(asked, key=lambda loop: -loop.length)[:MOST_LOOPS]

@@ -1,4 +1,4 @@
-"""The map of a contour: what became of every pose, and one pose of it in detail."""
+"""The map of a contour: the reason of loss of every pose, and one pose in detail."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ KINDS = {
     Loss.FLOOR: "cell",
     Loss.PINNED: "pinned",
 }
-"""What a loss is coloured by; others are "other"."""
+"""The kind that decides the colour of each loss; losses that are not listed are "other"."""
 
 UNITS = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
-"""By what values are multiplied to be sent, and the unit that they then have."""
+"""Factor from the SI unit to the unit that is shown, and that unit."""
 
 
 def map_id(graph: LayeredGraph) -> str:
-    """Return the id of a graph's map: the same for the same map."""
+    """Return the id of a graph's map; equal maps have the same id."""
     digest = hashlib.sha256("\n".join(graph.reasons).encode())
     digest.update(np.array(graph.reason.shape).tobytes() + graph.gamma.tobytes())
     digest.update(graph.reason.tobytes())
@@ -48,7 +48,7 @@ def map_id(graph: LayeredGraph) -> str:
 
 
 def with_collisions(cut: CutResult, graph: LayeredGraph) -> LayeredGraph:
-    """Return the graph with what collides lost, where the job asks for a map of its cell."""
+    """Return the graph with collisions among its reasons, if the clearance map is known."""
     from kerfpath.report import add_clearance
 
     known = cut.clearance
@@ -70,15 +70,16 @@ def map_message(
     Parameters
     ----------
     cuts : sequence of CutResult
-        What came of the contour, or of its pieces.
+        Result of the contour, or of each of its pieces.
     nodes : Contour
+        Nodes of the complete contour.
     graph : LayeredGraph
-        Of the whole of it.
+        Layered graph of the complete contour.
     robot : Robot
     shades : sequence of ShadeName
-        What it can be shaded by.
+        Quantities that the map can be shaded by.
     revision : int
-        Of the job.
+        Revision of the job.
     """
     from kerfpath.report import hidden_postures, reason_colours, shown_postures
 
@@ -120,20 +121,20 @@ def map_message(
 
 
 def _along(robot: Robot, graph: LayeredGraph, cuts: Sequence[CutResult]) -> str:
-    """Say where the external axes are at the poses of a map; nothing where there are none."""
+    """Return a sentence on the external axes at the poses of a map, or "" without any."""
     x = graph.external
     if x is None:
         return ""
     names = " and ".join(axis.name for axis in robot.externals)
     if x.shape[1] > 1:
-        return f"With {names} anywhere on the grid of the search."
+        return f"The map shows the best place of {names} on the grid of the search."
     if all(cut.plan is not None for cut in cuts):
-        return f"Along the plan's course of {names}."
+        return f"The map has {names} where the plan has them."
     if (x == x[0]).all():
         held = (UNITS[axis.unit] for axis in robot.externals)
         at = (f"{by * value:g} {unit}" for (by, unit), value in zip(held, x[0, 0], strict=True))
-        return f"No plan: with {names} at rest, at {' and '.join(at)}."
-    return f"No plan: along the course of {names} that promised most."
+        return f"No plan: the map has {names} at rest, at {' and '.join(at)}."
+    return f"No plan: the map follows the most promising course of {names}."
 
 
 def pose_message(
@@ -147,16 +148,16 @@ def pose_message(
     gamma: float,
     posture: int,
 ) -> PoseMessage:
-    """Return where the robot is at a place of the map, and what became of that pose.
+    """Return the joints of the robot at a place of the map, and the reason if they are lost.
 
-    Gamma is taken to the nearest sample of the map. With a tolerance of the tool axis the joints
-    are those of the nominal axis. External axes are where the map has them; where that is a grid,
-    at the place of it that the map tells of, next to the plan's.
+    Gamma is rounded to the nearest sample of the map. With a tolerance of the tool axis, the joints
+    are those of the nominal axis. External axes are where the map has them; on a grid, at the point
+    whose reason the map shows, the one nearest to the plan if there are several.
 
     Raises
     ------
     IndexError
-        A node or posture that the map has not.
+        The map has no such node or posture.
     """
     codes = graph.reason_by_gamma
     off = np.angle(np.exp(1j * (graph.gamma - gamma)))
@@ -192,7 +193,7 @@ def _external(
     sample: int,
     posture: int,
 ) -> Array | None:
-    """Return where the external axes are (E,) at a place of the map; None: there are none."""
+    """Return the external axes (E,) rad or m at a place of the map; None without any."""
     if graph.external is None:
         return None
     codes = graph.reason[node, sample :: len(graph.gamma), posture]
@@ -208,7 +209,7 @@ def _external(
 
 
 def _turns(graph: LayeredGraph, why: Reason, node: int, sample: int, posture: int) -> str:
-    """Say where the joints may be that are admitted on several turns at a place of the map."""
+    """Return the reason of an admitted place, with its joints if several turns are admitted."""
     layer = slice(*graph.start[node : node + 2])
     here = (graph.sample[layer] == sample) & (graph.posture[layer] == posture)
     variant = graph.variant[layer][here]
@@ -221,7 +222,7 @@ def _turns(graph: LayeredGraph, why: Reason, node: int, sample: int, posture: in
 
 
 def _in_numbers(job: Job, why: Reason, q: Array | None) -> str:
-    """Say what became of a pose, with the joint and its limit where that is why."""
+    """Return the reason of a lost pose, with joint and limit if a joint limit is the reason."""
     if q is None or why.loss not in (Loss.LOW, Loss.HIGH):
         return str(why)
     name = str(why.which)
@@ -229,6 +230,6 @@ def _in_numbers(job: Job, why: Reason, q: Array | None) -> str:
         return str(why)
     i, limits = int(name.removeprefix("joint ")) - 1, job.robot.joint_limits()
     return (
-        f"{why}: at {np.degrees(q[i]):.1f} deg, it goes from {np.degrees(limits.lower[i]):g} to "
+        f"{why}: at {np.degrees(q[i]):.1f} deg, its limits are {np.degrees(limits.lower[i]):g} to "
         f"{np.degrees(limits.upper[i]):g} deg"
     )

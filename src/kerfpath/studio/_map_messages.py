@@ -1,4 +1,4 @@
-"""What the server says of maps beyond their reasons, see README.md beside this file."""
+"""Messages about shades and techniques on maps; README.md in this folder defines their keys."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class ShadeName(Message):
 
 
 class ShadeLayer(Message):
-    """That quantity over the map of one posture."""
+    """The values of a quantity over the map of one posture."""
 
     posture: int
     values: str
@@ -43,7 +43,7 @@ class ShadeMessage(Message):
 
 
 class TechniqueMessage(Message):
-    """The course that another technique takes along a contour, and what it comes to."""
+    """The course of another technique along a contour, with its cost and peak shares."""
 
     type: Literal["technique"] = "technique"
     revision: int

@@ -1,4 +1,4 @@
-"""What the server says to its pages, see README.md beside this file."""
+"""Messages that the server sends to its pages; README.md in this folder defines their keys."""
 
 from __future__ import annotations
 
@@ -53,21 +53,21 @@ __all__ = [
 
 
 class ContourName(Message):
-    """A contour of the job, and which table it is of."""
+    """A contour of the job, and the index of its [[contour]] table."""
 
     name: str
     index: int
 
 
 class Fault(Message):
-    """What is wrong with the job, and where."""
+    """An error in the job, and the key that it concerns."""
 
     key: list[str | int]
     message: str
 
 
 class JobMessage(Message):
-    """The job as it is."""
+    """The current job."""
 
     type: Literal["job"] = "job"
     revision: int
@@ -109,7 +109,7 @@ class RobotEntry(Message):
 
 
 class SampleEntry(Message):
-    """Joints, and the pose of the tip there."""
+    """Sample joints, and the pose of the tip there."""
 
     q: Numbers
     T: Numbers
@@ -140,7 +140,7 @@ class ContourEntry(Message):
 
 
 class SceneMessage(Message):
-    """What stands and moves in the cell."""
+    """The robot, bodies and contours of the cell."""
 
     type: Literal["scene"] = "scene"
     revision: int
@@ -153,7 +153,7 @@ class SceneMessage(Message):
 
 
 class ProgressMessage(Message):
-    """How far the server is."""
+    """The progress of the server's work."""
 
     type: Literal["progress"] = "progress"
     busy: bool
@@ -163,7 +163,7 @@ class ProgressMessage(Message):
 
 
 class NearestEntry(Message):
-    """The least of a measure of comfort, and where."""
+    """The least value of a measure of comfort along a plan, and its node."""
 
     name: str
     value: float
@@ -232,7 +232,7 @@ class PlanMessage(Message):
 
 
 class LossEntry(Message):
-    """What was lost, and how often."""
+    """A reason of loss, and its count."""
 
     name: str
     count: int
@@ -246,14 +246,14 @@ class EditEntry(Message):
 
 
 class Option(Message):
-    """A way out, as edits of the job."""
+    """A change that would make a path, as edits of the job."""
 
     label: str
     edits: list[EditEntry]
 
 
 class NoPathMessage(Message):
-    """Why a contour has no plan, and what would open the way."""
+    """The reason why a contour has no plan, and changes that would make a path."""
 
     type: Literal["nopath"] = "nopath"
     revision: int
@@ -283,7 +283,7 @@ class Segment(Message):
 
 
 class ProgramMessage(Message):
-    """What the robot does, in the order of the program, with its clock."""
+    """The segments of the program in its order, with their times."""
 
     type: Literal["program"] = "program"
     revision: int
@@ -294,7 +294,7 @@ class ProgramMessage(Message):
 
 
 class Export(Message):
-    """Something to take along."""
+    """A file that can be exported."""
 
     name: str
     href: str
@@ -303,7 +303,7 @@ class Export(Message):
 
 
 class Cycle(Message):
-    """Where the time of a program goes, s."""
+    """The shares of a program's time, s."""
 
     cutting: float
     air: float
@@ -312,7 +312,7 @@ class Cycle(Message):
 
 
 class OutcomeMessage(Message):
-    """What a run of the job comes to."""
+    """The result of a run of the job."""
 
     type: Literal["outcome"] = "outcome"
     revision: int
@@ -331,7 +331,7 @@ class CodeLayer(Message):
 
 
 class CourseEntry(Message):
-    """How gamma of a plan runs over the map."""
+    """Gamma and posture of a plan along the map."""
 
     name: str
     s: Numbers
@@ -340,7 +340,7 @@ class CourseEntry(Message):
 
 
 class MapMessage(Message):
-    """What became of every pose of a contour."""
+    """The map of a contour: the reason of loss of every pose."""
 
     type: Literal["map"] = "map"
     revision: int
@@ -360,7 +360,7 @@ class MapMessage(Message):
 
 
 class PoseMessage(Message):
-    """Where the robot is at one place of the map, and why it may not be."""
+    """The joints at one place of the map, and the reason if they are lost."""
 
     type: Literal["pose"] = "pose"
     contour: str
@@ -385,7 +385,7 @@ class FastestMessage(Message):
 
 
 class ErrorMessage(Message):
-    """What went wrong, in one line."""
+    """An error in one line."""
 
     type: Literal["error"] = "error"
     message: str

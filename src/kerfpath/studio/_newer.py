@@ -1,4 +1,4 @@
-"""Which of the messages from several threads are news, and what a plan cost before."""
+"""A filter that drops outdated messages of other threads and adds the previous cost to plans."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["Newer"]
 
 
 class _Cost(NamedTuple):
-    """What the plan of a revision costs, and that of the revision before."""
+    """The cost of the plan of a revision, and of the previous revision."""
 
     revision: int
     cost: float
@@ -19,16 +19,16 @@ class _Cost(NamedTuple):
 
 
 class Newer:
-    """Lets through what is not older than what was said before."""
+    """A filter that drops messages older than one that was sent."""
 
     def __init__(self) -> None:
         self._said: dict[tuple[str, str], tuple[int, bool]] = {}
         self._costs: dict[str, _Cost] = {}
 
     def of(self, message: Message) -> Message | None:
-        """Return a message, a plan with what it cost before; None where something newer was said.
+        """Return the message, a plan with its previous cost; None if a newer one was sent.
 
-        A draft is older than what a run finds of the same revision.
+        A draft counts as older than the plan of a run of the same revision.
         """
         revision = getattr(message, "revision", None)
         if revision is None:
@@ -43,7 +43,7 @@ class Newer:
         return self._with_cost(message) if isinstance(message, PlanMessage) else message
 
     def keep_only(self, contours: list[str]) -> None:
-        """Forget what was said of contours that there are no more."""
+        """Forget the contours that the job no longer has."""
         known = {*contours, ""}
         self._said = {key: said for key, said in self._said.items() if key[1] in known}
         self._costs = {name: cost for name, cost in self._costs.items() if name in known}

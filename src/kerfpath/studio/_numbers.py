@@ -1,4 +1,4 @@
-"""What all messages of the server share, and the numbers in them."""
+"""The base class of all messages of the server, and the numbers in them."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pydantic import BaseModel, ConfigDict
 __all__ = ["Message", "Numbers", "flat"]
 
 Numbers = list[float | None]
-"""Numbers in a message; null for infinity."""
+"""Numbers in a message; None (null in JSON) means infinity."""
 
 
 def flat(values: ArrayLike, digits: int = 9) -> Numbers:
-    """Return numbers in one row, row-major; None for what is not finite.
+    """Return values as a flat row-major list; None replaces values that are not finite.
 
-    They are rounded to `digits` places, a nanometre or less, so that they are short.
+    Values are rounded to `digits` decimal places (a nanometre or finer) to keep messages short.
     """
     row = np.round(np.asarray(values, dtype=np.float64).ravel(), digits)
     if np.isfinite(row).all():
@@ -25,6 +25,6 @@ def flat(values: ArrayLike, digits: int = 9) -> Numbers:
 
 
 class Message(BaseModel):
-    """What the server says, one line of JSON each; README.md has what the keys mean."""
+    """A message of the server, one line of JSON; README.md defines its keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

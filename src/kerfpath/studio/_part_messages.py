@@ -1,4 +1,4 @@
-"""What the server says of the part that is cut, see README.md beside this file."""
+"""Messages about the part that is cut; README.md in this folder defines their keys."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ class LoopEntry(Message):
 
 
 class FaceEntry(Message):
-    """A run of triangles of the part's mesh, and the face that they are of."""
+    """A run of triangles of the part's mesh, and the face that they belong to."""
 
     name: str
     triangles: int
 
 
 class PartMessage(Message):
-    """What can be picked of the drawing."""
+    """The loops and faces of the drawing that can be picked."""
 
     type: Literal["part"] = "part"
     revision: int

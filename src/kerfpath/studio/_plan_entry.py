@@ -1,4 +1,4 @@
-"""A plan, and why there is none, as messages."""
+"""The messages about a plan, and about the reason why there is none."""
 
 from __future__ import annotations
 
@@ -36,25 +36,25 @@ def plan_message(
     audited: bool,
     seconds: float,
 ) -> PlanMessage:
-    """Return the motion of a cut.
+    """Return the message about the motion of a cut.
 
     Parameters
     ----------
     cut : CutResult
     made : Plan
-        Its plan.
+        Plan of the cut.
     revision : int
-        Of the job that it was planned for.
+        Revision of the job that it was planned for.
     graph : str
-        The id of its map.
+        Id of its map.
     pieces : int
-        How many plans its contour has.
+        Number of plans of its contour.
     settled : bool
-        Whether nothing more is to be proved of it.
+        False while its bound is still to be computed.
     audited : bool
-        Whether the checks of the cut are all of them.
+        Whether the audit of the cut is complete.
     seconds : float
-        That it took to find.
+        Time that the search took, s.
     """
     velocity, acceleration = made.velocity_share, made.acceleration_share
     s, proof = made.contour.s, made.proof
@@ -94,12 +94,12 @@ def plan_message(
 
 
 def _load(velocity: Array, acceleration: Array) -> Array:
-    """Return the largest share of a limit that a joint uses at each node, (K,).
+    """Return the largest share of any joint's limits at each node, (K,).
 
     Parameters
     ----------
     velocity : (K-1, n)
-        Shares between nodes; both sides count.
+        Shares between nodes; a node takes the larger one of its two intervals.
     acceleration : (K-2, n)
         Shares at the inner nodes.
     """
@@ -125,7 +125,7 @@ def _criteria(made: Plan) -> CriteriaEntry:
 
 
 def check_entries(checks: Sequence[Check]) -> list[CheckEntry]:
-    """Return the table of an audit."""
+    """Return the entries of an audit's checks."""
     return [
         CheckEntry(
             code=check.code,
@@ -144,19 +144,20 @@ def check_entries(checks: Sequence[Check]) -> list[CheckEntry]:
 def no_path_message(
     cut: CutResult, placement: Array, *, revision: int, graph: str, ways: list[Option] | None
 ) -> NoPathMessage:
-    """Return why a cut has no plan.
+    """Return the message about the reason why a cut has no plan.
 
     Parameters
     ----------
     cut : CutResult
-        Without a plan.
+        A cut without a plan.
     placement : (4, 4) m
         T_base_part.
     revision : int
+        Revision of the job.
     graph : str
-        The id of its map.
+        Id of its map.
     ways : list of Option or None
-        What would open the way; None while it is looked for.
+        Changes that would make a path; None while they are being searched for.
     """
     broken, nodes = cut.broken, cut.candidate.nodes
     assert broken is not None

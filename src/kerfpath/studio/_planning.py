@@ -1,4 +1,4 @@
-"""The planning of a session, in threads of its own: soon a draft, then all that a run does."""
+"""The planning of a session, in separate threads: first a draft, then a complete run."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ from kerfpath.studio._work import Newest, Stop, said_of
 __all__ = ["Outcome", "Planning"]
 
 PATIENCE = 0.3
-"""s: where a draft shows what a change does, a run begins once nothing has changed for so long."""
+"""Time without a change after which a run begins while a draft is shown, s."""
 
 
 class Outcome(NamedTuple):
-    """What a revision of the job comes to, and whether nothing more is to be proved of it."""
+    """The result of a revision of the job; `settled` is False while bounds are being computed."""
 
     revision: int
     result: JobResult
@@ -61,7 +61,7 @@ class Outcome(NamedTuple):
 
 
 class Planning:
-    """Plans the newest job, and keeps what may serve the next one.
+    """Plans the newest job, and keeps intermediate results for the next one.
 
     Parameters
     ----------
@@ -70,20 +70,22 @@ class Planning:
     ready : callable
         Takes each job that has been prepared, and its revision; from any thread.
     refused : callable
-        Takes what is wrong with a job that cannot be, and its revision; from any thread.
+        Takes the error of an invalid job, and its revision; from any thread.
 
     Attributes
     ----------
     meshes : Meshes
-        Those of the scene.
+        Meshes of the scene.
+    prepared : PreparedJob or None
+        The job that was prepared last.
     cuts : dict of str to tuple of CutResult
-        What came of each contour, by its name.
+        Results of each contour, by its name.
     revisions : dict of str to int
-        Of the job that these came of, or of one before it.
+        Revision of the job that each contour was planned for, or an earlier one.
     result : Outcome or None
-        What the job that was planned last comes to.
+        Result of the job that was planned last.
     layouts : Layouts
-        Other places of the part.
+        Placements of the part.
     """
 
     def __init__(
@@ -100,7 +102,7 @@ class Planning:
         self._fronts = Fronts(say, self._failed)
         self.layouts = Layouts(say, self._failed)
         self._before: tuple[str, dict[str, Plan]] = ("", {})
-        """What drafts begin from: the motions of contours, and what they share."""
+        """Where drafts start: a `motion_key`, and the plans of contours for it."""
         self._scene, self._looked = "", ""
         self._clearances: dict[str, ClearanceMessage] = {}
         self._part: tuple[str, Part] | None = None
@@ -111,7 +113,7 @@ class Planning:
         self.result: Outcome | None = None
 
     def take(self, job: Job, revision: int, first: str | None) -> None:
-        """Plan a job in place of any other, one of its contours first."""
+        """Plan a job in place of any other, the contour `first` before the others."""
         for each in (self._fronts, self._speeds, self.layouts):
             each.cancel()
         hurry = Event()
@@ -125,12 +127,12 @@ class Planning:
     def whole(
         self, contour: str
     ) -> tuple[PreparedJob, tuple[CutResult, ...], Contour, LayeredGraph]:
-        """Return what came of a contour, with the nodes and the graph of the whole of it.
+        """Return the results of a contour, with the nodes and the graph of all of it.
 
         Raises
         ------
         InputError
-            It is not planned yet.
+            The contour is not planned yet.
         """
         cuts, prepared = self.cuts.get(contour), self.prepared
         if cuts is None or prepared is None:
@@ -138,7 +140,7 @@ class Planning:
         return prepared, cuts, *self._bench.whole(prepared.job, cuts)
 
     def fastest(self, contour: str, revision: int) -> None:
-        """Look for the fastest speed of a contour.
+        """Search for the fastest constant speed of a contour.
 
         Raises
         ------
@@ -147,7 +149,7 @@ class Planning:
         """
         prepared = self.prepared
         if prepared is None or contour not in prepared.names:
-            raise InputError(f"contour {contour!r:.60} is not known; wait for the job to be read")
+            raise InputError(f"contour {contour!r:.60} is not known; wait until the job is read")
         index = tables_of(prepared)[prepared.names.index(contour)]
 
         def work(stop: Stop) -> None:
@@ -163,56 +165,56 @@ class Planning:
         self._speeds.ask(work)
 
     def front(self, ask: FrontOf, revision: int) -> None:
-        """Look for the Pareto set of a contour.
+        """Search for the Pareto set of a contour.
 
         Raises
         ------
         InputError
-            It is not planned yet.
+            The current job is not planned yet.
         """
         planned = self.result
         cuts = self.cuts.get(ask.contour)
         if planned is None or planned.revision != revision or self.prepared is None or not cuts:
-            raise InputError("front: the job as it is now is not planned yet; wait until it is")
+            raise InputError("front: the current job is not planned yet; wait until it is")
         self._fronts.look(self.prepared, cuts[0], ask.criteria, ask.runs, revision)
 
     def look(self, ask: LayoutOf, revision: int) -> None:
-        """Look for the best placement.
+        """Search for the best placement.
 
         Raises
         ------
         InputError
-            The job is not planned yet.
+            The current job is not planned yet.
         """
         planned = self.result
         if planned is None or planned.revision != revision or self.prepared is None:
-            raise InputError("layout: the job as it is now is not planned yet; wait until it is")
+            raise InputError("layout: the current job is not planned yet; wait until it is")
         self.layouts.look(self.prepared, ask, revision)
 
     def candidate(self, ask: PointOf) -> CandidateMessage:
-        """Return the motion of a point of that set.
+        """Return the motion of a point of the Pareto set.
 
         Raises
         ------
         InputError
-            There is none; the contour is not planned.
+            There is no such point, or the contour is not planned.
         """
         _, _, _, graph = self.whole(ask.contour)
         return self._fronts.candidate(ask.contour, ask.number, map_id(graph))
 
     def cancel(self) -> None:
-        """Stop whatever is being done."""
+        """Stop all running work."""
         for each in (self._drafts, self._runs, self._speeds, self._fronts, self.layouts):
             each.cancel()
         self._say(ProgressMessage(busy=False))
 
     def close(self) -> None:
-        """Stop for good."""
+        """Stop all work, and end the threads."""
         for each in (self._drafts, self._runs, self._speeds, self._fronts, self.layouts):
             each.close()
 
     def _draft(self, job: Job, revision: int, contour: str, hurry: Event, stop: Stop) -> None:
-        """Say a motion near the one before, if there is one."""
+        """Send a motion near the previous one, if there is one."""
         key, plans = self._before
         found = drafts_of(job, self.cuts[contour][0], plans[contour], revision)
         stop.check()
@@ -225,12 +227,12 @@ class Planning:
         self._say(message)
 
     def _is_clear(self, made: Plan) -> bool:
-        """Return whether a motion is clear where a cell says what that is."""
+        """Return whether a motion is free of collisions; True without a cell."""
         cell = None if self.prepared is None else self.prepared.cell
         return cell is None or bool(cell.clear_through(made.unwrapped))
 
     def _run(self, job: Job, revision: int, first: str | None, hurry: Event, stop: Stop) -> None:
-        """Plan a job from its drawing to what is proved of its plans."""
+        """Plan a job, from reading its drawing to the bounds of its plans."""
         waited = 0.0
         while waited < PATIENCE and not hurry.is_set():
             stop.rest(PATIENCE / 20)
@@ -264,12 +266,12 @@ class Planning:
         self._say(ProgressMessage(busy=False))
 
     def _settle(self, result: JobResult, revision: int, *, settled: bool) -> None:
-        """Keep and say what a revision comes to."""
+        """Keep and send the result of a revision."""
         self.result = Outcome(revision, result, settled)
         self._say(_outcome(result, revision, settled=settled))
 
     def _measure(self, found: Outcome, stop: Stop) -> None:
-        """Say how near the robot comes to what stands in its cell, where there is one."""
+        """Send the distances along the plans, if there is a cell."""
         cell, known = found.result.cell, self._clearances
         self._clearances = {}
         if cell is None:
@@ -287,21 +289,21 @@ class Planning:
             self._say(self._clearances[key])
 
     def _look_ahead(self, prepared: PreparedJob, revision: int, run: Run) -> None:
-        """Say what forbids a program whatever the plans are, once for each job."""
+        """Send the errors that forbid a program whatever the plans are, once per setup."""
         setup = setup_key(prepared.job)
         if setup == self._looked:
             return
-        run.progress("whether there can be a program", 0, 0)
+        run.progress("checking the job for its program", 0, 0)
         if found := foresee(prepared):
             self._refused(all_of(found), revision)
         self._looked = setup
 
     def _took(self, key: str, revision: int, contour: str, cuts: tuple[CutResult, ...]) -> None:
-        """Keep what came of a contour."""
+        """Keep the results of a contour."""
         if self._before[0] != key:
             self._before = key, {}
         self.cuts[contour] = cuts
-        self.revisions[contour] = revision  # once they are there: never newer than they are
+        self.revisions[contour] = revision  # set after the cuts, so that it is never newer
         made = cuts[0].plan
         if len(cuts) == 1 and made is not None:
             self._before[1][contour] = made
@@ -309,7 +311,7 @@ class Planning:
             self._before[1].pop(contour, None)
 
     def _show_scene(self, prepared: PreparedJob, revision: int) -> None:
-        """Say the scene, unless it is as it was."""
+        """Send the scene, unless it is unchanged."""
         setup = setup_key(prepared.job)
         if setup == self._scene:
             return
@@ -321,42 +323,42 @@ class Planning:
         self.cuts = {name: cuts for name, cuts in self.cuts.items() if name in known}
 
     def _show_part(self, job: Job, revision: int) -> None:
-        """Say what can be picked of the drawing, unless it is as it was."""
+        """Send the loops that can be picked, unless they are unchanged."""
         part = self._bench.part(job)
         key = f"{part_key(job)} {job.placement.tolist()}"
-        # Kept before it is said: a page may ask for a loop as soon as it hears.
+        # Keep it before sending: a page may ask for a loop as soon as it knows of it.
         before, self._part = self._part, (key, part)
         if before is None or before[0] != key:
             self._say(part_message(job, part, revision))
 
     def known_part(self) -> Part:
-        """Return what the drawing holds.
+        """Return the content of the drawing.
 
         Raises
         ------
         InputError
-            It is not read yet.
+            The drawing is not read yet.
         """
         if self._part is None:
             raise InputError("the drawing is not read yet; wait until its loops are shown")
         return self._part[1]
 
     def _show(self, message: SceneMessage, meshes: Meshes) -> None:
-        # A page may still ask for what stood there before.
+        # A page may still ask for meshes of the previous scene.
         self.meshes = Meshes({**self._shown, **meshes})
         self._shown = meshes
         self._say(message)
 
     def _failed(self, error: BaseException) -> None:
-        """Say what went wrong in a thread."""
+        """Send the error of a thread."""
         self._say(ErrorMessage(message=said_of(error)))
         self._say(ProgressMessage(busy=False))
 
 
 def _outcome(result: JobResult, revision: int, *, settled: bool) -> OutcomeMessage:
-    """Return what a run comes to."""
-    notes = [] if result.stuck is None else [f"The moves between contours: {result.stuck}"]
-    notes += [f"The moves between contours: {c.issue()}" for c in result.air if not c.ok]
+    """Return the message about the result of a run."""
+    notes = [] if result.stuck is None else [f"Transfer moves: {result.stuck}"]
+    notes += [f"Transfer moves: {c.issue()}" for c in result.air if not c.ok]
     return OutcomeMessage(
         revision=revision,
         passed=result.passed,

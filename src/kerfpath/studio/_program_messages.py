@@ -1,4 +1,4 @@
-"""What the server says of the text of a program, see README.md beside this file."""
+"""Messages about the text of a program; README.md in this folder defines their keys."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["FileEntry", "FindingEntry", "ProgramTextMessage"]
 
 
 class FileEntry(Message):
-    """A file and its text."""
+    """A file of the program, its text, and the times of its lines."""
 
     name: str
     text: str
@@ -20,7 +20,7 @@ class FileEntry(Message):
 
 
 class FindingEntry(Message):
-    """What the preflight of a program finds, and where."""
+    """A finding of the preflight of a program, and its place."""
 
     level: str
     message: str

@@ -1,4 +1,4 @@
-"""The run of a job in the studio: contour after contour, shown as it comes, and stopped at will."""
+"""The run of a job in the studio: it sends the result of each contour and can be stopped."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ __all__ = ["Run", "drafts_of"]
 
 Say = Callable[[Message], None]
 SHOWN_EVERY = 0.1
-"""s: how often a page hears how far the work is."""
+"""Least time between two progress messages, s."""
 
 
 class Run:
-    """One run of a job; what comes of it is said as it comes, and kept.
+    """One run of a job; each result is sent and kept as soon as it is there.
 
     Parameters
     ----------
     bench : Bench
     prepared : PreparedJob
     revision : int
-        Of the job.
+        Revision of the job.
     say : callable
         Takes messages.
     stop : Stop
@@ -62,12 +62,12 @@ class Run:
         self._seconds: dict[str, float] = {}
 
     def progress(self, what: str, done: int, total: int, /) -> None:
-        """Take how far the work is, and stop it where that is asked for.
+        """Take the progress of the work, and stop it if requested.
 
         Raises
         ------
         Superseded
-            It is.
+            The run is asked to stop.
         """
         self._stop.check()
         if self._seldom.may():
@@ -76,14 +76,14 @@ class Run:
     def contours(
         self, first: str | None, took: Callable[[str, tuple[CutResult, ...]], None]
     ) -> list[list[tuple[CutResult, ...]]]:
-        """Plan and audit every contour, one of them first; return what came of each candidate.
+        """Plan and audit every contour, `first` before the others; return each candidate's cuts.
 
-        `took` takes each contour's name and the cuts that are shown of it.
+        `took` takes the name of each contour and its cuts that are shown.
 
         Raises
         ------
         Superseded
-            Meanwhile something else was asked for.
+            Something else has been requested meanwhile.
         """
         requests = list(self._prepared.contours)
         tried: dict[str, list[tuple[CutResult, ...]]] = {}
@@ -95,33 +95,33 @@ class Run:
             ]
             self._seconds[name] = perf_counter() - begun
             shown = next((c for c in tried[name] if all(cut.passed for cut in c)), tried[name][0])
-            # A page that hears of a plan asks for its map at once.
+            # Call this first: a page asks for the map as soon as it gets a plan.
             took(name, shown)
             self._show(shown)
         return [tried[request.task.name] for request in requests]
 
     def ordered(self, tried: Sequence[Sequence[tuple[CutResult, ...]]]) -> JobResult:
-        """Put the cuts in order, with the moves between them, and say their program.
+        """Order the cuts, plan the transfer moves, and send the program.
 
         Raises
         ------
         Superseded
-            Meanwhile something else was asked for.
+            Something else has been requested meanwhile.
         """
         result = order_cuts(self._prepared, tried, self.progress)
         self._stop.check()
-        if result.part is not None:  # joints that turn on, and other candidates
+        if result.part is not None:  # turns of joints and chosen candidates may differ now
             self._show(result.cuts)
         self._say(program_message(result, self._revision))
         return result
 
     def settled(self, result: JobResult, first: str | None) -> JobResult:
-        """Prove what is asked for of each plan, and look for what would open closed ways.
+        """Prove the requested bounds, and search for changes that make missing paths.
 
         Raises
         ------
         Superseded
-            Meanwhile something else was asked for.
+            Something else has been requested meanwhile.
         """
         cuts = list(result.cuts)
         for i in sorted(range(len(cuts)), key=lambda i: cuts[i].contour != first):
@@ -145,7 +145,7 @@ class Run:
             )
             self._bench.cuts.put(key, found)
         self._stop.check()
-        # What is proved of them, and where their table stands, may have changed.
+        # The requested proof and the index of the table may have changed.
         return tuple(replace(cut, request=request) for cut in found)
 
     def _proved(self, cut: CutResult) -> CutResult:
@@ -205,22 +205,22 @@ def _of_same(cuts: Sequence[CutResult], cut: CutResult) -> list[CutResult]:
 def drafts_of(
     job: Job, cut: CutResult, before: Plan, revision: int
 ) -> tuple[Plan, PlanMessage] | None:
-    """Return a motion near the one before that keeps what a job asks for now; None if none is.
+    """Return a motion near the previous one that satisfies the new job; None if there is none.
 
     Parameters
     ----------
     job : Job
-        Of which a contour has other weights, limits, metric, objective or speed than before.
+        The new job, with other weights, limits, metric, objective or speed than before.
     cut : CutResult
-        What came of it before, as it was asked for then.
+        The previous result of the contour.
     before : Plan
-        The motion to begin from: that of the cut, or a draft after it.
+        The motion to start from: that of the cut, or a later draft.
     revision : int
-        Of the job.
+        Revision of the job.
     """
     begun, task = perf_counter(), cut.request.task
     specs = {spec.name: spec for spec in job.contours if spec.table.pick_all is None}
-    # Of tables that pick several loops the windows are compared, and none of them is drafted.
+    # A contour of a `pick_all` table keeps its old request: no draft if the windows have changed.
     spec = specs.get(task.name, task)
     windows = {each.windows for each in job.contours if each.table.pick_all is not None}
     if spec is task and windows - {task.windows}:

@@ -25,14 +25,14 @@ from kerfpath.studio._numbers import flat
 __all__ = ["Meshes", "scene_of", "scene_of_robot", "tables_of"]
 
 SAMPLE = 0.3
-"""rad or m: every joint of the sample pose, from the middle of its range; anything but zero."""
+"""Offset of every joint of the sample pose from the middle of its range, rad or m; not zero."""
 
 
 class Meshes(dict[str, bytes]):
-    """Meshes by their ids, as `/mesh/ID` serves them; an id says what is in it."""
+    """Meshes by their ids, as `/mesh/ID` serves them; an id is the hash of its mesh."""
 
     def add(self, vertices: ArrayLike, triangles: ArrayLike) -> str:
-        """Keep vertices (V, 3) m and triangles (F, 3), and return their id."""
+        """Add a mesh of vertices (V, 3) m and triangles (F, 3), and return its id."""
         points = np.ascontiguousarray(vertices, dtype="<f4")
         corners = np.ascontiguousarray(triangles, dtype="<u4")
         counts = np.array([len(points), len(corners)], "<u4")
@@ -43,17 +43,17 @@ class Meshes(dict[str, bytes]):
 
 
 def scene_of(prepared: PreparedJob, revision: int) -> tuple[SceneMessage, Meshes]:
-    """Return what there is to see of a job, and its meshes.
+    """Return the scene of a job, and its meshes.
 
     Raises
     ------
     InputError
-        A robot whose joints nothing says the places of; an arm of seven axes.
+        The robot has no kinematic chain to draw, or has a free joint (an arm of seven axes).
     """
     job, meshes = prepared.job, Meshes()
     if prepared.cell is None:
         bodies = _own_bodies(job)
-    else:  # the part is drawn as the drawing has it
+    else:  # the part is drawn from the drawing below
         bodies = [body for body in prepared.cell.bodies if body.kind != "part"]
     entries = [_body(body, meshes) for body in bodies]
     vertices, triangles = prepared.part.mesh()
@@ -68,12 +68,12 @@ def scene_of(prepared: PreparedJob, revision: int) -> tuple[SceneMessage, Meshes
 
 
 def scene_of_robot(job: Job, revision: int) -> tuple[SceneMessage, Meshes]:
-    """Return what there is to see before the drawing has been read: the robot and its head.
+    """Return the scene before the drawing has been read: the robot and its head.
 
     Raises
     ------
     InputError
-        As `scene_of`.
+        As for `scene_of`.
     """
     meshes = Meshes()
     entries = [_body(body, meshes) for body in _own_bodies(job)]
@@ -96,12 +96,12 @@ def _scene(
 
 
 def tables_of(prepared: PreparedJob) -> list[int]:
-    """Return the place in the job of the table that each contour comes from."""
+    """Return the index of the [[contour]] table that each contour comes from."""
     tables = [spec.table for spec in prepared.job.contours]
     found = []
     for request in prepared.contours:
         table = request.task.table
-        # A table whose nodes had to be nearer is a copy of the one in the job.
+        # A table whose nodes had to be closer together is a copy of the one in the job.
         same = [i for i, one in enumerate(tables) if one is table]
         named = [i for i, one in enumerate(tables) if (one.name or one.pick) == request.task.name]
         found.append((same or named or _picking(tables, request))[0])
@@ -109,7 +109,7 @@ def tables_of(prepared: PreparedJob) -> list[int]:
 
 
 def _picking(tables: Sequence[object], request: CutRequest) -> list[int]:
-    """Return the tables that pick what the table of a request picks."""
+    """Return the indices of tables with the same `pick_all` as the table of a request."""
     pick = request.task.table.pick_all
     return [i for i, one in enumerate(tables) if getattr(one, "pick_all", None) == pick]
 
@@ -117,7 +117,7 @@ def _picking(tables: Sequence[object], request: CutRequest) -> list[int]:
 def _own_bodies(job: Job) -> Sequence[Body]:
     """Return the links of the robot's description, or capsules, and a generic head.
 
-    They are something to look at: nothing is kept clear of them.
+    They are only displayed: collisions with them are not checked.
     """
     return [*link_bodies(job.robot), *CuttingHead().bodies(chain_of(job.robot), job.tool)]
 
@@ -180,18 +180,18 @@ def _robot(job: Job) -> RobotEntry:
 
 
 def _through(axis: ExternalAxis) -> Array:
-    """Return a frame (4, 4) m in the robot base, turned as that, through which an axis passes."""
+    """Return a frame (4, 4) m on an axis, oriented like the robot base."""
     T = np.eye(4)
     T[:3, 3] = axis.point
     return T
 
 
 def _sample(job: Job) -> SampleEntry:
-    """Return a pose by the robot's own kinematics, for the page to hold its own against."""
+    """Return a pose by the robot's kinematics, against which the page checks its own."""
     robot = job.robot
     limits = robot.joint_limits()
     middle = np.where(robot.endless, 0.0, (limits.lower + limits.upper) / 2)
     q = middle + SAMPLE
-    # Poses of the robot are those of the part and of its base with every external axis at zero.
+    # Poses refer to the part and the base with every external axis at zero.
     part = carried(robot.externals, q[robot.family.joints :], "part")
     return SampleEntry(q=flat(q, 15), T=flat(part @ robot.forward(q) @ job.tool, 15))

@@ -1,4 +1,4 @@
-"""The server on its port, and the browser that is opened on it."""
+"""Start the server on its port, and open a browser."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ __all__ = ["serve"]
 HERE = ("127.0.0.1", "localhost", "::1")
 """Addresses that only this machine can reach."""
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
-"""Names of this machine for itself, in addresses."""
+"""Names of the local machine in URLs."""
 
 READER = "kerfpath.cad._step"
-"""What the process that reads drawings imports at once: most drawings are STEP files."""
+"""Module that the process that reads drawings imports first: most drawings are STEP files."""
 EVERYWHERE = ("0.0.0.0", "::")
-"""Addresses at which every one of this machine is listened at."""
+"""Addresses that mean every address of this machine."""
 WITHOUT_PORT = 80
-"""The port that addresses do not say."""
+"""Default HTTP port, which URLs leave out."""
 
 
 def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[str], None]) -> None:
@@ -35,22 +35,23 @@ def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[st
     Parameters
     ----------
     path : Path
-        The job.
+        Path of the job file.
     host : str
-        Address to listen at. At any but `HERE` a token is asked for, which is in the address shown.
+        Address to listen at. For any address except `HERE`, a token is required; the shown URL
+        contains it.
     port : int
-        0: one that is free.
+        Port to listen at; 0 takes a free one.
     browser : bool
-        Whether to open one.
+        Whether to open a browser.
     show : callable
-        Takes the address once the server listens there.
+        Takes the URL once the server listens there.
 
     Raises
     ------
     InputError
-        The job cannot be read; the port is in use or the address is not of this machine.
+        The job cannot be read, the port is in use, or the address is not of this machine.
     """
-    stand_by(READER)  # it starts while this one imports
+    stand_by(READER)  # the reader process starts while this process imports
     document = Document(path)
     with _listener(host, port) as listener:
         number = listener.getsockname()[1]
@@ -65,7 +66,7 @@ def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[st
             address += f"?token={token}"
         show(address)
         if browser:
-            # The listener is there: the browser starts, and waits for the rest.
+            # The port is open already: the browser starts and waits for the page.
             Thread(target=webbrowser.open, args=(address,), daemon=True).start()
         _run(document, hosts, token, listener)
 
@@ -73,17 +74,17 @@ def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[st
 def _run(
     document: Document, hosts: Sequence[str], token: str | None, listener: socket.socket
 ) -> None:
-    """Serve a document, with all that takes a second to be imported."""
+    """Serve a document; this imports modules that take a second to load."""
     import uvicorn
 
     from kerfpath.studio._app import LONGEST, application
 
     class Server(uvicorn.Server):
-        """A server that leaves Ctrl-C to the command that it is part of."""
+        """A server that leaves Ctrl-C to the command that started it."""
 
         @contextmanager
         def capture_signals(self) -> Iterator[None]:
-            """Capture none."""
+            """Capture no signals."""
             yield
 
     config = uvicorn.Config(
@@ -116,7 +117,7 @@ def _listener(host: str, port: int) -> socket.socket:
 
 
 def _names_of_machine() -> list[str]:
-    """Return by what names others may ask for this machine."""
+    """Return the names and addresses of this machine in URLs."""
     own = socket.gethostname()
     found = {own, socket.getfqdn()}
     with suppress(OSError):

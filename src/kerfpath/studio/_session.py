@@ -1,4 +1,4 @@
-"""A session: one job, edited, planned and shown; every page that is open sees the same."""
+"""A session: one job that is edited, planned and shown; all open pages see the same state."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ _Ts = TypeVarTuple("_Ts")
 
 
 class Session:
-    """One job that is worked on; all of it but the planning happens in the thread of the server.
+    """One job that is edited and planned; everything except planning runs in the server's thread.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Session:
         self._loop: asyncio.AbstractEventLoop | None = None
 
     async def work(self) -> None:
-        """Read and plan the job whenever it has changed, until this is cancelled."""
+        """Read and plan the job after each change, until this task is cancelled."""
         self._loop = asyncio.get_running_loop()
         self._changed.set()
         try:
@@ -122,34 +122,34 @@ class Session:
         return self._planning.meshes
 
     async def hear(self, ask: Ask, page: Page) -> None:
-        """Do what a page asks for; an error is an answer."""
+        """Carry out the request of a page; an error is sent to it as the answer."""
         try:
             await self._do(ask, page)
         except KerfpathError as error:
             page.say(ErrorMessage(message=str(error), about=ask.type))
 
     async def program(self, language: str | None) -> tuple[JobResult, FileTexts]:
-        """Return what the job comes to, asked for in a language, and its program.
+        """Return the result of the job and its program in a language, by default that of the job.
 
         Raises
         ------
         InputError
-            The job as it is now is not planned yet; an unknown language.
+            The current job is not planned yet, or the language is unknown.
         """
         result = in_language(self._planned().result, language)
         return result, await asyncio.to_thread(program_texts, result)
 
     async def files(self) -> FileTexts:
-        """Return all files that the job comes to.
+        """Return all files of the result.
 
         Raises
         ------
         InputError
-            The job as it is now is not planned yet, or what is proved of it is still to come.
+            The current job is not planned yet, or its bounds are still being computed.
         """
         planned = self._planned()
         if not planned.settled:
-            raise InputError(f"{WAIT}; wait for it")
+            raise InputError(f"{WAIT}; wait for them")
         if self._files is None or self._files[0] is not planned.result:
             self._files = planned.result, await asyncio.to_thread(result_texts, planned.result)
         return self._files[1]
@@ -160,7 +160,7 @@ class Session:
         Raises
         ------
         InputError
-            The job as it is now is not planned yet, or has what a script has no lines for.
+            The current job is not planned yet, or it has options that a script cannot express.
         """
         self._planned()
         prepared, path = self._planning.prepared, self.document.path
@@ -172,7 +172,7 @@ class Session:
     def _planned(self) -> Outcome:
         planned = self._planning.result
         if planned is None or planned.revision != self.document.revision:
-            raise InputError("the job as it is now is not planned yet; wait until it is")
+            raise InputError("the current job is not planned yet; wait until it is")
         return planned
 
     async def _do(self, ask: Ask, page: Page) -> None:
@@ -249,7 +249,7 @@ class Session:
         Raises
         ------
         InputError
-            It is no valid job.
+            The text is not a valid job.
         """
         document = self.document
         if self._job is None or self._job.text != document.text:
@@ -264,12 +264,12 @@ class Session:
         self._change([(tuple(one.path), one.value) for one in ways[ask.index].edits])
 
     def _keep(self, ask: Keep | Rename | OfKept) -> None:
-        """Keep the job, or do something with one that is kept."""
+        """Keep the job, or rename, forget or restore one that is kept."""
         match ask:
             case Keep():
                 asked = None if self._job is None else self._job.options
                 if asked is None:
-                    raise InputError("keep: the job is not planned yet; wait, or correct its fault")
+                    raise InputError("keep: the job is not planned yet; wait, or correct its error")
                 self.kept.keep(self.document, ask.name, asked.metric, asked.objective)
             case Rename():
                 self.kept.rename(ask.id, ask.name)
@@ -280,7 +280,7 @@ class Session:
         self.hub.say(self.kept.message())
 
     async def _read(self) -> None:
-        """Read the job as it is now, and have it planned."""
+        """Read the current job and start planning it."""
         document = self.document
         revision = document.revision
         try:
@@ -291,7 +291,7 @@ class Session:
             self._say_job()
             return
         if document.revision != revision:
-            return  # another reading is to come
+            return  # the job has changed meanwhile and will be read again
         self._job, self._faults = job, []
         self._say_job()
         self._planning.take(job, revision, self._first or self._default_first())
@@ -313,13 +313,13 @@ class Session:
         self._to_page(page, ErrorMessage(message=said_of(error), about=kind))
 
     def _from_thread(self, message: Message) -> None:
-        """Take a message from any thread."""
+        """Take a message; may be called from any thread."""
         self._soon(self._say, message)
 
     def _soon(self, take: Callable[[*_Ts], None], *what: *_Ts) -> None:
-        """Have something taken in the thread of the server, unless that has ended."""
+        """Call `take(*what)` in the thread of the server, unless that has ended."""
         assert self._loop is not None
-        with suppress(RuntimeError):  # the loop is closed: nobody hears any more
+        with suppress(RuntimeError):  # the loop is closed: no page is connected any more
             self._loop.call_soon_threadsafe(take, *what)
 
     def _say(self, message: Message) -> None:
@@ -343,7 +343,7 @@ class Session:
         self._soon(self._prepared, prepared, revision)
 
     def _prepared(self, prepared: PreparedJob, revision: int) -> None:
-        """Take what the contours of the job are called, once its drawing has been read."""
+        """Take the names of the job's contours, once its drawing has been read."""
         pairs = zip(prepared.names, tables_of(prepared), strict=True)
         contours = [ContourName(name=name, index=index) for name, index in pairs]
         interval = prepared.contours[0].candidates[0].dt if prepared.contours else 1.0
@@ -355,7 +355,7 @@ class Session:
         self._soon(self._refused, error, revision)
 
     def _refused(self, error: InputError, revision: int) -> None:
-        """Take what is wrong with a job that its drawing and cell show."""
+        """Take an error of the job that only its drawing or its cell reveals."""
         if revision == self.document.revision:
             self._faults = faults_of(error, self.document.text)
             self._say_job()

@@ -1,4 +1,4 @@
-"""What the admitted poses of a map are shaded by: clearance, the measures of comfort, turns."""
+"""Quantities that shade the admitted poses of a map: clearance, measures of comfort, turns."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ __all__ = ["shade_message", "shades_of"]
 CLEARANCE = ShadeName(by="clearance", words="clearance", unit="m")
 TURNS = ShadeName(by="turns", words="turns of the joints", unit="")
 BAND, RESOLUTION = 0.1, 5e-3
-"""m: clearance is sent up to here, so closely."""
+"""Largest clearance that is sent, and its resolution, m."""
 NODES_AT_ONCE = 32
-"""Nodes of which the clearance is found between two looks at whether that is still wanted."""
+"""Number of nodes whose clearance is computed between two checks for a stop."""
 MOST, CLOSED, NONE = 253, 254, 255
-"""Codes of the highest value, of a pose that comes too near, and of one that is not admitted."""
+"""Codes of the highest value, of a pose that is too close, and of one that is not admitted."""
 
 
 class _Values(NamedTuple):
     """A quantity (N,) of the vertices of a graph, and the ends of its scale.
 
-    `closed` (N,) where a vertex comes too near; `pair` (N,) which of `pairs` is nearest, -1: none.
+    `closed` (N,) is True where a body is too close; `pair` (N,) is the index into `pairs` of the
+    nearest pair, -1 for none.
     """
 
     value: Array
@@ -46,9 +47,9 @@ class _Values(NamedTuple):
 
 
 def shades_of(job: Job, graph: LayeredGraph, cell: Cell | None) -> list[ShadeName]:
-    """Return what a map can be shaded by: clearance in a cell, measures of the arm, turns.
+    """Return the quantities for a map: clearance in a cell, measures of the arm, turns.
 
-    Turns are told where any pose is admitted on more than one.
+    Turns are included if some pose is admitted on more than one turn.
     """
     measured = [
         ShadeName(by=name, words=each.words, unit=each.unit)
@@ -69,14 +70,14 @@ def shade_message(
     revision: int,
     stop: Stop,
 ) -> ShadeMessage:
-    """Return a quantity at every place of a map: that of its best vertex, the highest.
+    """Return a quantity at every place of a map: the highest value of its vertices.
 
     Raises
     ------
     InputError
         The map has no such quantity.
     Superseded
-        Meanwhile something else was asked for.
+        Something else has been requested meanwhile.
     """
     known = {each.by: each for each in shades_of(job, graph, cell)}
     if by not in known:
@@ -113,7 +114,7 @@ def shade_message(
 
 
 def _clearance(graph: LayeredGraph, cell: Cell, stop: Stop) -> _Values:
-    """Return the clearance of every vertex, at least; some nodes at a time."""
+    """Return a lower bound on the clearance of every vertex, computed in blocks of nodes."""
     lower, closed, pair = [], [], []
     for first in range(0, len(graph.start) - 1, NODES_AT_ONCE):
         stop.check()
@@ -126,7 +127,7 @@ def _clearance(graph: LayeredGraph, cell: Cell, stop: Stop) -> _Values:
     whole = np.concatenate(pair) if pair else np.zeros(0, np.int64)
     used, place = np.unique(whole, return_inverse=True)
     names = tuple(cell.pair_names[k] for k in used.tolist() if k >= 0)
-    # -1, none, comes first among those that are used.
+    # -1 (no pair) sorts first.
     place = place - int(used.size > 0 and used[0] < 0)
     return _Values(
         value=np.concatenate(lower) if lower else np.zeros(0),
@@ -145,7 +146,7 @@ def _measured(name: str, job: Job, graph: LayeredGraph) -> _Values:
 
 
 def _turns(graph: LayeredGraph) -> _Values:
-    """Return on how many turns the pose of each vertex is admitted."""
+    """Return the number of turns on which the pose of each vertex is admitted."""
     layer = np.repeat(np.arange(len(graph.start) - 1), np.diff(graph.start))
     at = layer, graph.candidate, graph.posture
     place = np.ravel_multi_index(at, graph.reason.shape)
@@ -163,7 +164,7 @@ def _on_the_map(graph: LayeredGraph, found: _Values) -> tuple[NDArray[np.uint8],
     code = np.round(np.clip(share, 0.0, 1.0) * MOST).astype(np.uint8)
     if found.closed is not None:
         code[found.closed] = CLOSED
-    # The best comes last: it stays.
+    # The best vertex comes last and overwrites the others.
     rank = np.where(code == CLOSED, -1.0, found.value)
     order = np.argsort(rank, kind="stable")
     layer = np.repeat(np.arange(K), np.diff(graph.start))[order]

@@ -1,4 +1,4 @@
-"""What other techniques make of a contour: the paper's procedure, and the one known before it."""
+"""Courses of other techniques on a contour: the paper's procedure, and the known technique."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def technique_message(
     *,
     revision: int,
 ) -> TechniqueMessage:
-    """Return the course of a technique along a contour, on the graph that its plan began from."""
+    """Return the course of a technique along a contour, on the layered graph of its plan."""
     asked, notes = _without(cut.request.options, prepared, method)
     job, first = prepared.job, float(nodes.s[0])
     robot = replace(job.robot, load=None, jerk=None)
@@ -57,7 +57,7 @@ def technique_message(
 def _without(
     options: PlanOptions, prepared: PreparedJob, method: Literal["paper", "known"]
 ) -> tuple[PlanOptions, list[str]]:
-    """Return the options as the technique can take them, and what of them it does not keep."""
+    """Return the options that the technique can use, and a note on those that it ignores."""
     comfort = options.comfort
     asked = replace(
         options, method=method, refine=False, refine_parts=1, certify=None,
@@ -66,9 +66,9 @@ def _without(
         comfort=None if comfort is None else replace(comfort, clearance=None),
     )  # fmt: skip
     kept = {
-        "that the motion closes": options.closure == "free",
-        "limits on how far endless joints turn": options.rotation is None,
-        "a reduced feed": options.feed == "constant",
+        "the closure of the motion": options.closure == "free",
+        "limits on the rotation of endless joints": options.rotation is None,
+        "feed reductions": options.feed == "constant",
         "interruptions": options.interruptions == "none",
         "limits between the nodes": options.between_nodes != "guaranteed",
         "limits on torque": prepared.job.robot.load is None,
@@ -76,4 +76,4 @@ def _without(
         "collisions in the cell": prepared.cell is None,
     }
     left = [words for words, none in kept.items() if not none]
-    return asked, [f"It does not look at {', '.join(left)}."] if left else []
+    return asked, [f"It ignores {', '.join(left)}."] if left else []

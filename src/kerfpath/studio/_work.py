@@ -1,4 +1,4 @@
-"""Work beside the server: a thread of which the newest request wins, and how work is stopped."""
+"""Work in threads: each does only the newest request, and running work can be stopped."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ __all__ = ["Newest", "Seldom", "Stop", "Superseded", "said_of"]
 log = logging.getLogger("kerfpath.studio")
 
 
-class Superseded(Exception):  # it says what has happened, and is no error
-    """Raised inside work that nobody waits for any more."""
+class Superseded(Exception):  # not an error, so its name does not end in Error
+    """Raised inside work whose result is no longer wanted."""
 
 
 class Stop:
-    """Says to work that it is not wanted any more."""
+    """A flag that asks running work to stop."""
 
     def __init__(self) -> None:
         self._event = Event()
@@ -32,41 +32,41 @@ class Stop:
 
     @property
     def asked(self) -> bool:
-        """Whether it is to stop."""
+        """Whether the work is asked to stop."""
         return self._event.is_set()
 
     def check(self) -> None:
-        """Raise where the work is to stop.
+        """Raise `Superseded` if the work is asked to stop.
 
         Raises
         ------
         Superseded
-            It is.
+            The work is asked to stop.
         """
         if self._event.is_set():
             raise Superseded
 
     def rest(self, seconds: float) -> None:
-        """Wait, unless the work is stopped meanwhile.
+        """Wait, unless the work is asked to stop meanwhile.
 
         Raises
         ------
         Superseded
-            It is.
+            The work is asked to stop.
         """
         if self._event.wait(seconds):
             raise Superseded
 
 
 class Newest:
-    """A thread that does the newest of what it is asked for; what it is at is asked to stop.
+    """A thread that does only the newest request; a new one asks the running work to stop.
 
     Parameters
     ----------
     name : str
-        Of the thread.
+        Name of the thread.
     failed : callable
-        Takes what work raised, other than that it was stopped; in that thread.
+        Takes every exception of the work except `Superseded`; called in that thread.
     """
 
     def __init__(self, name: str, failed: Callable[[BaseException], None]) -> None:
@@ -75,7 +75,7 @@ class Newest:
         self._stop = Stop()
 
     def ask(self, work: Callable[[Stop], None]) -> None:
-        """Do this next, and nothing else that was asked for before."""
+        """Do this next, in place of every earlier request."""
         with self._lock:
             self._stop.set()
             stop = self._stop = Stop()
@@ -83,12 +83,12 @@ class Newest:
         future.add_done_callback(self._done)
 
     def cancel(self) -> None:
-        """Stop what is being done."""
+        """Stop the running work."""
         with self._lock:
             self._stop.set()
 
     def close(self) -> None:
-        """Stop, and take nothing more."""
+        """Stop the running work and take no further requests."""
         self.cancel()
         self._pool.shutdown(wait=False, cancel_futures=True)
 
@@ -107,11 +107,12 @@ def _do(work: Callable[[Stop], None], stop: Stop) -> None:
 
 
 class Seldom:
-    """Lets something through a few times a second.
+    """A limiter of how often something is done.
 
     Parameters
     ----------
     every : float s
+        Least time from one permission to the next.
     """
 
     def __init__(self, every: float) -> None:
@@ -127,8 +128,8 @@ class Seldom:
 
 
 def said_of(error: BaseException) -> str:
-    """Return what work raised in one line; what is a fault of kerfpath goes to the log, too."""
+    """Return the message of an exception in one line; an internal error is also logged."""
     if isinstance(error, KerfpathError):
         return str(error)
     log.error("the studio's work failed", exc_info=error)
-    return f"a fault in kerfpath, {type(error).__name__}: {error}; the terminal has more"
+    return f"internal error, {type(error).__name__}: {error}; see the terminal for the traceback"

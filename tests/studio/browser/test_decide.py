@@ -51,7 +51,7 @@ def test_a_plan_that_is_kept_is_compared_with_the_one_that_is_shown(page, studio
     page.get_by_role("button", name="Go back to A").click()
     until(page, lambda: sent(studio, "restore"))
     assert sent(studio, "restore") == [{"type": "restore", "id": 3}]
-    page.get_by_label("Name of the plan that is kept").fill("slow")
+    page.get_by_label("Name of the kept plan").fill("slow")
     page.keyboard.press("Enter")
     until(page, lambda: sent(studio, "rename"))
     # A page that is told that it is gone compares with nothing.
@@ -66,7 +66,7 @@ def test_another_page_chooses_what_it_compares_with(page, studio, first):
     ready(page)
     assert page.locator("#compare table").count() == 0
     page.locator(".kept button", has_text="A").click()
-    page.get_by_text("A has no plan of this contour.").wait_for()
+    page.get_by_text("A has no plan for this contour.").wait_for()
     page.locator(".kept button", has_text="A").click()
     until(page, lambda: page.locator("#compare .actions").count() == 0)
 
@@ -84,8 +84,8 @@ def test_every_option_has_a_control_and_is_found_by_its_name(page, studio, first
     until(page, lambda: sent(studio, "edits"))
     path = ["contour", 2, "lead_in", "length_mm"]
     assert sent(studio, "edits")[-1]["edits"] == [{"path": path, "value": 4}]
-    page.get_by_label("Find an option").fill("wrist costs")
-    width = page.get_by_label("Wrist singularity, costs below", exact=True)
+    page.get_by_label("Find an option").fill("wrist band")
+    width = page.get_by_label("Wrist singularity, band width", exact=True)
     width.fill("20")
     width.press("Enter")
     until(page, lambda: len(sent(studio, "edits")) == 2)
@@ -101,7 +101,7 @@ def test_every_option_has_a_control_and_is_found_by_its_name(page, studio, first
         {"path": ["contour", 2, "count"], "value": 200},
     ]
     page.get_by_label("Find an option").fill("gamma")
-    page.get_by_label("Step of gamma: as it is by default").click()
+    page.get_by_label("Step of gamma: reset to default").click()
     until(page, lambda: len(sent(studio, "edits")) == 4)
     step = {"path": ["plan", "gamma_step_deg"], "value": None}
     assert sent(studio, "edits")[-1]["edits"] == [step]
@@ -118,7 +118,7 @@ def test_every_option_has_a_control_and_is_found_by_its_name(page, studio, first
     assert place.get_attribute("aria-invalid") == "true"
     assert serious(page) == []
     page.get_by_label("Find an option").fill("nonsense")
-    page.get_by_text("No option is called so.").wait_for()
+    page.get_by_text("No option matches.").wait_for()
 
 
 def test_the_keys_of_the_controls_are_keys_of_the_job(page, studio, first, messages):
@@ -175,8 +175,8 @@ def test_a_point_of_the_pareto_set_is_shown_and_taken(page, studio, first, messa
     page.locator("#contours button", has_text="slot").click()
     page.get_by_text("Criteria and runs").click()
     page.get_by_label("limits", exact=True).check()
-    page.locator("#front").get_by_role("button", name="Look for it").click()
-    page.get_by_text("2 plans that no other beats").wait_for()
+    page.locator("#front").get_by_role("button", name="Search", exact=True).click()
+    page.get_by_text("2 non-dominated plans").wait_for()
     asked = sent(studio, "front")[0]
     assert asked["criteria"] == ["displacement", "velocity", "range", "limits"]
     page.get_by_label("Criterion by colour").select_option("limits")

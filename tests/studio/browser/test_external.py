@@ -318,8 +318,8 @@ def test_the_keys_of_an_axis_have_controls(page, studio, carried):
     path = ["robot", "external", 0, "velocity_mm_s"]
     assert sent(studio, "edits")[-1]["edits"] == [{"path": path, "value": 750}]
     page.get_by_label("Find an option").fill("table")
-    assert page.get_by_label("table, from").count() == 0  # endless
-    assert page.get_by_label("table, a point of it", exact=True).input_value() == "1200, 0, 500"
+    assert page.get_by_label("table, lower limit").count() == 0  # endless
+    assert page.get_by_label("table, point on the axis", exact=True).input_value() == "1200, 0, 500"
     job = copy.deepcopy(carried[0])
     job["revision"] += 1
     job["values"]["robot"]["external"] = []

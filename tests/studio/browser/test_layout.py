@@ -174,15 +174,15 @@ def test_the_fastest_speed_follows_and_the_best_place_is_found_and_taken(opened)
     page, sheet = opened, opened.locator("#sheet")
     until(page, lambda: "m/min" in sheet.locator("dd").first.inner_text(), seconds=120)
     before = sheet.locator("dd").first.inner_text()
-    sheet.get_by_text("What may vary, and how far").click()
+    sheet.get_by_text("Variables and ranges").click()
     sheet.get_by_label("Placements to try").fill("8")
     sheet.get_by_label("Part about z", exact=True).uncheck()
-    look = sheet.get_by_role("button", name="Look for it")
+    look = sheet.get_by_role("button", name="Search", exact=True)
     until(page, look.is_enabled, seconds=120)
     look.click()
     done = "() => studio.store.layout?.state === 'done'"
     until(page, lambda: page.evaluate(done), seconds=240)
-    sheet.get_by_text("What may vary, and how far").click()
+    sheet.get_by_text("Variables and ranges").click()
     rows = sheet.locator(".tries button")
     assert rows.count() >= 5
     assert serious(page) == []
@@ -199,7 +199,7 @@ def test_the_fastest_speed_follows_and_the_best_place_is_found_and_taken(opened)
     assert part_of(page)["xyz_mm"][0] == pytest.approx(
         was["xyz_mm"][0] + best["offsets"]["x_mm"], abs=1e-3
     )
-    assert "Of the job before its last change" in sheet.inner_text()
+    assert "Out of date: the job has changed" in sheet.inner_text()
     settled(page, page.evaluate(REVISION) - 1)
     until(page, lambda: before in sheet.locator("dd").nth(1).inner_text(), seconds=120)
     until(page, lambda: re.search(r"\d m/min", sheet.locator("dd").first.inner_text()), seconds=120)
@@ -237,7 +237,7 @@ def test_what_the_search_has_tried_is_said_in_words(page, studio, first, message
     until(page, lambda: studio.sent[-1] == {"type": "take", "number": 3})
     sheet.get_by_role("button", name="Back to the job's place").click()
     assert page.get_by_label("Part x, mm").input_value() == "1200"
-    sheet.get_by_role("button", name="Look again").click()
+    sheet.get_by_role("button", name="Search again").click()
     until(page, lambda: studio.sent[-1]["type"] == "layout")
     asked = studio.sent[-1]
     spans = {"x_mm": [-200, 200], "y_mm": [-200, 200], "yaw_deg": [-30, 30]}
@@ -249,5 +249,5 @@ def test_what_the_search_has_tried_is_said_in_words(page, studio, first, message
     until(page, lambda: studio.sent[-1]["type"] == "cancel")
     job = next(m for m in first if m["type"] == "job")
     studio.say(job | {"revision": 2})
-    until(page, lambda: "Of the job before its last change" in sheet.inner_text())
+    until(page, lambda: "Out of date: the job has changed" in sheet.inner_text())
     assert page.locator(".tries button:disabled").count() == 5

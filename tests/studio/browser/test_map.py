@@ -136,10 +136,10 @@ def test_what_comes_too_near_is_crossed_and_said(mapped, studio, messages):
         }
     )
     until(page, lambda: "100 mm" in page.locator("#legend .shades").inner_text())
-    assert "nearer than allowed" in page.locator("#legend .shades").inner_text()
+    assert "closer than allowed" in page.locator("#legend .shades").inner_text()
     page.evaluate("() => studio.map.hover.enter({ node: 3, sample: 10 })")
     said = page.locator("#map-tip").inner_text()
-    assert said.startswith("Nearer than it must be")
+    assert said.startswith("Closer than allowed")
     assert "link 3 \u2013 post" in said
     page.evaluate("() => studio.map.hover.enter({ node: 3, sample: 300 })")
     assert "at least 100 mm" in page.locator("#map-tip").inner_text()
@@ -274,12 +274,12 @@ def test_the_course_of_another_technique_is_dotted_with_what_it_comes_to(mapped,
     assert serious(page) == []
     # The paper's procedure is still looked for; nothing of it can be left out of the page's words.
     page.locator("#map-technique").select_option("paper")
-    assert "Being looked for" in legend.inner_text()
+    assert "Being computed" in legend.inner_text()
     studio.say(
         technique
         | {"method": "paper", "s": [], "gamma": [], "posture": [], "cost": None}
         | {"peak_velocity": [], "peak_acceleration": [], "statement": "no edge from node 3"}
-        | {"notes": ["It does not look at collisions in the cell."]}
+        | {"notes": ["It ignores collisions in the cell."]}
     )
     until(page, lambda: "finds no path" in legend.inner_text())
     legend.locator("summary").click()

@@ -39,7 +39,7 @@ def test_the_nearest_pair_is_said_and_lit_where_the_robot_is(page, studio, first
     assert label.inner_text() == "12.3 mm: link 3 \u2013 part"
     until(page, lambda: page.evaluate("() => studio.view.near.lit.length") == 2)
     page.evaluate(go, 0.9)
-    assert label.inner_text() == "4.0 mm: head \u2013 part nearer than it must be"
+    assert label.inner_text() == "4.0 mm: head \u2013 part closer than allowed"
     assert serious(page) == []
     by.select_option("kind")
     assert label.is_hidden()

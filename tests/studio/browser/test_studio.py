@@ -166,7 +166,7 @@ def test_a_slider_changes_cost_and_course_and_undo_brings_them_back(opened):
     settled(page, drag(page, "#weight-6", 0.9))
     assert cost(page) != first
     assert page.evaluate(COURSE) != course
-    assert page.locator("#saved").inner_text().startswith("changed")
+    assert page.locator("#saved").inner_text().startswith("not saved")
     before = page.evaluate(REVISION)
     page.locator("#undo").click()
     settled(page, before)
@@ -272,7 +272,7 @@ def test_two_pages_see_the_same_and_a_new_server_finds_the_work(opened, servers,
     page.goto(servers[0].url)
     settled(page)
     assert cost(page) == pytest.approx(shown, rel=1e-3)  # four digits are shown
-    assert page.locator("#saved").inner_text().startswith("changed")
+    assert page.locator("#saved").inner_text().startswith("not saved")
 
 
 @pytest.mark.slow

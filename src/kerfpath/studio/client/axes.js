@@ -1,12 +1,12 @@
-/** Joints and external axes as the page tells of them: their names, units and colours. */
+/** Joints and external axes as the page shows them: their names, units and colours. */
 
 import { UNITS } from "./format.js";
 
 /**
  * @typedef {object} Axis
- * @property {string} label  where there is little room: "J1", an external axis by its name
- * @property {string} unit  of its values as they are told: deg or mm
- * @property {(value: number) => number} of  what rad or m are in it
+ * @property {string} label  short: "J1", or the name of an external axis
+ * @property {string} unit  the shown unit of its values: deg or mm
+ * @property {(value: number) => number} of  converts rad or m to that unit
  * @property {string} colour  a variable of the theme
  * @property {boolean} external
  */

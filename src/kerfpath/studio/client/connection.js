@@ -1,4 +1,4 @@
-/** The one connection to the server: messages out and in, and what to do when it breaks. */
+/** The connection to the server: it sends and receives messages, and reconnects. */
 
 /** @typedef {import("./messages.js").ClientMessage} ClientMessage */
 /** @typedef {import("./messages.js").ServerMessage} ServerMessage */
@@ -48,7 +48,7 @@ export class Connection {
   }
 
   /**
-   * Send a message; false where there is nobody to take it.
+   * Send a message; false if the connection is not open.
    * @param {ClientMessage} message
    * @returns {boolean}
    */

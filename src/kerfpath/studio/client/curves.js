@@ -1,4 +1,4 @@
-/** What the joints do over a cut, as curves: speed, acceleration, place; and those of another plan. */
+/** Curves of the joints over a cut: speed, acceleration, position; also those of another plan. */
 
 import { themeColour } from "./dom.js";
 
@@ -7,14 +7,14 @@ import { themeColour } from "./dom.js";
 /** @typedef {"speed" | "acceleration" | "angle"} Kind */
 
 /**
- * Return the scale that the curve of an axis is drawn to: %, deg or mm.
+ * Return the scale of the curve of an axis: %, deg or mm.
  * @param {Axis} axis
  * @param {Kind} kind
  */
 export const scaleOf = ({ unit }, kind) => (kind === "angle" ? unit : "%");
 
 /**
- * Return the columns to plot: time, then one per joint; pieces are apart by a gap.
+ * Return the columns to plot: time, then one per joint; a gap separates pieces.
  * @param {PlanMessage[]} plans
  * @param {Axis[]} axes
  * @param {Kind} kind
@@ -46,7 +46,7 @@ export function columns(plans, axes, kind) {
 }
 
 /**
- * Return the least and the largest of some columns; nothing of none.
+ * Return the least and the largest value of columns.
  * @param {(number | null)[][]} found
  * @returns {[number, number]}
  */

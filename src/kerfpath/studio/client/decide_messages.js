@@ -1,5 +1,5 @@
 /**
- * What the server says of choices: plans that are kept, Pareto sets, other places of the part.
+ * Messages of the server about kept plans, Pareto sets and other placements of the part.
  * Units and meaning: README.md of the studio.
  */
 
@@ -57,8 +57,8 @@
  * @property {number | null} bound
  * @property {number | null} estimate
  * @property {string | null} reason
- * @property {number[]} part  16, how the part moves in the robot's base
- * @property {number[]} rest  16, how all else but the robot does
+ * @property {number[]} part  16, the pose that moves the part in the robot's base
+ * @property {number[]} rest  16, the same for everything else except the robot
  */
 
 /**

@@ -1,9 +1,9 @@
-/** The desk itself: its theme, and how high its lower part is. Both are remembered. */
+/** The desk: its theme and the height of its lower part. The browser remembers both. */
 
 import { byId } from "./dom.js";
 
 /**
- * Light or dark as the system says, until the button says otherwise.
+ * Follow the light or dark theme of the system until the button changes it.
  * @param {HTMLElement} button
  * @param {(name: string) => SVGElement} icon
  * @param {() => void} changed
@@ -26,7 +26,7 @@ export function theme(button, icon, changed) {
   set();
 }
 
-/** Let the line between scene and map be moved, by pointer and by keys. */
+/** Make the line between scene and map movable by pointer and keys. */
 export function splitter() {
   const [desk, line] = [byId("desk"), byId("split")];
   const set = (/** @type {number} */ share) => {
@@ -59,7 +59,7 @@ function remembered(name) {
   try {
     return localStorage.getItem(`kerfpath.${name}`);
   } catch {
-    return null; // a browser that keeps nothing
+    return null; // the browser stores nothing
   }
 }
 
@@ -72,6 +72,6 @@ function remember(name, value) {
     if (value === null) localStorage.removeItem(`kerfpath.${name}`);
     else localStorage.setItem(`kerfpath.${name}`, value);
   } catch {
-    // The next visit begins afresh.
+    // The browser stores nothing: the next visit begins with defaults.
   }
 }

@@ -1,4 +1,4 @@
-/** Elements, made and found; text only ever enters the page as text. */
+/** Create and find elements; text enters the page only as text, never as HTML. */
 
 /**
  * Return a new element.
@@ -39,7 +39,7 @@ export function icon(name) {
 }
 
 /**
- * Return the element of the page with an id; its absence is a fault of the page.
+ * Return the element of the page with an id; throws if it is missing.
  * @template {HTMLElement} T
  * @param {string} id
  * @param {new () => T} [kind]
@@ -51,11 +51,11 @@ export function byId(id, kind) {
   return /** @type {T} */ (found);
 }
 
-/** @type {Map<string, string>} asked for in every frame, so remembered; by theme and name */
+/** @type {Map<string, string>} cached, as every frame needs them; by theme and name */
 const colours = new Map();
 
 /**
- * Return a colour of the theme that holds, as CSS writes it.
+ * Return a colour of the current theme, in CSS notation.
  * @param {string} name  of the custom property, as "--ink"
  * @returns {string}
  */
@@ -72,14 +72,14 @@ export function themeColour(name) {
 let size = 0;
 addEventListener("resize", () => (size = 0));
 
-/** Return the size of the page's text in px: canvases write with it, too. */
+/** Return the size of the page's text in px, which canvases also use. */
 export function textSize() {
   size ||= parseFloat(getComputedStyle(document.documentElement).fontSize);
   return size;
 }
 
 /**
- * Fit a canvas to the pixels that it covers on the screen.
+ * Match the resolution of a canvas to its size on the screen.
  * @param {HTMLCanvasElement} canvas
  * @returns {{width: number, height: number, ratio: number, changed: boolean}} in CSS px
  */

@@ -1,4 +1,4 @@
-/** Numbers as people read them: SI in, units of the trade out. */
+/** Numbers for display: SI units in, mm, deg, % and m/min out. */
 
 const DEG = 180 / Math.PI;
 const MINUS = "\u2212";
@@ -13,7 +13,7 @@ export function fixed(value, places = 1) {
 }
 
 /**
- * Return a number with about so many digits that count, without an exponent.
+ * Return a number with about `digits` significant digits, without an exponent.
  * @param {number} value
  * @param {number} [digits]
  */
@@ -36,7 +36,7 @@ export const millimetres = (metres, places = 1) => `${fixed(metres * 1e3, places
 export const percent = (fraction, places = 0) => `${fixed(fraction * 100, places)} %`;
 
 /**
- * Return a time as a clock shows it, 1:02.3.
+ * Return a time in the format 1:02.3.
  * @param {number} seconds
  */
 export function clock(seconds, places = 1) {
@@ -67,7 +67,7 @@ export function change(now, before) {
 export const counted = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;
 
 /**
- * Units of the trade by those of the server, and what a value is in them.
+ * Shown units by the units of the server, with the conversion of values.
  * @type {Record<string, {unit: string, of: (value: number) => number}>}
  */
 export const UNITS = {

@@ -1,16 +1,16 @@
-/** Poses near a known one: the tool turned about its beam, by Newton's method on the kinematics. */
+/** Inverse kinematics near a known pose, for turning the tool about its beam (Newton's method). */
 
 import { baseOf, frames, multiply, rotation } from "./kinematics.js";
 
 /** @typedef {import("./messages.js").RobotModel} RobotModel */
 
 const STRIDE = 0.1; // rad of the beam's rotation from one solution to the next
-const FAR = 0.6; // rad that a joint may move in one stride: beyond, it is near a singularity
-const ENOUGH = 1e-7; // m and rad: far below what a picture shows
+const FAR = 0.6; // rad that a joint may move in one stride: more means a singularity is near
+const ENOUGH = 1e-7; // m and rad: far below what is visible
 
 /**
- * Return the joints with the tool turned about its beam, the tip held: Newton's method in strides,
- * so that the posture stays. External axes stand still. Null where it does not come through.
+ * Return the joints after turning the tool about its beam with the tip fixed. Newton's method runs
+ * in strides, so that the posture stays. External axes do not move. Null if it does not converge.
  * @param {RobotModel} robot  of six joints, and external axes
  * @param {ArrayLike<number>} from  rad or m
  * @param {number} angle  rad
@@ -31,7 +31,7 @@ export function turnedAbout(robot, from, angle) {
 }
 
 /**
- * Return joints that reach a pose of the tip, from joints near by, or null.
+ * Return joints that reach a pose of the tip, from nearby joints, or null.
  * @param {RobotModel} robot
  * @param {number} base  its frame
  * @param {number[]} from
@@ -59,7 +59,7 @@ function newton(robot, base, from, goal) {
 }
 
 /**
- * Return how far one pose is from another: m along the axes, rad about them.
+ * Return the difference of two poses: m along the axes, rad about them.
  * @param {number[]} from
  * @param {number[]} to
  */
@@ -83,7 +83,7 @@ const cross = (a, b) => [
 ];
 
 /**
- * Return x of the sum of columns x = right, by elimination with pivots; null where it is singular.
+ * Solve columns * x = right by elimination with pivoting; null if the matrix is singular.
  * @param {number[][]} columns
  * @param {number[]} right
  * @returns {number[] | null}

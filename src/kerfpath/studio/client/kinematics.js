@@ -1,4 +1,4 @@
-/** Forward kinematics: the frames of all joints from their values, as the server's robot has them. */
+/** Forward kinematics: the frames of all joints from their values, for the robot of the server. */
 
 /** @typedef {import("./messages.js").RobotModel} RobotModel */
 
@@ -37,11 +37,11 @@ export function rotation(axis, angle) {
   ];
 }
 
-/** The pose that changes nothing. */
+/** The identity pose. */
 export const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
 /**
- * Return how far an external axis has moved what it carries.
+ * Return the pose by which an external axis has moved what it carries.
  * @param {import("./messages.js").Joint} joint
  * @param {number} value  rad or m
  */
@@ -56,26 +56,26 @@ function motion({ T, axis, unit }, value) {
 }
 
 /**
- * Return the frame that stands still: as many come before it as axes carry the part.
+ * Return the index of the fixed frame, which is the number of axes that carry the part.
  * @param {RobotModel} robot
  */
 export const groundOf = ({ joints }) => joints.filter(({ carries }) => carries === "part").length;
 
 /**
- * Return the frame of the robot's base: as many come before it as there are external axes.
+ * Return the index of the robot's base frame, which is the number of external axes.
  * @param {RobotModel} robot
  */
 export const baseOf = ({ joints }) => joints.filter(({ carries }) => carries).length;
 
 /**
- * Return the frames of the robot in the room: from that of the part over the ground to its base,
- * then that of each joint, at last the tip. Without external axes the first is ground and base.
+ * Return the frames of the robot in the room: from the part over the ground to the base, then of
+ * each joint, and last the tip. Without external axes the first one is ground and base.
  * @param {RobotModel} robot
  * @param {ArrayLike<number>} q  rad or m
  * @returns {number[][]} n + 2 poses
  */
 export function frames({ joints, T_flange, T_tool }, q) {
-  /** @type {(what: "part" | "robot") => number[][]} of what is carried by none, one, more axes */
+  /** @type {(what: "part" | "robot") => number[][]} poses of what 0, 1, ... axes carry */
   const carried = (what) =>
     joints.reduce(
       (found, joint, i) =>
@@ -94,7 +94,7 @@ export function frames({ joints, T_flange, T_tool }, q) {
 }
 
 /**
- * Return where the last entry of ascending `times` is that is not after t, from 0 to length - 2.
+ * Return the index of the last of ascending `times` that is not after t, from 0 to length - 2.
  * @param {ArrayLike<number>} times
  * @param {number} t
  * @returns {number}
@@ -111,7 +111,7 @@ export function interval(times, t) {
 }
 
 /**
- * Return the joints at a time, straight between rows.
+ * Return the joints at a time, interpolated linearly between rows.
  * @param {ArrayLike<number>} times  m, s, ascending
  * @param {ArrayLike<number>} q  m n, row-major
  * @param {number} joints  n

@@ -1,4 +1,4 @@
-/** The page, put together: one store, one connection, one player, and the views that follow them. */
+/** Assemble the page: one store, one connection, one player, and the views that follow them. */
 
 import { Connection } from "./connection.js";
 import { byId, icon } from "./dom.js";
@@ -31,7 +31,7 @@ const connection = new Connection(
   (status, retryAt) => store.connected(status, retryAt),
 );
 
-// The timeline is put together before the views are called, which follow it.
+// Build the timeline before the views are called, which depend on it.
 let loading = false;
 store.on(["plan", "program", "scene"], () => {
   if (loading) return;
@@ -69,7 +69,7 @@ theme(byId("theme"), icon, () => {
   front.paint();
 });
 
-// Whoever watches sees the contour that is being cut; whoever chooses one goes there.
+// Playing selects the contour that is being cut; selecting a contour moves the player there.
 let followed = "";
 player.on((moment) => {
   const contour = moment?.span.contour ?? null;
@@ -86,7 +86,7 @@ store.on(["selected"], () => {
   if (begin !== null && document.activeElement?.id !== "scrub") player.seek(begin);
 });
 
-// A button that was clicked gives the keyboard back: the space bar then plays.
+// A clicked button loses the focus again, so that the space bar plays.
 document.addEventListener("click", (event) => {
   const button = /** @type {HTMLElement} */ (event.target).closest("button");
   const clicked = event.detail > 0 && button === document.activeElement;
@@ -129,5 +129,5 @@ document.addEventListener("keydown", (event) => {
 
 connection.open();
 
-// For whoever looks into the page from outside: tests and the console.
+// Access for tests and the console.
 Object.assign(window, { studio: { store, player, connection, view, map, plots } });

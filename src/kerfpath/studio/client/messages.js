@@ -1,10 +1,10 @@
 /**
- * What the server and the page say to each other: the types of README.md, and nothing else.
+ * The types of the messages between server and page, as in README.md.
  * Values are in m, rad and s in the robot's base frame unless a key carries its unit; arrays of
  * vectors are flat and row-major; a pose is 16 numbers, row-major.
  */
 
-/** @typedef {(string | number)[]} Path a key of the job, as ["contour", 0, "speed_m_min"] */
+/** @typedef {(string | number)[]} Path a key of the job, such as ["contour", 0, "speed_m_min"] */
 /** @typedef {{key: Path, message: string}} Fault */
 /** @typedef {{path: Path, value: unknown}} Edit */
 

@@ -1,4 +1,4 @@
-/** What is said of the loops of the part: which are cut, what each one is, in words. */
+/** The loops of the part: which are cut, and descriptions in words. */
 
 import { counted, millimetres } from "./format.js";
 
@@ -6,16 +6,16 @@ import { counted, millimetres } from "./format.js";
 /** @typedef {import("./store.js").Store} Store */
 
 /**
- * Return the contours of the job by the loops that they are of.
+ * Return the contours of the job by their loops.
  * @param {Store} store
  */
 export const contoursByLoop = (store) =>
   new Map((store.scene?.contours ?? []).map((each) => [each.loop, each]));
 
 /**
- * Return the loops that no contour of the job is of.
+ * Return the loops that are not cut.
  * @param {Store} store
- * @param {boolean} inside  those on the inner side of a sheet, too
+ * @param {boolean} inside  whether to include the inner side of a sheet
  */
 export function uncut(store, inside = false) {
   const known = contoursByLoop(store);
@@ -25,7 +25,7 @@ export function uncut(store, inside = false) {
 }
 
 /**
- * Say what a loop is.
+ * Return the kind of a loop in words.
  * @param {Loop} loop
  */
 export function kindOf({ kind, diameter }) {
@@ -35,13 +35,13 @@ export function kindOf({ kind, diameter }) {
 }
 
 /**
- * Say what a loop is and how long.
+ * Return the kind and the length of a loop in words.
  * @param {Loop} loop
  */
 export const described = (loop) => `${kindOf(loop)}, ${millimetres(loop.length)} long`;
 
 /**
- * Return why a loop cannot be cut, "" where it can.
+ * Return why a loop cannot be cut, or "".
  * @param {Loop} loop
  */
 export const barred = ({ kind, closed, gap }) =>
@@ -50,7 +50,7 @@ export const barred = ({ kind, closed, gap }) =>
     : `has a gap of ${millimetres(gap, 3)}: close it in CAD, or raise gap_mm of the part`;
 
 /**
- * Have loops cut, and the contour of the first one chosen once it is there.
+ * Ask the server to cut loops; the contour of the first one is chosen once it exists.
  * @param {Store} store
  * @param {{send: (message: any) => boolean}} connection
  * @param {string[]} loops
@@ -61,7 +61,7 @@ export function cutLoops(store, connection, loops) {
 }
 
 /**
- * Return the words for taking a contour out of the job: its table may be that of several.
+ * Return the words for taking a contour out of the job; its table may pick several contours.
  * @param {Store} store
  * @param {number} index
  */
@@ -71,6 +71,6 @@ export function leaving(store, index) {
   const tables = new Set(contours.map((each) => each.index)).size;
   return {
     words: same > 1 ? `Take out, with the ${counted(same - 1, "other")} of its table` : "Take out",
-    why: tables > 1 ? "" : "the only contour of the job stays; add another one first",
+    why: tables > 1 ? "" : "a job needs at least one contour; add another one first",
   };
 }

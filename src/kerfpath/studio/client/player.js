@@ -1,10 +1,10 @@
-/** The clock of the motion: play, pause, step, scrub; it says where the robot is to whoever asks. */
+/** The clock of the motion: play, pause, step, scrub; it calls listeners with the robot's pose. */
 
 import { Timeline } from "./timeline.js";
 
 /** @typedef {import("./timeline.js").Moment} Moment */
 
-/** Plays a timeline. Its time is kept by place in the program when the program changes. */
+/** Plays a timeline. When the program changes, the time stays at the same place of the program. */
 export class Player {
   constructor() {
     this.timeline = new Timeline([], 0, false);
@@ -18,7 +18,7 @@ export class Player {
   }
 
   /**
-   * Call `listener` whenever time, program or playing change.
+   * Call `listener` whenever time, program or play state change.
    * @param {(moment: Moment | null) => void} listener
    */
   on(listener) {
@@ -91,7 +91,7 @@ export class Player {
   }
 
   /**
-   * Go to the next row of the motion, or to the one before.
+   * Go to the next or the previous row of the motion.
    * @param {1 | -1} direction
    */
   step(direction) {
@@ -111,7 +111,7 @@ export class Player {
   }
 
   /**
-   * Go to where the next cut begins, or the one before.
+   * Go to the begin of the next or the previous cut.
    * @param {1 | -1} direction
    */
   skip(direction) {

@@ -1,4 +1,4 @@
-/** The joints of the chosen contour against time: speed, acceleration, place; the cursor is the player's. */
+/** The joints of the chosen contour over time: speed, acceleration, position, and a cursor. */
 
 import UPlot from "uplot";
 
@@ -19,7 +19,7 @@ const KINDS = {
 };
 
 /**
- * What the scales of each kind are called.
+ * The labels of the scales of each kind.
  * @type {Record<Kind, Record<string, string>>}
  */
 const SCALES = {
@@ -86,7 +86,7 @@ export class Plots {
     });
   }
 
-  /** The plans that are shown, the joints of the robot, and what they are drawn as. */
+  /** The shown plans, the joints of the robot, and their axes. */
   shown() {
     const plans = this.store.plans.get(this.store.selected ?? "") ?? [];
     const { robot } = this.store.scene ?? {};
@@ -225,7 +225,7 @@ export class Plots {
   }
 
   /**
-   * Draw the limits: what the job allows, and what the maker does.
+   * Draw the limits of the job and of the robot's maker.
    * @param {UPlot} plot
    */
   limits(plot) {
@@ -289,7 +289,7 @@ export class Plots {
   }
 
   /**
-   * Say the values under the pointer.
+   * Show the values under the pointer.
    * @param {UPlot} plot
    */
   say(plot) {
@@ -336,7 +336,7 @@ export class Plots {
     }
   }
 
-  /** Put the line where the player is. */
+  /** Move the line to the time of the player. */
   follow() {
     const { moment } = this.player;
     const { plans } = this.shown();

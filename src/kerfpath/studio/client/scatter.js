@@ -1,4 +1,4 @@
-/** The points of a Pareto set in two of its criteria, a third by colour, on a canvas. */
+/** A scatter plot of a Pareto set in two of its criteria, with a third one as colour. */
 
 import { fitCanvas, textSize, themeColour } from "./dom.js";
 import { digits } from "./format.js";
@@ -53,7 +53,7 @@ export class Scatter {
   }
 
   /**
-   * Return the least and the largest value of a criterion, and some room.
+   * Return the least and the largest value of a criterion, with some margin.
    * @param {number} axis
    * @returns {[number, number]}
    */

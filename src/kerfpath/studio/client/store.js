@@ -1,4 +1,4 @@
-/** What the page knows: the newest messages, what is chosen, and who wants to hear of changes. */
+/** The state of the page: the newest messages, the chosen contour, and listeners to changes. */
 
 /** @typedef {import("./messages.js").ServerMessage} ServerMessage */
 /** @typedef {import("./messages.js").PlanMessage} PlanMessage */
@@ -17,12 +17,12 @@
 
 const MOST_SHADES = 12; // some 100 kB each
 
-/** The state of the page. One message changes it, then those who listen to its topic are called. */
+/** The state of the page. A message changes it; then the listeners to its topic are called. */
 export class Store {
   constructor() {
     /** @type {import("./connection.js").Status} */
     this.connection = "connecting";
-    /** @type {number | null} ms, when the next try is */
+    /** @type {number | null} time of the next try, ms */
     this.retryAt = null;
     /** @type {import("./messages.js").JobMessage | null} */
     this.job = null;
@@ -46,9 +46,9 @@ export class Store {
     this.error = null;
     /** @type {Map<string, PlanMessage[]>} by contour, its pieces in order */
     this.plans = new Map();
-    /** @type {Map<string, PlanMessage[]>} by contour, what held before its last change */
+    /** @type {Map<string, PlanMessage[]>} by contour, the plans before its last change */
     this.before = new Map();
-    /** @type {WeakMap<PlanMessage, string>} what each plan was asked for */
+    /** @type {WeakMap<PlanMessage, string>} metric, objective and weights of each plan */
     this.asked = new WeakMap();
     /** @type {Map<string, NoPathMessage>} */
     this.nopaths = new Map();
@@ -60,11 +60,11 @@ export class Store {
     this.shades = new Map();
     /** @type {Map<string, import("./messages.js").TechniqueMessage>} by contour and method */
     this.techniques = new Map();
-    /** @type {string | null} the loop whose contour is chosen once there is one */
+    /** @type {string | null} the loop whose contour is chosen once it is in the scene */
     this.awaited = null;
-    /** @type {KeptEntry[]} jobs that are kept to be compared */
+    /** @type {KeptEntry[]} jobs that are kept for comparison */
     this.kept = [];
-    /** @type {Against | null} the one of them that is compared */
+    /** @type {Against | null} the kept job that is compared */
     this.against = null;
     /** @type {import("./messages.js").FrontMessage | null} */
     this.front = null;
@@ -118,7 +118,7 @@ export class Store {
   }
 
   /**
-   * Compare with a job that is kept; null: with none.
+   * Compare with a kept job; null: with none.
    * @param {Against | null} against
    */
   compareWith(against) {
@@ -127,7 +127,7 @@ export class Store {
   }
 
   /**
-   * Return the courses beside a contour's own: of the job that is compared, else before the change.
+   * Return the other courses of a contour: of the compared job, else those before the last change.
    * @param {string} contour
    * @returns {Course[]}
    */
@@ -139,7 +139,7 @@ export class Store {
   }
 
   /**
-   * Return the plans of a contour in the job that is compared; none of a robot with other joints.
+   * Return the plans of a contour in the compared job; none if its robot has other joints.
    * @param {string} contour
    */
   compared(contour) {
@@ -155,7 +155,7 @@ export class Store {
   }
 
   /**
-   * Return what these are called; null: there are none.
+   * Return the name of the other courses, or null without any.
    * @param {string} contour
    */
   besideOf(contour) {
@@ -168,7 +168,7 @@ export class Store {
   }
 
   /**
-   * Whether what was computed of a revision is out of date.
+   * Whether the result of a revision is out of date.
    * @param {{revision: number}} message
    */
   stale(message) {
@@ -186,7 +186,7 @@ export class Store {
         break;
       case "scene":
         this.scene = message;
-        this.shades.clear(); // robot or cell may be others
+        this.shades.clear(); // robot or cell may have changed
         this.techniques.clear();
         this.dropMissing();
         break;
@@ -279,7 +279,7 @@ export class Store {
   takePlan(plan) {
     const { candidate } = this;
     if (candidate?.contour === plan.contour && candidate.own[0].revision === plan.revision) {
-      // What is proved of the job's own plan comes while a point is looked at.
+      // The bound of the job's own plan may arrive while a point is shown.
       candidate.own = candidate.own.map((each) => (each.name === plan.name ? plan : each));
       this.asked.set(plan, this.question(plan));
       return;
@@ -301,7 +301,7 @@ export class Store {
   }
 
   /**
-   * Keep what held before a change, to compare; of a drag the motion before it, not its drafts.
+   * Keep the plans before a change for comparison; during a drag, those before it, not its drafts.
    * @param {string} contour
    * @param {PlanMessage[]} held
    */
@@ -311,7 +311,7 @@ export class Store {
   }
 
   /**
-   * What a plan was asked for, as far as it decides what its cost means.
+   * Return a key of the options that decide the meaning of a plan's cost.
    * @param {PlanMessage} plan
    */
   question(plan) {
@@ -320,7 +320,7 @@ export class Store {
   }
 
   /**
-   * Whether the costs of a contour now and before are of the same kind.
+   * Whether the costs of a contour now and before can be compared.
    * @param {string} contour
    */
   comparable(contour) {
@@ -330,7 +330,7 @@ export class Store {
   }
 
   /**
-   * Return the distances along a plan, or null where they are not known yet.
+   * Return the distances along a plan, or null if they are not known yet.
    * @param {PlanMessage} plan
    */
   clearanceOf(plan) {
@@ -349,7 +349,7 @@ export class Store {
     this.emit("plan", answer);
   }
 
-  /** Forget what is of contours or joints that the job no longer has; choose a contour it has. */
+  /** Forget the data of contours or joints that the job no longer has; choose a contour it has. */
   dropMissing() {
     const names = new Set(this.contours());
     if (this.candidate && !names.has(this.candidate.contour)) this.withdraw();

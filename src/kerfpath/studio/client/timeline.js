@@ -1,4 +1,4 @@
-/** The program as one stretch of time: its segments, and where the robot is at each moment. */
+/** The timeline of the program: its segments, and the joints of the robot at each time. */
 
 import { interval, jointsAt } from "./kinematics.js";
 
@@ -23,10 +23,10 @@ import { interval, jointsAt } from "./kinematics.js";
  * @property {Span} span
  * @property {number[]} q
  * @property {number} local  s from the begin of the span
- * @property {number} node  of the plan where it is a cut, else of its own rows
+ * @property {number} node  of the plan for a cut, else of the span's rows
  */
 
-/** The spans of a program in order; `whole` false where only the cuts are known so far. */
+/** The spans of a program in order; `whole` is false if only the cuts are known so far. */
 export class Timeline {
   /**
    * @param {Span[]} spans
@@ -82,7 +82,7 @@ export class Timeline {
 }
 
 /**
- * Return the timeline of a program, or of the cuts one after the other where there is none.
+ * Return the timeline of a program, or of the cuts one after the other without a program.
  * @param {ProgramMessage | null} program
  * @param {Map<string, PlanMessage[]>} plans
  * @param {string[]} order  the contours

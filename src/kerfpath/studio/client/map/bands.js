@@ -1,4 +1,4 @@
-/** Pins on the map: drawn as bands, drawn and changed with the pointer, and listed beside it. */
+/** Pins on the map: drawn as bands, edited with the pointer, and listed beside the map. */
 
 import { el, themeColour } from "../dom.js";
 import { deg } from "../format.js";
@@ -10,14 +10,14 @@ import { AROUND, intervals, pinOver, said, stretched, widened, Pins } from "./pi
 /** @typedef {{index: number, sides: Set<"start" | "end" | "low" | "high">}} Hit */
 /** @typedef {{x: number, y: number, s: number, gamma: number}} Place px, m, deg */
 
-const [NEAR, STILL] = [6, 5]; // px: a handle is hit, a hand has not moved
+const [NEAR, STILL] = [6, 5]; // px: a handle is hit, the pointer has not moved
 const HATCH = 7; // px between lines
 
 export class Bands {
   /**
    * @param {Chart} chart
    * @param {Pins} pins
-   * @param {() => void} changed  is called when something else is to be drawn
+   * @param {() => void} changed  called when the map has to be drawn again
    */
   constructor(chart, pins, changed) {
     this.chart = chart;
@@ -55,7 +55,7 @@ export class Bands {
     const { grid, window } = this.chart;
     const first = grid?.message.s[0] ?? 0;
     const [from, to] = [pin.start, pin.end].map((mm) => this.chart.x(first + mm / 1e3, frame));
-    // As far as the cells of its nodes, and no narrower than can be seen.
+    // As wide as the cells of its nodes, and at least wide enough to be seen.
     const shown = (window.to - window.from) * Math.max(1, (grid?.nodes ?? 2) - 1);
     const beside = Math.max(2, frame.width / shown / 2);
     const [begin, end] = [
@@ -72,7 +72,7 @@ export class Bands {
   }
 
   /**
-   * Return the pin at a place, and the sides of it that are near; the chosen one before others.
+   * Return the pin at a place and its sides that are near; the chosen pin has priority.
    * @param {Place} place
    * @returns {Hit | null}
    */
@@ -90,7 +90,7 @@ export class Bands {
           if (Math.abs(x - box.x) <= NEAR) sides.add("start");
           else if (Math.abs(x - right) <= NEAR) sides.add("end");
         }
-        // The edge of the map is none of the pin.
+        // The edge of the map is not a side of the pin.
         if (Math.abs(y - box.y) <= NEAR && box.high < 180) sides.add("high");
         else if (Math.abs(y - bottom) <= NEAR && box.low > -180) sides.add("low");
         return { index, sides };
@@ -140,7 +140,7 @@ export class Bands {
   }
 
   /**
-   * Return the pin that has been drawn: a rectangle, a place, or a stretch about one rotation.
+   * Return the drawn pin: a rectangle, a place, or a stretch about one rotation.
    * @param {Place} to
    */
   drawn(to) {
@@ -154,7 +154,7 @@ export class Bands {
   }
 
   /**
-   * Return the pin that is held with the sides that are held elsewhere, or all of it.
+   * Return the dragged pin with its dragged sides, or all of it, at the new place.
    * @param {Hit} hit
    * @param {Place} to
    */
@@ -199,7 +199,7 @@ export class Bands {
   }
 
   /**
-   * Take a key of the map; return whether it was one for pins.
+   * Take a key of the map; return whether the pins used it.
    * @param {KeyboardEvent} event
    * @param {number} node  of the map's cursor
    * @param {number | null} course  deg, of the plan there or of the cursor
@@ -224,7 +224,7 @@ export class Bands {
   }
 
   /**
-   * Draw every pin: what it leaves out hatched, what it admits outlined.
+   * Draw every pin: its inside outlined, its outside hatched.
    * @param {CanvasRenderingContext2D} context
    * @param {Frame} frame
    */
@@ -256,7 +256,7 @@ export class Bands {
   }
 
   /**
-   * Dim and hatch what is outside of the boxes of a pin, over its stretch.
+   * Dim and hatch the outside of the boxes of a pin, over its stretch.
    * @param {CanvasRenderingContext2D} context
    * @param {{x: number, y: number, width: number, height: number}[]} boxes
    * @param {Frame} frame
@@ -277,7 +277,7 @@ export class Bands {
     context.lineWidth = scale;
     context.beginPath();
     const [tall, step] = [frame.height, HATCH * scale];
-    // Lines of one family over the whole map, so that those of two pins meet.
+    // Lines continue over the whole map, so that those of two pins meet.
     const first = Math.floor((x - tall - frame.left) / step) * step + frame.left;
     for (let at = first; at < x + width; at += step) {
       context.moveTo(at, frame.top + tall);
@@ -330,14 +330,14 @@ export class Bands {
         el("h3", {}, "Pins"),
         rows.length
           ? el("ul", {}, ...rows)
-          : el("p", { class: "quiet" }, "Drag over the map to keep gamma inside there."),
+          : el("p", { class: "quiet" }, "Drag over the map to keep gamma inside a rectangle."),
       ),
     ];
   }
 }
 
 /**
- * Return the rotation of a plan at a path length, deg, or null where none of them is there.
+ * Return the rotation of the plan at a path length, deg, or null if no plan covers it.
  * @param {import("../messages.js").PlanMessage[]} plans
  * @param {number} s  m
  */

@@ -19,7 +19,7 @@ import { WHOLE } from "./window.js";
  * @property {Course[]} before  drawn dashed
  * @property {Course | null} technique  drawn dotted
  * @property {boolean} stale
- * @property {number | null} broken  m, where no path goes on
+ * @property {number | null} broken  m, where the path breaks
  * @property {{s: number, gamma: number} | null} now
  * @property {{node: number, sample: number} | null} hover
  * @property {Under} under  draws what is below the courses
@@ -38,7 +38,7 @@ export class Chart {
     /** @type {Shade | null} */
     this.shade = null;
     this.window = WHOLE;
-    /** @type {HTMLCanvasElement} the cells alone, painted when they change */
+    /** @type {HTMLCanvasElement} only the cells, painted when they change */
     this.back = document.createElement("canvas");
     this.painted = "";
     this.font = getComputedStyle(document.body).fontFamily;
@@ -107,7 +107,7 @@ export class Chart {
   }
 
   /**
-   * Paint the cells where they, their size or the theme have changed.
+   * Paint the cells if they, their size or the theme have changed.
    * @param {number} ratio
    * @param {Frame} frame
    */
@@ -137,7 +137,7 @@ export class Chart {
   }
 
   /**
-   * Return the path length at a place, no farther than the window shows.
+   * Return the path length at a place, clamped to the window.
    * @param {number} x  px
    * @returns {number} m
    */
@@ -149,7 +149,7 @@ export class Chart {
   }
 
   /**
-   * Return the rotation at a place, no farther than the window shows.
+   * Return the rotation at a place, clamped to the window.
    * @param {number} y  px
    * @returns {number} deg
    */
@@ -234,7 +234,7 @@ export class Chart {
   }
 
   /**
-   * Draw a course; faint where it is in another posture than the one that is shown.
+   * Draw a course; it is faint where its posture is not the shown one.
    * @param {CanvasRenderingContext2D} context
    * @param {Course} plan
    * @param {Frame} frame
@@ -263,7 +263,7 @@ export class Chart {
   }
 
   /**
-   * Draw where no path goes on.
+   * Draw where the path breaks.
    * @param {CanvasRenderingContext2D} context
    * @param {number} s  m
    * @param {Frame} frame
@@ -280,12 +280,12 @@ export class Chart {
     context.strokeStyle = themeColour("--course-halo");
     context.lineWidth = 4;
     const at = /** @type {const} */ ([x + (right ? -6 : 6), frame.top + 6]);
-    context.strokeText("no path goes on from here", ...at);
-    context.fillText("no path goes on from here", ...at);
+    context.strokeText("the path breaks here", ...at);
+    context.fillText("the path breaks here", ...at);
   }
 
   /**
-   * Draw where the player is.
+   * Draw the place of the player.
    * @param {CanvasRenderingContext2D} context
    * @param {{s: number, gamma: number}} now
    * @param {Frame} frame
@@ -304,7 +304,7 @@ export class Chart {
   }
 
   /**
-   * Draw where the pointer is.
+   * Draw the place of the pointer.
    * @param {CanvasRenderingContext2D} context
    * @param {{node: number, sample: number}} hover
    * @param {Frame} frame

@@ -1,4 +1,4 @@
-/** What the map is shaded by and whose course is beside the plan's: chosen, asked for, explained. */
+/** The shade of the map, and the course of another technique beside the plan's. */
 
 import { byId, el } from "../dom.js";
 import { digits, fixed } from "../format.js";
@@ -23,9 +23,9 @@ export class Choices {
     this.changed = changed;
     this.by = "";
     this.method = "";
-    /** @type {Record<string, string>} what was asked for last, by kind */
+    /** @type {Record<string, string>} the last request, by kind */
     this.asked = {};
-    /** @type {Record<string, string>} why it was not answered, by kind */
+    /** @type {Record<string, string>} why it was refused, by kind */
     this.refused = {};
     /** @type {Shade | null} */
     this.shade = null;
@@ -52,11 +52,11 @@ export class Choices {
       this.refused[about] = message;
       changed();
     });
-    store.on(["scene"], () => (this.asked = {})); // robot or cell may be others
+    store.on(["scene"], () => (this.asked = {})); // robot or cell may have changed
   }
 
   /**
-   * Ask for something, once; no key: stop looking for it.
+   * Ask for something, once; an empty key stops its computation.
    * @param {"shade" | "technique"} kind
    * @param {string} key
    * @param {object} what
@@ -70,7 +70,7 @@ export class Choices {
   }
 
   /**
-   * Take what is known for a map, and ask for the rest.
+   * Take the known data for a map, and ask for the rest.
    * @param {Grid | null} grid
    */
   load(grid) {
@@ -78,7 +78,7 @@ export class Choices {
     if (store.connection !== "open") this.asked = {};
     const shades = grid?.message.shades ?? [];
     const list = [
-      { by: "", words: "reason alone" },
+      { by: "", words: "reason only" },
       ...shades.map((each) => ({ by: each.by, words: each.words })),
     ];
     if (
@@ -111,7 +111,7 @@ export class Choices {
   }
 
   /**
-   * Whether the course beside is of the same job as the plan.
+   * Whether the other course is for the same job as the plan.
    * @param {string} contour
    */
   fresh(contour) {
@@ -125,7 +125,7 @@ export class Choices {
   }
 
   /**
-   * Return what the shades and the course beside are.
+   * Return the legend of the shade and of the other course.
    * @param {Grid} grid
    * @returns {Node[]}
    */
@@ -144,7 +144,7 @@ export class Choices {
   }
 
   /**
-   * Return what the other technique comes to.
+   * Return the results of the other technique.
    * @param {string} contour
    * @param {(kind: string, words: string) => Node} waiting
    * @returns {Node[]}
@@ -153,7 +153,7 @@ export class Choices {
     const { technique } = this;
     const name = TECHNIQUES[/** @type {keyof typeof TECHNIQUES} */ (this.method)];
     const head = el("p", { class: "technique" }, el("i", { class: "line dots" }), name);
-    const late = this.fresh(contour) ? [] : [waiting("technique", "Being looked for \u2026")];
+    const late = this.fresh(contour) ? [] : [waiting("technique", "Being computed \u2026")];
     if (!technique) return [head, ...late];
     const notes = technique.notes.map((each) => el("p", { class: "quiet" }, each));
     if (technique.cost === null)
@@ -180,7 +180,7 @@ export class Choices {
 }
 
 /**
- * Say the largest share of a limit, and of which joint it is; loudly where it is broken.
+ * Show the largest share of a limit and its joint, highlighted if the limit is broken.
  * @param {string} words
  * @param {(number | null)[]} shares
  */

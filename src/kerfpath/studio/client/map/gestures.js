@@ -6,8 +6,8 @@ import { isWhole, moved, showing, WHOLE, zoomed } from "./window.js";
 /** @typedef {import("./chart.js").Chart} Chart */
 /** @typedef {import("./window.js").Window} Window */
 
-const NODES = 6; // seen at least
-const DEGREES = 12; // seen at least
+const NODES = 6; // least number in view
+const DEGREES = 12; // least range in view
 const STEP = 1.3; // of a key, and of a notch of the wheel
 const NOTCH = 100; // px of the wheel
 
@@ -37,7 +37,7 @@ export class Gestures {
     canvas.addEventListener("pointercancel", () => (this.drag = null));
   }
 
-  /** See of the chart's map what was seen of its contour before. */
+  /** Restore the view that the contour of the chart's map had before. */
   recall() {
     const { grid } = this.chart;
     this.chart.window = (grid && this.kept.get(grid.message.contour)) ?? WHOLE;
@@ -53,7 +53,7 @@ export class Gestures {
     this.changed();
   }
 
-  /** See a place of the map.
+  /** Move the view so that it contains a place of the map.
    * @param {number} along  share of the map
    * @param {number} down  share of the map
    */

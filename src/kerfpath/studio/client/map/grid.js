@@ -1,4 +1,4 @@
-/** What a map message holds, unpacked: codes of all poses, their joints, and where a place falls. */
+/** A map message, unpacked: the codes of all poses, and the node and sample of a place. */
 
 /** @typedef {import("../messages.js").MapMessage} MapMessage */
 
@@ -43,7 +43,7 @@ export class Grid {
   sampleAt(gamma) {
     const list = this.message.gamma;
     const angle = wrapped(gamma);
-    let [low, high] = [-1, list.length]; // the ends of windows are samples, too: no even steps
+    let [low, high] = [-1, list.length]; // the ends of windows are also samples: steps are uneven
     while (high - low > 1) {
       const middle = (low + high) >> 1;
       if (list[middle] <= angle) low = middle;
@@ -55,7 +55,7 @@ export class Grid {
   }
 
   /**
-   * Return how many poses of a layer have each code.
+   * Return the number of poses of a layer with each code.
    * @param {number} layer
    */
   counts(layer) {
@@ -65,7 +65,7 @@ export class Grid {
   }
 
   /**
-   * Return the layer of a posture, -1 where it has none.
+   * Return the layer of a posture, or -1.
    * @param {number} posture
    */
   layerOf(posture) {

@@ -1,4 +1,4 @@
-/** The cursor of the map: what became of a pose, in numbers, and its ghost. */
+/** The cursor of the map: the reason of loss of a pose, its numbers, and its ghost. */
 
 import { byId, el } from "../dom.js";
 import { deg, degrees, fixed } from "../format.js";
@@ -11,7 +11,7 @@ import { wrapped } from "./grid.js";
 /** @typedef {{node: number, sample: number}} Cell */
 /** @typedef {(q: ArrayLike<number> | null, admitted: boolean) => void} Haunt */
 
-const ASK_AFTER = 140; // ms at rest, before the server is asked for more than the map says
+const ASK_AFTER = 140; // ms at rest before the server is asked for details
 
 export class Hover {
   /**
@@ -57,7 +57,7 @@ export class Hover {
   }
 
   /**
-   * Say what became of a pose, and show it as a ghost.
+   * Show the reason of a pose, and its ghost.
    * @param {Cell} cell
    */
   enter(cell) {
@@ -82,8 +82,8 @@ export class Hover {
   }
 
   /**
-   * Return the joints of a pose by turning the plan's at its node about the beam; null where the
-   * plan is in another posture or the robot cannot follow: then the server's answer shows it.
+   * Return the joints of a pose by turning the plan's pose at its node about the beam; null if the
+   * plan is in another posture or the iteration fails: the server's answer shows it then.
    * @param {Cell} cell
    */
   turned({ node, sample }) {
@@ -101,7 +101,7 @@ export class Hover {
   }
 
   /**
-   * Return what a reason is in numbers, as far as the joints say it.
+   * Return the numbers of a reason that follow from the joints.
    * @param {string} words
    * @param {ArrayLike<number> | null} q
    */
@@ -117,7 +117,7 @@ export class Hover {
         ? ""
         : `joint ${i + 1} at ${degrees(at)}, its limit is ${degrees(limit)}`;
     }
-    // Of the arm: where the external axes are is not chosen by the cursor.
+    // Only joints of the arm: the cursor does not move external axes.
     let [nearest, room] = [-1, Infinity];
     joints.forEach(({ lower, upper, endless, carries }, i) => {
       if (endless || carries || lower === null || upper === null) return;
@@ -141,7 +141,7 @@ export class Hover {
     const place = cell.node * grid.samples + cell.sample;
     const [{ posture }, { shade }] = [grid.layers[chart.layer], this.choices];
     const shaded = shade?.said(posture, place) ?? "";
-    if (head === "free" && shade?.tooNear(posture, place)) head = "nearer than it must be";
+    if (head === "free" && shade?.tooNear(posture, place)) head = "closer than allowed";
     tip.replaceChildren(
       el("b", {}, head[0].toUpperCase() + head.slice(1)),
       ...[shaded, numbers].flatMap((each) => (each ? [el("span", {}, each), el("br")] : [])),

@@ -1,4 +1,4 @@
-/** What the colours and patterns of a map mean, and how much of it each one is. */
+/** The legend of a map: its colours and patterns, with the share of each. */
 
 import { el } from "../dom.js";
 import { percent } from "../format.js";
@@ -9,12 +9,12 @@ import { pixels } from "./paint.js";
 const SWATCH = 28; // px, drawn at half that size
 
 /**
- * Return the legend of a layer: what is free first, then by how much is lost.
+ * Return the legend of a layer: free places first, then reasons by decreasing share.
  * @param {Grid} grid
  * @param {number} layer
  * @param {import("./paint.js").Ink[]} ink
  * @param {{course: boolean, before: string | null, shaded: boolean}} lines
- *   before: whose course is dashed; shaded: what is free has the colours of a scale
+ *   before: name of the dashed course; shaded: free places have the colours of a scale
  * @returns {Node[]}
  */
 export function legend(grid, layer, ink, lines) {

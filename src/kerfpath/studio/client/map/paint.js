@@ -8,7 +8,7 @@ import { WHOLE } from "./window.js";
 /** @typedef {"none" | "rising" | "falling" | "dots" | "cross" | "level"} Pattern */
 /** @typedef {{base: Rgb, mark: Rgb, pattern: Pattern, free: boolean}} Ink */
 
-/** Codes of a shade: too near to something, and none; those below are along its scale. */
+/** Codes of a shade: bodies too close, and no pose; lower codes are along its scale. */
 export const [TOO_NEAR, NO_SHADE] = [254, 255];
 /** The code of the end of the scale. */
 export const MOST = 253;
@@ -34,7 +34,7 @@ const mix = (a, b, share) => {
 };
 
 /**
- * Return the pattern of a reason: it says the same as the colour, for whoever cannot tell colours.
+ * Return the pattern of a reason; it repeats the colour for people who cannot distinguish colours.
  * @param {string} kind
  * @param {string} words
  * @returns {Pattern}

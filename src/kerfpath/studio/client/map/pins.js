@@ -4,7 +4,7 @@
 /** @typedef {import("./grid.js").Grid} Grid */
 /** @typedef {{start: number, end: number, low: number, high: number}} Pin mm and deg */
 
-/** deg: about the course, either way, where no height was drawn. */
+/** Half width of a pin without a drawn height, about the course, deg. */
 export const AROUND = 10;
 const [NARROWEST, WIDEST] = [0.2, 359];
 
@@ -12,7 +12,7 @@ const [NARROWEST, WIDEST] = [0.2, 359];
 const turned = (angle) => ((angle % 360) + 360) % 360;
 
 /**
- * Return an angle in [-180, 180), to a tenth of a degree.
+ * Return an angle in [-180, 180), rounded to a tenth of a degree.
  * @param {number} angle  deg
  */
 const written = (angle) => Math.round((turned(angle + 180) - 180) * 10) / 10;
@@ -24,7 +24,7 @@ const written = (angle) => Math.round((turned(angle + 180) - 180) * 10) / 10;
 export const widthOf = (pin) => turned(pin.high - pin.low);
 
 /**
- * Return the intervals of a pin on a map from -180 to 180 deg: two where it crosses the edge.
+ * Return the intervals of a pin on a map from -180 to 180 deg: two if it crosses the edge.
  * @param {Pin} pin
  * @returns {[number, number][]}
  */
@@ -62,14 +62,14 @@ export function pinOver(grid, from, to, low, high) {
   const place = (/** @type {number} */ at) => (s[grid.nodeAt(at)] - first) * 1e3;
   const [start, end] = [place(Math.min(from, to)), place(Math.max(from, to))];
   return {
-    // Rounding may not lose the node: 1e-6 of a tenth is far below what divides two nodes.
+    // Rounding must not lose the node: 1e-6 of a tenth is far below the distance of two nodes.
     ...{ start: Math.floor(start * 10 + 1e-6) / 10, end: Math.ceil(end * 10 - 1e-6) / 10 },
     ...{ low: written(low), high: written(high) },
   };
 }
 
 /**
- * Return a pin with one of its ends of gamma elsewhere; as it is where it would turn inside out.
+ * Return a pin with one end of gamma moved; the unchanged pin if it would turn inside out.
  * @param {Pin} pin
  * @param {"low" | "high"} side
  * @param {number} angle  deg
@@ -83,7 +83,7 @@ export function stretched(pin, side, angle) {
 }
 
 /**
- * Return a pin wider by so many degrees on either side.
+ * Return a pin that is wider by `by` degrees on either side.
  * @param {Pin} pin
  * @param {number} by  deg
  * @returns {Pin}
@@ -105,7 +105,7 @@ export class Pins {
     this.connection = connection;
     /** @type {number | null} */
     this.chosen = null;
-    /** @type {Pin[] | null} as they are being drawn, until the job has them */
+    /** @type {Pin[] | null} pins that are being drawn, until the job has them */
     this.preview = null;
     store.on(["job", "selected"], () => {
       this.preview = null;
@@ -114,7 +114,7 @@ export class Pins {
     store.on(["selected"], () => (this.chosen = null));
   }
 
-  /** The place of the chosen contour's table in the job, or null. */
+  /** The index of the chosen contour's table in the job, or null. */
   get table() {
     const { job, selected } = this.store;
     return job?.contours.find(({ name }) => name === selected)?.index ?? null;
@@ -136,7 +136,7 @@ export class Pins {
   }
 
   /**
-   * Write pins to the job: one step of undo.
+   * Write pins to the job, as one step of undo.
    * @param {Pin[]} pins
    */
   write(pins) {

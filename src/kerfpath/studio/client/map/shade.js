@@ -1,4 +1,4 @@
-/** A quantity over a map that its admitted poses are shaded by, and its scale. */
+/** A quantity that shades the admitted poses of a map, and its scale. */
 
 import { el } from "../dom.js";
 import { UNITS, digits, fixed } from "../format.js";
@@ -33,7 +33,7 @@ export class Shade {
   }
 
   /**
-   * Say what it is at a place of the map; "" where it has no value.
+   * Return the value at a place of the map in words; "" without a value.
    * @param {number} posture
    * @param {number} place  of all gamma of all nodes
    */
@@ -47,7 +47,7 @@ export class Shade {
     const { low, high, words, beyond, unit } = this.message;
     if (!unit) return `${words}: ${fixed(low + ((high - low) * code) / MOST, 0)}`;
     const value = this.shown(low + ((high - low) * code) / MOST);
-    // What is told up to a distance is a lower bound.
+    // Values that are only known up to a distance are lower bounds.
     const from = beyond ? "at least " : "";
     return `${words}: ${from}${value}${code < MOST ? pair : ""}`;
   }
@@ -59,7 +59,7 @@ export class Shade {
   }
 
   /**
-   * Whether something comes too near at a place.
+   * Whether a body is too close at a place.
    * @param {number} posture
    * @param {number} place
    */
@@ -67,7 +67,7 @@ export class Shade {
     return this.of(posture)?.[place] === TOO_NEAR;
   }
 
-  /** Whether something comes too near anywhere. */
+  /** Whether a body is too close anywhere. */
   get closed() {
     return [...this.layers.values()].some(({ values }) => values.includes(TOO_NEAR));
   }
@@ -83,9 +83,9 @@ export class Shade {
     const [first, last] = [low, high].map((each) => this.shown(each));
     const begin = first.split(" ")[0];
     return [
-      el("p", {}, beyond ? `${words} beyond what is kept` : words),
+      el("p", {}, beyond ? `${words} beyond the near-miss distance` : words),
       el("p", { class: "scale" }, begin, strip, beyond ? `\u2265 ${last}` : last),
-      ...(this.closed ? [el("p", { class: "quiet" }, "crossed: nearer than allowed")] : []),
+      ...(this.closed ? [el("p", { class: "quiet" }, "crossed out: closer than allowed")] : []),
     ];
   }
 }

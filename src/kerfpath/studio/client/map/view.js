@@ -1,4 +1,4 @@
-/** The map: what became of every rotation along the path, the course through it, and its ghosts. */
+/** The map: the reason of loss of every rotation along the path, the plan's course, and ghosts. */
 
 import { byId, el } from "../dom.js";
 import { deg } from "../format.js";
@@ -78,7 +78,7 @@ export class MapView {
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
-  /** Take what is known of the chosen contour; ask for its map where it is not that of its plan. */
+  /** Take the data of the chosen contour; ask for its map unless it belongs to the plan. */
   load() {
     const { store } = this;
     const { selected } = store;
@@ -111,14 +111,14 @@ export class MapView {
     this.invalidate();
   }
 
-  /** Hand the chart what it shows. */
+  /** Give the chart its data. */
   hand() {
     const { chart, grid, layer, choices } = this;
     Object.assign(chart, { grid, layer, shade: choices.shade });
     this.gestures.recall();
   }
 
-  /** Draw the tabs, the legend and what stands in for a map. */
+  /** Draw the tabs, the legend, or a text if there is no map. */
   describe() {
     const { grid, store } = this;
     const busy = store.progress.busy || store.connection !== "open";
@@ -249,7 +249,7 @@ export class MapView {
     event.stopPropagation();
   }
 
-  /** Return the place that keys zoom about: the cursor, else the middle of what is seen. */
+  /** Return the place that keys zoom about: the cursor, else the middle of the view. */
   middle() {
     const { cell } = this.hover;
     const { message } = /** @type {Grid} */ (this.grid);
@@ -263,7 +263,7 @@ export class MapView {
   }
 
   /**
-   * Give a key to the pins; return whether it was one of theirs.
+   * Pass a key to the pins; return whether they used it.
    * @param {KeyboardEvent} event
    */
   pinned(event) {

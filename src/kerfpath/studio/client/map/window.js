@@ -1,4 +1,4 @@
-/** The part of a map that is seen: shares of its length and of its height, from the top left. */
+/** The visible part of a map: shares of its length and of its height, from the top left. */
 
 /** @typedef {Readonly<{from: number, to: number, top: number, bottom: number}>} Window */
 
@@ -6,7 +6,7 @@
 export const WHOLE = { from: 0, to: 1, top: 0, bottom: 1 };
 
 /**
- * Return an interval of a length that begins near a place and stays within 0 and 1.
+ * Return an interval with a length that begins near a place and stays within 0 and 1.
  * @param {number} begin
  * @param {number} length
  */
@@ -16,7 +16,7 @@ function within(begin, length) {
 }
 
 /**
- * Return what is seen after a zoom about a place.
+ * Return the view after a zoom about a place.
  * @param {Window} seen
  * @param {number} x  share of what is seen, from the left
  * @param {number} y  share of what is seen, from the top
@@ -34,7 +34,7 @@ export function zoomed(seen, x, y, factor, least) {
 }
 
 /**
- * Return what is seen after it has been moved.
+ * Return the view after a move.
  * @param {Window} seen
  * @param {number} x  share of what is seen, to the right
  * @param {number} y  share of what is seen, downwards
@@ -48,7 +48,7 @@ export function moved(seen, x, y) {
 }
 
 /**
- * Return what is seen, moved as little as it takes to see a place.
+ * Return the view, moved as little as possible so that it contains a place.
  * @param {Window} seen
  * @param {number} along  share of the map, from the left
  * @param {number} down  share of the map, from the top

@@ -1,4 +1,4 @@
-/** The top of the page and its foot: the job, undo and redo, files, theme, progress, notices. */
+/** The header and footer of the page: job, undo and redo, exports, theme, progress, notices. */
 
 import { byId, el, icon } from "../dom.js";
 
@@ -8,7 +8,7 @@ import { byId, el, icon } from "../dom.js";
 /**
  * @param {Store} store
  * @param {Link} connection
- * @param {import("../scene/record.js").Extra[]} extras  files that the page makes itself
+ * @param {import("../scene/record.js").Extra[]} extras  exports that the page makes itself
  */
 export function topBar(store, connection, extras) {
   const send = (/** @type {string} */ type) => () => void connection.send({ type });
@@ -40,7 +40,7 @@ export function topBar(store, connection, extras) {
     set("open-program", live);
     set("export", live);
     byId("file").textContent = job?.name ?? "Opening the job";
-    byId("saved").textContent = !job ? "" : job.saved ? "saved" : "changed, kept beside the job";
+    byId("saved").textContent = !job ? "" : job.saved ? "saved" : "not saved; kept beside the job";
     document.title = job
       ? `${job.saved ? "" : "• "}${job.name} – kerfpath studio`
       : "kerfpath studio";
@@ -84,7 +84,7 @@ function menu(store, extras) {
               "div",
               { class: "off" },
               "Nothing yet",
-              el("small", {}, "Files can be taken along once every contour is planned."),
+              el("small", {}, "Files can be exported once every contour is planned."),
             ),
           ]),
       ...extras.map(({ name, about, why, make }) => {
@@ -120,15 +120,15 @@ function menu(store, extras) {
 /** @param {string} path */
 const describe = (path) =>
   path.includes("script")
-    ? "in Python: the same plans by the public functions"
+    ? "in Python: the same plans from the public functions"
     : path.includes("job")
-      ? "the job file, comments kept"
+      ? "the job file with its comments"
       : path.includes("program")
         ? "in the language of the job"
         : path.includes("trajectory")
           ? "one row for each node"
           : path.includes("report")
-            ? "a page of its own"
+            ? "on a separate page"
             : "";
 
 /**
@@ -159,7 +159,7 @@ export function foot(store, connection) {
 }
 
 /**
- * Show what went wrong, and what to do about it, above the desk.
+ * Show errors, and what to do about them, above the desk.
  * @param {Store} store
  * @param {Link} connection
  */
@@ -219,7 +219,7 @@ export function notices(store, connection) {
     count();
   }
 
-  /** Whether the connection has been lost since it was last there. */
+  /** Whether the connection has been lost since it was last open. */
   function lostOnce() {
     if (store.connection === "lost") broken = true;
     return broken;
@@ -232,7 +232,7 @@ export function notices(store, connection) {
     const seconds = Math.max(1, Math.ceil(((store.retryAt ?? 0) - Date.now()) / 1000));
     const when = store.connection === "lost" ? `Next try in ${seconds} s.` : "Trying now.";
     const text = wasOpen
-      ? `The studio's server has stopped or cannot be reached. Every change up to now is kept beside the job; start "kerfpath studio" again to go on. ${when}`
+      ? `The studio's server has stopped or cannot be reached. All changes are kept beside the job file; start "kerfpath studio" again to continue. ${when}`
       : `The studio's server does not answer. ${when}`;
     const said = lost.querySelector("p");
     if (said && said.textContent !== text) said.textContent = text;

@@ -1,4 +1,4 @@
-/** The search for the best placement: what may vary, what has been found, and taking one of them. */
+/** The search for the best placement: its ranges, the placements found, and taking one. */
 
 import { el } from "../dom.js";
 import { change, counted, digits, fixed } from "../format.js";
@@ -6,7 +6,7 @@ import { change, counted, digits, fixed } from "../format.js";
 /** @typedef {import("../store.js").Store} Store */
 /** @typedef {import("../messages.js").Try} Try */
 
-/** What may vary: how it is called, its unit, and how far it goes where nobody says. */
+/** The variables: label, unit, and default range on either side. */
 const VARIABLES = /** @type {const} */ ({
   x_mm: ["Part x", "mm", 200],
   y_mm: ["Part y", "mm", 200],
@@ -25,7 +25,7 @@ const EVALUATIONS = 64;
 /** @type {Record<string, {words: string, value: string}>} */
 const GOALS = {
   speed: { words: "Fastest speed of the slowest contour", value: "m/min" },
-  margin: { words: "Least of fastest over asked speed", value: "times the speed asked for" },
+  margin: { words: "Least ratio of fastest to requested speed", value: "times requested speed" },
   motion: { words: "Least displacement of the joints", value: "displacement" },
 };
 
@@ -39,17 +39,17 @@ export function candidates(store, connection, placing, moved) {
   /** @type {number | null} the one that is shown */
   let shown = null;
   let filled = false;
-  /** @type {unknown[]} what the list was drawn of: it is drawn again only where that changes */
+  /** @type {unknown[]} inputs of the last drawing of the list, which is only redrawn on changes */
   let drawnBefore = [];
   const goal = el(
     "select",
-    { "aria-label": "What is best" },
+    { "aria-label": "Goal" },
     ...Object.entries(GOALS).map(([value, { words }]) => el("option", { value }, words)),
   );
   const judged = el(
     "select",
     { "aria-label": "Judged by", onchange: draw },
-    el("option", { value: "grid" }, "Judged on the grid: quicker"),
+    el("option", { value: "grid" }, "Judged on the grid (faster)"),
     el("option", { value: "plans" }, "Judged by plans over continuous gamma"),
   );
   const evaluations = el("input", {
@@ -82,13 +82,13 @@ export function candidates(store, connection, placing, moved) {
   const element = el(
     "section",
     { class: "card" },
-    el("header", {}, el("h3", {}, "Best place"), el("span", { class: "grow" }), start),
+    el("header", {}, el("h3", {}, "Best placement"), el("span", { class: "grow" }), start),
     el("p", { class: "field" }, goal),
     el("p", { class: "field" }, judged),
     el(
       "details",
       { class: "group-of-keys" },
-      el("summary", {}, "What may vary, and how far"),
+      el("summary", {}, "Variables and ranges"),
       ...rows.map((row) => row.element),
       el("p", { class: "field head" }, el("span", {}, "Placements to try "), evaluations),
     ),
@@ -103,7 +103,7 @@ export function candidates(store, connection, placing, moved) {
     return store.layout?.state === "running" && !store.stale(store.layout);
   }
 
-  /** The ranges as they are asked for; null: one of them is none. */
+  /** The requested ranges; null if there is none, or one is invalid. */
   function ranges() {
     const wanted = rows.filter(({ box }) => box.checked);
     const spans = wanted.map(({ name, low, high }) => [
@@ -131,7 +131,7 @@ export function candidates(store, connection, placing, moved) {
     });
   }
 
-  /** Take what the job says of a search, once. */
+  /** Take the settings of [layout] from the job, once. */
   function fill() {
     const table = store.job?.values?.layout;
     if (filled || !table) return;
@@ -164,7 +164,7 @@ export function candidates(store, connection, placing, moved) {
     const planned = store.outcome?.revision === job?.revision;
     const live = store.connection === "open" && Boolean(job?.values);
     judged.hidden = job?.values?.plan?.method !== "continuous";
-    start.textContent = running() ? "Stop" : layout ? "Look again" : "Look for it";
+    start.textContent = running() ? "Stop" : layout ? "Search again" : "Search";
     start.disabled = !live || (!running() && (!planned || !ranges()));
     bar.hidden = !running();
     if (layout?.total) bar.value = layout.done / layout.total;
@@ -189,12 +189,12 @@ export function candidates(store, connection, placing, moved) {
   function say(stale) {
     const { layout } = store;
     const words = !layout
-      ? "The library's layout search, from where the part lies. It takes from seconds to many minutes, and a change of the job stops it."
+      ? "Searches for the best placement around the current one. It takes from seconds to many minutes; a change of the job stops it."
       : stale
-        ? "Of the job before its last change. Look again for that of the job as it is."
+        ? "Out of date: the job has changed. Search again for the current job."
         : running()
           ? `${layout.label}: ${layout.total ? `${layout.done} of ${layout.total}` : "under way"}. ${counted(layout.tried, "placement")} tried.`
-          : `${counted(layout.tried, "placement")} tried, ${layout.feasible} feasible${layout.state === "stopped" ? "; stopped" : ""}. ${layout.said}${layout.grid ? " Values are those of the grid; plans over continuous gamma may be faster." : ""}`;
+          : `${counted(layout.tried, "placement")} tried, ${layout.feasible} feasible${layout.state === "stopped" ? "; stopped" : ""}. ${layout.said}${layout.grid ? " Values are for the grid; plans over continuous gamma may be faster." : ""}`;
     if (said.textContent !== words) said.textContent = words;
   }
 

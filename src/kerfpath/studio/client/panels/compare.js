@@ -1,4 +1,4 @@
-/** Two plans side by side: one that is kept, against the one that is shown now. */
+/** Two plans side by side: a kept plan, and the plan that is shown now. */
 
 import { axesOf } from "../axes.js";
 import { byId, el, icon } from "../dom.js";
@@ -17,7 +17,7 @@ import { OF_JOINT, body, jointRows, rows } from "./differences.js";
  */
 export function comparePanel(store, connection, player, view) {
   const host = byId("compare");
-  /** @type {number | null} the one that is compared, also while its plans are still to come */
+  /** @type {number | null} the one that is compared, also while its plans are being fetched */
   let chosen = null;
   let keeping = false;
   let ghost = true;
@@ -27,11 +27,11 @@ export function comparePanel(store, connection, player, view) {
   let kind = "displacement";
   const keep = el(
     "button",
-    { class: "plain", title: "Keep the job and its plans as they are now", onclick: take },
+    { class: "plain", title: "Keep the current job and its plans", onclick: take },
     icon("keep"),
     "Keep to compare",
   );
-  const list = el("div", { class: "kept", role: "group", "aria-label": "Plans that are kept" });
+  const list = el("div", { class: "kept", role: "group", "aria-label": "Kept plans" });
   const shown = el("div", {});
   host.replaceChildren(
     el(
@@ -62,7 +62,7 @@ export function comparePanel(store, connection, player, view) {
     keeping = connection.send({ type: "keep" });
   }
 
-  /** Take what is kept now: compare with what this page has just kept, and with none that is gone. */
+  /** Take the list of kept plans: compare with one just kept here, and drop one that is gone. */
   function heard() {
     const entry = store.kept.find(({ id }) => id === chosen);
     if (keeping && store.kept.length) choose(store.kept[store.kept.length - 1]);
@@ -143,14 +143,14 @@ export function comparePanel(store, connection, player, view) {
         : `This contour has no plan now; ${name} has one.`
       : plans.has(store.selected ?? "")
         ? `The robot of ${name} has other joints or external axes.`
-        : `${name} has no plan of this contour.`;
+        : `${name} has no plan for this contour.`;
     return [
       both ? figures(entry, then, now) : el("p", { class: "quiet small" }, told),
       both ? byJoint(entry, then, now) : null,
       el(
         "div",
         { class: "actions" },
-        action("restore", "Take its job as the job; one step of undo", `Go back to ${name}`, () =>
+        action("restore", "Restore this job, as one step of undo", `Go back to ${name}`, () =>
           connection.send({ type: "restore", id }),
         ),
         both
@@ -158,7 +158,7 @@ export function comparePanel(store, connection, player, view) {
               "button",
               {
                 ...{ class: "text", "data-key": "ghost", "aria-pressed": String(ghost) },
-                title: "Its robot in the scene, at the same path length",
+                title: "Show its robot in the scene, at the same path length",
                 onclick: haunt,
               },
               "Show its robot",
@@ -192,7 +192,7 @@ export function comparePanel(store, connection, player, view) {
   function naming({ id, name }, live) {
     const input = el("input", {
       ...{ class: "name", "data-key": "name", value: name, maxlength: 40, disabled: !live },
-      "aria-label": "Name of the plan that is kept",
+      "aria-label": "Name of the kept plan",
       onchange: () =>
         input.value.trim() && connection.send({ type: "rename", id, name: input.value.trim() }),
       onkeydown: (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && input.blur(),

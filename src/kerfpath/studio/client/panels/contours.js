@@ -1,15 +1,15 @@
-/** The list of contours: what each one is, how its plan stands, and which one is chosen. */
+/** The list of contours with the state of their plans; one of them is chosen. */
 
 import { byId, el, icon } from "../dom.js";
 import { clock, fixed } from "../format.js";
 
 /** @typedef {import("../store.js").Store} Store */
 
-/** How a contour stands, by the class of its dot, and in words. */
+/** The state of a contour: the class of its dot, and words. */
 /** @typedef {{dot: "done" | "none" | "warn" | "busy" | "open", words: string}} Standing */
 
 /**
- * Return how a contour stands.
+ * Return the state of a contour.
  * @param {Store} store
  * @param {string} name
  * @returns {Standing}

@@ -1,4 +1,4 @@
-/** Two plans of a contour in figures: criterion by criterion, and joint by joint. */
+/** The figures of two plans of a contour, by criterion and by joint. */
 
 import { el } from "../dom.js";
 import { deg, digits, fixed } from "../format.js";
@@ -14,8 +14,8 @@ import { deg, digits, fixed } from "../format.js";
  * @property {string} unit
  * @property {number | null} then  of the plan that is compared
  * @property {number | null} now
- * @property {1 | -1 | 0} better  1: where it is more, -1: where it is less
- * @property {number} [places]  default: three digits that count
+ * @property {1 | -1 | 0} better  1: more is better, -1: less is better
+ * @property {number} [places]  default: three significant digits
  */
 
 /** @type {Record<OfJoint, string>} */
@@ -75,7 +75,7 @@ function travel(then, now, axes) {
 const largest = (plans, kind) => 100 * Math.max(...plans.flatMap(({ criteria }) => criteria[kind]));
 
 /**
- * Return the nearest that a motion comes to each thing that it keeps away from, in units of the trade.
+ * Return the least value of each measure of comfort along a motion, in the shown units.
  * @param {PlanMessage[]} plans
  */
 function nearest(plans) {
@@ -133,7 +133,7 @@ export function rows(then, now, { alike, cycle, axes }) {
     })),
     { name: "Gap to the bound", unit: "%", then: gap(then), now: gap(now), better: -1, places: 2 },
   ];
-  // Costs of another metric or of other weights are numbers of another kind.
+  // Costs with different metrics or weights cannot be compared.
   if (alike)
     found.unshift({ name: "Cost", unit: "", then: cost(then), now: cost(now), better: -1 });
   return found.filter((row) => row.then !== null || row.now !== null);

@@ -1,4 +1,4 @@
-/** Controls of the job: sliders with numbers, choices; each sends its edits while it is dragged. */
+/** Controls of the job: sliders with numbers, and choices; sliders send edits during a drag. */
 
 import { el } from "../dom.js";
 
@@ -12,7 +12,7 @@ let gestures = 0;
 export const gesture = () => `${Date.now().toString(36)}-${gestures++}`;
 
 /**
- * Return a function that is called at most every so often, with the newest value, the last at once.
+ * Return functions that limit how often `act` is called; `end` passes the last value at once.
  * @template T
  * @param {(value: T) => void} act
  */
@@ -139,7 +139,7 @@ export function amount({ id, label, unit, min, max, step, places, send }) {
 }
 
 /**
- * Return a choice of one of a few words.
+ * Return buttons for a choice of one of a few words.
  * @param {string} label
  * @param {(value: string) => void} send
  */
@@ -180,7 +180,7 @@ export function choice(label, send) {
 }
 
 /**
- * Return a slider for the weight of a joint: none, or from a tenth to ten times the usual.
+ * Return a slider for the weight of a joint: 0, or a tenth to ten times the default.
  * @param {number} joint  0-based
  * @param {(ratio: number, gesture: string) => void} send
  */
@@ -195,7 +195,7 @@ export function weight(joint, send) {
   const write = () => {
     const times = ratio();
     shown.textContent = `×${times.toFixed(times >= 9.95 || times === 0 ? 0 : times >= 0.995 ? 1 : 2)}`;
-    slider.setAttribute("aria-valuetext", `${shown.textContent.slice(1)} times the usual weight`);
+    slider.setAttribute("aria-valuetext", `${shown.textContent.slice(1)} times the default weight`);
     fill(slider);
   };
   const pace = paced((/** @type {number} */ value) => send(value, drag));
@@ -213,7 +213,7 @@ export function weight(joint, send) {
     id,
     element,
     /**
-     * @param {number} times  the usual weight
+     * @param {number} times  the default weight
      * @param {string} absolute  the weight itself
      * @param {boolean} disabled
      */

@@ -1,4 +1,4 @@
-/** The Pareto set of the chosen contour: which trade-offs there are, each to be seen and taken. */
+/** The Pareto set of the chosen contour: its points, whose motions can be shown and taken. */
 
 import { byId, el } from "../dom.js";
 import { UNITS, digits } from "../format.js";
@@ -83,7 +83,7 @@ export function frontPanel(store, connection) {
   draw();
   return { paint: draw };
 
-  /** The set of the chosen contour, if it is there. */
+  /** The set of the chosen contour, or null. */
   function mine() {
     return store.front?.contour === store.selected ? store.front : null;
   }
@@ -155,7 +155,7 @@ export function frontPanel(store, connection) {
     const live = store.connection === "open" && Boolean(job?.values);
     const planned = store.plans.has(store.selected ?? "");
     host.hidden = !job;
-    start.textContent = running() ? "Stop" : front ? "Look again" : "Look for it";
+    start.textContent = running() ? "Stop" : front ? "Search again" : "Search";
     start.disabled = !live || !planned || wanted.size < 2;
     bar.hidden = !running();
     bar.value = store.front ? store.front.done / store.front.total : 0;
@@ -187,7 +187,7 @@ export function frontPanel(store, connection) {
       const best = front.points.filter((point) => point.best).length;
       canvas.setAttribute(
         "aria-label",
-        `${best} plans that no other beats; arrow keys go from one to the next, Enter shows its motion`,
+        `${best} non-dominated plans; arrow keys go from one to the next, Enter shows its motion`,
       );
       scatter.draw();
     }
@@ -236,7 +236,7 @@ export function frontPanel(store, connection) {
     });
   }
 
-  /** Say the values of the point that is pointed at, or how it stands. */
+  /** Show the values of the point under the pointer, or the state of the search. */
   function say() {
     const front = mine();
     if (!front) return;
@@ -248,10 +248,10 @@ export function frontPanel(store, connection) {
         .join(", "));
     const best = front.points.filter((each) => each.best).length;
     said.textContent = store.stale(front)
-      ? "Of the job before its last change. Look again for that of the job as it is."
+      ? "Out of date: the job has changed. Search again for the current job."
       : front.state === "running"
-        ? `${front.done} of ${front.total} runs, ${best} plans that no other beats.`
-        : `${best} plans that no other beats, of ${front.done} runs${front.state === "stopped" ? "; stopped" : ""}. Click one to see it move. An arrow after a criterion points to where it is better.`;
+        ? `${front.done} of ${front.total} runs, ${best} non-dominated plans.`
+        : `${best} non-dominated plans, from ${front.done} runs${front.state === "stopped" ? "; stopped" : ""}. Click a plan to see its motion. The arrow of a criterion points in the better direction.`;
   }
 
   /** @param {boolean} live */
@@ -272,7 +272,7 @@ export function frontPanel(store, connection) {
         el(
           "p",
           { class: "quiet small" },
-          "A job cannot say what this plan was held to, windows of joints or a clearance. kerfpath pareto --pick writes its program.",
+          "This plan was restricted by windows of joints or by a clearance, for which a job has no keys. kerfpath pareto --pick writes its program.",
         ),
       ];
     const take = () => connection.send({ type: "edits", edits });

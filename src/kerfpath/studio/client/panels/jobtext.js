@@ -1,4 +1,4 @@
-/** The text of the job in a sheet over the page, to read and to change. */
+/** The text of the job in a sheet over the page, for reading and editing. */
 
 import { byId, el } from "../dom.js";
 import { showSheet } from "./sheet.js";
@@ -41,7 +41,7 @@ export function jobSheet(store, connection) {
           el(
             "span",
             { class: "quiet" },
-            "Changes here are one step of undo. Nothing is written to the job file before Save job.",
+            "Changes here are one step of undo. The job file is only written with Save job.",
           ),
           el("span", { class: "grow" }),
           el("button", { class: "plain", onclick: () => sheet.close() }, "Cancel"),

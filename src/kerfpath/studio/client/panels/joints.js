@@ -1,4 +1,4 @@
-/** The joints of the robot: the weight of each, to drag, and beside it how much the joint does. */
+/** The joints of the robot: a slider for each weight, and the motion and load of each joint. */
 
 import { axesOf } from "../axes.js";
 import { byId, el, icon } from "../dom.js";
@@ -20,11 +20,11 @@ export function jointsPanel(store, connection) {
     "button",
     {
       class: "text",
-      title: "Take the weights out of the job: each joint by its own speed limit",
+      title: "Remove the weights from the job: each joint is then weighted by its speed limit",
       onclick: () => send(null, gesture()),
     },
     icon("reset"),
-    "Usual weights",
+    "Default weights",
   );
   const [body, units] = [el("tbody"), el("span")];
   const table = el(
@@ -38,7 +38,7 @@ export function jointsPanel(store, connection) {
         {},
         ...[
           ["", ""],
-          ["weight", "× usual"],
+          ["weight", "× default"],
           ["moves", units],
           ["speed", "% limit"],
           ["accel.", "% limit"],
@@ -91,7 +91,7 @@ export function jointsPanel(store, connection) {
   /**
    * Send the weights with one of them changed.
    * @param {number} joint
-   * @param {number} ratio  of its usual weight
+   * @param {number} ratio  of its default weight
    * @param {string} drag
    */
   function set(joint, ratio, drag) {
@@ -108,7 +108,7 @@ export function jointsPanel(store, connection) {
     const { job, selected, scene } = store;
     const base = job?.weights ?? [];
     const axes = axesOf(scene?.robot);
-    // Those of a job that has been changed come before its scene.
+    // The weights of a changed job arrive before its scene.
     host.hidden = !base.length || axes.length !== base.length;
     if (host.hidden) return;
     const key = JSON.stringify(axes);

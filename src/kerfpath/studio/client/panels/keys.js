@@ -1,4 +1,4 @@
-/** The keys of the job that have a control of their own under "All options", grouped by meaning. */
+/** The keys of the job that have a control under "All options", in groups. */
 
 /**
  * @typedef {object} Key
@@ -7,9 +7,9 @@
  * @property {"number" | "words" | "switch" | "table" | "list" | "joints"} kind
  * @property {string} [unit]
  * @property {string} [hint]
- * @property {string} [needs]  a key without which this one may not be
- * @property {string} [table]  taken out of the job with this key, which it cannot be without
- * @property {[string, number]} [beside]  a key that this one must not be without, and its value
+ * @property {string} [needs]  a key that this one requires
+ * @property {string} [table]  a table that requires this key and is removed with it
+ * @property {[string, number]} [beside]  a key that is set with this one, and its value
  */
 
 /** @type {(key: string, label: string, unit?: string, more?: Partial<Key>) => Key} */
@@ -55,19 +55,19 @@ const band = (name, label, unit, suffix = unit) => {
   return [
     ...(name === "clearance"
       ? []
-      : [number(`comfort.${name}_margin_${suffix}`, `${label}, kept away by`, unit)]),
-    number(width, `${label}, costs below`, unit, { beside: [cost, 1] }),
+      : [number(`comfort.${name}_margin_${suffix}`, `${label}, margin`, unit)]),
+    number(width, `${label}, band width`, unit, { beside: [cost, 1] }),
     number(cost, `${label}, cost`, "", { needs: width, beside: [width, 0] }),
   ];
 };
 
-/** The title of the keys of external axes, which a job has as many of as axes. */
+/** The title of the group of external axes; each axis has its own keys. */
 export const EXTERNAL = "External axes";
 
 /** @type {{title: string, contour?: boolean, keys: Key[]}[]} */
 export const GROUPS = [
   {
-    title: "What is best",
+    title: "Objective and limits",
     keys: [
       words("plan.objective", "Objective"),
       words("plan.metric", "Metric"),
@@ -88,12 +88,12 @@ export const GROUPS = [
     ],
   },
   {
-    title: "How it is searched",
+    title: "Search",
     keys: [
-      words("plan.method", "Method", { hint: "continuous: gamma off its grid, too" }),
+      words("plan.method", "Method", { hint: "continuous: gamma is not restricted to a grid" }),
       number("plan.gamma_step_deg", "Step of gamma", "deg"),
-      words("plan.closure", "Closed contours", { hint: "periodic: end as it began" }),
-      number("plan.rotation_deg", "Turned on at most", "deg"),
+      words("plan.closure", "Closed contours", { hint: "periodic: the motion ends as it begins" }),
+      number("plan.rotation_deg", "Rotation of endless joints, at most", "deg"),
       words("plan.frames", "Frames"),
       yes("plan.refine", "Refined off the grid"),
       number("plan.refine_parts", "Parts of the refinement"),
@@ -101,9 +101,9 @@ export const GROUPS = [
     ],
   },
   {
-    title: "Where the speed cannot be kept",
+    title: "Feed reductions and pieces",
     keys: [
-      words("plan.feed", "Feed", { hint: "dip: slow down where it must" }),
+      words("plan.feed", "Feed", { hint: "dip: slow down where needed" }),
       words("plan.interruptions", "Interruptions", { hint: "fewest: cut in pieces" }),
       number("plan.least_piece_mm", "Shortest piece", "mm"),
     ],
@@ -128,21 +128,21 @@ export const GROUPS = [
     ],
   },
   {
-    title: "What is proved",
+    title: "Bound",
     keys: [
       yes("plan.certify", "Bound of the cost"),
-      number("plan.certify_gap_percent", "Gap that is enough", "%", { needs: "plan.certify" }),
-      number("plan.certify_seconds", "Time for it", "s", { needs: "plan.certify" }),
+      number("plan.certify_gap_percent", "Required gap", "%", { needs: "plan.certify" }),
+      number("plan.certify_seconds", "Time limit", "s", { needs: "plan.certify" }),
     ],
   },
   {
-    title: "Order and moves",
+    title: "Order and transfer moves",
     keys: [
-      { key: "sequence", label: "Moves between contours are planned", kind: "table" },
+      { key: "sequence", label: "Plan transfer moves", kind: "table" },
       words("sequence.order", "Order", { needs: "sequence" }),
       yes("sequence.inner_first", "Inner contours first", { needs: "sequence" }),
       number("sequence.heat_spacing_mm", "Heat spacing", "mm", { needs: "sequence" }),
-      number("sequence.seconds", "Time for the order", "s", { needs: "sequence" }),
+      number("sequence.seconds", "Time limit for the order", "s", { needs: "sequence" }),
       { key: "sequence.home_deg", label: "Home", unit: "deg", kind: "joints", needs: "sequence" },
     ],
   },
@@ -153,7 +153,7 @@ export const GROUPS = [
       words("contour.start", "Start"),
       number("contour.start_mm", "Start at", "mm"),
       words("contour.direction", "Direction"),
-      number("contour.candidates", "Starts that are tried"),
+      number("contour.candidates", "Number of starts to try"),
       words("contour.scrap", "Scrap side"),
       number("contour.kerf_mm", "Kerf", "mm"),
       number("contour.bevel_deg", "Bevel", "deg"),
@@ -178,7 +178,7 @@ export const GROUPS = [
         table: "contour.micro_joints",
       }),
       number("contour.corners.round_mm", "Corners rounded by", "mm"),
-      number("contour.corners.loop_mm", "Corners run around, radius", "mm"),
+      number("contour.corners.loop_mm", "Loop at corners, radius", "mm"),
       number("contour.corners.slow_share", "Share of the speed at corners"),
     ],
   },
@@ -203,16 +203,16 @@ export const externalKeys = (axes) =>
     });
     return [
       list("axis", "direction"),
-      ...(kind === "rotary" ? [list("point_mm", "a point of it", "mm")] : []),
-      ...(endless ? [] : [own("lower", "from"), own("upper", "to")]),
+      ...(kind === "rotary" ? [list("point_mm", "point on the axis", "mm")] : []),
+      ...(endless ? [] : [own("lower", "lower limit"), own("upper", "upper limit")]),
       own("velocity", "speed", "/s"),
       own("acceleration", "acceleration", "/s2"),
-      own("home", "at home"),
-      own("step", "step of a grid"),
+      own("home", "home"),
+      own("step", "grid step"),
     ];
   });
 
-/** How nodes may be laid on a contour: exactly one of these keys is in its table. */
+/** The ways to sample a contour: its table has exactly one of these keys. */
 export const SAMPLINGS = {
   spacing_mm: { label: "spacing", unit: "mm", usual: 2 },
   time_step_ms: { label: "time step", unit: "ms", usual: 20 },

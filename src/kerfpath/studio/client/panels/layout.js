@@ -1,4 +1,4 @@
-/** Where the part lies: moved by numbers or in the scene, with what is in reach and how fast it is. */
+/** The placement of the part: moved by numbers or handles, with its reach and fastest speed. */
 
 import { byId, el, icon } from "../dom.js";
 import { change, counted, fixed } from "../format.js";
@@ -8,7 +8,7 @@ import { sheetShown, showSheet } from "./sheet.js";
 /** @typedef {import("../store.js").Store} Store */
 /** @typedef {import("../scene/placing.js").What} What */
 
-const PATIENCE = 2000; // ms after which an answer is not waited for any more
+const PATIENCE = 2000; // ms to wait for an answer
 const AXES = ["x", "y", "z"];
 const TURNS = ["roll", "pitch", "yaw"];
 
@@ -27,7 +27,7 @@ export function layoutSheet(store, connection, view) {
   /** @type {Map<string, {place: string, now: number | null, before: number | null}>} by contour */
   const speeds = new Map();
 
-  const what = segments("What is moved", { part: "Part", robot: "Robot" }, (value) => {
+  const what = segments("Body to move", { part: "Part", robot: "Robot" }, (value) => {
     placing.choose(/** @type {What} */ (value), turns);
     draw();
   });
@@ -52,7 +52,7 @@ export function layoutSheet(store, connection, view) {
     el(
       "p",
       { class: "quiet small" },
-      "A job is written in the robot's base: where this moves, all else moves the other way.",
+      "The job is written in the robot's base: if the base moves, all else moves the other way.",
     ),
   );
   const search = candidates(store, connection, placing, moved);
@@ -60,12 +60,12 @@ export function layoutSheet(store, connection, view) {
     "div",
     { class: "cards" },
     card(
-      "Where it is",
+      "Position",
       el("div", { class: "pair" }, what.element, how.element),
       grid([...xyz, ...rpy]),
       robot,
     ),
-    card("In reach", reach),
+    card("Reach", reach),
     card("Fastest speed", speed),
     search.element,
   );
@@ -115,13 +115,13 @@ export function layoutSheet(store, connection, view) {
     placing.show(false);
   }
 
-  /** What has been moved is shown, and what is in reach there is asked for. */
+  /** Show the new placement, and ask for its reach. */
   function moved() {
     draw();
     ask();
   }
 
-  /** Have what is moved in the job: one step of undo. */
+  /** Write the move to the job, as one step of undo. */
   function commit() {
     const offsets = placing.offsets();
     if (Object.keys(offsets).length)
@@ -129,7 +129,7 @@ export function layoutSheet(store, connection, view) {
     moved();
   }
 
-  /** Ask what is in reach; while an answer is waited for, once more after it. */
+  /** Ask for the reach; if an answer is awaited, ask again after it. */
   function ask() {
     if (!placing.open || store.connection !== "open") return;
     if (waiting && performance.now() - waiting < PATIENCE) return void (again = true);
@@ -191,7 +191,7 @@ export function layoutSheet(store, connection, view) {
     const count = lost.reduce((sum, { out }) => sum + out.length, 0);
     const nodes = contours.reduce((sum, each) => sum + each.nodes, 0);
     const words = !placing.reach
-      ? "Looking what the robot reaches."
+      ? "Testing what the robot reaches."
       : count
         ? `Out of reach: ${count} of ${counted(nodes, "node")}, on ${lost.length} of ${counted(contours.length, "contour")}.`
         : `All ${counted(nodes, "node")} of ${counted(contours.length, "contour")} are within reach.`;
@@ -211,7 +211,7 @@ export function layoutSheet(store, connection, view) {
     return `${name}: ${out.length === nodes ? "all of it" : `${out.length} of ${counted(nodes, "node")}`}`;
   }
 
-  /** Say how fast the chosen contour can be cut, and look for it once there is nothing else to do. */
+  /** Show the fastest speed of the chosen contour; search for it once the server is idle. */
   function drawSpeed() {
     const { selected, job, outcome, progress } = store;
     if (!selected || !job) return;
@@ -231,16 +231,16 @@ export function layoutSheet(store, connection, view) {
         ? el("span", { class: "quiet" }, ` ${change(known.now, was)}`)
         : "";
     const state = placing.moved
-      ? "once it is in the job"
+      ? "once the move is in the job"
       : out
         ? "none: nodes are out of reach"
         : looking
-          ? "looking"
+          ? "searching"
           : here
             ? "none was found"
             : idle
-              ? "not looked for"
-              : "once all is planned";
+              ? "not searched for"
+              : "once all contours are planned";
     const now = row(state, here && !out && !placing.moved ? known?.now : null);
     now.append(gain);
     const offer = looking ? "stop" : idle && !here && !out && looked === key ? "look" : "";
@@ -248,7 +248,7 @@ export function layoutSheet(store, connection, view) {
     if (speed.dataset.drawn === drawn) return;
     speed.dataset.drawn = drawn;
     speed.replaceChildren(
-      el("p", { class: "quiet small" }, `Of ${selected}, constant along it.`),
+      el("p", { class: "quiet small" }, `Constant speed along ${selected}.`),
       el(
         "dl",
         { class: "facts" },
@@ -258,7 +258,7 @@ export function layoutSheet(store, connection, view) {
         row("–", was),
       ),
       ...(offer === "stop"
-        ? [el("button", { class: "text", onclick: () => stop() }, "Stop looking")]
+        ? [el("button", { class: "text", onclick: () => stop() }, "Stop the search")]
         : offer
           ? [el("button", { class: "text", onclick: () => find(key) }, "Find the fastest")]
           : []),
@@ -288,7 +288,7 @@ export function layoutSheet(store, connection, view) {
     draw();
   }
 
-  /** What the place of part and tip is known by. */
+  /** A key for the place of part and tip. */
   function placeNow() {
     return JSON.stringify([store.scene?.T_part, store.scene?.robot.T_tool]);
   }
@@ -343,7 +343,7 @@ const grid = (fields) => el("div", { class: "place" }, ...fields.map(({ element 
 const card = (title, ...body) => el("section", { class: "card" }, el("h3", {}, title), ...body);
 
 /**
- * Return buttons of which one is pressed.
+ * Return a group of buttons, one of which is pressed.
  * @param {string} label
  * @param {Record<string, string>} words
  * @param {(value: string) => void} take

@@ -1,4 +1,4 @@
-/** The loops of the part in a sheet: which are cut, and buttons to cut more of them or fewer. */
+/** The loops of the part in a sheet, with buttons to add them to the job or remove them. */
 
 import { byId, el } from "../dom.js";
 import { counted } from "../format.js";
@@ -16,7 +16,7 @@ export function loopsSheet(store, connection) {
   const opener = byId("open-loops", HTMLButtonElement);
   const rows = el("div", { class: "rows" });
   const words = el("input", { type: "search", placeholder: "Find by name", "aria-label": "Find" });
-  const [onlyUncut, inside] = ["Not cut only", "Inner side of the sheet, too"].map((label) => {
+  const [onlyUncut, inside] = ["Only uncut loops", "Also inner side of the sheet"].map((label) => {
     const box = el("input", { type: "checkbox", onchange: draw });
     return { box, label: el("label", {}, box, label) };
   });
@@ -36,9 +36,9 @@ export function loopsSheet(store, connection) {
   function footer() {
     const hidden = store.part?.left_out ?? 0;
     const more = hidden
-      ? ` ${counted(hidden, "loop")} of pieces of skins and around the thickness of sheets are not listed: write their names in the job file.`
+      ? ` ${counted(hidden, "loop")} of single faces of skins and around the thickness of sheets are not listed: write their names in the job file.`
       : "";
-    const text = `A loop that is added is cut like the contour of the job that is most like it.${more}`;
+    const text = `An added loop is cut like the most similar contour of the job.${more}`;
     return el("footer", {}, el("span", { class: "quiet" }, text));
   }
 
@@ -61,7 +61,7 @@ export function loopsSheet(store, connection) {
       ...[...faces].flatMap(([face, loops]) => [heading(face, loops, known), ...loops.map(row)]),
     );
     if (!shown.length) {
-      const why = all.length ? "No loop is of this kind." : "The drawing holds no loop.";
+      const why = all.length ? "No loop matches." : "The drawing has no loops.";
       rows.replaceChildren(el("p", { class: "empty" }, why));
     }
     if (focused !== undefined)

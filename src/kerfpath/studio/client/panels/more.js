@@ -1,4 +1,4 @@
-/** All options: a control of its kind for every key that is not in sight already, and a search. */
+/** All options: a control for every planning key of the job, and a search. */
 
 import { axesOf } from "../axes.js";
 import { byId, el, icon } from "../dom.js";
@@ -14,7 +14,7 @@ import { EXTERNAL, GROUPS, SAMPLINGS, externalKeys } from "./keys.js";
  * @property {HTMLElement} element
  * @property {() => void} show
  * @property {() => boolean} given
- * @property {string} words  that it is found by
+ * @property {string} words  that the search looks in
  */
 
 /**
@@ -36,7 +36,7 @@ export function morePanel(store, connection, player) {
     );
     return { title, rows, count, fold };
   });
-  const none = el("p", { class: "quiet small", hidden: true }, "No option is called so.");
+  const none = el("p", { class: "quiet small", hidden: true }, "No option matches.");
   const find = el("input", {
     ...{ type: "search", class: "find", placeholder: "Find an option" },
     ...{ "aria-label": "Find an option", oninput: filter },
@@ -54,7 +54,7 @@ export function morePanel(store, connection, player) {
   store.on(["job", "selected", "connection", "scene"], draw);
   draw();
 
-  /** Have controls for the keys of each external axis of the job. */
+  /** Build controls for the keys of each external axis of the job. */
   function build() {
     const keys = externalKeys(store.job?.values?.robot.external ?? []);
     const now = JSON.stringify(keys);
@@ -92,7 +92,7 @@ export function morePanel(store, connection, player) {
     none.hidden = found > 0;
   }
 
-  /** The place of the chosen contour's table in the job. */
+  /** The index of the chosen contour's table in the job. */
   function table() {
     return store.job?.contours.find(({ name }) => name === store.selected)?.index ?? 0;
   }
@@ -128,7 +128,7 @@ export function morePanel(store, connection, player) {
   }
 
   /**
-   * Set a key, and what it may not be without; null takes it out of the job.
+   * Set a key, and a key that must be used with it; null removes it from the job.
    * @param {Key} what
    * @param {unknown} to
    */
@@ -137,7 +137,7 @@ export function morePanel(store, connection, player) {
     const parent = key.slice(0, key.lastIndexOf("."));
     const held = `${path(parent).join(".")}.`;
     const alone = store.job?.given.filter((each) => each.startsWith(held)).length === 1;
-    // A table inside a contour's, that nothing would be left of, goes, too.
+    // Remove a nested table that would be empty.
     if (to === null && alone && parent.includes(".")) return send([parent, null]);
     if (!beside) return send([key, to]);
     const [other, usual] = beside;
@@ -160,8 +160,8 @@ export function morePanel(store, connection, player) {
     const reset = el(
       "button",
       {
-        ...{ class: "tool reset", title: "As it is by default" },
-        "aria-label": `${label}: as it is by default`,
+        ...{ class: "tool reset", title: "Reset to default" },
+        "aria-label": `${label}: reset to default`,
         onclick: () => set(what, null),
       },
       icon("reset"),
@@ -182,7 +182,7 @@ export function morePanel(store, connection, player) {
         const without = needs !== undefined && !value(needs);
         const disabled = store.connection !== "open" || !store.job?.values || without;
         control.show(value(key), disabled);
-        // Of a key that has no default, as that of a table, there is nothing else to go back to.
+        // A key that is not in the job has nothing to reset.
         reset.style.visibility = given(key) && !disabled ? "visible" : "hidden";
         const at = path(key).join(".");
         const wrong = store.job?.faults.find((each) => each.key.join(".") === at)?.message ?? "";
@@ -196,7 +196,7 @@ export function morePanel(store, connection, player) {
   /** @typedef {{element: HTMLElement, input: HTMLElement, show: (value: any, disabled: boolean) => void}} Control */
 
   /**
-   * A field to type in, which is empty where there is no value.
+   * A text field, which is empty if there is no value.
    * @param {string} id
    * @param {Record<string, string>} attributes
    * @param {(text: string) => void} take
@@ -269,7 +269,7 @@ export function morePanel(store, connection, player) {
         input.disabled = disabled;
         input.checked = now === true;
         input.indeterminate = now === null;
-        input.title = now === null ? "as the method asks for" : "";
+        input.title = now === null ? "as the method requires" : "";
       },
     };
   }
@@ -331,7 +331,7 @@ export function morePanel(store, connection, player) {
         .map(({ unit }, i) => [`robot.external.${i}.home_${unit}`, at[arm + i]]);
       send([what.key, at.slice(0, arm)], ...others);
     };
-    const words = { title: "The pose that is shown", "aria-label": "Take the pose that is shown" };
+    const words = { title: "Take the shown pose", "aria-label": "Take the shown pose" };
     const here = el("button", { ...words, class: "tool", onclick: take }, icon("follow"));
     return {
       element: el("span", { class: "value" }, input, here),
@@ -344,7 +344,7 @@ export function morePanel(store, connection, player) {
   }
 
   /**
-   * How nodes are laid on the contour: by one of several keys.
+   * The sampling of the contour, which has one of several keys.
    * @returns {Row}
    */
   function sampling() {

@@ -1,4 +1,4 @@
-/** No feasible path: where it breaks, why, of what it is proved, and what would help, as buttons. */
+/** No feasible path: where it breaks, why, what is proved, and buttons for changes that help. */
 
 import { el, icon } from "../dom.js";
 import { millimetres } from "../format.js";
@@ -8,11 +8,11 @@ import { millimetres } from "../format.js";
 const SCOPES = {
   "every gamma": "Proved: no motion exists, whatever the rotation, posture and turn.",
   grid: "Proved on this grid of gamma; between its samples a motion may exist.",
-  undecided: "Not proved: none was found, yet a motion may exist.",
+  undecided: "Not proved: no motion was found, but one may exist.",
 };
 
 /**
- * Return what to say of a contour without a path.
+ * Return the elements for a contour without a path.
  * @param {NoPathMessage} answer
  * @param {{send: (message: any) => boolean}} connection
  * @param {{look: (view: string) => void}} view
@@ -51,7 +51,7 @@ export function noPath(answer, connection, view) {
           ),
         ]
       : []),
-    el("h3", { class: "sub" }, "What was lost there"),
+    el("h3", { class: "sub" }, "Reasons of loss there"),
     el(
       "ul",
       { class: "reasons" },
@@ -68,7 +68,7 @@ export function noPath(answer, connection, view) {
             "p",
             { class: "waiting" },
             el("i", { class: "dot busy" }),
-            "Looking for the smallest change that makes a path.",
+            "Searching for the smallest change that makes a path.",
           ),
         ]
       : answer.relaxations.length
@@ -94,6 +94,6 @@ export function noPath(answer, connection, view) {
     ...(answer.relaxations?.length && answer.remedy
       ? [el("p", { class: "quiet" }, answer.remedy)]
       : []),
-    el("details", {}, el("summary", {}, "In full"), el("p", { class: "quiet" }, answer.statement)),
+    el("details", {}, el("summary", {}, "Details"), el("p", { class: "quiet" }, answer.statement)),
   ];
 }

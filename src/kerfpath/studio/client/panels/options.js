@@ -1,4 +1,4 @@
-/** What one decides: speed of the contour, objective, metric, shares of the limits. */
+/** The main options: speed of the contour, objective, metric, posture, shares of the limits. */
 
 import { byId, el, icon } from "../dom.js";
 import { fixed } from "../format.js";
@@ -69,7 +69,7 @@ export function optionsPanel(store, connection) {
     key,
     field: choice(label, (value) => send(["plan", key], value, gesture())),
   }));
-  /** @type {Map<string, number>} by contour, how far its slider of speed goes */
+  /** @type {Map<string, number>} end of the speed slider, by contour */
   const reach = new Map();
   let looking = false;
 
@@ -85,7 +85,7 @@ export function optionsPanel(store, connection) {
     el(
       "section",
       { class: "card" },
-      el("h2", {}, "What is best"),
+      el("h2", {}, "Objective and limits"),
       ...choices.map(({ field }) => field.element),
       el("div", { class: "field row" }, el("label", { for: "posture" }, "Posture"), posture),
       ...etas.map(({ field }) => field.element),
@@ -126,7 +126,7 @@ export function optionsPanel(store, connection) {
     speed.show(now, { max: most, disabled, fault: faultOf(`contour.${table()}.speed_m_min`) });
     const alike = (job?.contours ?? []).filter(({ index }) => index === table()).length;
     shared.textContent =
-      alike > 1 ? `The same for the ${alike} contours that this table of the job picks.` : "";
+      alike > 1 ? `Applies to all ${alike} contours that this table of the job picks.` : "";
     shared.hidden = alike < 2;
     fastest.disabled = disabled || looking;
     for (const { key, field } of etas)
@@ -164,7 +164,7 @@ export function optionsPanel(store, connection) {
         "p",
         { class: "waiting" },
         el("i", { class: "dot busy" }),
-        "Looking for the fastest constant speed.",
+        "Searching for the fastest constant speed.",
       ),
     );
     fastest.disabled = true;
@@ -178,10 +178,8 @@ export function optionsPanel(store, connection) {
       el(
         "p",
         {},
-        best === null
-          ? "No speed was found at which it can be cut. "
-          : `Fastest: ${fixed(best, 2)} m/min. `,
-        el("span", { class: "quiet" }, binds && `What binds: ${binds}`),
+        best === null ? "No feasible speed was found. " : `Fastest: ${fixed(best, 2)} m/min. `,
+        el("span", { class: "quiet" }, binds && `Binding limit: ${binds}`),
       ),
       ...(edits.length
         ? [

@@ -1,4 +1,4 @@
-/** The program as text beside the scene: a line is a place of the motion, and the other way round. */
+/** The text of the program beside the scene; its lines are linked to places of the motion. */
 
 import { byId, el } from "../dom.js";
 import { interval } from "../kinematics.js";
@@ -112,8 +112,8 @@ export function programSheet(store, player, connection) {
   function footer({ files }) {
     const linked = files.some(({ lines }) => lines.length) && player.timeline.whole;
     const words = linked
-      ? "A click on a line, or the arrow keys, take the robot there; the line that runs is marked."
-      : "Lines of this language are not read back, so that none leads to a place in the scene.";
+      ? "Click a line, or use the arrow keys, to move the robot there; the current line is marked."
+      : "Programs in this language are not read back, so their lines are not linked to the scene.";
     return el("footer", {}, el("span", { class: "quiet" }, words));
   }
 
@@ -164,7 +164,7 @@ export function programSheet(store, player, connection) {
   }
 
   /**
-   * Go to where a line leads, or the next one that leads anywhere.
+   * Go to the place of a line, or of the next line that is linked.
    * @param {number} line
    */
   function go(line) {
@@ -174,11 +174,11 @@ export function programSheet(store, player, connection) {
     if (k < 0) return;
     player.pause();
     player.seek(file.end[k]);
-    listing.mark(file.lines[k]); // of several that end then, the one that was meant
+    listing.mark(file.lines[k]); // several lines may end at that time
   }
 
   /**
-   * Go to the line that runs next, or before.
+   * Go to the next or the previous linked line.
    * @param {number} way  1 or -1
    */
   function step(way) {
@@ -200,7 +200,7 @@ export function programSheet(store, player, connection) {
     const answer = store.programText;
     if (!answer?.files.length || !player.timeline.whole) return;
     const near = 1e-5; // s: times are sent to a microsecond
-    // Of all lines the one that ends next; the first may stand before all of them.
+    // The line that ends next; the robot may also be before the first one.
     let [at, line, soonest] = [-1, 0, Infinity];
     answer.files.forEach(({ lines, end }, i) => {
       const k = !end.length || end[0] >= t - near ? 0 : interval([...end, Infinity], t - near) + 1;

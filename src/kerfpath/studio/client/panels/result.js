@@ -1,4 +1,4 @@
-/** What the chosen contour's plan is worth, and how far it may be from the best; or why there is none. */
+/** The cost and proof of the chosen contour's plan, or the reason why there is none. */
 
 import { byId, el, icon } from "../dom.js";
 import { change, counted, deg, digits, fixed, millimetres, percent } from "../format.js";
@@ -58,7 +58,7 @@ export function resultPanel(store, connection, view) {
             "p",
             { class: "quiet" },
             store.progress.busy
-              ? "The first plan takes a few seconds; later ones a fraction of one."
+              ? "The first plan takes a few seconds, later ones a fraction of a second."
               : "Not planned. Plan again to see its motion.",
           ),
         ),
@@ -122,15 +122,15 @@ export function resultPanel(store, connection, view) {
       const most = Math.max(.../** @type {number[]} */ (gaps));
       return [
         icon("check"),
-        `Proved: at most ${percent(most, most < 0.01 ? 2 : 1)} above the best motion there is, at any gamma, posture and turn.`,
+        `Proved: the best motion, at any gamma, posture and turn, saves at most ${percent(most, most < 0.01 ? 2 : 1)} of this cost.`,
       ];
     }
     if (plans.some(({ settled }) => !settled))
-      return [el("i", { class: "dot busy" }), "How near this is to the best is being proved."];
+      return [el("i", { class: "dot busy" }), "The bound on the best cost is being computed."];
     return [
       plans.every(({ optimal }) => optimal)
-        ? "The best motion of its grid, proved."
-        : "The best motion found; how near to the best is not proved.",
+        ? "Proved: the best motion on its grid."
+        : "The best motion found; no bound on the best cost is proved.",
     ];
   }
 
@@ -187,7 +187,7 @@ export function resultPanel(store, connection, view) {
 }
 
 /**
- * Return a value of SI in the units of the trade.
+ * Return an SI value in the units that are shown.
  * @param {number} value
  * @param {string} unit
  */

@@ -1,4 +1,4 @@
-/** The one sheet of the page: over it, or beside the scene, so that this can still be used. */
+/** The sheet of the page: over the page, or docked beside the scene, which stays usable. */
 
 import { byId, el, icon } from "../dom.js";
 
@@ -11,7 +11,7 @@ let shown = null;
 export const sheetShown = () => shown;
 
 /**
- * Show something in the sheet, in place of whatever it shows.
+ * Show content in the sheet, in place of its previous content.
  * @param {Name} name
  * @param {string} title
  * @param {(Node | null)[]} tools

@@ -77,7 +77,7 @@ export class Track {
       where.textContent = span.contour ? `${words} ${span.contour}` : words;
       where.title = timeline.whole
         ? ""
-        : "Only the cuts so far: the moves between them follow with the program.";
+        : "Only the cuts so far: transfer moves follow with the program.";
       scrub.setAttribute(
         "aria-valuetext",
         `${fixed(player.t)} s of ${fixed(timeline.total)} s, ${where.textContent}`,
@@ -87,7 +87,7 @@ export class Track {
     if (key !== this.shown) this.draw();
   }
 
-  /** Draw the segments: cuts coloured, the chosen contour's strongest, moves thin. */
+  /** Draw the segments: cuts in colour, those of the chosen contour strongest, moves thin. */
   draw() {
     const { timeline } = this.player;
     this.shown = `${timeline.spans.length} ${timeline.total} ${this.store.selected}`;

@@ -1,4 +1,4 @@
-/** Ghosts that stay: all that moves, as it stood at places that were chosen, until they are cleared. */
+/** Ghosts that stay: copies of all moving bodies at chosen poses, until they are cleared. */
 
 import { Color, Group, Mesh, MeshStandardMaterial } from "three";
 
@@ -27,7 +27,7 @@ export class Ghosts {
     this.material.color = new Color(themeColour("--moving"));
   }
 
-  /** Keep a ghost where the robot is; of too many the eldest goes. */
+  /** Keep a ghost where the robot is; if there are too many, the oldest is removed. */
   keep() {
     const { machine, player, store, stage } = this.view;
     const { moment } = player;
@@ -47,7 +47,7 @@ export class Ghosts {
     stage.invalidate();
   }
 
-  /** Take all of them away. */
+  /** Remove all ghosts. */
   clear() {
     this.group.clear();
     this.say();

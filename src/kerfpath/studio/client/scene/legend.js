@@ -1,4 +1,4 @@
-/** What the colours of the contours mean. */
+/** The legend of the colours of the contours. */
 
 import { el } from "../dom.js";
 import { fixed } from "../format.js";
@@ -6,7 +6,7 @@ import { FAR } from "./paths.js";
 import { SCALE_GRADIENT } from "./scale.js";
 
 /**
- * Return the keys of the colours that contours have now.
+ * Return the keys of the colours in use.
  * @param {import("./paths.js").Paths} paths
  * @param {string} why  there are no distances, where there are none
  */

@@ -1,4 +1,4 @@
-/** The loops of the part that are not cut: thin lines, some of them lit, and what is pointed at. */
+/** The loops of the part that are not cut: thin lines, some highlighted, and the one pointed at. */
 
 import { Color, Group, Raycaster, Vector2, Vector3 } from "three";
 
@@ -53,7 +53,7 @@ export class Loops {
   }
 
   /**
-   * Return what is hit first under a place of the canvas, and how far it is; null: nothing.
+   * Return the first hit under a place of the canvas, and its distance; null: nothing.
    * @param {Stage} stage
    * @param {number} x  px
    * @param {number} y  px
@@ -102,7 +102,7 @@ export class Loops {
 }
 
 /**
- * Return the name of the face that a triangle of the part's mesh is of, "" where it has none.
+ * Return the name of the face that a triangle of the part's mesh belongs to, or "".
  * @param {PartMessage} part
  * @param {number} triangle
  */
@@ -116,7 +116,7 @@ export function faceOf(part, triangle) {
 }
 
 /**
- * Return how far a point is from a segment.
+ * Return the distance of a point from a segment.
  * @param {number} x
  * @param {number} y
  * @param {number} ax

@@ -1,4 +1,4 @@
-/** Robot, head, part, fixtures: bodies that stand still or move with an axis, and their ghost. */
+/** Robot, head, part and fixtures: bodies that are fixed or move with an axis, and their ghost. */
 
 import {
   BufferAttribute,
@@ -32,10 +32,10 @@ const COLOURS = {
 };
 const MOST_EDGES = 60000;
 
-/** @typedef {{standing?: string[], move?: string}} Layout  what goes with the part, as [layout] says */
+/** @typedef {{standing?: string[], move?: string}} Layout  from [layout] */
 
 /**
- * Return the frame in which the part is placed elsewhere: 0, or that before an axis that goes with it.
+ * Return the index of the frame in which the part is moved: 0, or the frame before the `move` axis.
  * @param {SceneMessage["robot"]} robot
  * @param {Layout} layout
  */
@@ -46,7 +46,7 @@ function placedIn({ joints }, { move }) {
 }
 
 /**
- * What a body goes with where all is placed elsewhere: the part, what stands, or the robot.
+ * Return what a body moves with in another placement: the part, the fixed bodies, or the robot.
  * @param {Body} body
  * @param {SceneMessage["robot"]} robot
  * @param {Layout} layout
@@ -81,10 +81,10 @@ export class Machine {
     this.carried = [];
     /** @type {Group[]} in each frame the fixtures that do not go with the part */
     this.standing = [];
-    this.ground = 0; // the frame that stands still
-    this.base = 0; // that of the robot's base
-    this.moved = 0; // the frame in which the part is placed elsewhere
-    /** The part where the job has it, seen while it is shown elsewhere. */
+    this.ground = 0; // the fixed frame
+    this.base = 0; // the frame of the robot's base
+    this.moved = 0; // the frame in which the part is moved
+    /** The part in the placement of the job, visible while it is shown elsewhere. */
     this.left = new Group();
     this.left.visible = false;
     /** @type {Record<Kind, MeshStandardMaterial>} */
@@ -100,7 +100,7 @@ export class Machine {
       });
     }
     this.edge = new LineBasicMaterial({ transparent: true, opacity: 0.55 });
-    // The veil only writes how far away the ghost is, so that of its links the nearest is seen.
+    // The veil only writes the depth of the ghost, so that only its nearest link is visible.
     this.veil = new MeshBasicMaterial({ colorWrite: false, transparent: true });
     this.ghostMaterial = new MeshStandardMaterial({
       transparent: true,
@@ -140,7 +140,7 @@ export class Machine {
     }
     const made = await Promise.all(
       [...groups.values()].map(async (bodies) => ({
-        // What stands in for a shape that is not known has no edges that would mean anything.
+        // The edges of an approximate shape mean nothing.
         ...creased(
           merged(await Promise.all(bodies.map((body) => mesh(body.mesh)))),
           bodies[0].approximate && bodies[0].kind === "robot" ? Math.PI / 2 : undefined,
@@ -180,7 +180,7 @@ export class Machine {
       }
       if (kind === "part") {
         const left = new Mesh(faces, this.leftMaterial);
-        left.raycast = () => {}; // nobody points at it
+        left.raycast = () => {}; // it cannot be pointed at
         this.left.add(left);
       }
       if (by === "frames" ? kind !== "floor" : frame !== this.ground)
@@ -206,7 +206,7 @@ export class Machine {
   }
 
   /**
-   * Put all that moves, or its ghost, where the joints say; returns the pose of the tip.
+   * Move all moving bodies, or their ghost, to a joint vector; return the pose of the tip.
    * @param {SceneMessage["robot"]} robot
    * @param {ArrayLike<number>} q
    * @param {boolean} [ghost]
@@ -214,18 +214,18 @@ export class Machine {
   pose(robot, q, ghost = false) {
     const found = frames(robot, q);
     const groups = ghost ? this.ghostFrames : this.frames;
-    // Until a robot with other joints is built, the one before it stands.
+    // Until a robot with other joints is built, the previous one stays.
     const built = groups.length === found.length - 1 ? groups : [];
     built.forEach((group, i) => {
       group.matrix.copy(matrix(found[i]));
       group.matrixWorldNeedsUpdate = true;
-      // A ghost of the part where the part itself is would only tint it.
+      // Hide the ghost of the part where it coincides with the part.
       if (ghost && i < this.ground) group.visible = !group.matrix.equals(this.frames[i].matrix);
     });
     return found[found.length - 1];
   }
 
-  /** Return points all over the bodies but a floor, in the room: enough to see how far they reach. */
+  /** Return points of all bodies except a floor, in the room, to find their extent. */
   outline() {
     this.group.updateMatrixWorld(true);
     /** @type {Vector3[]} */
@@ -241,7 +241,7 @@ export class Machine {
   }
 
   /**
-   * Show the ghost in the colour of what may be, or of what may not.
+   * Show the ghost in the colour of admitted or of lost poses.
    * @param {boolean} admitted
    */
   haunt(admitted) {

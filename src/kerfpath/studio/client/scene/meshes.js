@@ -1,4 +1,4 @@
-/** Meshes from the server, made ready to draw: creased normals, sharp edges, merged by body. */
+/** Meshes from the server, prepared for drawing: creased normals, sharp edges, merged by body. */
 
 import { BufferAttribute, BufferGeometry } from "three";
 
@@ -41,7 +41,7 @@ export function unpack(bytes) {
 }
 
 /**
- * Return meshes as one.
+ * Return several meshes merged into one.
  * @param {Triangles[]} several
  * @returns {Triangles}
  */
@@ -60,7 +60,7 @@ export function merged(several) {
 }
 
 /**
- * Return for each vertex the number of its place: vertices at one place have the same.
+ * Return for each vertex the number of its position; vertices at one position have the same number.
  * @param {Float32Array} xyz
  * @returns {Int32Array}
  */
@@ -90,8 +90,8 @@ function places(xyz) {
 }
 
 /**
- * Return a geometry whose normals are smooth but across edges sharper than the crease, and these
- * edges as pairs of points.
+ * Return a geometry with normals that are smooth except across edges sharper than the crease, and
+ * these edges as pairs of points.
  * @param {Triangles} triangles
  * @param {number} [crease]  rad
  * @returns {{faces: BufferGeometry, edges: Float32Array}}
@@ -153,7 +153,7 @@ export function creased({ xyz, corners }, crease = 0.6) {
   return { faces, edges: new Float32Array(edges) };
 
   /**
-   * Return the triangle beyond an edge of triangle t, -1 where there is none.
+   * Return the triangle beyond an edge of triangle t, or -1.
    * @param {number} t
    * @param {number} from
    * @param {number} to

@@ -1,4 +1,4 @@
-/** What comes nearest to what: the two bodies lit, and their distance written beside the tip. */
+/** The nearest pair of bodies: both highlighted, with their distance beside the tip. */
 
 import { Color, Mesh, MeshBasicMaterial, Vector3 } from "three";
 
@@ -32,15 +32,15 @@ export class Near {
     return known && known.distance.map((each) => each ?? Infinity);
   }
 
-  /** Say why there are no distances. */
+  /** Return why there are no distances. */
   why() {
     return this.view.store.scene?.cell
-      ? "distances are measured once all contours are planned"
-      : "the job has no [cell]: nothing is measured";
+      ? "distances are computed once all contours are planned"
+      : "the job has no [cell]: no distances are computed";
   }
 
   /**
-   * Light the pair that is nearest at a moment, and say how far it is apart; null: none.
+   * Highlight the nearest pair at a moment and show its distance; null: none.
    * @param {Moment | null} moment
    * @param {Vector3} at  the tip
    */
@@ -59,13 +59,13 @@ export class Near {
     this.label.replaceChildren(
       el("b", {}, millimetres(distance)),
       `: ${one} \u2013 ${other}`,
-      over <= 0 ? el("small", {}, " nearer than it must be") : "",
+      over <= 0 ? el("small", {}, " closer than allowed") : "",
     );
     this.at.copy(at);
     this.place();
   }
 
-  /** Put the label beside the tip. */
+  /** Place the label beside the tip. */
   place() {
     if (this.label.hidden) return;
     const { stage, canvas } = this.view;
@@ -77,7 +77,7 @@ export class Near {
   }
 
   /**
-   * Light bodies by their names; the part is drawn as one.
+   * Highlight bodies by their names; the part is drawn as one body.
    * @param {string[]} names
    */
   async light(names) {

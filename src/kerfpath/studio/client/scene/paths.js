@@ -31,7 +31,7 @@ const colourOfKind = (kind) =>
  * @param {object} [more]
  */
 export function line(width, more = {}) {
-  // Nearer than the surface that they are drawn on; among lines the later is over the earlier.
+  // Draw lines in front of the surface that they are on, and later lines over earlier ones.
   const nearer = {
     depthWrite: false,
     polygonOffset: true,
@@ -46,7 +46,7 @@ export function line(width, more = {}) {
   return made;
 }
 
-/** m: distances from here on are coloured alike. */
+/** Distance from which on all distances have the same colour, m. */
 export const FAR = 0.2;
 
 export class Paths {
@@ -64,7 +64,7 @@ export class Paths {
     this.beam.renderOrder = 4;
     this.mark.renderOrder = 5;
     this.lines = [this.chosen, this.through, this.all, this.kerf, this.beam, this.mark];
-    // All go with the part; the beam goes with the head.
+    // All of these move with the part; the beam moves with the head.
     this.group.add(...this.lines.filter((each) => each !== this.beam));
     /** @type {Track[]} */
     this.tracks = [];
@@ -89,7 +89,7 @@ export class Paths {
   }
 
   /**
-   * Draw these lines; where they have changed, the colours follow.
+   * Draw these lines, and colour them again if they have changed.
    * @param {Track[]} tracks
    */
   load(tracks) {
@@ -147,7 +147,7 @@ export class Paths {
   }
 
   /**
-   * Prepare the kerf: all cuts in the order of the program, of which the first few are shown.
+   * Prepare the kerf: all cuts in the order of the program; those before the time are shown.
    * @param {Timeline} timeline
    */
   prepare(timeline) {
@@ -176,7 +176,7 @@ export class Paths {
       } else break;
     }
     this.kerf.geometry.instanceCount = shown;
-    this.kerf.visible = shown > 0 && this.by === "kind"; // else it would hide the values
+    this.kerf.visible = shown > 0 && this.by === "kind"; // otherwise it would hide the values
   }
 
   /**
@@ -196,7 +196,7 @@ export class Paths {
   }
 
   /**
-   * Mark a point, as where no path goes on; null takes the mark away.
+   * Mark a point, such as a break of the path; null removes the mark.
    * @param {number[] | null} point
    */
   markAt(point) {
@@ -218,7 +218,7 @@ const least = (values) => values.reduce((low, value) => Math.min(low, value), In
  * @param {ColourBy} by
  */
 function valuesOf({ plan, clearance }, by) {
-  // What overlaps has the colour of what is too much; all that is far has one colour.
+  // Overlaps have the colour of values beyond the scale; large distances share one colour.
   if (by === "clearance")
     return clearance?.map((each) => (each < 0 ? 2 * FAR : Math.min(each, FAR))) ?? null;
   if (!plan) return null;

@@ -50,7 +50,7 @@ export class Picking {
   }
 
   /**
-   * Return the loop under a place of the canvas, and how far away in px, or null.
+   * Return the loop under a place of the canvas and its distance in px, or null.
    * @param {number} x  px
    * @param {number} y  px
    */
@@ -75,7 +75,7 @@ export class Picking {
   }
 
   /**
-   * Offer what can be done with the loop or the face that was clicked.
+   * Offer the actions for the loop or the face that was clicked.
    * @param {number} x  px
    * @param {number} y  px
    * @param {Loop | null} loop
@@ -167,7 +167,7 @@ export class Picking {
   }
 
   /**
-   * Light the loop under the pointer.
+   * Highlight the loop under the pointer.
    * @param {Loop | null} loop
    */
   hover(loop) {
@@ -178,7 +178,7 @@ export class Picking {
   }
 
   /**
-   * Say what a loop is.
+   * Return the label of a loop.
    * @param {Loop} loop
    */
   words(loop) {

@@ -1,4 +1,4 @@
-/** The part, or the robot, taken elsewhere by hand: handles, where all is meanwhile, what is in reach. */
+/** Moving the part or the robot by handles: the scene meanwhile, and the reach there. */
 
 import { Euler, Group, Matrix4, Object3D, Vector3 } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
@@ -16,7 +16,7 @@ const MM = 1e3;
 const DEG = 180 / Math.PI;
 
 /**
- * Return the pose that a job says by a position and roll, pitch and yaw.
+ * Return the pose of a position and roll, pitch and yaw of a job.
  * @param {number[]} xyz  mm
  * @param {number[]} rpy  deg
  */
@@ -27,7 +27,7 @@ export function poseOf(xyz, rpy) {
 }
 
 /**
- * Return position and roll, pitch and yaw of a pose, as a job says them.
+ * Return position and roll, pitch and yaw of a pose, in the convention of a job.
  * @param {Matrix4} pose
  * @returns {{xyz: number[], rpy: number[]}} mm, deg
  */
@@ -53,19 +53,19 @@ export class Placing {
     this.open = false;
     /** @type {What} */
     this.what = "part";
-    /** How the part has been moved in the scene, and the robot's base. */
+    /** The moves of the part and of the robot's base in the scene. */
     this.part = new Matrix4();
     this.base = new Matrix4();
     this.mount = 0; // deg, of the head
-    /** Whether what is shown is on its way into the job, and whether it has not been sent. */
+    /** Whether the shown move has been sent to the job, and whether it has not been sent yet. */
     this.awaits = false;
     this.fresh = false;
     this.middle = new Vector3();
-    /** @type {{xyz: number[], rpy: number[]} | null} what the job said of the part in the scene */
+    /** @type {{xyz: number[], rpy: number[]} | null} place of the part in the job */
     this.numbers = null;
-    /** Where the scene has the part. */
+    /** Pose of the part in the scene. */
     this.there = new Matrix4();
-    /** How external axes have moved what the part is placed in, the part in it, and the base. */
+    /** Moves by external axes: of the frame of the part, of the part in it, and of the base. */
     this.turned = new Matrix4();
     this.inside = new Matrix4();
     this.railed = new Matrix4();
@@ -106,7 +106,7 @@ export class Placing {
   }
 
   /**
-   * Call `listener` whenever all has been moved by hand; with true once it is let go.
+   * Call `listener` after each move by hand, with true when the handle is released.
    * @param {(done: boolean) => void} listener
    */
   on(listener) {
@@ -118,7 +118,7 @@ export class Placing {
     for (const listener of this.listeners) listener(done);
   }
 
-  /** Whether anything is elsewhere than in the job. */
+  /** Whether anything has been moved from its place in the job. */
   get moved() {
     return Object.keys(this.offsets()).length > 0;
   }
@@ -157,7 +157,7 @@ export class Placing {
   }
 
   /**
-   * Return how far all is from where the job has it; what is not moved is left out.
+   * Return the offsets from the placement of the job; zero offsets are left out.
    * @returns {Offsets}
    */
   offsets() {
@@ -174,7 +174,7 @@ export class Placing {
     return Object.fromEntries(known.filter(([, value]) => value !== 0));
   }
 
-  /** The place of the part as the job would say it, or null. */
+  /** The place of the part in the keys of the job, or null. */
   get place() {
     if (!this.numbers) return null;
     const { xyz, rpy } = this.numbers;
@@ -183,7 +183,7 @@ export class Placing {
   }
 
   /**
-   * Have the part where a job would say it to be.
+   * Move the part to a place in the keys of a job.
    * @param {number[]} xyz  mm
    * @param {number[]} rpy  deg
    */
@@ -196,7 +196,7 @@ export class Placing {
   }
 
   /**
-   * Have the robot's base and its head moved.
+   * Move the robot's base and its head.
    * @param {number[]} xyz  mm
    * @param {number} yaw  deg
    * @param {number} mount  deg
@@ -209,7 +209,7 @@ export class Placing {
   }
 
   /**
-   * Have all where a placement that was tried has it.
+   * Show a placement that was tried.
    * @param {import("../messages.js").Try} tried
    */
   preview({ part, rest, offsets }) {
@@ -221,15 +221,15 @@ export class Placing {
   }
 
   /**
-   * What is shown has been asked for.
-   * @param {boolean} awaits  whether it can be waited for
+   * Note that the shown move has been sent.
+   * @param {boolean} awaits  whether sending succeeded
    */
   sent(awaits) {
     this.awaits = awaits;
     this.fresh = false;
   }
 
-  /** Have all where the job has it. */
+  /** Go back to the placement of the job. */
   reset() {
     this.clear();
     this.apply();
@@ -242,7 +242,7 @@ export class Placing {
     this.fresh = false;
   }
 
-  /** A new scene: what was sent is there now, seen from the robot's base; what is fresh is kept. */
+  /** Take a new scene: it contains the move that was sent; a move that was not sent is kept. */
   landed() {
     const { stage, store } = this.view;
     const away = this.base.clone().invert();
@@ -262,7 +262,7 @@ export class Placing {
   }
 
   /**
-   * Take what is in reach.
+   * Take the answer on reach.
    * @param {ReachMessage} reach
    */
   take(reach) {
@@ -290,7 +290,7 @@ export class Placing {
     this.view.stage.invalidate();
   }
 
-  /** Have all in the scene where it is now. */
+  /** Move everything in the scene to its current place. */
   apply() {
     const { machine } = this.view;
     machine.group.matrixAutoUpdate = false;
@@ -299,12 +299,12 @@ export class Placing {
     this.lay();
   }
 
-  /** The middle of the part, in what it is placed in. */
+  /** The middle of the part, in the frame that it is placed in. */
   carriedMiddle() {
     return this.middle.clone().applyMatrix4(this.inside);
   }
 
-  /** Have part and fixtures, lines and handles where they are now: only the robot goes with its base. */
+  /** Move part and fixtures, lines and handles; only the robot moves with its base. */
   lay() {
     const { machine, paths, picking, stage } = this.view;
     const { frames, ground, moved } = machine;

@@ -1,4 +1,4 @@
-/** Pictures and videos of the scene, made by the browser and offered as files. */
+/** Pictures and videos of the scene, which the browser makes and offers as files. */
 
 import { byId, el, themeColour } from "../dom.js";
 import { clock } from "../format.js";
@@ -8,11 +8,11 @@ import { clock } from "../format.js";
 /** @typedef {import("./view.js").SceneView} SceneView */
 
 /**
- * Something of the menu of files that the page makes itself.
+ * An entry of the export menu that the page makes itself.
  * @typedef {object} Extra
  * @property {string} name
  * @property {string} about
- * @property {() => string} why  why it cannot be had now, "" where it can
+ * @property {() => string} why  why it is not available now, or ""
  * @property {() => void} make
  */
 
@@ -21,7 +21,7 @@ const BITS = 8e6; // a second
 const KINDS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 
 /**
- * Return what the menu of files offers of the scene.
+ * Return the entries of the scene for the export menu.
  * @param {Store} store
  * @param {Player} player
  * @param {SceneView} view
@@ -32,13 +32,13 @@ export function recordings(store, player, view) {
   return [
     {
       name: "picture of the view",
-      about: "PNG, as large as the view is here",
+      about: "PNG, in the size of the view",
       why: () => (view.ready ? "" : "the cell is not drawn yet"),
       make: () => picture(store, view),
     },
     {
       name: "video of the motion",
-      about: "WebM, at the speed that is chosen for the player",
+      about: "WebM, at the speed of the player",
       why: () =>
         !player.timeline.spans.length
           ? "nothing is planned yet"
@@ -46,7 +46,7 @@ export function recordings(store, player, view) {
             ? "a video is being recorded"
             : film.kind
               ? ""
-              : "this browser records no WebM",
+              : "this browser cannot record WebM",
       make: () => film.begin(),
     },
   ];
@@ -64,7 +64,7 @@ function picture(store, view) {
   shot.toBlob((blob) => blob && offer(blob, `${stem(store)}.png`), "image/png");
 }
 
-/** The motion from its begin to its end, recorded as it is played. */
+/** A recording of the motion from begin to end while it is played. */
 class Film {
   /**
    * @param {Store} store
@@ -121,7 +121,7 @@ class Film {
     this.follow();
   }
 
-  /** Keep up with the player: it may be paused meanwhile, and it ends. */
+  /** Follow the player, which may be paused; the recording ends with it. */
   follow() {
     const { recorder, player } = this;
     if (!recorder) return;
@@ -146,7 +146,7 @@ class Film {
 }
 
 /**
- * Draw a canvas on another one, on the sky of the theme.
+ * Draw a canvas on another one, over the background of the theme.
  * @param {HTMLCanvasElement} target
  * @param {HTMLCanvasElement} scene
  */

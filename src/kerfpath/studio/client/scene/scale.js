@@ -1,4 +1,4 @@
-/** A scale of colours that the colour-blind can read, too: viridis, from five of its colours. */
+/** A colour scale that colour-blind people can read: viridis, from five of its colours. */
 
 import { Color } from "three";
 
@@ -7,7 +7,7 @@ const STOPS = ["#440154", "#3b528b", "#21918c", "#5ec962", "#fde725"].map(
 );
 
 /**
- * Return the colour of a share of the scale; beyond 1 the colour of what is too much.
+ * Return the colour of a share of the scale; beyond 1 the colour of excess.
  * @param {number} share
  * @returns {Color}
  */

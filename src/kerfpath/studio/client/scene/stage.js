@@ -112,7 +112,7 @@ export class Stage {
   }
 
   /**
-   * Look at points from one of the views, as near as all of them stay in the picture.
+   * Look at points from one of the views, as near as possible with all of them in the picture.
    * @param {keyof typeof VIEWS | string} name
    * @param {Vector3[]} points
    */
@@ -144,7 +144,7 @@ export class Stage {
   }
 
   /**
-   * Look at what has moved as before it has.
+   * Move the camera with what has moved, so that the view stays.
    * @param {import("three").Matrix4} motion
    */
   move(motion) {
@@ -155,7 +155,7 @@ export class Stage {
   }
 
   /**
-   * Move camera and its target alike.
+   * Move the camera and its target by the same vector.
    * @param {Vector3} by
    */
   carry(by) {

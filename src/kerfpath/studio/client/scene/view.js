@@ -1,4 +1,4 @@
-/** The view of the cell: follows the store and the player, and lets contours be pointed at. */
+/** The view of the cell: it follows the store and the player, and contours can be pointed at. */
 
 import { Box3, Vector3 } from "three";
 
@@ -102,7 +102,7 @@ export class SceneView {
   }
 
   /**
-   * Choose the contour that was clicked, or offer what the loop, the face or the contour may become.
+   * Choose the contour that was clicked, or offer actions for the loop, face or contour.
    * @param {number} x  px
    * @param {number} y  px
    * @param {boolean} right  whether it was the other button
@@ -127,7 +127,7 @@ export class SceneView {
     if (when !== null && when !== undefined) this.player.seek(when);
   }
 
-  /** Build the bodies where they are not those that are shown. */
+  /** Build the bodies if they are not the shown ones. */
   async build() {
     const { scene } = this.store;
     if (!scene) return;
@@ -155,7 +155,7 @@ export class SceneView {
     this.state();
   }
 
-  /** Lay the floor under what stands in the cell. */
+  /** Draw the floor under the bodies of the cell. */
   lay() {
     const { scene } = this.store;
     if (!scene || !this.ready || scene.bodies.some(({ kind }) => kind === "floor")) return;
@@ -171,7 +171,7 @@ export class SceneView {
     /** @type {import("./paths.js").Track[]} */
     const tracks = [];
     for (const { name: contour, points, kind } of scene?.contours ?? []) {
-      // A plan of before the part was moved is elsewhere.
+      // A plan from before the part was moved is elsewhere.
       const all = plans.get(contour) ?? [];
       const found = all.filter(({ revision }) => revision >= (scene?.revision ?? 0));
       for (const plan of found)
@@ -222,7 +222,7 @@ export class SceneView {
   }
 
   /**
-   * Show the robot elsewhere as a ghost; null takes it away.
+   * Show the robot elsewhere as a ghost; null removes it.
    * @param {ArrayLike<number> | null} q
    * @param {boolean} [admitted]
    */
@@ -239,7 +239,7 @@ export class SceneView {
   }
 
   /**
-   * Show the robot of another plan as a ghost, wherever none is pointed at; null takes it away.
+   * Show the robot of another plan as a ghost, unless a pose is pointed at; null removes it.
    * @param {ArrayLike<number> | null} q
    */
   accompany(q) {
@@ -247,7 +247,7 @@ export class SceneView {
     if (!this.haunted) this.haunt(null);
   }
 
-  /** @param {string} view  "fit", "part", "top", ..., "head", or "mark", where no path goes on */
+  /** @param {string} view  "fit", "part", "top", ..., "head", or "mark", where the path breaks */
   look(view) {
     const { scene, nopaths, selected } = this.store;
     if (!scene || !this.ready) return;
@@ -317,7 +317,7 @@ export class SceneView {
   }
 
   /**
-   * Say what a contour is at a node.
+   * Show the values of a contour at a node.
    * @param {{contour: string, node: number}} found
    */
   describe(found) {
@@ -334,12 +334,12 @@ export class SceneView {
     );
   }
 
-  /** Say what the colours of the contours mean. */
+  /** Show the legend of the contours' colours. */
   scale() {
     byId("scale").replaceChildren(...legend(this.paths, this.near.why()));
   }
 
-  /** Say what is going on while there is nothing to see. */
+  /** Show the state while there is no scene. */
   state() {
     const { job, scene, connection, progress } = this.store;
     byId("view").classList.toggle("ready", this.ready);
@@ -351,7 +351,7 @@ export class SceneView {
       );
     if (job?.faults.length && !scene)
       return this.said.replaceChildren(
-        el("strong", {}, "The job has a fault"),
+        el("strong", {}, "The job has an error"),
         el("p", {}, job.faults[0].message),
         el("p", {}, "Correct it under Job file, at the top of the page."),
       );
@@ -362,11 +362,11 @@ export class SceneView {
         {},
         connection === "open" ? "Reading the cell" : "Waiting for the studio's server",
       ),
-      el("p", {}, progress.label || "Robot, head and part appear here as soon as they are read."),
+      el("p", {}, progress.label || "Robot, head and part appear here once they are read."),
     );
   }
 
-  /** Say which shapes are only roughly so. */
+  /** List the approximate shapes. */
   note() {
     const rough = new Set(
       this.store.scene?.bodies.filter((body) => body.approximate).map(({ kind }) => kind),
