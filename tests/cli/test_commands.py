@@ -425,7 +425,7 @@ def test_robots_lists_the_library_and_shows_sources():
 def test_robots_lists_rails_and_positioners_too():
     listed = run("robots").stdout
     row = next(line for line in listed.splitlines() if line.startswith("kuka_dkp400.tilt"))
-    said = ["-90 to 90 deg", "94.5 deg/s", "give it"]
+    said = ["-90 to 90 deg", "94.5 deg/s", "set in job"]
     assert re.split(r"  +", row.strip())[1:] == ["KUKA DKP-400", "400", *said]
     assert "4 rails and positioners" in listed
     shown = run("robots", "kuka_dkp400").stdout

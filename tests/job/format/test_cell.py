@@ -203,7 +203,7 @@ def test_check_shows_bodies_pairs_and_the_start(folder):
     assert shown.returncode == 0, shown.stderr
     for words in (
         "nest left", "post - head: 20 mm", "not judged", "base - table", "slot",
-        "800 x 1500 x 50", "not the real one", "beyond the 24 mm that they overlap by design",
+        "800 x 1500 x 50", "not the real shape", "beyond the 24 mm that they overlap by design",
     ):  # fmt: skip
         assert words in shown.stdout
     assert "is its unit right?" not in shown.stdout

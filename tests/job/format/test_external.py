@@ -62,7 +62,7 @@ def test_axes_are_read_in_their_own_units(tmp_path):
 FAULTS = [
     ("upper_mm = 1500\n", "", "robot.external.upper_mm: expected every limit of the axis, got no"),
     ("velocity_mm_s = 1000\n", "", "external.velocity_mm_s: expected every limit of the axis"),
-    ("velocity_mm_s = 1000", "velocity_deg_s = 90", "expected velocity_mm_s of a linear axis"),
+    ("velocity_mm_s = 1000", "velocity_deg_s = 90", "expected velocity_mm_s for a linear axis"),
     (
         "axis = [0, 1, 0]",
         "axis = [0, 0, 0]",
@@ -248,7 +248,7 @@ def test_joints_of_a_description_are_external_axes_of_a_job(tmp_path):
 JOINT_FAULTS = [
     ("", "", 'robot.urdf: joint "rail": expected every limit .* no acceleration_mm_s2; .* joint ='),
     (RAIL_JOINT.replace("1800", "-1800"), "", "external.upper_mm: expected upper_mm not below"),
-    (RAIL_JOINT.replace("mm_s2", "deg_s2"), "", "expected acceleration_mm_s2 of a linear axis"),
+    (RAIL_JOINT.replace("mm_s2", "deg_s2"), "", "expected acceleration_mm_s2 for a linear axis"),
     (RAIL_JOINT.replace("joint = ", "model = "), "", "external.model: expected an axis of the lib"),
     (RAIL_JOINT.replace('"rail"', '"j2"'), "", 'joint: expected a joint of the desc.*"j2"; there'),
     (RAIL_JOINT + "axis = [0, 1, 0]\n", "", "axis: expected no axis with joint"),

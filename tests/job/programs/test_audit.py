@@ -316,7 +316,7 @@ def test_a_measured_part_that_is_none_or_out_of_reach_gives_no_program(folder):
     assert "out of the robot's reach at this placement" in result.stderr
     assert "and planned again there: " in result.stderr
     # Where the part stands is told all the same, so that a job can be planned there.
-    assert re.search(r"as a job says it: xyz_mm = \[.*\], rpy_deg = \[.*\]", result.stdout)
+    assert re.search(r"keys for a job: xyz_mm = \[.*\], rpy_deg = \[.*\]", result.stdout)
     assert "xyz_mm = [" in run(*command, "--json").stderr
     assert not out.exists()
     with_points(folder, shift=300)
