@@ -13,7 +13,7 @@ __all__ = ["is_compiled", "warm_up"]
 
 
 def warm_up() -> bool:
-    """Compile the kernels if this copy never has; return whether that was needed."""
+    """Compile the kernels if this copy has not yet; return whether that was needed."""
     if is_compiled():
         return False
     arm = robot("abb_irb4600_60_205", acceleration_ratio="iontec_20_to_70kg")
