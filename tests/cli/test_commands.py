@@ -542,7 +542,9 @@ def test_a_job_is_written_as_a_script_that_finds_its_drawing(folder, tmp_path):
         x for x in printed.stdout.splitlines() if "Put it beside" not in x
     ]
     (folder / "ordered.toml").write_text(SMALL + "\n[sequence]\nhome_deg = [0, 0, 0, 0, 90, 0]\n")
-    assert_refused(run("script", "ordered.toml", cwd=folder), "cannot express [sequence]", "run_job")
+    assert_refused(
+        run("script", "ordered.toml", cwd=folder), "cannot express [sequence]", "run_job"
+    )
     assert_refused(run("script", "small.toml", "-o", "no/where.py", cwd=folder), "cannot write")
 
 
