@@ -59,7 +59,7 @@ class AsRun:
 
 
 def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsRun:
-    """Return a plan as a controller runs its program; without checks if the program has no cut.
+    """Return a plan as a controller runs its program; without checks if it stops at every node.
 
     The checks of velocity and acceleration hold at every instant if the rates of the arm can be
     bounded, otherwise at samples, as those of torque do. If a joint would exceed its full limit
