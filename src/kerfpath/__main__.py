@@ -1,4 +1,4 @@
-"""`python -m kerfpath` is the command `kerfpath`."""
+"""Run the command `kerfpath` by `python -m kerfpath`."""
 
 from kerfpath.cli import main
 

@@ -425,7 +425,7 @@ def test_robots_lists_the_library_and_shows_sources():
 def test_robots_lists_rails_and_positioners_too():
     listed = run("robots").stdout
     row = next(line for line in listed.splitlines() if line.startswith("kuka_dkp400.tilt"))
-    said = ["-90 to 90 deg", "94.5 deg/s", "give it"]
+    said = ["-90 to 90 deg", "94.5 deg/s", "set in job"]
     assert re.split(r"  +", row.strip())[1:] == ["KUKA DKP-400", "400", *said]
     assert "4 rails and positioners" in listed
     shown = run("robots", "kuka_dkp400").stdout
@@ -542,7 +542,9 @@ def test_a_job_is_written_as_a_script_that_finds_its_drawing(folder, tmp_path):
         x for x in printed.stdout.splitlines() if "Put it beside" not in x
     ]
     (folder / "ordered.toml").write_text(SMALL + "\n[sequence]\nhome_deg = [0, 0, 0, 0, 90, 0]\n")
-    assert_refused(run("script", "ordered.toml", cwd=folder), "no lines for [sequence]", "run_job")
+    assert_refused(
+        run("script", "ordered.toml", cwd=folder), "cannot express [sequence]", "run_job"
+    )
     assert_refused(run("script", "small.toml", "-o", "no/where.py", cwd=folder), "cannot write")
 
 

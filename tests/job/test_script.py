@@ -133,7 +133,7 @@ def test_the_script_says_external_axes_in_their_units(tmp_path):
 def test_the_script_has_external_axes_of_the_library_as_they_stand(tmp_path):
     job, script = scripted(tmp_path, QUICK + PRODUCT)
     names = {"__file__": str(script)}
-    exec(script.read_text().split("# How every plan")[0], names)
+    exec(script.read_text().split("# The options of every plan")[0], names)
     arm = names["arm"]
     for made, meant in zip(arm.externals, job.robot.externals, strict=True):
         assert (made.name, made.kind, made.carries) == (meant.name, meant.kind, meant.carries)
@@ -174,7 +174,7 @@ def test_a_script_fails_where_a_guarantee_of_its_job_is_not_kept(tmp_path):
         runpy.run_path(str(script))
     assert not list((tmp_path / "out").glob("*"))
     stopping = asked.replace("[program]\n", "[program]\nzone_mm = 0\n")
-    with pytest.raises(InputError, match='"guaranteed" between_nodes that nothing proves'):
+    with pytest.raises(InputError, match='between_nodes = "guaranteed" without a proof'):
         scripted(tmp_path, stopping)
 
 

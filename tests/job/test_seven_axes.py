@@ -130,7 +130,7 @@ def test_the_speed_is_found(folder):
         (
             '"kuka_lbr_iiwa14_r820"\nacceleration_deg_s2 = [300, 300, 300, 300, 500, 500, 700]',
             '"kuka_kr10_r1100_2"\nelbow_step_deg = 5',
-            "elbow_step_deg: expected elbow_step_deg only of an arm of seven axes, got 6",
+            "elbow_step_deg: expected elbow_step_deg only for an arm with seven axes, got 6 axes",
         ),
     ],
 )

@@ -162,7 +162,7 @@ def test_a_job_takes_it_and_its_own_distances_come_first(tmp_path: Path) -> None
     assert frozenset({"base", "link_4"}) in judged(cell('srdf = "arm.srdf"', own))
     own = '[[cell.pair]]\nbetween = ["link_4", "base"]\nallowed = "the hose"\n'
     assert "the hose" in cell('srdf = "arm.srdf"', own).unjudged.values()
-    with pytest.raises(InputError, match=r"cell\.links: expected the links of the description"):
+    with pytest.raises(InputError, match=r'cell\.links: expected links = "description" with srdf'):
         cell('srdf = "arm.srdf"', 'links = "capsules"')
     with pytest.raises(InputError, match=r"robot\.srdf: .*other\.srdf"):
         cell('srdf = "other.srdf"')

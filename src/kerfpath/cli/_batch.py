@@ -30,11 +30,11 @@ def plan_jobs(
     if as_json:
         print_json({"passed": passed == len(found), "jobs": [_entry(row) for row in found]})
     else:
-        columns = ["job", "contours", "passed", "cutting s", "seconds", "program, or why none"]
+        columns = ["job", "contours", "passed", "cutting s", "seconds", "program or reason"]
         table(columns, [_cells(row) for row in found], numbers=columns[1:5])
         out.print(
             f"{passed} of {len(found)} jobs passed; their files are in {escape(str(folder))}, "
-            "each in a folder of its name"
+            "in one folder for each job"
         )
     return passed == len(found)
 

@@ -1,4 +1,4 @@
-"""`kerfpath check`: print bodies and pairs of the cell of a job, and how contours begin."""
+"""`kerfpath check`: print bodies and pairs of the cell of a job, and the start of each contour."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def show_check(checked: JobPreview, *, as_json: bool) -> None:
 
 
 def _note(checked: JobPreview) -> str:
-    """Return what `kerfpath plan` checks for collisions; this command checks only the starts."""
+    """Return the note on the collision checks of `kerfpath plan`; here only starts are checked."""
     moves_too = checked.job.sequence is not None and checked.cell is not None
     return collision_note(checked.cell, moves_too=moves_too)
 
@@ -68,7 +68,7 @@ def _show_cell(cell: Cell) -> None:
             body.kind,
             escape(cell.chain.moves_with(body.frame)),
             " x ".join(f"{edge * 1e3:.0f}" for edge in body.size),
-            _shape(body) + ("" if body.holds else ", not the real one"),
+            _shape(body) + ("" if body.holds else ", not the real shape"),
             f"{len(_partners(cell, i))}",
         ]
         for i, body in enumerate(cell.bodies)
@@ -85,7 +85,7 @@ def _show_cell(cell: Cell) -> None:
             if depth > 0:
                 rule = f"beyond the {depth * 1e3:g} mm that they overlap by design"
             elif required < asked:
-                rule += f" of {asked * 1e3:g} mm asked, nearly all that the design leaves"
+                rule += f" instead of {asked * 1e3:g} mm, as the design leaves hardly more"
             out.print(f"  {escape(a)} - {escape(b)}: {rule}")
     out.print("not judged:")
     for why, pairs in _not_judged(cell).items():
@@ -98,7 +98,7 @@ def _partners(cell: Cell, body: int) -> list[int]:
 
 
 def _not_judged(cell: Cell) -> dict[str, list[tuple[str, str]]]:
-    """Return the pairs that are not judged, by why they are not."""
+    """Return the pairs that are not judged, by reason."""
     found: dict[str, list[tuple[str, str]]] = {}
     for pair, why in cell.unjudged.items():
         found.setdefault(why, []).append(pair)

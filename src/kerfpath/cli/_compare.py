@@ -1,4 +1,4 @@
-"""`kerfpath compare`: say in words what differs between two programs."""
+"""`kerfpath compare`: describe in words what differs between two programs."""
 
 from __future__ import annotations
 

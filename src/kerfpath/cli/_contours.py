@@ -1,4 +1,4 @@
-"""`kerfpath contours`: list the loops of a drawing by the names that jobs pick them by."""
+"""`kerfpath contours`: list the loops of a drawing by the names that jobs use."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def list_contours(part: Part, html: Path | None, *, everything: bool, as_json: b
     table(heads, rows, numbers=columns[2:6], whole=["ends"], spare=spare)
     if len(shown) < len(part.loops):
         out.print(
-            f"and {len(part.loops) - len(shown)} loops of single faces in skins and around the "
-            "thickness of the sheet: list them with --all"
+            f"{len(part.loops) - len(shown)} more loops, of single faces in skins and around the "
+            "thickness of the sheet, are listed with --all"
         )
     if html is not None:
         out.print(f"wrote {escape(str(html))}")

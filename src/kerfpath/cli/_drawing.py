@@ -1,4 +1,4 @@
-"""The summary of a drawing in one line: printed wherever a command reads one."""
+"""The one-line summary of a drawing, which every command that reads a drawing prints."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def drawing_in(
     axis: tuple[float, float, float] | None,
     columns: str | None,
 ) -> Part:
-    """Return the part that a file holds, `gap` in m; `columns` as x,y,z,... or x=NAME,y=NAME,...
+    """Return the part in a file; `columns` is x,y,z,... or x=NAME,y=NAME,..., and `gap` is in m.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def drawing_in(
 
 
 def _columns(text: str) -> dict[str, str] | list[str]:
-    """Return the columns of a table; an item with a comma in it stands in double quotes."""
+    """Return the columns of a table; an item that contains a comma is in double quotes."""
     parts = [part.strip() for part in next(csv.reader([text], skipinitialspace=True), [])]
     if not any("=" in part for part in parts):
         return parts
@@ -59,7 +59,7 @@ def drawing_of(job: Job) -> Part:
     Raises
     ------
     InputError
-        It cannot be read, or has not the loops that the job picks.
+        The drawing cannot be read, or lacks a loop that the job picks.
     """
     with busy(f"reading {job.part_file.name}"):
         part = job.read_part()

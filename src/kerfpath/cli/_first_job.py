@@ -1,4 +1,4 @@
-"""A job to begin with, for a drawing that has none yet: everything in it is there to be changed."""
+"""Write a first job for a drawing that has none; all its values are guesses to be changed."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from kerfpath.job import pose
 __all__ = ["first_job", "job_text"]
 
 MOST_LOOPS = 8
-"""Loops that are cut at first: the longest."""
+"""Most loops in a first job; the longest are taken."""
 NODES = 400
-"""Nodes of the longest loops, at most; others are spaced by `SPACING`."""
+"""Most nodes of a loop; shorter loops are spaced by `SPACING`."""
 SPACING = 2.0
-"""mm."""
+"""Least distance between nodes, mm."""
 TURNS = ((0, 0, 0), (180, 0, 0), (90, 0, 0), (-90, 0, 0), (0, 90, 0), (0, -90, 0))
-"""deg, roll, pitch and yaw: ways to lay a part down, the first that serves best."""
+"""Roll, pitch and yaw in deg of the ways to lay a part down; the first of the best is taken."""
 PLACE = (1300.0, 0.0, 500.0)
-"""mm, in the robot base: middle of the part, and its lowest point; within reach."""
+"""x and y of the middle of the part and z of its lowest point, mm, robot base; within reach."""
 HEAD = """\
-# A job to begin with, for {drawing}: robot, head, place, loops and speed are guesses to be changed.
+# A first job for {drawing}: robot, head, placement, loops and speed are guesses to be changed.
 
 [robot]
 model = "abb_irb4600_60_205"                              # kerfpath robots lists the others
@@ -51,7 +51,7 @@ gamma_step_deg = 2
 
 
 def first_job(drawing: Path) -> Path:
-    """Return the job beside a drawing that has its name; where there is none, write one.
+    """Return the job beside a drawing with the same name; write one if there is none.
 
     Raises
     ------
@@ -66,25 +66,25 @@ def first_job(drawing: Path) -> Path:
         write_whole({job: text.encode()})
     except OSError as error:
         raise InputError(
-            f"{job}: a job for the drawing cannot be written there ({error.strerror}); copy the "
-            "drawing to a folder that can be written to"
+            f"{job}: cannot write a job for the drawing ({error.strerror}); copy the drawing to "
+            "a writable folder"
         ) from None
     return job
 
 
 def job_text(part: Part) -> str:
-    """Return a job that cuts the longest closed loops of a part, laid down before the robot.
+    """Return a job that cuts the longest closed loops of a part, placed in front of the robot.
 
     Raises
     ------
     InputError
-        It has no closed loop.
+        The part has no closed loop.
     """
     closed = [loop for loop in part.loops if loop.closed and loop.kind != "open"]
     main = [loop for loop in closed if not loop.skin and loop.side in ("outer", "")] or closed
     if not main:
         raise InputError(
-            f"{part.path}: has no closed loop to begin with; write a job that picks its lines"
+            f"{part.path}: expected a closed loop, got none; write a job that picks its open lines"
         )
     chosen = sorted(main, key=lambda loop: loop.length)[-MOST_LOOPS:]
     xyz, rpy = _place(part, chosen)
@@ -106,7 +106,7 @@ def _contour(loop: Loop) -> str:
 
 
 def _place(part: Part, loops: Sequence[Loop]) -> tuple[list[float], tuple[int, ...]]:
-    """Return xyz in mm and rpy in deg such that the beam comes from above on the whole."""
+    """Return xyz in mm and rpy in deg with which the beam comes mainly from above."""
     axes = np.vstack([part.contour(loop.name).axes.mean(axis=0) for loop in loops])
     weighed = (axes * np.array([[loop.length] for loop in loops])).sum(axis=0)
 

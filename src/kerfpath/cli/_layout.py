@@ -1,4 +1,4 @@
-"""`kerfpath layout`: find the best placement, what it gains, and why others are infeasible."""
+"""`kerfpath layout`: find the best placement and its gain, or why no placement is feasible."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ REMEDIES = {
     "speed": "ask for lower speeds, or widen the ranges",
 }
 ON_ONE_LINE = 200
-"""Characters of a reason that are printed."""
+"""Most characters of a reason that are printed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LayoutOptions:
-    """Options of `kerfpath.study.layout` that the command line takes; None: as the job says."""
+    """Options of `kerfpath.study.layout` on the command line; None takes the value of the job."""
 
     goal: Goal | None
     evaluations: int | None
@@ -81,7 +81,7 @@ def show_layout(
     if as_json:
         print_json({**entry, "files": [str(path) for path in written]})
         return bool(entry["feasible"])
-    by_default = " (by default: neither [layout] nor --vary says)" if found.by_default else ""
+    by_default = " (by default: no range in [layout] or --vary)" if found.by_default else ""
     spans = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in found.ranges.items())
     out.print(escape(f"varied{by_default}: {spans}"))
     _show_best(entry)
@@ -117,29 +117,31 @@ def _show_best(entry: LayoutEntry) -> None:
     out.print(f"[bold]best placement[/]: {escape(offsets)}")
     was = f"{shipped['value']:.3f}{unit}" if shipped["value"] is not None else shipped["status"]
     gain = "" if best["gain"] is None else f", {100 * best['gain']:+.1f} %"
-    out.print(f"{entry['goal']}: {best['value']:.3f}{unit}, as the job has it {was}{gain}")
+    out.print(f"{entry['goal']}: {best['value']:.3f}{unit}, as placed in the job {was}{gain}")
     count = entry["statuses"].get("feasible", 0)
     said = f"{tried} placements tried, {count} feasible, {solved}"
     if entry["off_grid"]:
-        out.print(f"{said} planned over continuous rotation, this one the best of them")
+        out.print(f"{said} planned over continuous rotation; this one is the best of them")
         out.print(_claim(entry, unit))
         return
-    others = "better" if entry["open_bound"] is None else f"{entry['open_bound']:.3f}{unit}"
-    proved = "no other of them is better there, proved"
-    still = f"others of them may come to {others}"
+    others = (
+        "be better" if entry["open_bound"] is None else f"reach {entry['open_bound']:.3f}{unit}"
+    )
+    proved = "it is proved that no other of them is better there"
+    still = f"others of them may {others}"
     out.print(f"{said} solved exactly; {proved if entry['proved'] else still}")
     out.print(f"speeds and displacements are those {ON_THIS_GRID}; {FINER}: see kerfpath speed")
 
 
 def _claim(entry: LayoutEntry, unit: str) -> str:
-    """Say of the placements that were not planned what is proved of them."""
+    """Return what is proved about the placements that were not planned."""
     said = []
     if count := entry["stages"].get("proved", 0):
         said.append(f"{count} proved to be no faster at any rotation")
     if count := entry["estimated"]:
         best = "" if entry["open_bound"] is None else f" (at best {entry['open_bound']:.3f}{unit})"
         said.append(f"{count} judged by an estimate alone{best}, which proves nothing")
-    return f"of the others {'; '.join(said)}" if said else "no other is left to be better"
+    return f"of the others: {'; '.join(said)}" if said else "no other placement can be better"
 
 
 def _show_why(entry: LayoutEntry) -> None:

@@ -43,7 +43,7 @@ Strict = Annotated[
 
 
 def run() -> None:
-    """Run the command line and leave with its exit code."""
+    """Run the command line and exit with its exit code."""
     try:
         app()
     except (NoFeasiblePath, AuditFailed) as error:
@@ -120,7 +120,7 @@ def plan(
 
 @app.command()
 def check(job: JobArgument, as_json: Json = False) -> None:
-    """Read a job without planning it: the bodies and pairs of its cell, and how contours begin.
+    """Read a job without planning it; print its cell and the poses at the start of each contour.
 
     The command lists every fault that can be found before planning, with its key; the exit code is
     then 2.
@@ -140,7 +140,7 @@ def check(job: JobArgument, as_json: Json = False) -> None:
     if not as_json:
         show_drawing(part)
     compile_kernels(read.robot.kinematics)
-    with busy("looking at the cell"):
+    with busy("checking the cell"):
         checked = check_job(read, part)
     show_check(checked, as_json=as_json)
     require_foreseen(prepare(read, part, checked.cell))
@@ -151,7 +151,7 @@ def speed(
     job: JobArgument,
     as_json: Json = False,
 ) -> None:
-    """Find the fastest constant cutting speed of each contour, and what limits it where.
+    """Find the fastest constant cutting speed of each contour, and the limit that binds.
 
     The column on the grid is exact on the graph that the job describes (its spacing, rotation step,
     limits and eta), and free of collisions in its cell, if it has one. The column refined has the
@@ -183,18 +183,18 @@ def contours(
         typer.Option(help="Length unit, if the file has none or a wrong one: mm, cm, m, in."),
     ] = None,
     gap_mm: Annotated[
-        float, typer.Option(help="Largest distance between two ends that a loop bridges, mm.")
+        float, typer.Option(help="Largest gap between two curve ends that a loop bridges, mm.")
     ] = 0.05,
     outer_towards: Annotated[
         tuple[float, float, float] | None,
         typer.Option(
-            help="Where the outer sides of sheets face, in the part. Default: the side that "
-            "lies less deep in the part; of a flat sheet the one that faces up."
+            help="Direction that the outer sides of sheets face, in the part. Default: the side "
+            "that lies less deep in the part; for a flat sheet, the side that faces up."
         ),
     ] = None,
     axis: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(help="Tool axis of lines in space, and of points that have none."),
+        typer.Option(help="Tool axis for lines in space, and for points without one."),
     ] = None,
     columns: Annotated[
         str | None,
@@ -210,7 +210,7 @@ def contours(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """List the loops of a drawing, by the names that jobs pick them by.
+    """List the loops of a drawing by the names that jobs use.
 
     Check the bounding box first: it shows a wrong unit in the file's header. A job picks a loop
     with pick = "NAME" in a table [[contour]].
@@ -242,7 +242,7 @@ def robots(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """List the library, or show a robot, rail or positioner of it with limits and their sources.
+    """List the robots, rails and positioners of the library, or show one with limits and sources.
 
     A job uses a robot with model = "ID" in its table [robot], and an axis of a rail or positioner
     with model = "ID" in a table [[robot.external]].

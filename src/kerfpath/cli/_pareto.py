@@ -1,4 +1,4 @@
-"""`kerfpath pareto`: find the front of a contour, and write the plan picked from it."""
+"""`kerfpath pareto`: find the front of a contour, or write a plan picked from it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from kerfpath.study import JobFront, axes_of, pareto_of_job, plan_picked, read_p
 __all__ = ["pick_plan", "show_front"]
 
 SHOWN = 12
-"""Rows of the table at most: the report has all plans."""
+"""Most rows of the table; the report has all plans."""
 
 
 def show_front(
@@ -79,7 +79,7 @@ def show_front(
         out.print(f"no plan in {number} runs: {escape(why)}")
     show_files(written)
     out.print(
-        f"write one: kerfpath pareto {escape(str(job_file))} --out {escape(str(folder))} "
+        f"to write one: kerfpath pareto {escape(str(job_file))} --out {escape(str(folder))} "
         f"--pick {front.numbers[front.balanced_at]} (the balanced one)"
     )
 
@@ -94,8 +94,8 @@ def _show_plans(front: Front) -> None:
         for i in range(0, len(values), step)
     ]
     table(columns, rows, numbers=columns, spare=columns[:3:-1])
-    more = f"; one in {step} of the {len(values)} plans, the report has all" if step > 1 else ""
-    out.print(f"arrows: where better is{more}")
+    more = f"; shown is one in {step} of the {len(values)} plans, the report has all"
+    out.print(f"arrows: the better direction{more if step > 1 else ''}")
 
 
 def _entry(found: JobFront, written: Sequence[Path]) -> dict[str, object]:
@@ -123,7 +123,7 @@ def _entry(found: JobFront, written: Sequence[Path]) -> dict[str, object]:
 def pick_plan(
     job_file: Path, folder: Path, which: str, *, refine: bool, strict: bool, as_json: bool
 ) -> None:
-    """Plan the job with a contour planned as picked, and write its files.
+    """Plan the job with the picked plan of one contour, and write its files.
 
     Raises
     ------

@@ -119,19 +119,20 @@ def finish_run(
         for note in merge_notes(written.notes, [cut.name for cut in outcome.cuts]):
             out.print(f"note: {escape(note)}")
         for fault in written.faults:
-            out.print(f"[bold red]not to be cut:[/] {escape(fault)}")
+            out.print(f"[bold red]do not cut:[/] {escape(fault)}")
         show_files(written.files, written.removed, of="an earlier run")
     if written.stale is not None:
         errors.print(
             f"kerfpath: {escape(str(written.stale))} is from an earlier run and does not belong "
-            "to this plan; it is left, as it was edited or is not known to be ours: move it away"
+            "to this plan; it was kept, as it was edited or kerfpath may not have written it: "
+            "move it away"
         )
     if not outcome.passed:
         raise typer.Exit(1)
 
 
 def _largest_tilt(cut: CutResult) -> float | None:
-    """Return the largest tilt of the tool axis at the nodes, deg; None where none is allowed."""
+    """Return the largest tilt of the tool axis at the nodes, deg; None if no tilt is allowed."""
     if cut.plan is None or cut.plan.settings.tilt is None:
         return None
     return float(np.degrees(np.hypot(*cut.plan.tilt.T).max()))
@@ -217,33 +218,35 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
     spare = ["step deg", "chord mm", "grid", "bound", "m/min", "run s"]
     table(columns, rows, numbers=columns[1:-1], whole=["audit"], spare=spare)
     out.print(
-        "run s: how long it takes from rest to rest, corners rounded and every joint limit kept; "
-        "cost: what is minimised; grid: the best on the grid of rotations, before the refinement; "
-        "bound: no motion that keeps the limits at the nodes costs less, at any rotation, posture "
-        "and turn; gap: at most so much of the cost lies above the best motion; "
-        "vel, acc: highest share of a joint's velocity and acceleration limit; chord: largest "
-        "distance of the CAD curve from the chords between nodes; step: largest turn of the tool "
-        "axis from node to node"
+        "run s: time from rest to rest, with rounded corners and every joint limit kept; "
+        "cost: value of the objective; grid: lowest cost on the grid of rotations, before the "
+        "refinement; bound: no motion that keeps the limits at the nodes costs less, at any "
+        "rotation, posture and turn; gap: largest share of the cost that may lie above the best "
+        "motion; vel, acc: highest share of a joint's velocity and acceleration limit; chord: "
+        "largest distance of the CAD curve from the chords between nodes; step: largest rotation "
+        "of the tool axis from node to node"
     )
     unbound = [cut.name for cut in cuts if _is_unbound(cut)]
     if unbound:
-        out.print(f"no bound for {escape(', '.join(unbound))}: the report and --json say why")
+        out.print(
+            f"no bound for {escape(', '.join(unbound))}: the report and --json have the reason"
+        )
     found = [cut.departure for cut in cuts if cut.departure is not None]
     loops = [each.path for each in found if each.path is not None]
     if loops:
         out.print(
-            "*: from the path as cut, which is not the drawn one; that was within "
+            "*: measured from the path as cut, which differs from the drawn loop; that was within "
             f"{max(loop.chord_error for loop in loops) * 1e3:.4f} mm of the CAD curve"
         )
     rounded = [c.value for cut in cuts for c in cut.checks if c.code == "drawing"]
     if rounded:
         out.print(f"rounded corners leave the drawing by up to {max(rounded) * 1e3:.4f} mm")
     if any(each.against == "points of the drawing" for each in found + loops):
-        out.print("where the drawing has points, the lines through them stand for the CAD curve")
+        out.print("if the drawing has points, the lines through them are taken as the CAD curve")
 
 
 def _is_unbound(cut: CutResult) -> bool:
-    """Return whether a bound was asked for and none could be proved."""
+    """Return whether a bound was asked for but none could be proved."""
     plan = cut.plan
     return plan is not None and plan.settings.certify is not None and plan.proof.bound is None
 

@@ -32,8 +32,9 @@ def write_post(
 ) -> None:  # fmt: skip
     """Write the files of a plan's program to `output`; print them without one.
 
-    A file with the suffix of the language names the program, and others go beside it; else a
-    program of one file is written as `output`, and one of several into that folder.
+    If `output` has the suffix of the language, it names the program, and further files go beside
+    it. Otherwise a program of one file is written as `output`, and one of several files into the
+    folder `output`.
     """
     if language is None:
         source = read_plan_file(plan_file).job if job is None else read_job(job).source
@@ -42,12 +43,12 @@ def write_post(
     if measured is not None:
         points = read_measured(measured)
         frame = placement_from_points(*points, most_residual=residual_mm / 1000)
-        if not as_json:  # first of all: also where no program comes of it
+        if not as_json:  # printed first, so that it is shown even if there will be no program
             for line in _frame_lines(frame, plan_file):
                 (errors if output is None else out).print(line)
     name = _name(output, find_language(language))
     if name is not None and dry_share is not None:
-        name = name.removeprefix("dry_")  # which dry runs begin with by themselves
+        name = name.removeprefix("dry_")  # dry runs add this prefix themselves
     try:
         files, notes = program_from_file(
             plan_file, language, name=name, strict=strict, job_file=job, dry_share=dry_share,
@@ -61,7 +62,7 @@ def write_post(
     replaced: FolderChanges | None = None
     if output is not None and name is not None:
         main, *_ = files
-        # FANUC's names are in capitals; the file is called as it was asked for.
+        # FANUC names are in capitals; the file gets the name that was asked for.
         names = {main: output.name} if main.lower() == output.name.lower() else {}
         files = {names.get(k, k): t for k, t in files.items()}
         replaced = replace_program(output.parent, files, list(files), only=output.name)
@@ -84,7 +85,7 @@ def write_post(
             }
         )
         return
-    # A program that is printed has stdout for itself.
+    # If the program is printed, nothing else goes to stdout.
     console = out if written else errors
     if not written:
         for name, text in files.items():
@@ -102,8 +103,8 @@ def _name(output: Path | None, chosen: Language) -> str | None:
     Raises
     ------
     InputError
-        The file has the suffix of another language, its folder is not there, or no program can be
-        called like it.
+        The file has the suffix of another language, its folder does not exist, or its name is not
+        possible for a program.
     """
     if output is None or output.is_dir():
         return None
@@ -112,30 +113,30 @@ def _name(output: Path | None, chosen: Language) -> str | None:
         others = [each.name for each in languages().values() if each.suffix.lower() == suffix]
         if others:
             raise InputError(
-                f"{output}: the program is to be in {chosen.name}, whose files end in "
-                f"{chosen.suffix}; name it so, or say --language {others[0]}"
+                f"{output}: expected a file that ends in {chosen.suffix}, as the program is in "
+                f"{chosen.name}; rename it, or choose --language {others[0]}"
             )
         return None
     if not output.parent.is_dir():
-        raise InputError(f"cannot write the program to {output}: {output.parent} is no folder")
+        raise InputError(f"cannot write the program to {output}: {output.parent} is not a folder")
     if identifier(output.stem) != output.stem:
         raise InputError(
-            f"{output}: expected a file named by letters, digits and _ as the program will be, got "
-            f"{output.stem!r}"
+            f"{output}: expected a name of letters, digits and _, as the program gets the same "
+            f"name, got {output.stem!r}"
         )
     return output.stem
 
 
 def _frame_lines(frame: MeasuredFrame, plan_file: Path) -> list[str]:
-    """Return lines for people: residuals, distance from the planned placement, and the frame."""
+    """Return the lines to print: residuals, distance from the planned placement, and frame."""
     residuals = ", ".join(f"{r * 1e3:.3f}" for r in frame.residuals)
     planned = read_plan_file(plan_file).plans[0].T_base_part
     shift, turn = frame.moved_from(planned)
     return [
         f"residuals of {len(frame.residuals)} points: {residuals} mm",
-        f"the part is {shift * 1e3:.3f} mm and {np.degrees(turn):.4f} deg from where it was "
-        "planned",
-        f"as a job says it: xyz_mm = {escape(str(frame.xyz_mm))}, rpy_deg = "
+        f"the part is {shift * 1e3:.3f} mm and {np.degrees(turn):.4f} deg from its planned "
+        "placement",
+        f"keys for a job: xyz_mm = {escape(str(frame.xyz_mm))}, rpy_deg = "
         f"{escape(str(frame.rpy_deg))}",
     ]
 

@@ -1,4 +1,4 @@
-"""The commands for programs: written, audited, compared, taught again; and the job as a script."""
+"""The commands that write, audit, compare and touch up programs, or write a job as a script."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def post(
         Path | None,
         typer.Option(
             metavar="JOB.toml",
-            help="Job to take [program] from, and whose cell the audit looks at.",
+            help="Job with the table [program] to use, and with the cell for the audit.",
         ),
     ] = None,
     strict: Strict = False,
@@ -53,7 +53,7 @@ def post(
     measured: Annotated[
         Path | None,
         typer.Option(
-            metavar="POINTS.csv", help="Move the plan to the part as measured, and audit it there."
+            metavar="POINTS.csv", help="Move the plan to the measured part, and audit it there."
         ),
     ] = None,
     residual_mm: Annotated[
@@ -117,7 +117,7 @@ def audit(
 @app.command()
 def compare(
     a: Annotated[Path, typer.Argument(metavar="A", help="A kerfpath program.")],
-    b: Annotated[Path, typer.Argument(metavar="B", help="Another one, or the same edited.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Another one, or an edited copy.")],
     job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job of both programs.")],
     as_json: Json = False,
 ) -> None:
@@ -170,7 +170,7 @@ def script(
         typer.Option("-o", "--output", help="File to write; default: print the script."),
     ] = None,
 ) -> None:
-    """Write a job as a Python script that does the same by the public functions.
+    """Write a job as a Python script that does the same with the public functions.
 
     The script reads the drawing, plans each contour with the options of the job, audits, and writes
     the program. Keep it beside the drawing. Jobs with features that a script cannot express, such

@@ -1,4 +1,4 @@
-"""`kerfpath robots`: the library as tables, one robot or product with its sources, or its URDF."""
+"""`kerfpath robots`: list the library, show one robot or product, or write the URDF of a robot."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from kerfpath.robots import ExternalProduct, KnownAxis, external, external_ids, 
 __all__ = ["list_robots", "show_external", "show_robot", "write_urdf"]
 
 UNITS = {"lower": "", "upper": "", "velocity": "/s", "acceleration": "/s^2"}
-"""Limits of external axes, and what follows mm or deg in their units."""
+"""Limits of external axes, and the end of their units after mm or deg."""
 
 
 def list_robots(*, as_json: bool) -> None:
     """Print id, maker, model, payload and reach of every robot, and which limits are known.
 
-    Then the axes of every rail and positioner, and their limits.
+    The axes of every rail and positioner follow with their limits.
     """
     known = [robot(name) for name in robot_ids()]
     products = [external(name) for name in external_ids()]
@@ -51,7 +51,7 @@ def list_robots(*, as_json: bool) -> None:
             escape(f"{r.manufacturer} {r.model}"),
             f"{r.payload:g}",
             f"{r.reach:g}",
-            "known" if r.acceleration is not None else "name it",
+            "known" if r.acceleration is not None else "set in job",
             "missing" if r.limits_missing else "",
         ]
         for r in known
@@ -59,7 +59,7 @@ def list_robots(*, as_json: bool) -> None:
     columns = ["robot", "model", "payload kg", "reach m", "acceleration", "limits"]
     table(columns, rows, numbers=["payload kg", "reach m"])
     out.print(
-        f"{len(known)} robots. Where it says 'name it' the maker publishes no accelerations: give "
+        f"{len(known)} robots. 'set in job': the maker publishes no accelerations; set "
         "acceleration_deg_s2 or acceleration_ratio in the job."
     )
     heads = ["rail or positioner", "model", "payload kg", "range", "velocity", "acceleration"]
@@ -76,8 +76,8 @@ def list_robots(*, as_json: bool) -> None:
     ]
     table(heads, rows, numbers=["payload kg"])
     out.print(
-        f"{len(products)} rails and positioners, by their axes. Where it says 'give it' no source "
-        "is known, or it is chosen with the order: say it in the job."
+        f"{len(products)} rails and positioners, by their axes. 'set in job': no source is known, "
+        "or the value is chosen when the product is ordered; set it in the job."
     )
 
 
@@ -112,13 +112,13 @@ def _in_unit(each: KnownAxis, limit: str) -> tuple[float | None, str]:
     """Return a limit in mm or deg, None where it is not known, and its unit."""
     value: float | None = getattr(each, limit)
     unit, factor = ("mm", 1e3) if each.axis.kind == "linear" else ("deg", 180 / np.pi)
-    # Data sheets are in these units; m, rad and back leave digits that nobody wrote.
+    # Data sheets are in these units; conversion to m or rad and back adds spurious digits.
     return None if value is None else round(factor * value, 9), unit + UNITS[limit]
 
 
 def _said(each: KnownAxis, limit: str) -> str:
     value, unit = _in_unit(each, limit)
-    return "give it" if value is None else f"{value:g} {unit}"
+    return "set in job" if value is None else f"{value:g} {unit}"
 
 
 def _range(each: KnownAxis) -> str:
@@ -133,7 +133,7 @@ def _numbers(values: Array) -> str:
 
 
 def _entry(product: ExternalProduct) -> dict[str, object]:
-    """Return all that is known of a product."""
+    """Return all known data of a product."""
     return {
         "id": product.id,
         "manufacturer": product.manufacturer,
@@ -237,7 +237,7 @@ def write_urdf(name: str | None, path: Path, *, as_json: bool) -> None:
     Raises
     ------
     InputError
-        No robot; as `Robot.to_urdf`; no place to write to.
+        `name` is not a robot, the file cannot be written, or as `Robot.to_urdf`.
     """
     if name is None or name in external_ids():
         raise InputError(
@@ -262,5 +262,5 @@ def _key(said: str) -> str:
 
 
 def _degrees(values: Array | None) -> list[float] | None:
-    # Data sheets are in degrees; radians and back leave digits that nobody wrote.
+    # Data sheets are in degrees; conversion to radians and back adds spurious digits.
     return None if values is None else np.degrees(values).round(9).tolist()

@@ -1,4 +1,4 @@
-"""`kerfpath layout --robots`: find which robots can do a job, and how fast."""
+"""`kerfpath layout --robots`: find the robots that can do a job, and how fast they are."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def show_robots_for(
     Raises
     ------
     InputError
-        As `which_robots`; a folder that cannot be made.
+        As `which_robots`; or the folder cannot be made.
     """
     make_folder(folder)
     if scheduler is None:

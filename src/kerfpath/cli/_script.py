@@ -1,4 +1,4 @@
-"""`kerfpath script`: a job as Python."""
+"""`kerfpath script`: write a job as a Python script."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def write_script(path: Path, output: Path | None) -> None:
     Raises
     ------
     InputError
-        A job that cannot be prepared, or has what a script has no lines for; no place to write to.
+        The job cannot be prepared or written as a script, or the file cannot be written.
     """
     job = read_job(path)
     folder = None if output is None else output.absolute().parent

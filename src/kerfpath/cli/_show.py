@@ -38,21 +38,21 @@ __all__ = [
 ]
 
 _PIPED = 200
-"""Characters of a line that goes to a file or another program: nothing is cut off there."""
+"""Width in characters of output to a file or another program, where nothing is cut off."""
 
 _LEAST_OF_WORDS = 16
-"""Characters that a column of words has at least, or its own length."""
+"""Least width of a column of words in characters, unless its words are shorter."""
 _ROOM_FOR_WORDS = 40
-"""Characters that are enough for words: headings are not folded for more."""
+"""Width in characters that is enough for words; headings are not folded to gain more."""
 _BETWEEN = 2
 """Characters between two columns of a table."""
 LINE_SECONDS = 10.0
-"""Time between two lines of progress where there is no terminal."""
+"""Time between two lines of progress without a terminal, s."""
 DAY = 86400.0
 """Seconds over which the speed of a bar is averaged: tasks may take minutes each."""
 
 quiet = Event()
-"""Is set where no progress is to be shown."""
+"""Set if no progress is to be shown."""
 
 out = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else _PIPED)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -86,7 +86,7 @@ def table(
     kept, heads, left_out = list(range(len(columns))), list(columns), list[str]()
 
     def width_with(least_of_words: int) -> int:
-        """Return the width of the kept columns, with words folded to so many characters."""
+        """Return the width of the kept columns, words folded to `least_of_words` characters."""
         widths = []
         for i in kept:
             width = cells[i] if columns[i] in fixed else min(cells[i], least_of_words)
@@ -116,11 +116,11 @@ def table(
         shown.add_row(*(row[i] for i in kept))
     out.print(shown, soft_wrap=False)
     if left_out:
-        out.print(f"no room for: {', '.join(left_out)}; a wider terminal or --json has them")
+        out.print(f"no room for: {', '.join(left_out)}; a wider terminal or --json shows them")
 
 
 def merge_notes(notes: Sequence[str], names: Collection[str] = ()) -> list[str]:
-    """Return notes with those that differ by figures and `names` alone as one, and counted."""
+    """Return the notes; those that differ only in figures and `names` are one, with a count."""
     groups: dict[str, list[str]] = {}
     longest = sorted(names, key=len, reverse=True)
     pattern = "|".join([*map(re.escape, longest), r"\d+(?:\.\d+)?"])
@@ -133,7 +133,7 @@ def merge_notes(notes: Sequence[str], names: Collection[str] = ()) -> list[str]:
 
 
 def show_files(written: Iterable[Path], removed: Iterable[Path] = (), *, of: str = "") -> None:
-    """Print the files that were removed, each with whose it was, and those that were written."""
+    """Print the files that were removed, with what they belonged to, and the written ones."""
     for path in removed:
         out.print(f"removed {escape(str(path))}, of {of}")
     for path in written:
@@ -142,7 +142,7 @@ def show_files(written: Iterable[Path], removed: Iterable[Path] = (), *, of: str
 
 @contextmanager
 def progress_lines(unit: str) -> Iterator[Progress]:
-    """Give a `Progress` that prints a line every few seconds: for output without a terminal."""
+    """Give a `Progress` that prints a line every few seconds, for output without a terminal."""
     state, begun, over = "", monotonic(), Event()
 
     def take(what: str, done: int, total: int) -> None:
@@ -165,7 +165,7 @@ def progress_lines(unit: str) -> Iterator[Progress]:
 
 @contextmanager
 def progress_bars(unit: str = "nodes", *, time_left: bool = False) -> Iterator[Progress]:
-    """Give a `Progress` that draws a bar for each piece of work; the unit is that of its parts.
+    """Give a `Progress` that draws a bar for each piece of work, counted in `unit`.
 
     Without a terminal it prints lines instead, and after `--quiet` nothing.
     """
@@ -209,13 +209,13 @@ def sweep_bar(unit: str) -> Iterator[Progress]:
 
 
 def resumable() -> AbstractContextManager[None]:
-    """Print at Ctrl-C how to go on, and exit with code 130."""
-    return stop_in_order("kerfpath: stopped; the same command goes on from the results so far")
+    """Print at Ctrl-C how to continue, and exit with code 130."""
+    return stop_in_order("kerfpath: stopped; the same command continues from the results so far")
 
 
 @contextmanager
 def busy(what: str) -> Iterator[None]:
-    """Show a piece of work without a measure on a terminal; print nothing elsewhere."""
+    """Show work of unknown length on a terminal; print nothing elsewhere."""
     if errors.is_terminal and not quiet.is_set():
         with errors.status(what):
             yield

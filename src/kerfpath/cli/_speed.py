@@ -1,4 +1,4 @@
-"""`kerfpath speed`: find the fastest constant speed of each contour, and what binds where."""
+"""`kerfpath speed`: find the fastest constant speed of each contour, and the limit that binds."""
 
 from __future__ import annotations
 
@@ -61,10 +61,10 @@ def show_speeds(answers: Sequence[ContourSpeed], *, as_json: bool) -> bool:
         at = "at x y z mm"
         table([*columns, at], rows, numbers=columns[1:7], spare=[at])
         out.print(
-            "on the grid: the fastest constant speed there, exactly; refined: the fastest that is "
-            "found off the grid, not proved to be the fastest there is; both keep the limits at "
+            "on the grid: the fastest constant speed there, exact; refined: the fastest speed "
+            "found off the grid, not proved to be the fastest possible; both keep the limits at "
             "the nodes; as run: a speed at which the program keeps them between the nodes, too, "
-            "where the job asks for it (between_nodes) and one was found; impossible from: proved "
-            "that at this speed and above there is no motion, at any rotation"
+            "if the job asks for it (between_nodes) and one was found; impossible from: at this "
+            "speed and above it is proved that there is no motion, at any rotation"
         )
     return all(entry["fastest_m_min"] is not None for entry in entries)

@@ -1,8 +1,8 @@
 """Ctrl-C: the command prints one line and exits with code 130, whatever it is doing.
 
-No exception is raised: in the middle of foreign code (a solver, a CAD kernel, an import) it may be
-swallowed, turn into another one or crash the interpreter, as may one that ends the interpreter
-while threads of a solver run. Instead a thread waits for the signal and ends the process.
+No exception is raised: inside foreign code (a solver, a CAD kernel, an import) it may be swallowed,
+turn into another exception or crash the interpreter, and so may an exit while threads of a solver
+run. Instead a thread waits for the signal and ends the process.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ __all__ = ["STOPPED", "stop_in_order", "stoppable"]
 STOPPED = 130
 """Exit code of a command that Ctrl-C has stopped."""
 FILE_SECONDS = 5.0
-"""Time that a file under way may take to be finished, s."""
+"""Time in which a file that is being written may be finished, s."""
 
 _in_order = False
 _received = False
@@ -42,7 +42,7 @@ def stoppable() -> Iterator[None]:
     watch.start()
     before = signal.set_wakeup_fd(sender.fileno(), warn_on_full_buffer=False)
     signal.signal(signal.SIGINT, _note)
-    # Once the interpreter shuts down the work is done, and shutting down takes a while, too.
+    # When the interpreter shuts down, the work is done; ignore Ctrl-C while that takes its time.
     atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     try:
         yield

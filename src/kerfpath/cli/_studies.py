@@ -53,7 +53,7 @@ def pareto(
     refine: Annotated[
         bool,
         typer.Option(
-            "--refine", help="Refine a picked plan of the grid: move its rotation off it."
+            "--refine", help="Refine a picked plan of the grid: move its rotation off the grid."
         ),
     ] = False,
     strict: Strict = False,
@@ -148,11 +148,11 @@ def layout(
         float | None, typer.Option(help="Tolerance of angles, over which the worst value counts.")
     ] = None,
     map_points: Annotated[
-        int | None, typer.Option(help="Points of the map each way, 0 for no map; default: 15.")
+        int | None, typer.Option(help="Points of the map per side, 0 for no map; default: 15.")
     ] = None,
     robots: Annotated[
         bool,
-        typer.Option("--robots", help="Move nothing: list which robots can do the job."),
+        typer.Option("--robots", help="Move nothing; list the robots that can do the job."),
     ] = False,
     acceleration_ratio: Annotated[
         str | None,
@@ -177,7 +177,7 @@ def layout(
 
     The variables are offsets in the robot base: x_mm, y_mm, z_mm, yaw_deg, tilt_x_deg, tilt_y_deg
     of the part with its fixtures; base_x_mm, base_y_mm, base_z_mm, base_yaw_deg of the robot's
-    base; mount_deg, the turn of the head about the flange. Their ranges come from --vary, or else
+    base; mount_deg, the rotation of the head on the flange. Their ranges come from --vary, or else
     from the table [layout] of the job; by default x_mm and y_mm vary by 200 mm, yaw_deg by 30 deg.
 
     layout.json, layout.html and placed.toml, the job with its new numbers, go to the folder
@@ -192,7 +192,7 @@ def layout(
 
     Then: kerfpath plan door-layout/placed.toml
 
-    With --robots nothing is moved: every robot of the library replaces that of the job in turn.
+    With --robots nothing is moved; instead each robot of the library replaces that of the job.
     robots.json and robots.html list reach, fastest speed of each contour and margin over the speeds
     of the job, the best robot first. Exit code 1: no robot is as fast as the job asks.
 
@@ -208,13 +208,13 @@ def layout(
     folder = to or Path(f"{job.stem}-layout")
     if robots:
         if given := [*(["--vary"] if vary is not None else []), *options.given()]:
-            raise InputError(f"--robots: nothing is moved with it; leave out {', '.join(given)}")
+            raise InputError(f"--robots moves nothing; remove {', '.join(given)}")
         found = show_robots_for(
             job, folder, scheduler=scheduler, processes=processes, ratio=acceleration_ratio,
             as_json=as_json,
         )  # fmt: skip
     elif acceleration_ratio is not None:
-        raise InputError("--acceleration-ratio: only with --robots; else the job says it")
+        raise InputError("--acceleration-ratio: only with --robots; else set it in the job")
     else:
         found = show_layout(
             job, folder, vary=vary or [], options=options, scheduler=scheduler,
@@ -234,7 +234,7 @@ def studio(
         ),
     ] = None,
     port: Annotated[
-        int, typer.Option(help="Port to listen at; 0: any that is free.", min=0, max=65535)
+        int, typer.Option(help="Port to listen at; 0: any free port.", min=0, max=65535)
     ] = 8087,
     host: Annotated[
         str,

@@ -1,4 +1,4 @@
-"""`kerfpath studio`: a job in the browser."""
+"""`kerfpath studio`: open a job in the browser."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kerfpath.errors import InputError
 __all__ = ["open_studio"]
 
 SHIPPED = ("b_pillar.toml", "b_pillar.step")
-"""The demo job and its part, which are copied so that they can be changed."""
+"""The demo job and its part; the studio copies them, so that they can be changed."""
 DRAWINGS = (
     *(".step", ".stp", ".iges", ".igs", ".dxf", ".csv", ".tsv", ".txt"),
     *(".apt", ".aptsource", ".cl", ".cls", ".h", ".mpf", ".nc", ".spf", ".tap"),
@@ -23,14 +23,15 @@ DRAWINGS = (
 
 
 def open_studio(job: Path | None, *, host: str, port: int, browser: bool) -> None:
-    """Serve a job to the browser until the command is stopped; without one, a copy of the demo's.
+    """Serve a job to the browser until the command is stopped.
 
-    Of a drawing the job beside it that has its name; where there is none, one is written.
+    Without a job, a copy of the demo job is served. For a drawing, the job beside it with the same
+    name is served, and written if there is none.
 
     Raises
     ------
     InputError
-        What the studio needs is not installed; no job; a port in use.
+        The packages for the studio are not installed, there is no job, or the port is in use.
     """
     require_extra("studio", "the studio")
     if job is None:
@@ -50,7 +51,7 @@ def open_studio(job: Path | None, *, host: str, port: int, browser: bool) -> Non
 
 
 def _copy_of_demo() -> Path:
-    """Return the demo job in a folder of its own in this one, copied there unless it is."""
+    """Return the demo job in a subfolder of the current folder, copied there if it is missing."""
     folder = Path("kerfpath-studio")
     absent = [name for name in SHIPPED if not (folder / name).exists()]
     with as_file(files("kerfpath").joinpath("demo")) as source:
@@ -60,7 +61,7 @@ def _copy_of_demo() -> Path:
         write_whole(texts)
     except OSError as error:
         raise InputError(
-            f"{folder}: the demo job cannot be copied there ({error.strerror}); run kerfpath "
-            "studio in a folder that can be written to, or give a job"
+            f"{folder}: cannot copy the demo job there ({error.strerror}); run kerfpath studio in "
+            "a writable folder, or name a job"
         ) from None
     return folder / SHIPPED[0]

@@ -1,4 +1,4 @@
-"""The job: one file that says what to cut and how, its run, and the files the run leaves."""
+"""Read a job file, run it, and write, read and audit its plans and programs."""
 
 from kerfpath._extras import require_extra
 

@@ -1,4 +1,4 @@
-"""What the joints need of their limits where a controller rounds the corners of a program."""
+"""Joint limits between the nodes, as a controller runs the program with rounded corners."""
 
 from __future__ import annotations
 
@@ -37,18 +37,19 @@ __all__ = [
 ]
 
 SLACK = 1e-3
-"""Share of a limit that the steps of zones in a program take: they are rounded down."""
+"""Share by which limits may be exceeded, as zones in a program are rounded down to steps."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AsRun:
-    """A plan as its program has it run.
+    """A plan as a controller runs its program.
 
     Parameters
     ----------
     checks : tuple of Check
+        Rows of the audit about the motion between the nodes.
     timing : Timing or None
-        How long it takes and where it slows down; None where that is not known.
+        How long it takes and where it slows down; None if that is not known.
     """
 
     checks: tuple[Check, ...] = ()
@@ -58,12 +59,12 @@ class AsRun:
 
 
 def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsRun:
-    """Return a plan as its program has it run; without checks where it does not run straight.
+    """Return a plan as a controller runs its program; without checks if it stops at every node.
 
-    Those of velocity and acceleration hold at every instant where the arm is one whose rates can be
-    bounded, else at samples, as those of torque do.
-    Where a joint needs more than its full limit between the nodes a controller slows down: that is
-    a warning, or an error where the job asks for a guarantee. `kept` is what came of keeping them.
+    The checks of velocity and acceleration hold at every instant if the rates of the arm can be
+    bounded, otherwise at samples, as those of torque do. If a joint would exceed its full limit
+    between the nodes, the controller slows down: that is a warning, or an error if the job asks
+    for a guarantee. `kept` is the result of `kept_between_nodes`.
     """
     if kept is not None and kept.run is not None:
         return run_judged(job, kept.run, plan, path, "" if kept.done else kept.statement)
@@ -71,7 +72,7 @@ def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsR
     if not unknown:
         try:
             run = longest_run(_program(job)(plan), controller_of(job))
-        except InputError as fault:  # said when it is written
+        except InputError as fault:  # reported when the program is written
             unknown = str(fault)
     if unknown:
         return AsRun(checks=checks_of_unknown(job, unknown))
@@ -79,24 +80,24 @@ def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsR
 
 
 def checks_of_unknown(job: Job, why: str) -> tuple[Check, ...]:
-    """Return that nothing is guaranteed between the nodes, where the job asks for it."""
+    """Return a failed check if the job asks for a guarantee between the nodes, else none."""
     if job.options.between_nodes != "guaranteed":
         return ()
     return (
         Check(
             code="between-nodes",
-            title="limits between the nodes that are not judged",
+            title="joint limits between the nodes that are not checked",
             value=1.0,
             limit=0.0,
             unit="count",
             node=0,
-            advice=f"cannot be guaranteed: {why}",
+            advice=f"they cannot be guaranteed: {why}",
         ),
     )
 
 
 def run_judged(job: Job, run: Executed, plan: Plan, path: Contour, why: str = "") -> AsRun:
-    """Return what a run along the nodes of a plan and a path comes to, see `as_run`."""
+    """Return the checks and the timing of a run along a plan and its path, see `as_run`."""
     shares = (
         _check("velocity", run.peak_velocity, run.velocity_bound, run, plan),
         _check("acceleration", run.peak_acceleration, run.acceleration_bound, run, plan),
@@ -119,7 +120,7 @@ def run_judged(job: Job, run: Executed, plan: Plan, path: Contour, why: str = ""
 
 
 def _torque(run: Executed, plan: Plan) -> Iterator[Check]:
-    """Yield the largest share of a torque limit, where the load is known."""
+    """Yield the check of the largest share of a torque limit, if the load is known."""
     peak = run.peak_torque
     if peak is not None:
         yield Check(
@@ -130,33 +131,34 @@ def _torque(run: Executed, plan: Plan) -> Iterator[Check]:
             limit=1.0 + SLACK,
             unit="share",
             node=_node(run, plan, peak.time),
-            advice=f"joint {peak.joint + 1} needs it: go more slowly, or carry less",
+            advice=f"joint {peak.joint + 1} exceeds its limit: go more slowly, or carry less",
         )
 
 
 def _speed(run: Executed, plan: Plan, timing: Timing) -> Check:
-    """Return by how much the speed falls short between the ramps at both ends."""
+    """Return the check of the speed between the ramps at both ends."""
     share, at = timing.slowest
     time = float(np.interp(at, timing.length, timing.time))
     return Check(
         code="speed-as-run",
-        title="speed short of the programmed one, between the ramps",
+        title="loss of programmed speed, between the ramps",
         value=1 - share,
         limit=1 - AT_SPEED,
         unit="share",
         node=_node(run, plan, time),
         level="warning",
-        advice=f"it is held on {timing.held:.1%} of the length, as the joints keep their limits",
+        advice=f"the programmed speed is held on {timing.held:.1%} of the length, as the joints "
+        "keep their limits",
     )
 
 
 def _deviations(job: Job, run: Executed, plan: Plan, path: Contour) -> Iterator[Check]:
-    """Yield how far tip and tool axis leave the path, corners rounded."""
+    """Yield the checks of tip and tool axis against the path, with rounded corners."""
     off, allowed = deviation_of(run, path), job.tolerances
     cone = 0.0 if job.options.tilt is None else job.options.tilt.cone
     yield Check(
         code="tip-as-run",
-        title="tool tip off the path as run",
+        title="distance of the tool tip from the path as run",
         value=off.tip,
         limit=allowed.path,
         unit="m",
@@ -166,7 +168,7 @@ def _deviations(job: Job, run: Executed, plan: Plan, path: Contour) -> Iterator[
     )
     yield Check(
         code="axis-as-run",
-        title="tool axis off that of the path as run",
+        title="angle of the tool axis to that of the path as run",
         value=off.axis,
         limit=allowed.axis + cone,
         unit="rad",
@@ -177,30 +179,33 @@ def _deviations(job: Job, run: Executed, plan: Plan, path: Contour) -> Iterator[
 
 
 def _narrower(controller: Controller) -> str:
-    """Say what makes corners less round."""
+    """Return the advice to round corners less."""
     if controller.rounds_by_itself:
-        return "let the controller round less, see the page of its language"
+        return "let the controller round corners less, see the page of its language"
     return "write a lower zone_error_mm in [program]"
 
 
 def _node(run: Executed, plan: Plan, time: float) -> int:
-    """Return the node nearest to where the tip is at a time, s."""
+    """Return the node nearest to the tip at a time, s."""
     (there,) = run.course.poses(np.array([time]))[:, :3, 3]
     return int(np.argmin(np.linalg.norm(plan.T_part_tip[:, :3, 3] - there, axis=1)))
 
 
 def kept_between_nodes(job: Job, plan: Plan) -> Kept | None:
-    """Return a plan held to less at its nodes where it needs more between; None: not asked for."""
+    """Return the plan with lower limits at its nodes, so that those between them hold.
+
+    None if the job does not ask for it, or its program cannot be made.
+    """
     if not keeps_between_nodes(job):
         return None
     try:
         return keep_limits(plan, _program(job), controller=controller_of(job))
-    except InputError:  # said when it is written
+    except InputError:  # reported when the program is written
         return None
 
 
 def keeps_between_nodes(job: Job) -> bool:
-    """Return whether the plans of a job are held to less where they need more between nodes."""
+    """Return whether plans of a job get lower limits at nodes, to keep those between nodes."""
     options = job.options
     moves_gamma = options.method == "continuous" or (options.method == "exact" and options.refine)
     fits = moves_gamma and options.feed == "constant" and options.tilt is None
@@ -212,23 +217,23 @@ def _program(job: Job) -> Callable[[Plan], Program]:
 
 
 def controller_of(job: Job) -> Controller:
-    """Return the controller that a job is for, as its settings have it."""
+    """Return the controller of a job, by the settings of its language."""
     return language(job.program.language).controller(job.program.settings)
 
 
 def _not_modelled(job: Job) -> str:
-    """Return why the motion of the job's programs is not known between the nodes; else empty."""
+    """Return why the motion of the job's programs between the nodes is unknown; else empty."""
     if job.program.language == "none":
         return "there is no program; name a language in [program]"
     if not language(job.program.language).zones:
-        return f"{job.program.language} has no zones: what its controller does is not known"
+        return f"{job.program.language} has no zones, so the motion of its controller is unknown"
     if job.program.zone == 0:
         return 'the robot stops at every node; write zone_mm = "auto" in [program]'
     return ""
 
 
 def _check(what: str, peak: Peak, bound: float, run: Executed, plan: Plan) -> Check:
-    """Return a row about the largest share of one kind of limits."""
+    """Return the check of the largest share of one kind of limit."""
     proved = not run.sampled
     how = "at every instant" if proved else "sampled"
     how += ", corners assumed" if run.controller.assumed else ""
@@ -239,5 +244,6 @@ def _check(what: str, peak: Peak, bound: float, run: Executed, plan: Plan) -> Ch
         limit=1.0 + SLACK,
         unit="share",
         node=_node(run, plan, peak.time),
-        advice=f"{plan.robot.joint_names[peak.joint]} needs it, and a controller slows down there",
+        advice=f"{plan.robot.joint_names[peak.joint]} exceeds its limit, so the controller slows "
+        "down there",
     )

@@ -203,7 +203,7 @@ def test_check_shows_bodies_pairs_and_the_start(folder):
     assert shown.returncode == 0, shown.stderr
     for words in (
         "nest left", "post - head: 20 mm", "not judged", "base - table", "slot",
-        "800 x 1500 x 50", "not the real one", "beyond the 24 mm that they overlap by design",
+        "800 x 1500 x 50", "not the real shape", "beyond the 24 mm that they overlap by design",
     ):  # fmt: skip
         assert words in shown.stdout
     assert "is its unit right?" not in shown.stdout
@@ -269,7 +269,7 @@ FAULTS = [
     ("stand_off_mm = 1", "share = 1.5", "cell.share: .*below 1"),
     ("stand_off_mm = 1", 'may_touch = [["arm", "wall"]]', 'cell.may_touch: .*got "wall"'),
     ("stand_off_mm = 1", 'links = "description"', "cell.links: .*only with urdf"),
-    ("stand_off_mm = 1", "sheet_mm = 1.5", "closed solid, which has its thickness; remove"),
+    ("stand_off_mm = 1", "sheet_mm = 1.5", "closed solid with its own thickness; remove"),
     ("stand_off_mm = 1", "head.unit = 'mm'", "cell.head.unit: expected unit only with file"),
     ("stand_off_mm = 1", "head.xyz_mm = [0, 0, 0]", "cell.head.xyz_mm: .*only with file"),
     (
@@ -467,7 +467,7 @@ FIVES = [
     (
         "acceleration_deg_s2 = [400, 300, 500, 1500, 1500]",
         'acceleration_ratio = "iontec_20_to_70kg"',
-        "robot.acceleration_ratio: expected accelerations of 5 joints, got a ratio for 6",
+        "robot.acceleration_ratio: expected a ratio for 5 joints, got one for 6",
     ),
 ]
 

@@ -50,7 +50,7 @@ def test_a_drawing_that_is_not_read_whole_is_refused(tmp_path: Path, kind: str, 
     with pytest.raises(InputError) as refused:
         check_job(read_job(path))
     said = str(refused.value)
-    assert said.startswith(f"{path}:7: part.file: expected a drawing that is read whole")
+    assert said.startswith(f"{path}:7: part.file: expected a drawing that can be read completely")
     assert f"1 {name}" in said
     assert 'left_out = "accept"' in said
     path.write_text(JOB.format(more='left_out = "accept"'))
@@ -100,7 +100,7 @@ def test_a_part_is_placed_by_a_coordinate_system_of_its_drawing(tmp_path: Path) 
     np.testing.assert_allclose(job.placement @ job.read_part().frame("BENCH"), pose, atol=1e-12)
     for wrong, words in (
         ('frame = "FLOOR"', "got 'FLOOR'; it names 'BENCH'"),
-        ('frame = "BENCH"\nplaced_by = "centre"', "expected frame, or placed_by, got both"),
+        ('frame = "BENCH"\nplaced_by = "centre"', "expected frame or placed_by, got both"),
         ("frame = 1", "part.frame: expected the coordinate system"),
     ):
         path.write_text(text.format(more=wrong))

@@ -139,8 +139,8 @@ def test_what_an_open_line_can_have(folder):
 REFUSED = [
     (LINE + 'start = "smoothest"', "contour.start: ", "begins at one of its ends"),
     (LINE + "start_mm = 4", "contour.start_mm: ", 'the other with direction = "reversed"'),
-    (LINE + "overlap_mm = 2", "contour.overlap_mm: ", "does not come back to its start"),
-    (LINE + '[plan]\nclosure = "periodic"', "plan.closure: ", "does not come back to its start"),
+    (LINE + "overlap_mm = 2", "contour.overlap_mm: ", "does not return to its start"),
+    (LINE + '[plan]\nclosure = "periodic"', "plan.closure: ", "does not return to its start"),
 ]
 
 

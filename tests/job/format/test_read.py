@@ -275,7 +275,7 @@ FAULTS = [
     # tool
     ("laser-head-straight", "laser-head-30", 6, "tool.head: .*nearest: laser-head"),
     (HEAD, "", 5, "tool.head: expected a cutting head, got none; add head .laser-head-"),
-    (HEAD, HEAD + "\nrpy_deg = [0, 0, 0]", 7, "tool.rpy_deg: expected head alone, got both"),
+    (HEAD, HEAD + "\nrpy_deg = [0, 0, 0]", 7, "tool.rpy_deg: expected head alone, got it with"),
     (HEAD, "xyz_mm = [0, 0, 1]", 5, "tool.rpy_deg: expected rpy_deg together with xyz_mm"),
     (HEAD, "xyz_mm = [0, 1]\nrpy_deg = [0, 0, 0]", 6, r"tool.xyz_mm: .* got \[0, 1\]"),
     # part

@@ -46,9 +46,9 @@ def test_it_is_read_as_it_was_written(certificate):
     [
         ("value", "type", "<f4", "stage 0: value: expected numbers of type <f8, got '<f4'"),
         ("value", "shape", [9, 3], "value: expected 216 bytes"),
-        ("value", "shape", [-9, -2], "no shape of an array"),
-        ("value", "shape", [10**6, 10**6], "no shape of an array"),
-        ("value", "shape", [18], r"value is of \(18,\), and its nodes are \(9,\)"),
+        ("value", "shape", [-9, -2], "expected the shape of an array"),
+        ("value", "shape", [10**6, 10**6], "expected the shape of an array"),
+        ("value", "shape", [18], r"expected value for \(9,\) nodes, got the shape \(18,\)"),
         ("dual", "zlib_base64", "!!!!", "dual: cannot be unpacked"),
         ("dual", "zlib_base64", "AAAA", "dual: cannot be unpacked"),
         ("lift", "zlib_base64", "", "lift: expected 54 bytes"),

@@ -89,7 +89,7 @@ def test_what_is_only_claimed_is_said_to_be(made):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"schema": ', '"schema": 3, "schema": ', 'the key "schema" stands twice'),
+        ('"schema": ', '"schema": 3, "schema": ', 'the key "schema" is twice'),
         ('"dt": ', '"dt": true, "was": ', "contours.0.dt: expected a valid number, got true"),
         ('"dt": ', '"dt": "1.0", "was": ', 'contours.0.dt: expected a valid number, got "1.0"'),
         ('"dt": ', '"dt": NaN, "was": ', "expected a number, got NaN"),

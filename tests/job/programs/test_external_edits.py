@@ -135,7 +135,7 @@ def test_the_motion_between_the_nodes_is_judged_by_the_values_of_the_text(subjec
     jumped = as_run(subject, edited(subject.files, RAIL[language], 10, 0.2))
     worse = [key for key in rows if jumped[key].value > 1.5 * rows[key].value]
     assert ("hole", "acceleration-as-run") in worse
-    assert "rail needs it" in jumped["hole", "acceleration-as-run"].advice
+    assert "rail exceeds its limit" in jumped["hole", "acceleration-as-run"].advice
 
 
 @pytest.mark.parametrize("language", ["csv", "ros"])

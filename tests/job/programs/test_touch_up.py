@@ -242,10 +242,10 @@ def many(text):
         (lambda t: t, "no target on a contour was moved"),
         (lambda t: edited(t, "joined", 0, (0, 0, 1)), "the start of contour 'joined' was moved"),
         (lambda t: edited(t, "joined", 41, (0, 0, 1)), "the end of contour 'joined' was moved"),
-        (many, "targets were moved; a part that stands elsewhere is measured"),
+        (many, "targets were moved; for a part that is elsewhere"),
         (
             lambda t: re.sub(r'(wobjdata wPart:=\[FALSE,TRUE,"",\[\[)[\d.]+', r"\g<1>1201.0", t),
-            "the part frame is 1.0000 mm and 0.0000 deg off; a part that stands elsewhere",
+            "the part frame is 1.0000 mm and 0.0000 deg off; for a part that is elsewhere",
         ),
         (
             lambda t: re.sub(r"\n    MoveL [^\n]*vCut[^\n]*\n", "\n", t, count=1),
@@ -268,4 +268,4 @@ def test_jobs_and_plans_that_do_not_fit_are_refused(folder):
     assert_refused(run(*command, arcs), "jobs with arcs_mm cannot be touched up")
     other = folder / "elsewhere.toml"
     other.write_text(WHOLE.replace("[1200, -600, 500]", "[1201, -600, 500]"))
-    assert_refused(run(*command, other), "its part is not where that of")
+    assert_refused(run(*command, other), "its part is not at the place of that in")

@@ -42,7 +42,7 @@ def test_a_chuck_that_turns_while_it_is_cut_is_guaranteed_and_so_is_the_text(tmp
     (before,) = run_job(job_of(tmp_path, said)).cuts
     assert {code for code, row in rows_of(before).items() if not row.ok} >= {"acceleration-as-run"}
     assert rows_of(before)["acceleration-as-run"].level == "warning"
-    assert "chuck needs it" in rows_of(before)["acceleration-as-run"].advice
+    assert "chuck exceeds its limit" in rows_of(before)["acceleration-as-run"].advice
     result = run_job(job_of(tmp_path, said.replace("reported", "guaranteed")))
     assert result.passed
     (cut,) = result.cuts

@@ -84,8 +84,8 @@ def test_without_a_load_there_is_no_such_row(folder):
     ("load", "keys", "said"),
     [
         ("mass_kg = 25", "", "tool.centre_mm: expected the centre of mass of 25 kg in the flange"),
-        ("centre_mm = [0, 0, 1]", "", "tool.mass_kg: expected mass_kg, too, got none; add it"),
-        ("mass_kg = -1\ncentre_mm = [0, 0, 1]", "", "tool.mass_kg: expected 0 or a number above"),
+        ("centre_mm = [0, 0, 1]", "", "tool.mass_kg: expected mass_kg with centre_mm, got none"),
+        ("mass_kg = -1\ncentre_mm = [0, 0, 1]", "", "tool.mass_kg: expected a number not below 0"),
         ("mass_kg = 25\ncentre_mm = [0, 1]", "", "tool.centre_mm: expected 3 numbers"),
         (
             "mass_kg = 25\ncentre_mm = [0, 0, 1]\ninertia_kg_m2 = [1, 1, -1, 0, 0, 0]", "",
@@ -97,7 +97,7 @@ def test_without_a_load_there_is_no_such_row(folder):
         ),
         (
             "", "torque_nm = [1, 1, 1, 1, 1, 1]",
-            "tool.mass_kg: expected mass_kg and centre_mm of what the flange carries, as "
+            "tool.mass_kg: expected mass_kg and centre_mm of the load on the flange, as "
             "torque_nm is given",
         ),
         ("", "gravity_m_s2 = [0, 0, 9.81]", "as gravity_m_s2 is given"),
@@ -123,7 +123,7 @@ def test_robots_without_masses_are_refused_with_what_to_give(folder):
     text = (folder / "arm.urdf").read_text()
     (folder / "arm.urdf").write_text(re.sub(r' effort="[^"]*"', "", text))
     assert_refused(
-        run("check", path), "robot.torque_nm: expected joint torques, as arm.urdf does not state"
+        run("check", path), "robot.torque_nm: expected torque limits, as arm.urdf does not state"
     )
     (folder / "arm.urdf").write_text(re.sub(r"<inertial>.*?</inertial>", "", text))
     assert_refused(

@@ -1,4 +1,4 @@
-"""The job file: its tables, what they mean in SI, and what is wrong with one, said in a line."""
+"""The job file: its tables, their values in SI, and one-line messages about faults."""
 
 from kerfpath.job.format._cell import cell_of_job as cell_of_job
 from kerfpath.job.format._cell import with_map as with_map

@@ -1,4 +1,4 @@
-"""From a job's [cell] table and its part to the cell that plans and audits are held against."""
+"""Build the cell of a job from its [cell] table and its part."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ __all__ = ["cell_of_job", "with_map"]
 SIZES = (
     "nozzle_length_mm", "nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm",
 )  # fmt: skip
-"""Keys of [cell.head] that are arguments of the head, except for their unit."""
+"""Keys of [cell.head] that are arguments of `CuttingHead` without their unit."""
 SAME = 1e-6
-"""m: corners of neighbouring faces that are one; CAD systems keep to less."""
+"""Distance in m below which corners of neighbouring faces are merged; CAD systems stay below it."""
 
 
 def cell_of_job(job: Job, part: Part) -> Cell | None:
-    """Return the cell that a job describes; None where it has no [cell]: nothing is checked then.
+    """Return the cell that a job describes; None without [cell]: collisions are not checked then.
 
     Raises
     ------
     InputError
-        At its line in the job: a file that holds no closed solid, a pair of unknown bodies, a part
-        drawn as a surface whose thickness is not given, a robot whose links are not known.
+        With its line in the job file: a file without a closed solid, a pair with an unknown body,
+        a part drawn as a surface without a thickness, or a robot with unknown links.
     """
     table = job.cell
     if table is None:
@@ -65,7 +65,7 @@ def cell_of_job(job: Job, part: Part) -> Cell | None:
             raise refusal_at(
                 job.path,
                 ("cell", "fixture", i, "on"),
-                f'expected the name of a [[robot.external]], got "{fixture.on}"; there are '
+                f'expected the name of a [[robot.external]] table, got "{fixture.on}"; there are '
                 f"{', '.join(axes) or 'none'}",
             )
         with _at(job, "cell", "fixture", i):
@@ -99,12 +99,12 @@ def cell_of_job(job: Job, part: Part) -> Cell | None:
 
 
 def with_map(job: Job) -> Job:
-    """Return the job with the collision map asked for.
+    """Return the job with its collision map switched on.
 
     Raises
     ------
     InputError
-        It has no [cell].
+        The job has no [cell].
     """
     if job.cell is None:
         raise refusal_at(
@@ -116,7 +116,7 @@ def with_map(job: Job) -> Job:
 def _described_as_touching(
     job: Job, judged: Container[frozenset[str]]
 ) -> dict[tuple[str, str], str]:
-    """Return the pairs that the SRDF of the robot disables, but for those that the job judges."""
+    """Return the pairs that the SRDF of the robot disables, except those with a rule in the job."""
     robot = job.source["robot"]
     if "srdf" not in robot:
         return {}
@@ -125,8 +125,8 @@ def _described_as_touching(
         raise refusal_at(
             job.path,
             ("cell", "links"),
-            "expected the links of the description, which srdf in [robot] is about, got "
-            '"capsules"; remove one of both',
+            'expected links = "description" with srdf in [robot], got "capsules"; change links, '
+            "or remove srdf",
         )
     folder = job.path.parent
     with _at(job, "robot", "srdf"):
@@ -136,7 +136,7 @@ def _described_as_touching(
 
 @contextmanager
 def _at(job: Job, *where: str | int) -> Iterator[None]:
-    """Give the errors of a piece of the cell their place in the job."""
+    """Add the place in the job file to errors about a part of the cell."""
     try:
         yield
     except InputError as error:
@@ -167,7 +167,7 @@ def _two(names: tuple[str, ...]) -> tuple[str, str]:
 
 
 def _head(table: CellTable, folder: Path) -> CuttingHead | MeshHead:
-    """Return the head of its file, or the generic one with the sizes that are given."""
+    """Return the head from its file, or the generic head with the given sizes."""
     head = table.head
     sizes: dict[str, Any] = {"stand_off": table.stand_off_mm / 1000, "share": table.share}
     for name in given(head, *SIZES):
@@ -182,13 +182,13 @@ def _head(table: CellTable, folder: Path) -> CuttingHead | MeshHead:
 
 
 def _solid(job: Job, table: CellTable, part: Part) -> Mesh:
-    """Return the part as a solid, a part drawn as a surface by its thickness."""
+    """Return the part as a solid; a part drawn as a surface is thickened by sheet_mm."""
     if not part.faces:
         raise refusal_at(
             job.path,
             ("cell", "part"),
-            f"{job.part_file.name} holds curves and no solid to keep away from; write part = false "
-            "to leave it out of the cell, or give it as a solid",
+            f"expected a part with a solid, got only curves in {job.part_file.name}; write "
+            "part = false to leave it out of the cell, or draw it as a solid",
         )
     vertices, triangles = _triangles(part, table.deviation_mm / 1000)
     is_open = bool(edges_of(triangles)[1].any())
@@ -196,15 +196,15 @@ def _solid(job: Job, table: CellTable, part: Part) -> Mesh:
         raise refusal_at(
             job.path,
             ("cell", "sheet_mm"),
-            f"{job.part_file.name} is drawn as a surface, not as a closed solid: what is inside "
-            "is not known; add sheet_mm = its thickness in mm, behind the surface as the beam "
-            "sees it, or part = false to leave it out of the cell",
+            f"{job.part_file.name} is drawn as a surface, not as a closed solid, so its thickness "
+            "is unknown; add sheet_mm, the thickness behind the surface as seen from the nozzle, "
+            "or part = false to leave it out of the cell",
         )
     if not is_open and table.sheet_mm is not None:
         raise refusal_at(
             job.path,
             ("cell", "sheet_mm"),
-            f"{job.part_file.name} is a closed solid, which has its thickness; remove sheet_mm",
+            f"{job.part_file.name} is a closed solid with its own thickness; remove sheet_mm",
         )
     if table.sheet_mm is not None:
         vertices, triangles = thicken(vertices, triangles, table.sheet_mm / 1000)
@@ -225,14 +225,14 @@ def _shape(fixture: FixtureTable, folder: Path, deviation: float) -> Shape:
 
 
 def _read_solid(path: Path, unit: str | None, deviation: float) -> Mesh:
-    """Return the solid in an STL file of a unit, or in a STEP file, which says its own."""
+    """Return the solid in an STL file of a given unit, or in a STEP file, which states its own."""
     stamp = path.stat()
     return _solid_in(path, unit, deviation, (stamp.st_mtime_ns, stamp.st_size))
 
 
 @lru_cache(maxsize=16)
 def _solid_in(path: Path, unit: str | None, deviation: float, _stamp: tuple[int, int]) -> Mesh:
-    """Read a solid; a study that moves the cell asks for the same again and again."""
+    """Read a solid; cached because a layout study reads the same file for every placement."""
     if path.suffix.lower() == ".stl":
         assert unit is not None
         return read_stl(path, unit)

@@ -1,4 +1,4 @@
-"""One contour of a job: which loop, how fast, what is made of it and how it is sampled."""
+"""One contour of a job: its loop, speed, operations and sampling."""
 
 from __future__ import annotations
 
@@ -22,28 +22,30 @@ __all__ = ["ContourSpec", "task_of"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContourSpec:
-    """One contour to cut: which, how fast, and how it is sampled.
+    """One contour to cut: its loop, speed, operations and sampling.
+
+    Exactly one of `spacing`, `time_step`, `count` and `tolerance` is given.
 
     Parameters
     ----------
     pick : str
-        Name of the loop in the part; "" where the table picks several, see `expanded`.
+        Name of the loop in the part; "" if the table picks several loops, see `expanded`.
     name : str
-        What the contour is called in messages, reports and programs.
+        Name of the contour in messages, reports and programs.
     speed : float m/s
         Speed along the path.
     spacing : float m, optional
-        Largest distance between nodes; or
+        Largest distance between nodes.
     time_step : float s, optional
-        largest time between nodes; or
+        Largest time between nodes.
     count : int, optional
-        number of nodes; or
+        Number of nodes.
     tolerance : float m, optional
-        largest distance of the chords from the contour; exactly one of the four is given.
+        Largest distance of the chords from the contour.
     axis_tolerance : float rad, optional
-        Largest angle between the axis along a chord and the contour's, with `tolerance`.
+        Largest angle between the tool axis along a chord and the contour's, with `tolerance`.
     table : ContourTable
-        What is made of the loop before it is sampled, as the file says it.
+        The table in the file, with the operations on the loop before it is sampled.
     """
 
     pick: str
@@ -59,12 +61,12 @@ class ContourSpec:
     __repr__ = short_repr
 
     def expanded(self, part: Part) -> list[ContourSpec]:
-        """Return a task for each loop of the part that this one picks.
+        """Return one spec for each loop of the part that this one picks.
 
         Raises
         ------
         InputError
-            No such loop.
+            The part has no such loop.
         """
         if self.table.pick_all is None:
             return [replace(self, pick=part.loop(self.pick).name)]
@@ -74,21 +76,21 @@ class ContourSpec:
         ]
 
     def drawn(self, part: Part) -> Contour:
-        """Return its loop as the part has it.
+        """Return the loop as drawn in the part.
 
         Raises
         ------
         InputError
-            A loop with a gap; a line drawn open that is not asked for by name or as such, as a
-            trim that was meant to be closed may end up as one.
+            The loop has a gap; or it is an open line that was picked neither by name nor by
+            kind = "open", and may be a trim that was meant to be closed.
         """
         everything = self.table.pick_all
         return part.contour(self.pick, closed=everything is not None and everything.kind != "open")
 
     def candidates(self, part: Part, drawn: Contour | None = None) -> list[Contour]:
-        """Return the contours that may be cut for its loop, see `shape_contour`.
+        """Return the alternative contours that may be cut for the loop, see `shape_contour`.
 
-        `drawn` is the loop as the part has it, where that is at hand.
+        `drawn` is the loop as drawn; by default it is taken from the part.
         """
         laid = self.table.lead_in or self.table.lead_out or self.table.corners
         surface = part.surface(self.pick) if laid else None
@@ -97,12 +99,12 @@ class ContourSpec:
 
     @property
     def rounded(self) -> float | None:
-        """By how much its corners are rounded, m; None where they are not."""
+        """Distance of the rounded corners from the drawn ones, m; None without rounding."""
         corners = self.table.corners
         return None if corners is None else _metres(corners.round_mm)
 
     def unrounded(self, part: Part, drawn: Contour) -> list[Contour]:
-        """Return the same contours with their corners as they were before they were rounded."""
+        """Return the same contours without rounded corners."""
         corners = self.table.corners
         assert corners is not None
         sharp = corners.model_copy(update={"round_mm": None})
@@ -110,17 +112,17 @@ class ContourSpec:
         return replace(self, table=table).candidates(part, drawn)
 
     def evenly_fast(self, part: Part) -> Contour:
-        """Return the first of its paths, sampled, without shares of the speed."""
+        """Return the first candidate, sampled, at the full speed everywhere."""
         path = self.candidates(part)[0]
         return self.sample(replace(path, speed_share=np.ones(len(path))))
 
     def sample(self, contour: Contour) -> Contour:
-        """Return the contour sampled as this task says, under the task's name.
+        """Return the contour, sampled and named as this spec says.
 
         Raises
         ------
         InputError
-            A spacing that would make too many nodes, a tolerance that cannot be kept.
+            The spacing would give too many nodes, or the tolerance cannot be kept.
         """
         named, slowed = replace(contour, name=self.name), bool((contour.speed_share < 1).any())
         spacing, time_step = self.spacing, self.time_step
@@ -140,8 +142,8 @@ class ContourSpec:
         )
 
     def finer(self, share: float) -> ContourSpec:
-        """Return the task with its nodes nearer to each other by a share below 1."""
-        # What chords leave out grows with the square of their length.
+        """Return the spec with the distance between nodes multiplied by a share below 1."""
+        # The chord error grows with the square of the chord length.
         power = {"spacing_mm": 1, "time_step_ms": 1, "tolerance_mm": 2}
         given = self.table.model_dump(include=set(power), exclude_none=True)
         update = {key: value * share ** power[key] for key, value in given.items()}
@@ -150,12 +152,12 @@ class ContourSpec:
         return replace(task_of(table), pick=self.pick, name=self.name)
 
     def asked(self, options: PlanOptions) -> PlanOptions:
-        """Return the options of its job with what its table asks for besides."""
+        """Return the options of the job with the windows of gamma of this contour."""
         return replace(options, gamma_windows=self.windows)
 
     @property
     def windows(self) -> tuple[GammaWindow, ...]:
-        """Where gamma is kept inside an interval, by the arc length of its path."""
+        """Windows of gamma, by the arc length of the path."""
         return tuple(
             GammaWindow(
                 start=first / 1000,
@@ -168,14 +170,14 @@ class ContourSpec:
 
     @property
     def sampled_by(self) -> str:
-        """The key of its table that says how finely it is sampled."""
+        """The key of the table that sets the sampling."""
         return next(key for key in SAMPLINGS if getattr(self.table, key) is not None)
 
     def _require_few(self, contour: Contour, spacing: float, key: str) -> None:
         if contour.length / spacing > MOST_NODES:
             raise InputError(
-                f"contour {self.name!r}: {spacing * 1e3:g} mm between nodes would make more "
-                f"than {MOST_NODES} of them over {contour.length * 1e3:g} mm; raise {key}"
+                f"contour {self.name!r}: expected at most {MOST_NODES} nodes, got more with "
+                f"{spacing * 1e3:g} mm between nodes over {contour.length * 1e3:g} mm; raise {key}"
             )
 
 

@@ -1,4 +1,4 @@
-"""The drawing of a job: its file, and how it is read."""
+"""The drawing of a job: its file and how to read it."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ __all__ = ["Drawing"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drawing:
-    """A drawing, and how it is read.
+    """A drawing and how to read it.
 
     Parameters
     ----------
     file : Path
-        The CAD file, there when the job was read.
+        The CAD file; it existed when the job was read.
     unit : str or None
         Length unit that overrides the CAD file's own.
     gap : float m
-        Distance between the ends of two curves that a loop bridges.
+        Largest gap between the ends of two curves that a loop bridges.
     outer_towards : (3,) or None
-        Where the outer sides of its sheets face, see `kerfpath.cad.read`.
+        Direction that the outer sides of its sheets face, part frame, see `kerfpath.cad.read`.
     axis : (3,) or None
-        The tool axis of a drawing that has none, in the part.
+        Tool axis for a drawing without one, part frame.
     columns : mapping or sequence of str, or None
-        What the columns of a table are, see `kerfpath.cad.read`.
+        Meaning of the columns of a table of points, see `kerfpath.cad.read`.
     accept_left_out : bool
-        Whether something that may have been to cut may be left out.
+        Whether geometry that may have to be cut may be left out.
     """
 
     file: Path
@@ -47,12 +47,12 @@ class Drawing:
     __repr__ = short_repr
 
     def read(self) -> Part:
-        """Return the part that it holds.
+        """Return the part in the drawing.
 
         Raises
         ------
         InputError
-            It cannot be read.
+            The drawing cannot be read.
         """
         return read_drawing(
             self.file,

@@ -1,4 +1,4 @@
-"""Where a key or value of a TOML text stands, so that messages can name its line."""
+"""Locate keys and values in a TOML text, so that messages can name their line."""
 
 from __future__ import annotations
 
@@ -71,14 +71,14 @@ class TomlPlaces:
         self._root = _tree(source)
 
     def locate(self, where: Sequence[str | int]) -> Position:
-        """Return the position of what `where` leads to, or of the table that should hold it.
+        """Return the position of the item at `where`, or of the table that should hold it.
 
         Parameters
         ----------
         where : sequence of str and int
             Keys, and indices from 0, from the document down: ``("contour", 1, "speed_m_min")``.
-            A key is found at its own start, an array element at its value's, a table at its
-            header's; a table that the document lacks, at line 1.
+            A key is located at its start, an array element at its value, a table at its header,
+            and a table that is missing at line 1.
         """
         place = self._root
         row, column = 0, 0

@@ -1,4 +1,4 @@
-"""Contours put into the text of a job and taken out of it; all other lines stay as they are."""
+"""Add contours to the text of a job or remove them; all other lines stay as they are."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ from kerfpath.job.format._read import Job
 __all__ = ["with_loops", "without_contour"]
 
 FEWEST, MOST = 24, 400
-"""Nodes of a loop that is added, where the contour that it is cut like is spaced in mm."""
+"""Fewest and most nodes of an added loop, if the contour that it copies has spacing_mm."""
 OWN = ("pick", "pick_all", "name", "start_mm")
-"""Keys that no two contours share."""
+"""Keys that an added loop does not copy from another contour."""
 _CONTOUR = re.compile(r"[ \t]*\[\[[ \t]*contour[ \t]*\]\]")
 _INSIDE = re.compile(r"[ \t]*\[\[?[ \t]*contour[ \t]*\.")
 _HEADER = re.compile(r"[ \t]*\[")
 
 
 def with_loops(job: Job, part: Part, names: Sequence[str]) -> str:
-    """Return the text of a job that cuts these loops of its part, too.
+    """Return the text of a job that also cuts these loops of its part.
 
-    Each is cut as that contour of the job is which is most like it: of the same kind, if there is
-    one, and of the nearest length. Its nodes are spaced so that there are neither very few nor
-    very many. Holes come before the first trim line, everything else last.
+    Each new loop copies the settings of the most similar contour of the job: one of the same kind
+    if there is one, with the closest length. Its spacing is changed if it would give very few or
+    very many nodes. Holes are inserted before the first trim line, everything else at the end.
 
     Parameters
     ----------
     job : Job
     part : Part
-        What its drawing holds.
+        The part in the job's drawing.
     names : sequence of str
-        Of loops.
+        Names of the loops to add.
 
     Raises
     ------
     InputError
-        No such loop; one that is not closed though it should be, or that the job cuts already; a
-        text whose contours are no [[contour]] tables.
+        A loop does not exist, has a gap, or is cut already; or the contours of the job are not
+        written as [[contour]] tables.
     """
     cut = [{task.pick for task in spec.expanded(part)} for spec in job.contours]
     tables: list[Mapping[str, object]] = list(job.source["contour"])
@@ -68,14 +68,14 @@ def without_contour(job: Job, index: int) -> str:
     Raises
     ------
     InputError
-        There is no such table, or it is the only one; a text whose contours are no [[contour]]
+        There is no such table, it is the only one, or the contours are not written as [[contour]]
         tables.
     """
     tables = list(job.source["contour"])
     if not 0 <= index < len(tables):
         raise InputError(f"job: expected a contour from 0 to {len(tables) - 1}, got {index}")
     if len(tables) == 1:
-        raise InputError("job: its only contour cannot be taken out; add another one first")
+        raise InputError("job: the only contour cannot be removed; add another one first")
     lines = job.text.splitlines(keepends=True)
     begin, end = _blocks(lines, len(tables))[index]
     after = end
@@ -94,7 +94,7 @@ def _is_trim(loop: Loop) -> bool:
 
 def _require_to_cut(loop: Loop, job: Job, cut: bool) -> None:
     if cut:
-        raise InputError(f"loop {loop.name!r} is a contour of the job already")
+        raise InputError(f"loop {loop.name!r} is already a contour of the job; pick another one")
     if loop.kind != "open" and not loop.closed:
         raise InputError(
             f"loop {loop.name!r} has a gap of {loop.largest_gap * 1e3:.3g} mm, more than the "
@@ -103,7 +103,7 @@ def _require_to_cut(loop: Loop, job: Job, cut: bool) -> None:
 
 
 def _like(job: Job, part: Part, loop: Loop) -> Mapping[str, object]:
-    """Return the table that cuts a loop as the contour is cut that is most like it."""
+    """Return the [[contour]] table of a loop, copied from the most similar contour."""
 
     def unlike(index: int) -> tuple[bool, float]:
         loops = [part.loop(task.pick) for task in job.contours[index].expanded(part)]
@@ -127,18 +127,18 @@ def _ratio(one: float, two: float) -> float:
 
 
 def _spacing(spacing: float, length: float) -> float:
-    """Return how far apart nodes are, mm: as given (m), unless that makes too few or too many."""
+    """Return the spacing of nodes in mm: as given (m), unless that makes too few or too many."""
     mm = float(np.clip(spacing, length / MOST, length / FEWEST)) * 1e3
     return float(f"{mm:.2g}") if mm != spacing * 1e3 else mm
 
 
 def _blocks(lines: Sequence[str], count: int) -> list[tuple[int, int]]:
-    """Return the lines of each [[contour]] table, from its header to the last that says something.
+    """Return the range of lines of each [[contour]] table, from its header to its last key.
 
     Raises
     ------
     InputError
-        There are not so many.
+        The text does not have `count` such tables.
     """
     found = []
     for begin, line in enumerate(lines):
@@ -166,7 +166,7 @@ def _inserted(text: str, at: int, block: str) -> str:
         lines[-1] += "\n"
     line_end = "\r\n" if lines[0].endswith("\r\n") else "\n"
     place = blocks[at - 1][1] if at else blocks[0][0]
-    # Between tables there is a line that is empty.
+    # An empty line separates two tables.
     new = f"\n{block}" if at else f"{block}\n"
     lines[place:place] = [line + line_end for line in new.splitlines()]
     return "".join(lines)
@@ -191,7 +191,7 @@ def _value(value: object) -> str:
 
 
 def _required(text: str, source: Mapping[str, object], tables: list[Mapping[str, object]]) -> str:
-    """Return a text that says what a job says, but for its contours."""
+    """Return the text if it parses to the tables of the job with these contours, else raise."""
     try:
         said = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
@@ -203,6 +203,6 @@ def _required(text: str, source: Mapping[str, object], tables: list[Mapping[str,
 
 def _unwritten() -> InputError:
     return InputError(
-        "job: expected each contour to begin with a line [[contour]] of its own, got another way "
-        "of writing them; change them in the text of the job"
+        "job: expected each contour as a table that begins with a line [[contour]], got another "
+        "notation; edit the contours in the text of the job"
     )

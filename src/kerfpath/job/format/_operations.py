@@ -1,4 +1,4 @@
-"""From a loop as drawn to what is cut: the operations that a [[contour]] table asks for."""
+"""Apply the operations of a [[contour]] table to a drawn loop."""
 
 from __future__ import annotations
 
@@ -34,28 +34,27 @@ OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 
 
 def keys_of_closed_loops(table: ContourTable) -> dict[str, str]:
-    """Return the keys in use that only a closed loop can have, and what an open line lacks."""
-    ends = 'begins at one of its ends: the other with direction = "reversed"'
+    """Return the used keys that need a closed loop, each with what holds for an open line."""
+    ends = 'begins at one of its ends (at the other with direction = "reversed")'
     asked = {
         "start": (table.start != "drawn", ends),
         "start_mm": (table.start_mm is not None, ends),
-        "overlap_mm": (table.overlap_mm is not None, "does not come back to its start"),
+        "overlap_mm": (table.overlap_mm is not None, "does not return to its start"),
     }
     return {key: lacks for key, (used, lacks) in asked.items() if used}
 
 
 def shape_contour(table: ContourTable, drawn: Contour, surface: Surface | None) -> list[Contour]:
-    """Return the contours that may be cut for a loop: one, or several starts and directions.
+    """Return the contours that may be cut for a loop: one, or one for each start and direction.
 
-    Corners and leads are laid on `surface`.
-
-    In this order: direction, smoothed axes, kerf, corners, start, bevel, micro joints, overlap,
-    leads, slowing down (also where a lead meets the cut at an angle).
+    The operations are applied in this order: direction, smoothed axes, kerf, corners, start, bevel,
+    micro joints, overlap, leads, reduced speed at corners (also where a lead meets the cut at an
+    angle). Corners and leads lie on `surface`.
 
     Raises
     ------
     InputError
-        What the operations refuse.
+        An operation cannot be applied to the loop.
     """
     ways = {"drawn": (False,), "reversed": (True,), "best": (False, True)}[table.direction]
     return [cut for way in ways for cut in _run(table, drawn, surface, backwards=way)]
@@ -83,7 +82,7 @@ def _run(
 
 
 def _start_contour(table: ContourTable, contour: Contour) -> list[Contour]:
-    """Return the contour begun where the table says."""
+    """Return the contour with the start, or with each of the starts, that the table asks for."""
     if table.start_mm is not None:
         return [start_at(contour, contour.s[0] + table.start_mm * MM)]
     if table.start == "smoothest":

@@ -1,4 +1,4 @@
-"""The cutting heads that kerfpath ships, and the pose that position and angles in a job mean."""
+"""Shipped cutting heads, and poses from the position and angles in a job."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["HeadPose", "heads", "pose"]
 
 
 class HeadPose(NamedTuple):
-    """Where the tip of a cutting head is in the flange.
+    """Pose of the tip of a cutting head in the flange.
 
     Parameters
     ----------
     xyz_mm : (3,) mm
         Position of the tip.
     rpy_deg : (3,) deg
-        Its orientation as in `pose`; z along the beam, out of the nozzle into the part.
+        Its orientation as in `pose`; z points along the beam, out of the nozzle into the part.
     """
 
     xyz_mm: tuple[float, ...]
@@ -33,7 +33,7 @@ class HeadPose(NamedTuple):
 
 @cache
 def heads() -> dict[str, HeadPose]:
-    """Return the shipped cutting heads by name: generic dimensions, not those of any maker."""
+    """Return the shipped cutting heads by name; their dimensions are generic."""
     text = (files("kerfpath.job") / "heads.toml").read_text(encoding="utf-8")
     return {
         name: HeadPose(tuple(values["xyz_mm"]), tuple(values["rpy_deg"]))
@@ -42,14 +42,14 @@ def heads() -> dict[str, HeadPose]:
 
 
 def pose(xyz_mm: Sequence[float], rpy_deg: Sequence[float]) -> Array:
-    """Return the pose (4, 4), m, of a position and three angles, as a URDF origin has them.
+    """Return the pose (4, 4), in m, of a position and three angles, as in a URDF origin.
 
     Parameters
     ----------
     xyz_mm : (3,) mm
         Position.
     rpy_deg : (3,) deg
-        Roll, pitch and yaw about the fixed axes x, y and z, turned in this order:
+        Roll, pitch and yaw about the fixed axes x, y and z, applied in this order:
         R = Rz(yaw) Ry(pitch) Rx(roll).
     """
     T = np.eye(4)

@@ -1,4 +1,4 @@
-"""A job made ready: its drawing and cell are read, and each contour has the ways to cut it."""
+"""Prepare a job: read its drawing and cell, and list the ways to cut each contour."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ __all__ = ["Candidate", "CutRequest", "PreparedJob", "divide_nodes", "prepare"]
 
 
 SAME_PLACE = 1e-6
-"""m: what is off by no more is so by rounding."""
+"""Distance in m that is attributed to rounding."""
 SHORTER = 0.1
-"""Share of a path by which its nodes may be shorter, as chords are, and are still of all of it."""
+"""Share of its length by which chords may be shorter than a path of which they sample all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Candidate:
-    """One of the ways in which a contour may be cut.
+    """One way to cut a contour.
 
     Parameters
     ----------
     path : Contour
         The path to cut with its operations (leads, micro joints, ...), part frame.
     nodes : Contour
-        It, sampled as the job says: points, axes, kinds, speed shares and arc lengths.
+        The path sampled as the job says: points, axes, kinds, speed shares and arc lengths.
     speed : float m/s, optional
-        Along the path; None where the nodes carry their own times.
+        Speed along the path; None if the nodes carry their own times.
     unrounded : Contour, optional
-        The path before its corners were rounded, where they are.
+        The path before its corners were rounded; None without rounding.
     """
 
     path: Contour
@@ -58,34 +58,35 @@ class Candidate:
 
     @classmethod
     def at(cls, speed: float, path: Contour, nodes: Contour) -> Candidate:
-        """Return the candidate with nodes of a path, at a speed (m/s) unless they carry times."""
+        """Return the candidate with nodes of a path; `speed` (m/s) unless they carry times."""
         return cls(path=path, nodes=nodes, speed=speed if nodes.time is None else None)
 
     @property
     def dt(self) -> float:
-        """Time from node to node at the speed asked for, s."""
+        """Time from node to node at the requested speed, s."""
         return node_interval(self.nodes, self.speed)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CutRequest:
-    """What is asked for one contour: the ways to cut it, and how its plan is to be.
+    """The request to cut one contour: the ways to cut it and the options of its plan.
 
     Parameters
     ----------
     task : ContourSpec
-        What the job says of it.
+        The contour as the job describes it.
     loop : Contour
-        As drawn, part frame.
+        The loop as drawn, part frame.
     candidates : tuple of Candidate
-        Of which one is cut.
+        The ways to cut it, of which one is chosen.
     options : PlanOptions
+        Options of its plan.
     run : Subproblem or None
         The run of a Pareto set that the plan follows, with its windows and clearance.
     touched_up : bool
         Whether targets of the path were moved by hand.
     closer : str
-        How its nodes are nearer to each other than the job says, and why; "" where they are not.
+        Note on nodes that are closer together than the job says, and why; "" if they are not.
     """
 
     task: ContourSpec
@@ -100,20 +101,20 @@ class CutRequest:
 
     @property
     def leaves_the_loop(self) -> bool:
-        """Whether points or tool axes of the cut are other than those of the loop as drawn."""
+        """Whether points or tool axes of the cut differ from the drawn loop."""
         return self.touched_up or self.task.table.moves_the_path
 
     def drawing_checks(self, candidate: Candidate, nodes: Contour, path: float) -> list[Check]:
-        """Return the check of rounded corners against the drawing, where there are any.
+        """Return the check of rounded corners against the drawing; empty without such corners.
 
         Parameters
         ----------
         candidate : Candidate
-            What is cut.
+            The candidate that is cut.
         nodes : Contour
-            That sample it: all of it, or nothing is checked.
+            Its nodes; nothing is checked unless they sample the complete path.
         path : float m
-            How far chords between nodes may be off the path anyway.
+            Tolerance of the chords between nodes from the path.
         """
         rounded, sharp = self.task.rounded, candidate.unrounded
         whole = abs(nodes.length - candidate.path.length) <= SHORTER * candidate.path.length
@@ -126,7 +127,7 @@ class CutRequest:
         return [
             Check(
                 code="drawing",
-                title=f"drawing off the chords of the nodes, its corners rounded by "
+                title=f"distance of the drawing from the chords of the nodes, corners rounded by "
                 f"{rounded * 1e3:g} mm",
                 value=float(off[worst]),
                 limit=max(rounded, path) + SAME_PLACE,
@@ -140,14 +141,14 @@ class CutRequest:
         """Return the request for the first candidate, planned as a run of a Pareto set."""
         mine = self.options
         options = run.applied_to(replace(mine, feed="constant", refine=refine))
-        if run.continuous:  # it keeps its own shares of the limits, and all else the job's
+        if run.continuous:  # such a run keeps the job's shares of the limits
             options = replace(options, eta_v=mine.eta_v, eta_a=mine.eta_a)
         return replace(self, candidates=self.candidates[:1], options=options, run=run)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PreparedJob:
-    """A job with its drawing and its cell: what runs, and what plans and programs are judged by.
+    """A job with its drawing and cell read, ready to run and to audit plans and programs against.
 
     Parameters
     ----------
@@ -155,9 +156,9 @@ class PreparedJob:
     part : Part
     cell : Cell or None
     contours : tuple of CutRequest
-        In the order of the job, or in that in which they are to be cut.
+        The contours, in the order of the job or in the order of cutting.
     inner_first : tuple of (int, int)
-        Contours of which the first is to be cut before the second.
+        Pairs of contours (from 0) of which the first is to be cut before the second.
     """
 
     job: Job
@@ -172,7 +173,7 @@ class PreparedJob:
     def of(
         cls, job: Job, part: Part, cell: Cell | None, contours: Sequence[CutRequest]
     ) -> PreparedJob:
-        """Return the job with its contours; which lie in which follows from their loops."""
+        """Return the job with these contours; their nesting follows from their loops."""
         inner: Sequence[tuple[int, int]] = ()
         if job.sequence is not None and job.sequence.inner_first:
             inner = inner_first([contour.loop for contour in contours])
@@ -191,16 +192,16 @@ class PreparedJob:
 
 
 def prepare(job: Job, part: Part | None = None, cell: Cell | None = None) -> PreparedJob:
-    """Return a job with its drawing and cell read; `part`, `cell` where they are already.
+    """Return a job with its drawing and cell read; `part` and `cell` if they are read already.
 
     Raises
     ------
     InputError
-        The drawing or the cell cannot be read, a loop does not exist, contours cannot be sampled;
-        with a line for each of them.
+        The drawing or the cell cannot be read, a loop does not exist, or contours cannot be
+        sampled; the error has a line for each problem.
     """
     part = part or job.read_part()
-    tasks = job.tasks(part)  # a misspelt name shall not wait for the cell
+    tasks = job.tasks(part)  # first, so that a misspelt name is reported before the cell is read
     requests, faults = list[CutRequest](), list[InputError]()
     try:
         cell = cell_of_job(job, part) if cell is None else cell
@@ -238,9 +239,9 @@ def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
 def _within_tolerances(
     job: Job, task: ContourSpec, paths: Sequence[Contour]
 ) -> tuple[ContourSpec, str]:
-    """Return the task with nodes as near to each other as the audit asks for, and what changed.
+    """Return the task with nodes close enough for the tolerances of the audit, and a note on it.
 
-    A number of nodes that the job says is kept, and so are nodes that are divided later.
+    A number of nodes (`count`) is kept, and so are nodes that are divided later (refine_parts).
     """
     if task.count is not None or job.options.refine_parts > 1:
         return task, ""
@@ -250,8 +251,8 @@ def _within_tolerances(
     key = task.sampled_by
     asked, used = (getattr(each.table, key) for each in (task, finer))
     return finer, (
-        f"{key} = {used:.3g} in place of {asked:g}, as what lies between its nodes keeps the "
-        "tolerances of [audit] only so"
+        f"{key} = {used:.3g} is used in place of {asked:g}, so that the path between its nodes "
+        "keeps the tolerances of [audit]"
     )
 
 

@@ -1,4 +1,4 @@
-"""What the [program] and [audit] tables say, in SI: a program's options, what an audit allows."""
+"""Program options and audit tolerances, in SI, from the [program] and [audit] tables."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from kerfpath.transfer import TransferMove
 __all__ = ["ProgramOptions", "Tolerances", "program_options", "tolerances_of"]
 
 _NAME_LENGTH = 32
-"""Characters that a robot controller takes in a name."""
+"""Longest name, in characters, that robot controllers take."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,7 @@ class ProgramOptions:
     language : str
         Robot language, or "none".
     settings : LanguageSettings or None
-        Those of the language.
+        Settings of the language.
     name, retract, zone, zone_error, lead_time, pierce_time, approach_speed, air_speed,
     arc_tolerance, gas_lead, handshakes
         As in `kerfpath.post.build_program`.
@@ -69,7 +69,7 @@ class ProgramOptions:
         Raises
         ------
         InputError
-            As there.
+            As `kerfpath.post.build_program`.
         """
         return build_program(
             plans,
@@ -88,7 +88,10 @@ class ProgramOptions:
         )
 
     def issues(self, cuts: Sequence[tuple[str, float]], robot: Robot) -> list[ProgramIssue]:
-        """Return what the language refuses of cuts, see `kerfpath.post.issues_before_planning`."""
+        """Return the issues of the language, see `kerfpath.post.issues_before_planning`.
+
+        `cuts` are the names of the contours and their speeds in m/s.
+        """
         return issues_before_planning(
             cuts,
             robot,
@@ -106,14 +109,14 @@ class ProgramOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
-    """What the audit allows between the nodes.
+    """Tolerances of the audit between the nodes.
 
     Parameters
     ----------
     path : float m
         Largest distance of the tool tip from the path.
     axis : float rad
-        Largest angle of the tool axis from the one asked for.
+        Largest angle between the tool axis and the requested one.
     """
 
     path: float
@@ -141,16 +144,16 @@ class Tolerances:
 
 
 def tolerances_of(table: AuditTable) -> Tolerances:
-    """Return what an [audit] table allows."""
+    """Return the tolerances of an [audit] table, in SI."""
     return Tolerances(
         path=table.path_tolerance_mm / 1000, axis=float(np.radians(table.axis_tolerance_deg))
     )
 
 
 def program_options(table: ProgramTable, stem: str, allowed: Tolerances) -> ProgramOptions:
-    """Return the options of a [program] table; `stem` names the program where it does not.
+    """Return the options of a [program] table; a program without a name is named after `stem`.
 
-    Corners are rounded as far as the path may be left, where the table does not say how far.
+    Without zone_error_mm, corners may be rounded by the path tolerance that is `allowed`.
     """
     error = table.zone_error_mm
     stem = re.sub(r"[^A-Za-z0-9_]", "_", stem)

@@ -1,4 +1,4 @@
-"""read_job(): from a TOML file to a job in SI with everything in it resolved."""
+"""Read a TOML job file into a job in SI with all its references resolved."""
 
 from __future__ import annotations
 
@@ -46,46 +46,46 @@ from kerfpath.robots import Robot
 __all__ = ["Job", "home_of", "places_of", "read_job"]
 
 MOST_TEXT = 10_000_000
-"""Characters of a job file: many thousand contours."""
+"""Largest job file, in characters; enough for many thousand contours."""
 _DOTTED = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){33}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Job:
-    """A job file, read and resolved: all in SI, nothing left to look up but the part itself.
+    """A job file, read and resolved: all values are in SI, only the part is not read yet.
 
     Parameters
     ----------
     path : Path
         The job file.
     robot : Robot
-        With limits, velocities and accelerations as the job says.
+        The robot, with the limits of the job.
     tool : (4, 4) m
         T_flange_tip.
     placement : (4, 4) m
         T_base_part.
     drawing : Drawing
-        The CAD file, and how it is read.
+        The CAD file and how to read it.
     contours : tuple of ContourSpec
-        In the order of cutting.
+        The contours, in the order of the file.
     options : PlanOptions
-        How every contour is to be planned.
+        Options for planning every contour.
     cell : CellTable or None
-        What stands around, as the file says it; without one, collisions are not checked.
+        The [cell] table; without one, collisions are not checked.
     home : (n,) rad, optional
-        Joints that the program begins and ends at, external axes last (linear: m).
+        Joints at the beginning and the end of the program, external axes last (m if linear).
     sequence : SequenceTable or None
-        How the order and the moves between contours are chosen; without one, neither is.
+        The [sequence] table; without one, the order is that of the file and no moves are planned.
     layout : LayoutTable
-        What `kerfpath layout` may move, and how far, as the file says it.
+        The [layout] table: what `kerfpath layout` may move, and how far.
     tolerances : Tolerances
-        What the audit allows between the nodes.
+        Tolerances of the audit between the nodes.
     program : ProgramOptions
-        For the robot program.
+        Options of the robot program.
     source : mapping
-        The whole file as read: tables, keys and values that JSON can hold.
+        The parsed file: its tables and keys, with values that JSON can hold.
     text : str
-        The same as it was written, with its comments.
+        The text of the file, with its comments.
     """
 
     path: Path
@@ -108,22 +108,22 @@ class Job:
 
     @property
     def part_file(self) -> Path:
-        """The CAD file, there when the job was read."""
+        """The CAD file; it existed when the job was read."""
         return self.drawing.file
 
     def read_part(self) -> Part:
-        """Return the part that the CAD file holds.
+        """Return the part in the CAD file.
 
         Raises
         ------
         InputError
-            It cannot be read, or not all of it that may have been to cut.
+            The file cannot be read, or geometry that may have to be cut is left out.
         """
         part = self.drawing.read()
         doubtful = [str(one) for one in part.left_out if one.may_cut]
         if doubtful and not self.drawing.accept_left_out:
             said = (
-                f"expected a drawing that is read whole; {'; '.join(doubtful)}; repair "
+                f"expected a drawing that can be read completely; {'; '.join(doubtful)}; repair "
                 f'{self.part_file.name}, or write left_out = "accept"'
             )
             raise refusal_at(self.path, ("part", "file"), said)
@@ -138,10 +138,11 @@ class Job:
         external: Array | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> LayeredGraph:
-        """Return the layered graph of a contour's nodes, by these options or the job's own.
+        """Return the layered graph of a contour's nodes, by these options or those of the job.
 
-        With `only` (M,) it has the layers of these nodes alone. External axes are at `external`
-        (K, E) or (K, X, E), or take the gentlest course.
+        With `only` (M,), the graph has the layers of these nodes only. External axes are at
+        `external`, (K, E) or (K, X, E) rad or m; by default the continuous method takes the
+        course of `kerfpath.planner.external_course`.
         """
         chosen = options or self.options
         if self.robot.free.size and external is None and chosen.method == "continuous":
@@ -160,13 +161,13 @@ class Job:
         )
 
     def tasks(self, part: Part) -> tuple[ContourSpec, ...]:
-        """Return the contours to cut of the part that was read.
+        """Return the contours to cut, one for each loop of the part that is picked.
 
         Raises
         ------
         InputError
-            A loop that does not exist, or that is picked twice; an open line with what only a
-            closed loop can have.
+            A loop does not exist or is picked twice, or an open line has a key that needs a
+            closed loop.
         """
         tasks, faults = list[ContourSpec](), list[InputError]()
         for number, table in enumerate(self.contours):
@@ -189,25 +190,25 @@ class Job:
         return tuple(tasks)
 
     def _require_open(self, task: ContourSpec, number: int) -> None:
-        """Raise InputError where a task of table `number` asks of an open line what it has not."""
+        """Raise InputError if table `number` has a key that its open line cannot have."""
         line = f"loop {task.pick!r} is an open line, which"
         for key, why in keys_of_closed_loops(task.table).items():
             raise refusal_at(self.path, ("contour", number, key), f"{line} {why}; remove {key}")
         if self.options.closure == "periodic":
-            said = f'{line} does not come back to its start; write closure = "free"'
+            said = f'{line} does not return to its start; write closure = "free"'
             raise refusal_at(self.path, ("plan", "closure"), said)
 
 
 def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
-    """Return the job of a TOML file.
+    """Return the job in a TOML file.
 
-    Of a copy that lies beside the job itself, `copy_of` gives the program its name.
+    If the file is a copy beside the job, `copy_of` is the job, which the program is named after.
 
     Raises
     ------
     InputError
-        Anything wrong with the file, in one line: file, line, key, what was expected, what came
-        and what to do; the first problem, and how many more there are.
+        The file is not a valid job. One line names file, line and key, what was expected, what
+        came and what to do, for the first problem, and how many more there are.
     """
     path = Path(path)
     text = _text(path)
@@ -222,8 +223,8 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         raise refusal_at(
             path,
             ("plan", "rotation_deg"),
-            "expected an endless axis to limit, got none; remove it, or say which with endless "
-            "in [robot]",
+            "expected an endless axis to limit, got none; remove rotation_deg, or list endless "
+            "axes with endless in [robot]",
         )
     try:
         moves = file.program.language != "none" or file.sequence is not None
@@ -256,7 +257,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
 
 
 def places_of(job: Job, nodes: Contour) -> Array | None:
-    """Return a coarse grid (K, X, E) of what poses leave free at every node; None: nothing."""
+    """Return a coarse grid (K, X, E) of the joints that a pose leaves free; None without any."""
     if not job.robot.free.size:
         return None
     places = coarse_places(job.robot)
@@ -268,7 +269,7 @@ def home_of(
 ) -> Array | None:
     """Return the joints (n,) at home, external axes last; None where a job has no home.
 
-    An axis of which no table says where that is stands at zero, or nearest to it.
+    An external axis without a home in its table is at zero, or at its limit nearest to zero.
     """
     if sequence is None or sequence.home_deg is None:
         return None
@@ -283,14 +284,14 @@ def home_of(
 
 
 def _loaded(path: Path, file: JobFile, robot: Robot) -> Robot:
-    """Return the robot with what its flange carries, where the job says; then torques are known."""
+    """Return the robot with the load on its flange if the job gives one; torques need it."""
     table, load = file.robot, file.tool.load()
     asked = next((k for k in ("torque_nm", "gravity_m_s2") if getattr(table, k) is not None), None)
     if load is None:
         if asked is not None:
             said = (
-                f"expected mass_kg and centre_mm of what the flange carries, as {asked} is given, "
-                "got none; add them, or mass_kg = 0 where it carries nothing"
+                f"expected mass_kg and centre_mm of the load on the flange, as {asked} is given, "
+                "got none; add them, or mass_kg = 0 without a load"
             )
             raise refusal_at(path, ("tool", "mass_kg"), said)
         return robot
@@ -299,7 +300,7 @@ def _loaded(path: Path, file: JobFile, robot: Robot) -> Robot:
     except InputError as error:
         if robot.torque is None and robot.inertia is not None:
             said = (
-                f"expected joint torques, as {table.urdf} does not state those of every joint, got "
+                f"expected torque limits, as {table.urdf} does not state that of every joint, got "
                 f"none; add torque_nm = [{robot.joints} numbers, N m]"
             )
             raise refusal_at(path, ("robot", "torque_nm"), said) from None
@@ -308,10 +309,10 @@ def _loaded(path: Path, file: JobFile, robot: Robot) -> Robot:
 
 
 def _comfort(file: JobFile, robot: Robot) -> Comfort | None:
-    """Return what plans keep away from.
+    """Return the margins and penalties of plans.
 
-    Joints keep off their limits, as the digits of a program and what is straight between two nodes
-    need; not where a range leaves no room for it.
+    By default joints keep a margin to their limits, for the digits of a program and for straight
+    joint motions between nodes, unless the range of a joint is too small for it.
     """
     limits, own = robot.joint_limits(), slice(robot.family.joints)
     ranges = (limits.upper - limits.lower)[own][~limits.endless[own]]
@@ -331,7 +332,7 @@ def _text(path: Path) -> str:
         why = getattr(error, "strerror", None) or str(error)
         raise error_at(path, None, f"cannot be read ({why}); give the path of a job file") from None
     if endless:
-        raise error_at(path, None, "is no file; give the path of a job file")
+        raise error_at(path, None, "is not a file; give the path of a job file")
     try:
         return raw.decode("utf-8-sig")  # some editors begin a UTF-8 file with a byte order mark
     except UnicodeDecodeError as error:
@@ -345,11 +346,16 @@ def _text(path: Path) -> str:
 
 def _tables(path: Path, text: str) -> dict[str, Any]:
     if len(text) > MOST_TEXT:
-        raise error_at(path, None, f"expected a job file, got one of {len(text) / 1e6:.0f} MB")
-    # The time that TOML's reader takes grows with the square of these.
+        raise error_at(
+            path,
+            None,
+            f"expected a job file of at most {MOST_TEXT / 1e6:.0f} MB, got "
+            f"{len(text) / 1e6:.0f} MB; give the path of a job file",
+        )
+    # The time that the TOML parser takes grows with the square of the number of parts.
     if (dotted := _DOTTED.search(text)) is not None:
         line = text.count("\n", 0, dotted.start()) + 1
-        raise error_at(path, line, "a key of too many parts joined by dots; no job has such keys")
+        raise error_at(path, line, "expected a key of a job, got one with too many dotted parts")
     try:
         tables = tomllib.loads(text)
     except RecursionError:

@@ -1,4 +1,4 @@
-"""What is wrong with a job file, said in one line: file, line, key, expected, got, what to do."""
+"""One-line messages about faults in a job file: place, key, expected, got, what to do."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _LONGEST = 60
 
 
 def refusal(path: Path, text: str, error: ValidationError) -> InputError:
-    """Return the first problem in the file, said in one line, and the others in lines of theirs."""
+    """Return an error with one line for the first problem in the file and one for each other."""
     details = error.errors(include_url=False)
     locs, places = [d["loc"] for d in details], TomlPlaces(text)
     problems = []
     for detail in details:
         loc = detail["loc"]
-        # An array with a wrong element is also called too short: the element says it all.
+        # pydantic also reports an array with a wrong element as too short: show the element only.
         if detail["type"] == "too_short" and any(p[: len(loc)] == loc != p for p in locs):
             continue
         where = (*loc, *detail["ctx"]["where"]) if detail["type"] == FAULT else loc
-        # What is missing comes last: a misspelt key is the better news of the two.
+        # Missing keys come last: a misspelt key explains more.
         order = detail["type"] == "missing", *places.locate(where)
         key = ".".join(part for part in where if isinstance(part, str))
         problems.append((order, f"{key}: {_problem(detail)}"))
@@ -39,14 +39,14 @@ def refusal(path: Path, text: str, error: ValidationError) -> InputError:
 
 
 def refusal_at(path: Path, where: Sequence[str | int], said: str) -> InputError:
-    """Return the error that says what is wrong at a place of a job file that was read before."""
+    """Return an error about a place in a job file that was read before."""
     line = TomlPlaces(path.read_text(encoding="utf-8-sig")).locate(where).line
     key = ".".join(part for part in where if isinstance(part, str))
     return error_at(path, line, f"{key}: {said}")
 
 
 def _problem(detail: ErrorDetails) -> str:
-    """Say what was expected, what came and what to do."""
+    """Return the words about what was expected, what came and what to do."""
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
     if kind == FAULT:
         if "said" in context:
@@ -80,7 +80,7 @@ def _problem(detail: ErrorDetails) -> str:
 
 
 def _table_of(names: list[str]) -> tuple[str, list[str]]:
-    """Return the innermost table that a place is in, and the keys that lead on from there."""
+    """Return the innermost table that contains a place, and the remaining keys."""
     for n in range(len(names), 0, -1):
         if (table := ".".join(names[:n])) in TABLES:
             return table, names[n:]
@@ -88,7 +88,7 @@ def _table_of(names: list[str]) -> tuple[str, list[str]]:
 
 
 def _shown(value: object) -> str:
-    """Return a value as TOML has it, cut short."""
+    """Return a value in TOML notation, shortened."""
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, list):
@@ -108,7 +108,7 @@ def _shown(value: object) -> str:
 
 
 def error_at(path: Path, line: int | None, said: str) -> InputError:
-    """Return the error with its place in front."""
+    """Return an error with its place in front of the message."""
     return InputError(f"{path}: {said}" if line is None else f"{path}:{line}: {said}")
 
 

@@ -1,4 +1,4 @@
-"""Nodes so near to each other that what lies between them keeps the tolerances of the audit."""
+"""Sample contours finely enough to keep the tolerances of the audit between the nodes."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from kerfpath.job.format._program import Tolerances
 __all__ = ["chord_error", "closer_nodes"]
 
 MOST_TIMES = 8
-"""How many times as many nodes there may be as were asked for."""
+"""Largest factor on the number of nodes that was asked for."""
 KEPT = 0.9
-"""Share of a tolerance that a finer sampling is to keep: what is drawn does not bend evenly."""
+"""Share of a tolerance that finer sampling aims at, as the curvature varies along a contour."""
 LEAST, MOST = 0.2, 0.9
-"""Shares of the distance between nodes, the least and the most that is tried next."""
+"""Least and largest factor on the distance between nodes in one step."""
 
 
 def closer_nodes(
     task: ContourSpec, paths: Sequence[Contour], tolerances: Tolerances
 ) -> ContourSpec | None:
-    """Return the task with its nodes as near to each other as the tolerances ask for.
+    """Return the task with its nodes close enough to keep the tolerances.
 
-    The task itself where they are near enough. Where the tool axis turns too fast for its
-    tolerance, only that of the path is kept; None where that cannot be, either.
+    This is the task itself if its nodes are close enough. If the tool axis turns too fast for its
+    tolerance, only the tolerance of the path is kept; None if that is impossible, too.
 
     Parameters
     ----------
     task : ContourSpec
     paths : sequence of Contour
-        That it is to sample.
+        The paths to sample.
     tolerances : Tolerances
     """
     found = _closer(task, paths, tolerances)
@@ -57,7 +57,7 @@ def _closer(
             return None
         if excess <= 1:
             return task
-        # What a chord leaves out grows with the square of its length.
+        # The chord error grows with the square of the chord length.
         share = float(np.clip(np.sqrt(KEPT / excess), LEAST, MOST))
         task, times = task.finer(share), times / share
     return None
@@ -69,9 +69,9 @@ def _excess(path: Contour, nodes: Contour, tolerances: Tolerances) -> float:
 
 
 def _between(path: Contour, nodes: Contour) -> tuple[float, float]:
-    """Return how far (m) a path's own points lie off the chords of its nodes, and the axes (rad).
+    """Return the largest errors between nodes: of the path's points (m) and of its axes (rad).
 
-    Along a chord the tip goes straight and the axis turns evenly, as a robot moves them.
+    Along a chord the tip moves straight and the axis turns evenly, as in a linear robot motion.
     """
     k = np.clip(np.searchsorted(nodes.s, path.s, side="right") - 1, 0, len(nodes) - 2)
     start, chord = nodes.points[k], np.diff(nodes.points, axis=0)[k]

@@ -1,4 +1,4 @@
-"""What the values of a job file may be, and how a message says what was expected instead."""
+"""Types of the values in a job file, and the messages about wrong values."""
 
 from __future__ import annotations
 
@@ -21,40 +21,40 @@ __all__ = [
 ]  # fmt: skip
 
 LARGEST = 1e6
-"""No number of a job is larger, in the unit of its key: a kilometre in mm is a slip of the pen."""
+"""Largest number in a job, in the unit of its key; a kilometre in mm is a typing error."""
 SMALLEST = 1e-9
-"""What must be positive is at least this: smaller numbers vanish when units are converted."""
+"""Least positive number in a job: smaller numbers vanish when units are converted."""
 MOST_NODES = 1_000_000
-"""More nodes than any contour needs, few enough to fit into memory."""
+"""Most nodes of a contour: more than any contour needs, few enough to fit into memory."""
 FAULT = "kerfpath"
 """Error type of the rules below that pydantic cannot state itself."""
 _LISTED = 12
-"""Known names are listed in a message up to this many."""
+"""Most known names that a message lists."""
 
 
 def nearest(name: str, known: Collection[str]) -> str:
-    """Say which of the `known` names are most like `name`, or which there are."""
+    """Return words with the `known` names that are most similar to `name`, or with all of them."""
     within = [k for k in known if name and name.lower() in k.lower()]
     if near := within[:3] or get_close_matches(name, known, n=3, cutoff=0.5):
         return f"nearest: {', '.join(near)}"
-    return f"known: {', '.join(known)}" if len(known) <= _LISTED else "none is called like it"
+    return f"known: {', '.join(known)}" if len(known) <= _LISTED else "no known name is similar"
 
 
 def key(expected: str, example: str, **bounds: Any) -> Any:
-    """Return a field's bounds, with what a message says was expected and how to write it."""
+    """Return a field with its bounds, and with the expected value and an example for messages."""
     return Field(description=expected, examples=[example], **bounds)
 
 
 def fault(
     expected: str, got: str | None, remedy: str, where: tuple[str | int, ...] = ()
 ) -> PydanticCustomError:
-    """Return an error at the key that `where` leads to from here; `got` None: the value itself."""
+    """Return an error at the key `where`, relative to here; `got` None shows the value itself."""
     said = {"expected": expected, "got": got, "remedy": remedy, "where": where}
     return PydanticCustomError(FAULT, "expected {expected}, got {got}; {remedy}", said)
 
 
 def fault_in_words(said: str, where: tuple[str | int, ...] = ()) -> PydanticCustomError:
-    """Return an error that says `said`, a whole line except for its place, at `where` from here."""
+    """Return an error with the complete message `said` at the key `where`, relative to here."""
     return PydanticCustomError(FAULT, "{said}", {"said": said, "where": where})
 
 
@@ -95,9 +95,9 @@ Number = Annotated[float, Field(allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(allow_inf_nan=False, ge=SMALLEST, le=LARGEST)]
 NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0, le=LARGEST)]
 Axis = Annotated[int, Field(ge=1, le=7)]
-# TOML arrays arrive as lists: not strict about that, while their elements stay strict.
+# TOML arrays arrive as lists, so these tuples are not strict; their elements are.
 Three = Annotated[tuple[Number, ...], Field(strict=False, min_length=3, max_length=3)]
-# One number for every joint: how many that are is known once the robot is.
+# One number for every joint; the length is checked once the robot is known.
 Joints = Annotated[tuple[Number, ...], Field(strict=False, min_length=1)]
 JointsPositive = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
 JointsNotNegative = Annotated[tuple[NotNegative, ...], Field(strict=False, min_length=1)]

@@ -1,4 +1,4 @@
-"""The files that a run leaves in its folder."""
+"""The files that a run writes into its folder."""
 
 from kerfpath.job.output._files import FileTexts as FileTexts
 from kerfpath.job.output._files import WrittenFiles as WrittenFiles

@@ -1,4 +1,4 @@
-"""What a run leaves on disk: plan.json, trajectory.csv, report.html and the program."""
+"""Write the files of a run: plan.json, trajectory.csv, report.html and the program."""
 
 from __future__ import annotations
 
@@ -46,27 +46,27 @@ __all__ = [
 ]
 
 SHORT_PIECE = 0.02
-"""m: a shorter piece has hardly room for its leads, and is warned of."""
+"""Length in m below which a piece has hardly room for its leads, so that a note warns of it."""
 SHORTEST_CUT = 8
-"""No language cuts names to fewer characters."""
+"""Least number of characters to which a language cuts names."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WrittenFiles:
-    """The files of a run, and what their reader must know.
+    """The written files of a run, and notes for their reader.
 
     Parameters
     ----------
     files : tuple of Path
-        Written, in this order.
+        Written files, in this order.
     removed : tuple of Path
-        Of the program of an earlier run, and removed: they do not belong to this one.
+        Removed files of the program of an earlier run.
     stale : Path or None
-        The same, but edited since or of unknown origin, and so left.
+        A file of an earlier program that was edited or is of unknown origin, and so was kept.
     notes : tuple of str
-        Warnings of the program's preflight, and what nobody has checked.
+        Warnings of the program's preflight, and what was not checked.
     faults : tuple of str
-        Why nothing is to be cut though every contour is planned.
+        Why nothing must be cut, although every contour is planned.
     """
 
     files: tuple[Path, ...]
@@ -85,17 +85,17 @@ class FileTexts:
     Parameters
     ----------
     files : dict of str to str
-        By their names in the folder, those of the program first.
+        Texts by the names of the files, those of the program first.
     program : tuple of str
-        Which of them are the program, the one that is started first; none without one.
+        Names of the files of the program, the one that is started first; empty without a program.
     refused : str
-        Why there is no program though every plan has passed; empty otherwise.
+        Why there is no program, although every plan has passed; empty otherwise.
     unsafe : bool
-        Whether that is because the program, as its language says it, fails its audit.
+        Whether the reason is that the text of the program fails its audit.
     notes : tuple of str
-        Warnings of the program's preflight, and what nobody has checked.
+        Warnings of the program's preflight, and what was not checked.
     faults : tuple of str
-        Why nothing is to be cut though every contour is planned.
+        Why nothing must be cut, although every contour is planned.
     """
 
     files: dict[str, str]
@@ -114,8 +114,8 @@ def write_result(outcome: JobResult, folder: Path, *, strict: bool = False) -> W
     Raises
     ------
     InputError
-        The folder cannot be made or written to; or the program is refused, and the other files
-        are written.
+        The folder cannot be made or written to; or the program is refused (the other files are
+        written).
     AuditFailed
         The program fails its audit; the other files are written.
     """
@@ -194,15 +194,15 @@ def plan_file_text(outcome: JobResult) -> str:
 
 
 def stale_program(options: ProgramOptions, folder: Path, program: Sequence[str]) -> Path | None:
-    """Return a program of the job's name in its folder that is none of the files of `program`."""
+    """Return a program with the job's name in a folder that is not one of the files `program`."""
     written = [folder / name for name in program]
     return next((path for path in _programs(options, folder) if path not in written), None)
 
 
 def _programs(options: ProgramOptions, folder: Path) -> list[Path]:
-    """Return the programs of a job's name in a folder, or in one of their own in it.
+    """Return the programs with a job's name in a folder or in a subfolder of it.
 
-    Languages cut names, or say them in capitals.
+    Languages cut names or write them in capitals.
     """
     if options.language == "none":
         return []
@@ -213,7 +213,7 @@ def _programs(options: ProgramOptions, folder: Path) -> list[Path]:
 
 
 def order_note(part: PartPlan) -> str:
-    """Say how long the part takes, of what, and what is proved about the order."""
+    """Return the note on the cycle time, and on what is proved about the order."""
     order = part.order
     proved = (
         "no order takes less"
@@ -222,19 +222,19 @@ def order_note(part: PartPlan) -> str:
     )
     return (
         f"Cycle time {part.cycle_time:.1f} s: cutting {part.cutting_time:.1f} s, air "
-        f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; by these candidates and "
+        f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; with these candidates and "
         f"moves {proved}."
     )
 
 
 def closer_sampling(outcome: JobResult) -> list[str]:
-    """Say of contours that their nodes are nearer to each other than the job says."""
+    """Return the notes on contours whose nodes are closer together than the job says."""
     found = {cut.contour: cut.request.closer for cut in outcome.cuts}
     return [f"{name}: {words}" for name, words in found.items() if words]
 
 
 def short_pieces(outcome: JobResult) -> list[str]:
-    """Say of interrupted contours which piece is shortest, if it is short and nobody asked."""
+    """Return the notes on short pieces of contours, unless the job sets least_piece_mm."""
     if outcome.job.options.least_piece is not None:
         return []
     lengths: dict[str, list[float]] = {}
@@ -242,20 +242,20 @@ def short_pieces(outcome: JobResult) -> list[str]:
         if cut.plan is not None:
             lengths.setdefault(cut.contour, []).append(float(np.ptp(cut.plan.contour.s)))
     return [
-        f"{name}: the shortest of its {len(pieces)} pieces is {min(pieces) * 1e3:.1f} mm; with "
-        "least_piece_mm in [plan] none is shorter than that"
+        f"{name}: the shortest of its {len(pieces)} pieces is {min(pieces) * 1e3:.1f} mm; set "
+        "least_piece_mm in [plan] to avoid short pieces"
         for name, pieces in lengths.items()
         if len(pieces) > 1 and min(pieces) < SHORT_PIECE
     ]
 
 
 def require_folder(folder: Path) -> None:
-    """Refuse a place for the files that cannot be a folder, before any work is done for it.
+    """Require that a path is a folder or can become one, before any work is done.
 
     Raises
     ------
     InputError
-        Something else than a folder is there, or on the way there.
+        The path or one of its parents is a file.
     """
     for place in (folder, *folder.parents):
         if place.is_dir():
@@ -276,11 +276,11 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None
+        raise InputError(f"{folder}: cannot make this folder ({error.strerror})") from None
 
 
 def require_language(job: Job) -> None:
-    """Refuse a program that the job's robot cannot run, before any work is done for it.
+    """Require that the job's robot can run programs in its language, before any work is done.
 
     Raises
     ------
@@ -300,10 +300,10 @@ def require_language(job: Job) -> None:
 def trajectory_text(plans: Sequence[Plan], moves: Sequence[TransferMove] = ()) -> str:
     """Return the text of trajectory.csv: one row per node, in mm and degrees, base frame.
 
-    External axes stand after the arm's joints, by their names and units; points and axes of the
-    tool are those of part and base with each at zero.
+    External axes follow the arm's joints, with their names and units. Points and axes of the tool
+    are given for part and base with every external axis at zero.
 
-    Transfer moves stand where they are made, a row per corner; each has a time of its own.
+    Transfer moves are in the order of execution, a row per corner; the time of each begins at 0.
     """
     header = ["contour", "node", "kind", "t_s", *_joint_header(plans)]
     header += ["x_mm", "y_mm", "z_mm", "axis_x", "axis_y", "axis_z", "gamma_deg", "posture"]
@@ -348,5 +348,5 @@ def _write_air(writer: Any, move: TransferMove, plan: Plan) -> None:
 
 
 def _shown(plan: Plan) -> Array:
-    """Return by what joints (n,) are multiplied to be in degrees, linear axes in mm."""
+    """Return the factors (n,) that convert joints to degrees, and linear axes to mm."""
     return np.array([1e3 if unit == "m" else 180 / np.pi for unit in plan.robot.units])

@@ -1,4 +1,4 @@
-"""Lines of a run's program: when each of them runs, and what its preflight finds at which."""
+"""Lines of a run's program: when each line runs, and what the preflight finds at it."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ __all__ = ["ProgramPlaces", "program_places"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProgramPlaces:
-    """Where the text of a program says what.
+    """The lines of a program, with their times and the findings of the preflight.
 
     Parameters
     ----------
     lines : tuple of TimedLine
-        Of moves and waits, in the order of the program; none where its language is not read back.
+        Lines of moves and waits, in the order of the program; none if the language has no reader.
     findings : tuple of (ProgramIssue, Line or None)
         What the preflight finds, and at which line.
     """
@@ -47,8 +47,8 @@ def program_places(outcome: JobResult, files: Mapping[str, str]) -> ProgramPlace
     ----------
     outcome : JobResult
     files : mapping of str to str
-        The program by the names of its files, the one to start first; empty where there is none:
-        findings have no lines then.
+        The program by the names of its files, the one to start first; if empty, findings have no
+        lines.
     """
     options = outcome.job.program
     if not outcome.plans or outcome.stuck is not None or options.language == "none":
@@ -56,7 +56,7 @@ def program_places(outcome: JobResult, files: Mapping[str, str]) -> ProgramPlace
     try:
         program = options.program(outcome.plans, outcome.moves)
         issues = preflight(program, options.language, options.settings)
-    except InputError:  # said by whoever writes the program
+    except InputError:  # reported when the program is written
         return ProgramPlaces()
     where: tuple[Line | None, ...] = (None,) * len(issues)
     lines: tuple[TimedLine, ...] = ()

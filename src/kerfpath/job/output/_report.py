@@ -1,4 +1,4 @@
-"""report.html: what the report shows of a run."""
+"""Write report.html, the report of a run."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from kerfpath.transfer import TransferMove
 __all__ = ["report_text"]
 
 PER_LEG = 17
-"""Points that a straight joint motion is drawn by."""
+"""Number of points with which a straight joint motion is drawn."""
 
 
 def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] = ()) -> str:
-    """Return the HTML report of a run; `faults` say why it is not to be cut though planned."""
+    """Return the HTML report of a run; `faults` say why it must not be cut although planned."""
     job = outcome.job
     sections = [
         ContourSection(
@@ -60,7 +60,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
         ("Endless axes", _row(np.flatnonzero(robot.endless[:arm]) + 1) or "none"),
         *_external_facts(robot),
     ]
-    # From home and back to it the way is long, and would make the part small.
+    # Moves from and to home are long, and would make the part small in the picture.
     moves = outcome.moves
     between = moves[1:-1] if len(moves) > len(outcome.plans) else moves
     return render(
@@ -86,7 +86,7 @@ def _more_limits(robot: Robot) -> Iterator[tuple[str, str]]:
 
 
 def _external_facts(robot: Robot) -> list[tuple[str, str]]:
-    """Return what each external axis moves, and its limits, in rows of words."""
+    """Return a row for each external axis: what it carries, and its limits."""
     limits, arm = robot.joint_limits(), robot.family.joints
     facts = []
     for i, axis in enumerate(robot.externals, arm):
@@ -103,11 +103,11 @@ def _external_facts(robot: Robot) -> list[tuple[str, str]]:
 
 
 def _sampling(found: Departure) -> list[tuple[str, str]]:
-    """Return how far the nodes leave what they sample, in words."""
+    """Return the rows on how far the nodes leave the curve that they sample."""
     against = {
         "CAD curve": "the CAD curve",
-        "points of the drawing": "the lines through the points of the drawing, which show no more",
-        "path as cut": "the path as cut, which is not the drawn one",
+        "points of the drawing": "the lines through the points of the drawing",
+        "path as cut": "the path as cut, which differs from the drawn loop",
     }
     rows = [
         ("Measured against", against[found.against]),
@@ -128,7 +128,7 @@ def _sampling(found: Departure) -> list[tuple[str, str]]:
 
 
 def _tips(job: Job, move: TransferMove) -> Array:
-    """Return where the tool tip is along a move, (m, 3) m, part frame."""
+    """Return points of the tool tip along a move, (m, 3) m, part frame."""
     legs = np.linspace(move.q[:-1], move.q[1:], PER_LEG, axis=1).reshape(-1, move.q.shape[1])
     T = np.linalg.inv(job.placement) @ job.robot.forward(legs) @ job.tool
     return np.asarray(T[:, :3, 3])

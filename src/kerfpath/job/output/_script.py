@@ -1,4 +1,4 @@
-"""A job as a Python script: what it does, by the public functions, to be read and gone on with."""
+"""Write a job as a Python script that calls the public functions, to be read and extended."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from kerfpath.robots import robot as robot_of
 __all__ = ["python_script", "script_refusal"]
 
 ANGLES = frozenset(("gamma_step", "cone", "angle", "lower", "upper", "velocity", "acceleration"))
-"""Arguments in rad, rad/s and rad/s^2, which are written in degrees where that loses no digit."""
+"""Arguments in rad, rad/s and rad/s^2, which are written in degrees if that loses no digit."""
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 CLASSES = ("Band", "Certify", "Comfort", "PlanOptions", "Tilt")
-"""What options are made of."""
+"""Names that the planning options may use."""
 OF_CELL = ("CuttingHead", "Mesh", "box", "cell_of", "link_capsules", "thicken", "weld")
-"""What cells are made of."""
+"""Names that a cell may use."""
 SAY = "print"
-"""By which the script, and no module of this package, says how far it is."""
+"""The function with which the script prints; no module of this package except the CLI calls it."""
 WIDTH = 99
-"""Characters of a line, beyond which the arguments of a call stand below each other."""
+"""Characters of a line beyond which the arguments of a call are written one per line."""
 HEAD = '''\
-"""What {job} asks for: read the drawing, plan each contour, audit, write the program.
+"""The job {job}: read the drawing, plan each contour, audit, write the program.
 
 Put it beside {drawing} and run it with Python. Lengths are in m, angles in rad, times in s and
 speeds in m/s, unless a name says another unit; T_a_b maps coordinates of b into a.
@@ -94,22 +94,22 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
     ----------
     prepared : PreparedJob
     folder : Path, optional
-        That the script is put into; default: that of the job.
+        Folder of the script; default: that of the job.
 
     Raises
     ------
     InputError
-        The job asks for something that a script has no few lines for; says what.
+        The job has a feature that a script cannot express; the message names it.
     """
     job = prepared.job
     if refusal := script_refusal(job, prepared.contours):
-        said = f"{job.path}: as Python: {refusal}; run the job itself with kerfpath.job.run_job"
+        said = f"{job.path}: {refusal}; run the job itself with kerfpath.job.run_job"
         raise InputError(said)
     drawing = os.path.relpath(job.part_file.absolute(), folder or job.path.absolute().parent)
-    at_nodes = replace(job.options, between_nodes="reported")  # what else comes after each plan
+    at_nodes = replace(job.options, between_nodes="reported")  # the rest follows after each plan
     lines = [_robot(job), *_externals(job), f"T_flange_tip = {_array(job.tool)}", ""]
     lines += [f"T_base_part = {_array(job.placement)}", "", _part(job, drawing), ""]
-    lines += ["# How every plan is asked for.", _options(at_nodes)]
+    lines += ["# The options of every plan.", _options(at_nodes)]
     if prepared.cell is not None:
         lines += ["", *cell_lines(job, prepared.cell)]
     within, cell = job.tolerances, "" if prepared.cell is None else ", cell=cell"
@@ -137,10 +137,10 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
 
 
 def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
-    """Return what a job asks for that a script has no few lines for; empty where there is none."""
+    """Return what a job asks for that a script cannot express; empty if there is none."""
     assumed = not keeps_between_nodes(job) or bool(controller_of(job).assumed)
     beyond = {
-        'a "guaranteed" between_nodes that nothing proves': assumed
+        'between_nodes = "guaranteed" without a proof': assumed
         and job.options.between_nodes == "guaranteed",
         "solids from files in [cell]": job.cell is not None and has_files(job.cell),
         "[sequence]": job.sequence is not None,
@@ -151,7 +151,7 @@ def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
         "handshakes": bool(job.program.handshakes),
     }
     found = ", ".join(name for name, asked in beyond.items() if asked)
-    return f"a script has no lines for {found}" if found else ""
+    return f"a script cannot express {found}" if found else ""
 
 
 def _robot(job: Job) -> str:

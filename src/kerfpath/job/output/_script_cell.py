@@ -1,4 +1,4 @@
-"""The cell of a job in the lines of a Python script."""
+"""Write the cell of a job as lines of a Python script."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ __all__ = ["cell_lines", "has_files"]
 SIZES = (
     "nozzle_length_mm", "nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm",
 )  # fmt: skip
-"""Keys of [cell.head] that are arguments of the head, except for their unit."""
+"""Keys of [cell.head] that are arguments of `CuttingHead` without their unit."""
 SAME = 1e-6
-"""m: as jobs weld the corners of the part."""
+"""Distance in m below which corners of the part are merged, as in jobs."""
 
 
 def has_files(table: CellTable) -> bool:
-    """Return whether anything in a cell but the part is read from a file."""
+    """Return whether anything in a cell except the part is read from a file."""
     return table.head.file is not None or any(each.file is not None for each in table.fixture)
 
 
 def cell_lines(job: Job, cell: Cell) -> Iterator[str]:
-    """Yield the lines that make the cell of a job, without files of its own, as `cell`."""
+    """Yield the lines that build `cell`, the cell of a job whose bodies need no files."""
     table = job.cell
     assert table is not None
-    yield "# What the motions keep clear of."
+    yield "# The bodies that the motions keep clear of."
     named = {"tool": "T_flange_tip", "head": _head(table)}
     if table.part:
         yield f"vertices, triangles = weld(*part.mesh({table.deviation_mm!r} * MM), {SAME!r})"

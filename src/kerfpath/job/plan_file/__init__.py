@@ -1,4 +1,4 @@
-"""plan.json: written, read back, and audited against the job."""
+"""Write plan.json, read it back, and audit it against its job."""
 
 from kerfpath.job.plan_file._audit import PlanAudit as PlanAudit
 from kerfpath.job.plan_file._audit import audit_file as audit_file

@@ -1,4 +1,4 @@
-"""The audit of a plan.json: by its job where that is given, by itself where it is not."""
+"""Audit a plan.json against its job, or by itself if no job is given."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from kerfpath.plans import Plan
 
 __all__ = ["PlanAudit", "audit_file"]
 
-JOB, FILE = "what follows from the job and the joints", "what follows from the joints"
+JOB, FILE = "those of the job and the joints", "those of the joints"
 OWN_NODES = ("gamma_rad", "lead_lean_rad", "posture", "turn")
 """Columns of nodes that follow from the joints."""
 AIR = "air"
@@ -35,11 +35,11 @@ AIR = "air"
 
 
 def audit_file(plan_file: Path, job_file: Path | None = None) -> AuditReport:
-    """Return what the audit says of every contour of a plan.json.
+    """Audit every contour of a plan.json.
 
-    With a job, the job alone says what is asked for and allowed; what the plan repeats of it, or
-    says of its own joints, has to agree. Without one, limits, tool, placement and speed are those
-    that the plan says, and only what follows from its joints is compared.
+    With a job, only the job defines what is required and allowed; values that the plan repeats, or
+    that follow from its joints, must agree. Without one, limits, tool, placement and speed are
+    those of the plan, and only values that follow from its joints are compared.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class PlanAudit:
         return cls(prepared=prepare(read_job(job_file)))
 
     def audited(self, plan_file: Path) -> AuditReport:
-        """Return what the audit says of every contour of a plan.json, by the job.
+        """Audit every contour of a plan.json against the job.
 
         Raises
         ------
@@ -123,7 +123,7 @@ class PlanAudit:
     def _whole(
         self, file: PlanFile, judged: Sequence[PlanData], expected: Sequence[ExpectedPlan]
     ) -> list[Check]:
-        """Compare what stands in the file beside its contours: robot, limits, cell, sequence."""
+        """Compare the parts of the file beside its contours: robot, limits, cell, sequence."""
         prepared, job, data = self.prepared, self.prepared.job, file.data
         plans = [each.plan for each in expected if each.plan is not None]
         part = None
@@ -139,14 +139,14 @@ class PlanAudit:
                 continue  # a contour is refused already, and its times are not known
             rows += [row for row in compare_values(whole[key], own[key], JOB, (key,)) if not row.ok]
         if job.sequence is not None and data["sequence"] is None:
-            rows.append(count("moves", "moves between contours that the job asks for", 1))
+            rows.append(count("moves", "missing moves between contours", 1))
         return rows or compare_values({}, {}, JOB)
 
 
 def _entry(plan: Plan, said: PlanData, made: Sequence[Check], file: PlanFile) -> PlanData:
-    """Return what plan.json should say of a contour, the record of the audit included.
+    """Return the plan.json entry that a contour should have, with the record of its audit.
 
-    The record of another version is its own.
+    The record of another version of kerfpath is not compared.
     """
     name = said["contour"]
     picked, shown = plan.name in file.picked, "certificate" in said
@@ -157,19 +157,19 @@ def _entry(plan: Plan, said: PlanData, made: Sequence[Check], file: PlanFile) ->
 
 
 def _claims(plan: Plan) -> list[Check]:
-    """Check of what is claimed of other motions the part that can be checked."""
+    """Check the claims about other motions, as far as they can be checked."""
     before, rows = plan.proof.grid_cost, []
     if before is not None:
         title = "cost above that of the path it was refined from"
         rows.append(check("grid-cost", title, plan.cost - before * (1 + SAME), SAME, "count"))
     if plan.settings.method not in EXACT_OR_BETTER:
-        title = "claims to be best that its method cannot prove"
+        title = "claims of optimality that its method cannot prove"
         rows.append(count("optimal", title, plan.proof.optimal))
     return rows
 
 
 def _list_claims(file: PlanFile, tables: Mapping[str, Sequence[Check]]) -> str:
-    """Say which bounds are proved again, and what the file claims that nobody has verified."""
+    """Return the note on the bounds that are proved again, and on claims that are not verified."""
     proved = [
         name for name, table in tables.items() if any(c.code == BOUND and c.ok for c in table)
     ]
@@ -185,12 +185,12 @@ def _list_claims(file: PlanFile, tables: Mapping[str, Sequence[Check]]) -> str:
     if claims:
         said.append(f"Claimed, not verified: {' and '.join(claims)}.")
     if any(p.name in bounded and p.settings.objective == "sum" for p in file.plans):
-        said.append("plan.json keeps what proves a bound with certificate = true in [plan].")
+        said.append("With certificate = true in [plan], plan.json keeps the proof of a bound.")
     return " ".join(said)
 
 
 def _by_itself(file: PlanFile) -> AuditReport:
-    """Return the audit of a plan.json by what it says itself."""
+    """Audit a plan.json without its job."""
     tolerances = table_of(file, "audit", AuditTable, tolerances_of)
     tables = {}
     for p in file.plans:
@@ -201,17 +201,17 @@ def _by_itself(file: PlanFile) -> AuditReport:
         entry["audit"], entry["nodes"] = said["audit"], cast(NodesData, said["nodes"] | follow)
         tables[p.name] = [*made, *_claims(own), *compare_values(entry, said, FILE)]
     if not file.plans and not file.missing:
-        tables[file.path.name] = [count("contours", "plans lacking: the file has none", 1)]
+        tables[file.path.name] = [count("contours", "missing plans: the file has none", 1)]
     if file.moves and file.plans:
         robot = file.plans[0].robot
         tables[AIR] = worst_of(transfer_checks(robot, m.q, m.time) for m in file.moves)
     note = (
         "Limits, tool, placement and speed were taken from the plan itself; give its job with "
-        "--job to judge by that."
+        "--job to audit against the job."
     )
     collisions = (
-        "Planned clear of collisions in a cell, which was not checked again: give its job with "
-        "--job."
+        "The plan was made free of collisions in a cell, which was not checked again: give its "
+        "job with --job."
         if file.in_cell
         else collision_note(None)
     )

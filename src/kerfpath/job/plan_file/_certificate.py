@@ -1,4 +1,4 @@
-"""What plan.json says of a certificate: its arrays, packed."""
+"""Certificates in plan.json: their arrays, packed."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ TYPES: Mapping[str, str] = {
     "dual": "<f4",
     "multipliers": "<f8",
 }
-"""The numbers of each array of a stage, little-endian; its bytes row by row."""
+"""Number type of each array of a stage, little-endian; its bytes are row by row."""
 LARGEST = 1 << 30
-"""Bytes of the largest array that is unpacked."""
+"""Size of the largest array that is unpacked, in bytes."""
 
 
 def certificate_entry(certificate: Certificate) -> CertificateData:
-    """Return what plan.json says of a certificate."""
+    """Return the plan.json entry of a certificate."""
     stages = [
         {
             name: None if (part := getattr(stage, name)) is None else _packed(part, kind)
@@ -51,7 +51,7 @@ def read_certificate(data: CertificateData) -> Certificate:
     Raises
     ------
     InputError
-        Arrays that are not what they say, or of another shape than the cells of their stage.
+        An array differs from its stated type or size, or from the number of cells of its stage.
     """
     return Certificate(
         bound=data["bound"],
@@ -68,7 +68,7 @@ def _stage(number: int, data: StageData) -> Stage:
     C = arrays["node"].shape[:1] if arrays["node"] is not None else ()
     for name, part in arrays.items():
         if part is not None and name != "multipliers" and part.shape[:1] != C:
-            raise InputError(f"{where}: {name} is of {part.shape}, and its nodes are {C}")
+            raise InputError(f"{where}: expected {name} for {C} nodes, got the shape {part.shape}")
     return Stage(**arrays)  # type: ignore[arg-type]  # each of its type
 
 
@@ -87,7 +87,7 @@ def _unpacked(data: ArrayData, kind: str, where: str) -> NDArray[np.generic]:
     shape = data["shape"]
     size = math.prod(shape) * np.dtype(kind).itemsize
     if min(shape, default=0) < 0 or size > LARGEST:
-        raise InputError(f"{where}: no shape of an array: {shape}")
+        raise InputError(f"{where}: expected the shape of an array, got {shape}")
     try:
         packed = base64.b64decode(data["zlib_base64"], validate=True)
         opened = zlib.decompressobj()

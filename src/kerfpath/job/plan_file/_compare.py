@@ -1,4 +1,4 @@
-"""Where a plan.json says something else than what follows from its job and its joints."""
+"""Compare a plan.json with the values that follow from its job and its joints."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ __all__ = ["CLAIMS", "compare_jobs", "compare_values"]
 
 CLAIMS = {
     r"kerfpath$": "the version that wrote the file",
-    r"(proof|optimal|grid_cost|bound|gap)$": "what is claimed of motions that are not in the file",
-    r"certificate(/|$)": "what the audit has a check of its own for",
+    r"(proof|optimal|grid_cost|bound|gap)$": "claims about motions that are not in the file",
+    r"certificate(/|$)": "the proof of a bound, which the audit checks separately",
     r"counts(/|$)": "poses that were dropped in planning",
     r"audit/checks/\d+/(title|advice|node)$": "words and places of the audit made in planning",
-    r"sequence/(optimal|at_least_s)$": "what is claimed of orders that are not in the file",
+    r"sequence/(optimal|at_least_s)$": "claims about orders that are not in the file",
 }
-"""Places that are not compared, and why: none says anything of the motion."""
+"""Places that are not compared, and what they hold; none of them defines the motion."""
 DISTANCE = 1e-6
-"""m: distances between convex solids are exact to this; those of a record may differ."""
+"""Accuracy of distances between convex solids, m; those of a record may differ by it."""
 SHOWN = 60
-"""Characters of a value that a message shows."""
+"""Most characters of a value that a message shows."""
 PROGRAM = ("program", "audit", "layout")
-"""Tables of a job that do not say what the motion is."""
+"""Tables of a job that do not define the motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,9 +57,9 @@ class _Difference:
 def compare_values(
     expected: Any, found: Any, whose: str, under: tuple[str | int, ...] = ()
 ) -> list[Check]:
-    """Return a check for each kind of place at which `found` is not what is expected.
+    """Return a check for each kind of place at which `found` differs from what is expected.
 
-    The title says the first of each kind; a single check that passes where there is none.
+    The title has the first difference of the kind; without any, a single check passes.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def compare_values(
     whose : str
         Whose values are expected, in words.
     under : tuple
-        Where in the document the two stand.
+        Place of both values in the document.
     """
     groups: dict[tuple[str, ...], list[_Difference]] = {}
     for each in _differences(expected, found, under):
@@ -78,17 +78,19 @@ def compare_values(
         first = alike[0]
         many = "" if len(alike) == 1 else f" (and {len(alike) - 1} more such)"
         checks.append(
-            count("agrees", f"values that are not {whose}: {first}{many}", len(alike), first.node)
+            count(
+                "agrees", f"values that differ from {whose}: {first}{many}", len(alike), first.node
+            )
         )
-    return checks or [count("agrees", f"values that are not {whose}", 0)]
+    return checks or [count("agrees", f"values that differ from {whose}", 0)]
 
 
 def compare_jobs(job: Job, source: Mapping[str, Any]) -> list[Check]:
-    """Return the checks of the job that a plan.json repeats, by what its text means.
+    """Return the checks of the job that a plan.json repeats, compared by the values it means.
 
-    Tables that do not say what the motion is have a check of their own.
+    Tables that do not define the motion have a separate check.
     """
-    title = "values of the job that the plan was made from that are not the job's"
+    title = "values of the job in the plan that differ from the job"
     if _same(job.source, source):
         return [count("job", title, 0)]
     context = {"folder": job.path.parent}
@@ -96,7 +98,7 @@ def compare_jobs(job: Job, source: Mapping[str, Any]) -> list[Check]:
         then = JobFile.model_validate(source, context=context).model_dump(mode="json")
     except (ValidationError, ValueError, TypeError, OverflowError) as error:
         said = " ".join(str(error).split())[:SHOWN]
-        return [count("job", f"{title}: it is no job ({said}...)", 1)]
+        return [count("job", f"{title}: it is not a valid job ({said}...)", 1)]
     now = JobFile.model_validate(job.source, context=context).model_dump(mode="json")
     found = list(_differences(now, then, ("job",)))
     rows = []
@@ -140,7 +142,7 @@ def _differences(one: Any, two: Any, path: tuple[str | int, ...]) -> Iterator[_D
 def _far(
     one: NDArray[np.float64] | None, two: NDArray[np.float64] | None, path: tuple[str | int, ...]
 ) -> Iterator[_Difference]:
-    """Yield the numbers of two arrays that are apart, the farthest first."""
+    """Yield the numbers of two arrays that differ, the largest difference first."""
     assert one is not None
     assert two is not None
     if one.shape != two.shape:
@@ -161,7 +163,7 @@ def _allowed(path: tuple[str | int, ...], value: float) -> float:
 
 
 def _numbers(values: Any) -> NDArray[np.float64] | None:
-    """Return an array of numbers, of any depth; None where it holds anything else."""
+    """Return an array of numbers, of any depth; None if it holds anything else."""
     try:
         found = np.array(values)
     except ValueError:  # rows of unlike lengths
@@ -174,7 +176,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _same(one: Any, two: Any) -> bool:
-    """Say whether two documents are the same, types included."""
+    """Return whether two documents are the same, types included."""
     if type(one) is not type(two):
         return False
     if isinstance(one, dict):
@@ -185,7 +187,7 @@ def _same(one: Any, two: Any) -> bool:
 
 
 class _Absent:
-    """Stands for what one of the two has not."""
+    """Marks a value that one of the two documents lacks."""
 
 
 def _shown(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""What plan.json says of limits on torque and jerk, where there are any."""
+"""Limits on torque and jerk in plan.json."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def with_dynamics(entry: LimitsData, robot: Robot) -> Robot:
     Raises
     ------
     InputError
-        A load or masses that cannot be.
+        The load or the masses are not possible.
     """
     jerk = entry.get("jerk_rad_s3")
     if jerk is not None:

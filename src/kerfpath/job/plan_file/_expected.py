@@ -1,4 +1,4 @@
-"""The plans that a plan.json should hold: of its joints, and of the job in all the rest."""
+"""The plans that a plan.json should have: its joints, with all else from the job."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from kerfpath.retime import feed, retime
 __all__ = ["ExpectedPlan", "expect_plans"]
 
 SAME_PLACE = 1e-6
-"""m: a node and one of the job's are the same up to this distance."""
+"""Largest distance in m between a node and the same node of the job."""
 RETIMED = 1e-3
 """Share of an interval by which times of a reduced feed may differ: they are a local optimum."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ExpectedPlan:
-    """What is expected of one contour, or piece, of a plan.json.
+    """The plan that is expected for one contour, or piece, of a plan.json.
 
     Parameters
     ----------
     name : str
-        Of the plan in the file.
+        Name of the plan in the file.
     number : int
-        Which contour of the job it is of; -1 for none.
+        Number of its contour in the job, from 0; -1 for none.
     plan : Plan or None
-        The joints of the file, all else as the job has it; None where the two do not fit.
+        The joints of the file with all else from the job; None if the two do not fit.
     path : Contour or None
         The path that its nodes were sampled from.
     checks : tuple of Check
-        What does not fit: a contour that is not asked for, nodes that are not its nodes, joints.
+        Whether contour, nodes and joints fit the job.
     drawing : tuple of Check
-        Of rounded corners, against the drawing; a record of the file.
+        Checks of rounded corners against the drawing; the file has a record of them.
     """
 
     name: str
@@ -55,7 +55,7 @@ class ExpectedPlan:
 
 
 def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[ExpectedPlan], list[Check]]:
-    """Return what is expected of each plan of a file, and the checks of which contours it has."""
+    """Return the expected plan for each plan of a file, and the checks of its contours."""
     names = prepared.names
     members = [[p for p in file.plans if file.contours[p.name] == name] for name in names]
     found: dict[str, ExpectedPlan] = {}
@@ -82,7 +82,7 @@ def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[ExpectedPl
 def _of_contour(
     prepared: PreparedJob, number: int, plans: Sequence[Plan], picked: frozenset[str]
 ) -> list[ExpectedPlan]:
-    """Return what is expected of the plans of one contour: it alone, or its pieces."""
+    """Return the expected plans of one contour: a single one, or its pieces."""
     if not plans:
         return []
     name, job = prepared.names[number], prepared.job
@@ -104,7 +104,7 @@ def _of_contour(
 
 
 def _pieces(prepared: PreparedJob, number: int, plans: Sequence[Plan]) -> list[ExpectedPlan]:
-    """Return what is expected of the pieces of a contour, in the order along it."""
+    """Return the expected plans of the pieces of a contour, in the order along it."""
     job = prepared.job
 
     def off(candidate: Candidate) -> float:
@@ -120,7 +120,7 @@ def _pieces(prepared: PreparedJob, number: int, plans: Sequence[Plan]) -> list[E
         last = int(np.argmin(np.abs(whole.s - p.contour.s[-1])))
         last = len(whole) - 1 if p is plans[-1] else min(max(last, at + 1), len(whole) - 1)
         if at >= last:
-            row = count("pieces", "pieces that do not go on where the one before them ends", 1)
+            row = count("pieces", "pieces that do not begin where the piece before them ends", 1)
             found.append(ExpectedPlan(name=p.name, number=number, checks=(row,)))
             continue
         part = replace(whole.part(at, last, job.options.frames), name=p.name)
@@ -144,7 +144,7 @@ def _nearest(candidates: Sequence[Candidate], made: Plan, parts: int) -> Candida
 
 
 def _divided(candidate: Candidate, made: Plan, parts: int) -> Candidate:
-    """Return the candidate with its intervals divided, where those of the plan are."""
+    """Return the candidate with its intervals divided, if those of the plan are."""
     if parts == 1 or len(made.contour) != (len(candidate.nodes) - 1) * parts + 1:
         return candidate
     return replace(candidate, nodes=divide_nodes(candidate.path, candidate.nodes, parts))
@@ -167,7 +167,8 @@ def _expected(
         return ExpectedPlan(name=made.name, number=number, checks=(row,))
     far = np.linalg.norm(made.contour.points - nodes.points, axis=1)
     worst = int(np.argmax(far))
-    place = check("place", "nodes, off those of the job", far[worst], SAME_PLACE, "m", worst)
+    title = "distance of the nodes from those of the job"
+    place = check("place", title, far[worst], SAME_PLACE, "m", worst)
     parts = _parts(whole, nodes, job.options.refine_parts)
     plan = replace(
         made,
@@ -192,7 +193,7 @@ def _expected(
 
 
 def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
-    """Return into how many parts the nodes divide the intervals of the candidate's."""
+    """Return the number of parts into which the nodes divide intervals of the candidate."""
     step = float(np.median(np.diff(candidate.nodes.s)) / np.median(np.diff(nodes.s)))
     return parts if parts > 1 and step > (1 + parts) / 2 else 1
 
@@ -200,9 +201,9 @@ def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
 def _options(
     prepared: PreparedJob, number: int, dt: float, said: PlanOptions, *, picked: bool
 ) -> PlanOptions:
-    """Return how the job asks for a plan; one that was picked may aim at less than the limits."""
+    """Return the plan options of the job; a picked plan may have lower shares of the limits."""
     job, task = prepared.job, prepared.contours[number].task
-    # [program] may have been edited since: the retract of now has a check of its own.
+    # [program] may have been edited since: the current retract is checked separately.
     options = replace(task.asked(job.options).resolve(job.robot, dt), retract=said.retract)
     if not picked:
         return options
@@ -220,7 +221,7 @@ def _options(
 
 
 def _dipping(plan: Plan, dt: float, said: Array) -> Plan:
-    """Return the plan in the least time that its limits allow; what is said where that is it."""
+    """Return the plan in the least time within its limits; with the given times if they agree."""
     limits = plan.settings.limits(plan.robot)
     tau = retime(plan.increments, dt, limits)
     time, found = np.concatenate([[0.0], np.cumsum(tau)]), np.diff(said)
@@ -240,5 +241,5 @@ def _postures(job: Job, made: Plan) -> list[Check]:
 
 
 def _node_count(made: Plan, asked: str) -> Check:
-    said = f"nodes too many or too few: expected {asked}, found {len(made.contour)}"
+    said = f"wrong number of nodes: expected {asked}, found {len(made.contour)}"
     return count("nodes", said, 1)

@@ -1,4 +1,4 @@
-"""What plan.json says of external axes: their values apart from the arm's, in their own units."""
+"""External axes in plan.json: their values are separate from the arm's, in their own units."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["add_externals", "apart", "external_entries", "joints"]
 
 
 def apart(name: str, values: Array, robot: Robot) -> dict[str, object]:
-    """Return values (..., n) of the joints, those of external axes apart and in their own units."""
+    """Return values (..., n) of the joints; external axes are separate and in their own units."""
     n = robot.family.joints
     entry: dict[str, object] = {f"{name}_rad": values[..., :n].tolist()}
     if robot.externals:
@@ -25,12 +25,12 @@ def apart(name: str, values: Array, robot: Robot) -> dict[str, object]:
 
 
 def joints(entry: Mapping[str, Any], name: str, robot: Robot) -> Array:
-    """Return values (..., n) of the joints as `apart` has them.
+    """Return values (..., n) of the joints from an entry that `apart` has made.
 
     Raises
     ------
     InputError
-        Values of external axes missing, or too many.
+        There are too few or too many values of external axes.
     """
     own = np.array(entry[f"{name}_rad"], dtype=float)
     if not robot.externals:
@@ -45,7 +45,7 @@ def joints(entry: Mapping[str, Any], name: str, robot: Robot) -> Array:
 
 
 def external_entries(robot: Robot) -> list[ExternalData]:
-    """Return what there is to know of the robot's external axes."""
+    """Return the plan.json entries of the robot's external axes."""
     if not robot.externals:
         return []
     limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()

@@ -1,6 +1,6 @@
 """The layout of a plan.json: every key and the type of its value, SI, the unit in the name.
 
-It stands here once: the file is written as these types and checked against them, see `_schema`.
+The file is written as these types and checked against them, see `_schema`.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class CouplingData(TypedDict):
 
 
 class DynamicsData(TypedDict):
-    """The torque limits that were used, and what weighs on the joints."""
+    """The torque limits that were used, and the masses that load the joints."""
 
     torque_nm: Row
     gravity_m_s2: Row
@@ -99,7 +99,7 @@ class LimitsData(TypedDict):
 
 
 class NearestData(TypedDict):
-    """How near the arm comes to what comfort keeps it from, and where."""
+    """The least value of a measure of comfort along the plan, and its node."""
 
     least: float | None
     unit: str
@@ -107,7 +107,7 @@ class NearestData(TypedDict):
 
 
 class CriteriaData(TypedDict):
-    """The criteria of a plan, joint by joint; those of external axes apart."""
+    """The criteria of a plan, joint by joint; those of external axes are separate."""
 
     displacement_rad: Row
     external_displacement: NotRequired[Row]
@@ -121,7 +121,7 @@ class CriteriaData(TypedDict):
 
 
 class FeedData(TypedDict):
-    """Where the feed is reduced, and by what."""
+    """Where the feed is reduced, and the limit that binds there."""
 
     full: float
     slowest: float
@@ -191,14 +191,14 @@ class StageData(TypedDict):
 
 
 class CertificateData(TypedDict):
-    """What proves a bound, for whoever checks it."""
+    """The certificate that proves a bound."""
 
     bound: float
     stages: list[StageData]
 
 
 class PlanData(OptionData):
-    """A contour, or a piece of one, that has a plan: how it was asked for, and what came of it."""
+    """A contour, or a piece of one, that has a plan: its options and its results."""
 
     name: str
     contour: str
@@ -230,7 +230,7 @@ class ClosedData(TypedDict):
 
 
 class RelaxationData(TypedDict):
-    """Shares of what was asked for with which a motion was found: less speed, or more limits."""
+    """Factors on the request with which a motion was found: less speed, or higher limits."""
 
     speed: float
     velocity: float
@@ -279,7 +279,7 @@ class SequenceData(TypedDict):
 
 
 class PlanDocument(TypedDict):
-    """The whole file; `job` is the job file as read, `cell` a record that no reader relies on."""
+    """The complete file; `job` is the parsed job file, `cell` a record that no reader relies on."""
 
     schema: int
     kerfpath: str

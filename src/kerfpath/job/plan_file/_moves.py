@@ -1,4 +1,4 @@
-"""The audit of the transfer moves that a plan.json holds: by the job, cut to cut."""
+"""Audit the transfer moves of a plan.json against the job."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from kerfpath.transfer import End, TransferMove, back_off, least_time
 __all__ = ["check_moves", "expect_sequence"]
 
 SAME_CORNER = 1e-6
-"""rad: an end of a move and where the tool backs off to differ by rounding at most."""
+"""Rounding tolerance, rad, between an end of a move and the end of the retract."""
 FARTHEST = 1e3
-"""rad that no joint ever turns."""
+"""Joint value, rad, that no joint ever has."""
 SHARES = np.linspace(0.0, 1.0, 9)
-"""Of the retract, at which the way to and from a cut is looked at for collisions."""
+"""Shares of the retract at which approach and retract are checked for collisions."""
 
 
 def check_moves(
@@ -31,15 +31,15 @@ def check_moves(
 ) -> list[Check]:
     """Return the worst of each check over all moves; its node is the number of the move.
 
-    Each goes from where the tool backs off one cut to where it comes down to the next, or home;
-    within the limits, not faster than the robot can, and clear in the cell, as is the way down.
+    Each must lead from the retract of one cut to the approach of the next, or home, within the
+    limits, not faster than the robot can, and free of collisions, as must approach and retract.
     """
     sequence, robot = prepared.job.sequence, prepared.job.robot
     if sequence is None:
         return [count("moves", "moves that the job does not ask for", len(moves))] if moves else []
     homes = 2 if prepared.job.home is not None else 0
     wanted = len(plans) - 1 + homes
-    rows = [count("moves", "moves too many or too few", abs(len(moves) - wanted))]
+    rows = [count("moves", "missing or surplus moves", abs(len(moves) - wanted))]
     odd = [m for m in moves if m.q.shape[1] != robot.joints or len(m.q) < 2]
     far = [m for m in moves if not np.abs(m.q).max(initial=0.0) < FARTHEST]
     rows.append(count("corners", "moves without two corners of the robot's joints", len(odd)))
@@ -49,7 +49,7 @@ def check_moves(
     try:
         ways = [(_approach(prepared, p, "start"), _approach(prepared, p, "end")) for p in plans]
     except InputError as error:
-        return [*rows, count("retract", f"ends of cuts that cannot be backed off: {error}", 1)]
+        return [*rows, count("retract", f"ends of cuts without a possible retract: {error}", 1)]
     o, cell = prepared.job.options, prepared.cell
     tables = [
         transfer_checks(robot, m.q, m.time, cell=cell, eta_v=o.eta_v, eta_a=o.eta_a) for m in moves
@@ -72,7 +72,7 @@ def expect_sequence(
 ) -> PartPlan | None:
     """Return the plans and moves as the job asks for them, in the times that the moves need.
 
-    What is claimed of other orders (`at_least` s) is taken as it is.
+    The claim about other orders (`at_least` s) is not checked.
     """
     if prepared.job.sequence is None:
         return None
@@ -95,7 +95,7 @@ def expect_sequence(
 
 
 def _times(first: Plan, q: Array) -> Array:
-    """Return when the corners of a move are reached in the least time, as it is planned."""
+    """Return when the corners of a planned move are reached in the least time, s."""
     velocity, acceleration = first.robot.speed_limits()
     eta_v, eta_a = first.settings.eta_v, first.settings.eta_a
     took = least_time(np.diff(q, axis=0), eta_v * velocity, eta_a * acceleration)
@@ -103,7 +103,7 @@ def _times(first: Plan, q: Array) -> Array:
 
 
 def _approach(prepared: PreparedJob, plan: Plan, end: End) -> Array:
-    """Return joints (9, n) rad along the way down to a cut, or back from it, from the cut."""
+    """Return joints (9, n) rad along the approach or the retract of a cut, from the cut on."""
     retract = prepared.job.program.retract
     return np.array([back_off(plan, end, float(share) * retract) for share in SHARES])
 
@@ -119,9 +119,9 @@ def _ends(prepared: PreparedJob, ways: Sequence[tuple[Array, Array]]) -> list[tu
 
 
 def _fits(prepared: PreparedJob, move: TransferMove, ends: tuple[Array, Array]) -> list[Check]:
-    """Compare a move with where it has to begin and end, and with the time that it needs.
+    """Compare the ends of a move with those of the cuts and home, and its start time with zero.
 
-    Home is the same with endless joints turned on by whole turns, as the last move may have them.
+    In the last move, endless joints may be at home on another turn.
     """
     first, last = np.abs(move.q[0] - ends[0]), np.abs(move.q[-1] - ends[1])
     home = prepared.job.home
@@ -132,12 +132,12 @@ def _fits(prepared: PreparedJob, move: TransferMove, ends: tuple[Array, Array]) 
     begins = abs(float(move.time[0]))
     return [
         check(
-            "air-ends", "ends of a move, off those of the cuts and home", off, SAME_CORNER, "rad"
+            "air-ends", "distance of a move's ends from the cuts and home", off, SAME_CORNER, "rad"
         ),
-        check("air-begins", "time that a move begins at", begins, 1e-9, "s"),
+        check("air-begins", "time at the start of a move", begins, 1e-9, "s"),
     ]
 
 
 def _way_row(row: Check) -> Check:
-    title = f"on the way to a cut and back: {row.title}"
+    title = f"in approach and retract: {row.title}"
     return replace(row, code=f"approach-{row.code}", title=title, node=row.node // 2)

@@ -1,4 +1,4 @@
-"""The order of cutting, judged by the job."""
+"""Check the order of cutting against the job."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ def check_sequence(
     ----------
     prepared : PreparedJob
     done : sequence of int
-        Which contour of the job each cut is of, in the order of cutting; pieces of one follow each
-        other with the same number.
+        Number of the contour of each cut in the job, in the order of cutting; pieces of one
+        contour follow each other with the same number.
     paths : sequence of Contour
         The nodes of each cut.
     """
     sequence = prepared.job.sequence
     rows = check_order(sequence, prepared.inner_first, done)
     rows.append(
-        _count("pieces", "pieces cut before one that lies before them", _early(done, paths))
+        _count("pieces", "pieces cut after a later piece of their contour", _early(done, paths))
     )
     if sequence is not None and sequence.heat_spacing_mm > 0:
         warm = _too_warm(prepared, done, paths, sequence.heat_spacing_mm / 1000)
-        rows.append(_count("heat-spacing", "contours cut right after one too near to them", warm))
+        rows.append(_count("heat-spacing", "contours cut right after one that is too near", warm))
     return rows
 
 
@@ -49,8 +49,8 @@ def check_order(
     given = sequence is None or sequence.order == "given"
     turned = [k + 1 for k, (a, b) in enumerate(pairwise(done)) if given and b < a]
     return [
-        _count("inner-first", "contours cut after the one that they lie in", early),
-        _count("order", "contours cut before one that the job has first", turned),
+        _count("inner-first", "contours cut after the contour around them", early),
+        _count("order", "contours cut after one that comes later in the job", turned),
     ]
 
 
@@ -66,7 +66,7 @@ def _early(done: Sequence[int], paths: Sequence[Contour]) -> list[int]:
 def _too_warm(
     prepared: PreparedJob, done: Sequence[int], paths: Sequence[Contour], spacing: float
 ) -> list[int]:
-    """Return the cuts that follow one nearer than `spacing` (m), by the first ways to cut each."""
+    """Return the cuts that follow one nearer than `spacing` (m), by the first candidate of each."""
     whole = {i for i in done if list(done).count(i) == 1}
     first = {i: prepared.contours[i].candidates[0].nodes for i in whole}
     shapes = [first.get(i, path) for i, path in zip(done, paths, strict=True)]

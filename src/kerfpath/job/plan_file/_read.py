@@ -1,4 +1,4 @@
-"""plan.json, read back: its plans and moves, with everything in it checked for its type."""
+"""Read a plan.json: its plans and moves, with the type of every value checked."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ _R = TypeVar("_R")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlanFile:
-    """A plan.json, read back.
+    """A plan.json that was read back.
 
     Parameters
     ----------
     path : Path
     job : dict
-        The job file as it was read; empty when the plan was not made from one.
+        The parsed job file; empty if the plan was not made from one.
     plans : tuple of Plan
         One for each contour, in the order of cutting.
     missing : tuple of str
@@ -47,15 +47,15 @@ class PlanFile:
     failed : tuple of str
         Names of the contours whose plan failed its audit when it was made.
     moves : tuple of TransferMove
-        Through the air between them; empty when none were planned.
+        The transfer moves between them; empty if none were planned.
     contours : dict of str to str
-        What the job calls the contour of each plan: a plan may be that of a piece.
+        Name in the job of the contour of each plan; a plan may be that of a piece.
     in_cell : bool
         Whether the motions were planned and audited clear of collisions.
     picked : frozenset of str
         Names of the contours whose plan was picked from a Pareto set.
     data : dict
-        The whole document.
+        The complete document.
     """
 
     path: Path
@@ -73,7 +73,7 @@ class PlanFile:
 
     @property
     def entries(self) -> dict[str, PlanData]:
-        """What the file says of each contour, or piece, that has a plan, by its name."""
+        """The entry of each contour, or piece, that has a plan, by its name."""
         return {entry["name"]: entry for entry in planned_entries(self.data)}
 
 
@@ -87,13 +87,13 @@ def read_plan_file(path: str | Path) -> PlanFile:
     Returns
     -------
     file : PlanFile
-        Its `plans` in the order of cutting, and what else stands in it.
+        Its `plans` in the order of cutting, and the rest of the file.
 
     Raises
     ------
     InputError
-        No such file, not JSON, another schema; a key that is missing, unknown or there twice; a
-        value of the wrong type. In one line.
+        The file does not exist, is not JSON or has another schema; a key is missing, unknown or
+        twice in an object; or a value has the wrong type.
     """
     path = Path(path)
     data = read_document(path)
@@ -119,20 +119,22 @@ def read_plan_file(path: str | Path) -> PlanFile:
         raise InputError(f"{path}: {error}") from None
     except KeyError as error:
         raise InputError(f"{path}: the key {error} is missing; plan the job again") from None
-    except (TypeError, ValueError) as error:  # what the schema cannot say: rows of unlike lengths
+    except (TypeError, ValueError) as error:  # rows of different lengths, which no schema forbids
         said = " ".join(str(error).split())
-        raise InputError(f"{path}: something in it is of the wrong kind ({said})") from None
+        raise InputError(
+            f"{path}: a value has the wrong type ({said}); plan the job again"
+        ) from None
 
 
 def planned_entries(data: PlanDocument) -> list[PlanData]:
-    """Return what a document says of the contours that have a plan."""
+    """Return the entries of the contours that have a plan."""
     return [cast(PlanData, entry) for entry in data["contours"] if entry["feasible"]]
 
 
 def table_of(
     file: PlanFile, name: str, model: type[_M], read: Callable[[_M], _R], **changes: str
 ) -> _R:
-    """Return a table of the job that a plan was made from, read as the job's own would be."""
+    """Return a table of the job that a plan was made from, read like that of a job file."""
     table: Any = file.job.get(name, {})
     try:
         return read(model.model_validate({**table, **changes}))
@@ -142,7 +144,7 @@ def table_of(
 
 
 def _read_robot(robot: Mapping[str, Any], limits: LimitsData) -> Robot:
-    """Return the arm; its arrays are cast and checked by itself."""
+    """Return the arm, which casts and checks its arrays itself."""
     said: Mapping[str, Any] = limits
     arm = Robot(
         id=robot["id"],

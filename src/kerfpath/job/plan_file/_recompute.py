@@ -1,4 +1,4 @@
-"""What follows from the joints of a plan: gamma, tilt, posture, turns, and what it costs."""
+"""Compute what follows from the joints of a plan: gamma, tilt, posture, turns, and cost."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from kerfpath.robots import Robot
 __all__ = ["SAME", "recompute"]
 
 SAME = 1e-7
-"""Relative, or absolute below 1 (m, rad, s): two machines agree far better."""
+"""Tolerance, relative or absolute below 1 (m, rad, s); two machines agree far better."""
 SAME_POSTURE = 1e-5
-"""rad: what an inverse near a singularity loses; postures lie much farther apart."""
+"""Error of an inverse near a singularity, rad; postures are much farther apart."""
 NO_TILT = 1e-9
-"""rad: a tilt by less is rounding."""
+"""Tilt, rad, below which it is attributed to rounding."""
 
 
 def recompute(plan: Plan) -> Plan:
     """Return the plan with everything that its joints, contour and settings decide.
 
-    What the plan says and agrees is kept to the last digit: an angle near pi may be written as one
-    near -pi, and at a singularity several postures are the joints'.
+    Values of the plan that agree are kept to the last digit: an angle near pi may be written as one
+    near -pi, and at a singularity several postures fit the joints.
     """
     tilt, gamma = _rotation(plan)
     made = replace(
@@ -63,9 +63,9 @@ def _rotation(plan: Plan) -> tuple[Array, Array]:
 
 
 def _posture(robot: Robot, q: Array, said: Ints) -> Ints:
-    """Return the postures (K,) of joints q (K, n); what is `said` where the joints are that, too.
+    """Return the postures (K,) of joints q (K, n); those `said` where they fit, too.
 
-    Where no posture gives the joints back, at a singularity, any may be right.
+    At a singularity, where no posture gives the joints back, any may be right.
     """
     arm = robot.alone()
     q = np.ascontiguousarray(q[:, : arm.joints])
@@ -79,7 +79,7 @@ def _posture(robot: Robot, q: Array, said: Ints) -> Ints:
 
 
 def _turn(robot: Robot, q: Array, said: Ints) -> Ints:
-    """Return the turns (K, n) from (-pi, pi] to joints q (K, n); what is free has none."""
+    """Return the turns (K, n) from (-pi, pi] to joints q (K, n); free joints have none."""
     turn = np.ceil((q - np.pi) / (2 * np.pi)).astype(np.int64)
     kept = np.abs(q - 2 * np.pi * said) <= np.pi + SAME
     turn = np.where(kept, said, turn)
@@ -88,7 +88,7 @@ def _turn(robot: Robot, q: Array, said: Ints) -> Ints:
 
 
 def _cost(plan: Plan) -> float:
-    """Return the objective of a plan; what clearance costs is taken as said, within its bounds."""
+    """Return the objective of a plan; the penalty of clearance is the plan's, within its bounds."""
     s = plan.settings
     cost = path_cost(plan.increments, s.weights, s.metric, s.objective, plan.node_cost)
     band = None if s.comfort is None else s.comfort.clearance

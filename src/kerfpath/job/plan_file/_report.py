@@ -1,4 +1,4 @@
-"""What an audit of a file says."""
+"""The result of the audit of a file."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from kerfpath.cell import Cell, caveats
 __all__ = ["AuditReport", "collision_note"]
 
 NOT_CHECKED = "Collisions are not checked: simulate the program in the cell before running it."
-"""What is said of a job without a [cell]."""
+"""The note for a job without a [cell]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AuditReport:
-    """What the audit of a plan.json or of a program says.
+    """The result of the audit of a plan.json or of a program.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class AuditReport:
     note : str
         What was checked for collisions, and what was not.
     places : dict of str to tuple of str
-        Of a program: where the target of each node stands in its files.
+        For a program: file and line of the target of each node.
     """
 
     tables: dict[str, list[Check]]
@@ -39,7 +39,7 @@ class AuditReport:
 
     @property
     def passed(self) -> bool:
-        """True when every contour has a plan and no check found an error."""
+        """True if every contour has a plan and no check found an error."""
         return not self.missing and all(
             check.ok or check.level == "warning"
             for checks in self.tables.values()
@@ -47,12 +47,12 @@ class AuditReport:
         )
 
     def place(self, name: str, check: Check) -> str:
-        """Say where a check of a table failed: a node, and in a program the file and line."""
+        """Return where a check of a table failed: a node, or in a program the file and line."""
         lines = self.places.get(name, ())
         return f"{lines[check.node]}" if check.node < len(lines) else f"node {check.node}"
 
     def sentence(self, name: str, check: Check) -> str:
-        """Say in one sentence where a check of a table failed, what was found, what is allowed."""
+        """Return one sentence: where a check of a table failed, what was found, what is allowed."""
         if check.unit == "count" and check.limit == 0:
             found = f"{check.title}: {check.value:g}, expected none"
         else:
@@ -63,7 +63,7 @@ class AuditReport:
 
 
 def collision_note(cell: Cell | None, *, moves_too: bool = False) -> str:
-    """Say what was checked for collisions, and what was not."""
+    """Return the note on what was checked for collisions, and what was not."""
     if cell is None:
         return NOT_CHECKED
     about = f" (approximate: {', '.join(cell.approximate)})" if cell.approximate else ""

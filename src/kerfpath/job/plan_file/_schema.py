@@ -1,4 +1,4 @@
-"""A plan.json checked against its layout: every key and every value, as strictly as JSON can."""
+"""Check a plan.json against its layout: every key and every value, as strictly as JSON allows."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from kerfpath.job.plan_file._layout import BrokenData, ContourData, PlanData, Pl
 __all__ = ["SCHEMA", "read_document"]
 
 SCHEMA = 9
-"""Version of the layout of plan.json; it grows when a reader of the old one would go wrong."""
+"""Version of the layout of plan.json; it grows if readers of the old one would misread the file."""
 LARGEST = 1e12
-"""No number of a plan is larger, in SI: not even the sum of all it counts."""
+"""Largest number of a plan, in SI; not even the sum of all counts is larger."""
 SHOWN = 60
-"""Characters of a wrong value that a message shows."""
+"""Most characters of a wrong value that a message shows."""
 
 Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Whole = Annotated[int, Field(ge=-LARGEST, le=LARGEST)]
@@ -43,7 +43,7 @@ class _Entry(BaseModel):
 
 
 def _strict(kind: Any) -> Any:
-    """Return a type as this file takes it: numbers within bounds, objects without other keys."""
+    """Return the strict form of a type: numbers within bounds, objects without other keys."""
     if kind in (float, int):
         return Real if kind is float else Whole
     if kind == ContourData:
@@ -79,13 +79,14 @@ _Document = _model(PlanDocument)
 
 
 def read_document(path: Path) -> PlanDocument:
-    """Return what stands in a plan.json, every key known and every value of its type.
+    """Return the content of a plan.json, with every key and the type of every value checked.
 
     Raises
     ------
     InputError
-        No such file, not JSON, another schema, a key unknown, missing or said twice, a value of
-        another type (true or "1.0" for a number), a number that is none or too large: in one line.
+        The file does not exist, is not JSON or has another schema; a key is unknown, missing or
+        twice in an object; a value has another type (true or "1.0" for a number); or a number is
+        not finite or too large.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -115,7 +116,8 @@ def read_document(path: Path) -> PlanDocument:
         raise InputError(f"{path}: {_problem(error)}; plan the job again") from None
     twice = [name for name, n in Counter(e["name"] for e in data["contours"]).items() if n > 1]
     if twice:
-        raise InputError(f"{path}: contours: two are called {_shown(twice[0])}; plan the job again")
+        said = f"expected distinct names, got {_shown(twice[0])} twice"
+        raise InputError(f"{path}: contours: {said}; plan the job again")
     return cast(PlanDocument, data)
 
 
@@ -123,7 +125,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     table = dict(pairs)
     if len(table) < len(pairs):
         twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
-        raise ValueError(f"the key {_shown(twice)} stands twice in one object")
+        raise ValueError(f"the key {_shown(twice)} is twice in one object")
     return table
 
 
@@ -132,7 +134,7 @@ def _no_number(word: str) -> Any:
 
 
 def _problem(error: ValidationError) -> str:
-    """Say the first thing that is wrong: where, what was expected, what came."""
+    """Return the first problem: where, what was expected, what came."""
     first = error.errors(include_url=False)[0]
     where = ".".join(str(step) for step in first["loc"] if step not in ("planned", "broken"))
     where = "".join(c if c.isprintable() else "?" for c in where)
@@ -145,7 +147,7 @@ def _problem(error: ValidationError) -> str:
 
 
 def _shown(value: object) -> str:
-    """Return a value as JSON has it, cut short."""
+    """Return a value in JSON notation, shortened."""
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > LARGEST:
         return "a number of more than 12 digits"
     text = json.dumps(value)

@@ -1,4 +1,4 @@
-"""What plan.json says of the order of cutting and of the transfer moves."""
+"""The order of cutting and the transfer moves in plan.json."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["read_moves", "sequence_entry"]
 
 
 def sequence_entry(part: PartPlan) -> SequenceData:
-    """Return what plan.json says of a part's order, its times and its moves."""
+    """Return the plan.json entry of a part's order, times and moves."""
     robot = part.plans[0].robot
     return {
         "optimal": part.order.optimal,
@@ -34,7 +34,7 @@ def read_moves(entry: SequenceData | None, robot: Robot) -> tuple[TransferMove, 
     Raises
     ------
     InputError
-        Joints or times that do not go together, external axes missing.
+        Joints and times do not fit together, or external axes are missing.
     """
     if entry is None:
         return ()

@@ -1,4 +1,4 @@
-"""plan.json: everything about the plans of a job, so that other programs can rely on it."""
+"""Write plan.json, which has everything about the plans of a job for other programs."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")
 def plan_text(document: PlanDocument) -> str:
     """Return the text of a plan.json; the same document gives the same bytes."""
     text = json.dumps(document, indent=1, allow_nan=False)
-    # One row of numbers to a line: a person can still read it, and a diff shows a node.
+    # One row of numbers per line, so that people can read it and a diff shows a node.
     return _NUMBERS.sub(lambda m: "[" + re.sub(r"\s+", " ", m[1]) + "]", text) + "\n"
 
 
@@ -55,12 +55,12 @@ def plan_document(
     cell: Cell | None = None,
     part: PartPlan | None = None,
 ) -> PlanDocument:
-    """Return what a plan.json says.
+    """Return the content of a plan.json.
 
     Parameters
     ----------
     robot : Robot
-        With the limits used.
+        The robot, with the limits used.
     tool, placement : (4, 4) m
         T_flange_tip and T_base_part.
     contours : sequence of dict
@@ -68,7 +68,7 @@ def plan_document(
     job : mapping
         The job file as read.
     cell : Cell, optional
-        What the motions were planned and audited clear of.
+        The cell in which the motions were planned and audited.
     part : PartPlan, optional
         The moves between the contours, and what is proved about their order.
     """
@@ -95,10 +95,11 @@ def plan_entry(
     picked: bool = False,
     certificate: bool = False,
 ) -> PlanData:
-    """Return what plan.json says of a planned and audited contour, or of a piece of it.
+    """Return the plan.json entry of a planned and audited contour, or of a piece of it.
 
-    `picked`: from a Pareto set, which then says its objective, weights and eta. `certificate`: with
-    what proves its bound, where it has that; without, the audit has no row of it either.
+    `picked` marks a plan of a Pareto set, which has its own objective, weights and eta. With
+    `certificate` the entry has the certificate of the plan's bound, if there is one; without it,
+    the audit has no row about the bound.
     """
     criteria, settings, proof = plan.criteria, plan.settings, plan.proof
     shown = proof.certificate if certificate else None
@@ -156,7 +157,7 @@ def plan_entry(
 
 
 def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None) -> BrokenData:
-    """Return what plan.json says of a contour without a feasible path."""
+    """Return the plan.json entry of a contour without a feasible path."""
     closed, needed = broken.closed, broken.relaxation
     return {
         "name": name,
@@ -222,7 +223,7 @@ def _limits_entry(robot: Robot) -> LimitsData:
 
 
 def _cell_entry(cell: Cell) -> dict[str, object]:
-    """Return what was kept apart and how far: a record, as the cell itself is that of the job."""
+    """Return a record of the pairs kept apart and how far; the cell itself is that of the job."""
     return {
         "bodies": [
             {

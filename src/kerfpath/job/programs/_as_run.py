@@ -1,4 +1,4 @@
-"""What the joints need where a controller runs a program as its text stands, corners rounded."""
+"""Check the joint limits of a program as a controller runs its text, with rounded corners."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from kerfpath.post import CircularMove, Controller, Language, LanguageSettings, 
 __all__ = ["check_run"]
 
 UNSAID = 1.0
-"""m: a zone that the text has no length for; any but zero."""
+"""Zone, m, for a text that gives no length; any value except zero."""
 SHORTEST = 1e-9
-"""s: no move is shorter."""
+"""Least duration of a move, s."""
 
 
 def check_run(
@@ -29,13 +29,13 @@ def check_run(
 ) -> list[Check]:  # fmt: skip
     """Return the checks of a cut's motion along a path, by its own zones and speeds.
 
-    Digits of the text are allowed for: in a short interval they turn into acceleration.
+    The checks allow for the digits of the text, which over short intervals add accelerations.
     """
     if not chosen.zones:
         return [*checks_of_unknown(job, f"{chosen.name} has no zones")]
     controller = chosen.controller(settings)
     if any(move.zone is None for move in cut.targets) and not controller.rounds_by_itself:
-        return [*checks_of_unknown(job, f"the zones of {chosen.name} here are no lengths")]
+        return [*checks_of_unknown(job, f"the zones of {chosen.name} here are not lengths")]
     runs = [
         run_along(
             part, job.robot, T_base_part=job.placement, T_flange_tip=job.tool,
@@ -62,9 +62,9 @@ def check_run(
 
 
 def _moves(cut: ReadCut, controller: Controller) -> list[LinearMove]:
-    """Return the moves of a cut as its text has them, the first only for where it ends.
+    """Return the moves of a cut as in its text; of the first one only the end matters.
 
-    Where the text has no length for a zone it is the controller's.
+    If the text gives no length for a zone, it is that of the controller.
     """
     found: list[LinearMove] = []
     before = int(cut.ends[0])

@@ -1,4 +1,4 @@
-"""The audit of a program on disk: what its text means, against the job that it is to do."""
+"""Audit a program on disk: compare the motion that its text means with the job."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ from kerfpath.windows import GammaWindow
 __all__ = ["ProgramAudit", "audit_program"]
 
 NEAR = 5e-3
-"""A cut that leaves every contour of the job by more (m), all along, is none of them."""
+"""Median distance (m) from a contour of the job beyond which a cut is not of that contour."""
 SAME_FRAME = 1e-6
-"""How far (m, sine) tool and part may be from those of the job."""
+"""Tolerance (m, sine) of tool and part against those of the job."""
 FOLLOWED = ("postures",)
-"""Differences that follow from the path that was read, and are judged with it."""
+"""Codes of differences that follow from the path that was read, and are checked with it."""
 WHAT = {
     "added": "moves",
     "removed": "moves",
@@ -55,24 +55,24 @@ WHAT = {
 
 
 def audit_program(path: Path, job_file: Path) -> AuditReport:
-    """Return what the audit says of every cut of a program.
+    """Audit every cut of a program against its job.
 
-    The robot's kinematics give the joints of its targets, and these are audited as those of
-    a plan are: against the drawing, the limits and the cell of the job. Frames, speeds, switches
-    and waits are compared with what the job asks for.
+    The joints of its targets follow from the robot's kinematics and are audited like those of a
+    plan: against the drawing, the limits and the cell of the job. Frames, speeds, switches and
+    waits are compared with those of the job.
 
     Parameters
     ----------
     path : Path
-        The file that is started.
+        The main file of the program.
     job_file : Path
         The job that the program was made for.
 
     Raises
     ------
     InputError
-        A file cannot be read, a line is not of our making, or the job is of a kind that programs
-        cannot be compared with.
+        A file cannot be read, a line was not written by kerfpath, or programs of such a job cannot
+        be audited.
     """
     audit = ProgramAudit.of(job_file)
     chosen, settings = language_of(path, audit.job)
@@ -88,12 +88,12 @@ class ProgramAudit:
     ----------
     job : Job
     contours : tuple of tuples of Candidate
-        The ways in which each of its contours may be cut; their nodes have its name.
+        The ways to cut each contour; their nodes have its name.
     windows : tuple of tuples of GammaWindow
-        Where each of them keeps gamma.
+        The windows of gamma of each contour.
     cell : Cell or None
     inner_first : tuple of (int, int)
-        Contours of which the first is to be cut before the second.
+        Pairs of contours (from 0) of which the first is to be cut before the second.
     """
 
     job: Job
@@ -111,13 +111,19 @@ class ProgramAudit:
         Raises
         ------
         InputError
-            A file cannot be read, or the job is of a kind that programs cannot be compared with.
+            A file cannot be read, or programs of such a job cannot be audited.
         """
         return cls.by(prepare(read_job(job_file)))
 
     @classmethod
     def by(cls, prepared: PreparedJob) -> ProgramAudit:
-        """Return the same of a job whose drawing and cell are read already."""
+        """Return the audit of a prepared job's programs.
+
+        Raises
+        ------
+        InputError
+            The job has interruptions.
+        """
         job = prepared.job
         if job.options.interruptions != "none":
             raise InputError(
@@ -135,7 +141,7 @@ class ProgramAudit:
     def audited(
         self, read: ReadProgram, chosen: Language, settings: LanguageSettings, name: str
     ) -> AuditReport:
-        """Return what the audit says of every cut of a program that was read."""
+        """Audit every cut of a program that was read."""
         job, contours, cell = self.job, self.contours, self.cell
         names = [candidates[0].nodes.name for candidates in contours]
         read = add_tips(read, job)
@@ -147,7 +153,7 @@ class ProgramAudit:
         off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
         process = BeamProcess.of(job.program, ahead=chosen.ahead)
         tables[name] = [
-            check("frames", "tool and part, off the job's", off, SAME_FRAME, "m"),
+            check("frames", "distance of tool and part from the job's", off, SAME_FRAME, "m"),
             *check_laser_and_gas(read, job.robot, process),
         ]
         done: list[int] = []
@@ -187,7 +193,7 @@ class ProgramAudit:
 
 
 def _new_title(title: str, tables: Mapping[str, object]) -> str:
-    """Return a title that no table has yet: a cut that comes again must not hide the first."""
+    """Return a title that no table has yet, so that a repeated cut does not hide the first."""
     return title if title not in tables else _new_title(f"{title}, again", tables)
 
 
@@ -197,14 +203,14 @@ def _compared(
 ) -> list[Check]:  # fmt: skip
     """Compare a program with the one that the job would have along the same paths.
 
-    Whatever differs is a finding: how many moves, and where the largest stands.
+    Each kind of difference is a check, with the number of moves and the place of the largest.
     """
     if not followed:
         return []
     try:
         asked = expect_program(job, followed, home, chosen, settings)
     except InputError as error:
-        said = f"a program as the job asks for cannot be made along these paths ({error})"
+        said = f"the program of the job cannot be made along these paths ({error})"
         return [count("asked", said, 1)]
     rules = chosen.rules(settings)
     asked = add_tips(asked, job)
@@ -213,21 +219,21 @@ def _compared(
     rows = [
         count(
             f"asked-{each.code}",
-            f"not as the job asks for, {WHAT.get(each.code, each.code)}: {each.message}"
-            + (f" (said in {each.said_at})" if each.said_at else ""),
+            f"different from the job, {WHAT.get(each.code, each.code)}: {each.message}"
+            + (f" (from {each.said_at})" if each.said_at else ""),
             each.count,
             places.index(each.place) if each.place in places else 0,
         )
         for each in found
         if each.code not in FOLLOWED
     ]
-    return rows or [count("asked", "what is not as the job asks for", 0)]
+    return rows or [count("asked", "differences from the job", 0)]
 
 
 def _closest(cut: ReadCut, contours: Sequence[Sequence[Candidate]]) -> tuple[float, int, int]:
-    """Return how far (m) the cut leaves the contour that it follows best, and which candidate.
+    """Return the distance (m) of a cut from the contour that it follows best, and the candidate.
 
-    Compared at the same shares of the way.
+    Points at the same share of the length are compared.
     """
     points = cut.T_part_tip[:, :3, 3]
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
@@ -242,7 +248,7 @@ def _closest(cut: ReadCut, contours: Sequence[Sequence[Candidate]]) -> tuple[flo
 
 
 def _air(job: Job, cuts: Sequence[ReadCut], home: Array, cell: Cell | None) -> list[Check]:
-    """Check the joint moves to, between and after the cuts; the node is the number of the way."""
+    """Check the joint moves to, between and after the cuts; the node is the number of the move."""
     starts: list[Array | None] = [None, *(cut.q_out for cut in cuts)]
     corners = [cut.approach for cut in cuts] + [home]
     ways = (

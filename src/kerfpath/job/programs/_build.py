@@ -1,4 +1,4 @@
-"""The program of plans: written as text, read back, and audited before anyone gets it."""
+"""Write the program of plans as text, read it back, and audit it before it is returned."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ __all__ = ["audit_of_cuts", "audit_of_plans", "program_of"]
 
 REMEDIES = {
     "acceleration": "lower eta_acceleration in [plan] or raise the spacing of the nodes, and plan "
-    "again; with arcs_mm, lower it or leave it out",
+    "again; with arcs_mm, lower it or remove it",
     "velocity": "lower eta_velocity in [plan], and plan again",
     "velocity-between": "lower eta_velocity in [plan], and plan again",
     "beam-stop": "write a zone_mm above 0, and cut without stops",
-    "lead-time": "write a lead_time_s that the language can count",
-    "pierce": "write a pierce_time_s that the language can count",
-    "speed": "write a speed that the language can say",
+    "lead-time": "write a lead_time_s that the language can express",
+    "pierce": "write a pierce_time_s that the language can express",
+    "speed": "write a speed that the language can express",
     "tip-between-nodes": "lower arcs_mm, or sample the contour more finely",
-    "axis-between-nodes": "leave arcs_mm out, or sample the contour more finely",
+    "axis-between-nodes": "remove arcs_mm, or sample the contour more finely",
 }
-"""What to set where a check of a written program fails."""
-OTHERWISE = "change the job there and plan it again"
+"""What to change if a check of a written program fails, by the code of the check."""
+OTHERWISE = "change the job and plan it again"
 
 
 def audit_of_cuts(job: Job, cuts: Sequence[CutResult], cell: Cell | None) -> ProgramAudit:
-    """Return the audit of the program of a job's cuts: by their paths, nodes and speeds."""
+    """Return the audit for the program of a job's cuts, with their paths, nodes and speeds."""
     planned = [cut for cut in cuts if cut.plan is not None]
     return ProgramAudit(
         job=job,
@@ -47,7 +47,7 @@ def audit_of_cuts(job: Job, cuts: Sequence[CutResult], cell: Cell | None) -> Pro
 
 
 def audit_of_plans(job: Job, plans: Sequence[Plan]) -> ProgramAudit:
-    """Return the audit of the program of plans, without the drawing and the cell of their job."""
+    """Return the audit for the program of plans, without the drawing and the cell of their job."""
     contours = []
     for made in plans:
         dt = float(np.diff(made.time).min())  # where the feed is reduced it is longer
@@ -68,18 +68,19 @@ def program_of(
 ) -> tuple[dict[str, str], list[str]]:
     """Return the files of the program that cuts `plans`, and the warnings of its preflight.
 
-    Between them the robot moves as `moves` say; without any, straight to each. With `dry_share` it
-    is a dry run at that share of the speed. The text is read back and audited as `kerfpath audit`
-    would; of a dry run, that of the program at full speed.
+    Between the cuts the robot makes `moves`; without any, it moves straight to each cut. With
+    `dry_share` the program is a dry run at that share of the speed. The text is read back and
+    audited as by `kerfpath audit`; for a dry run, the text at full speed is audited.
 
-    The caller answers for the audit of the plans.
+    The caller must have audited the plans.
 
     Raises
     ------
     AuditFailed
-        There is no plan, or the program does not pass its audit: the first reason, and what to do.
+        There is no plan, or the program fails its audit; the message has the first reason and what
+        to do.
     InputError
-        The preflight refuses.
+        The preflight refuses the program.
     """
     if not plans:
         raise AuditFailed("no program: there is no plan to write one from")
@@ -100,7 +101,7 @@ def program_of(
 
 
 def _require_passed(found: AuditReport, title: str) -> None:
-    """Raise AuditFailed where a program fails: the first reason, how many more, and what to do."""
+    """Raise AuditFailed if a program fails, with the first reason, a count, and what to do."""
     failed = [
         (name, check)
         for name, table in found.tables.items()
@@ -111,8 +112,8 @@ def _require_passed(found: AuditReport, title: str) -> None:
         name, check = failed[0]
         more = f" (and {len(failed) - 1} more)" if len(failed) > 1 else ""
         raise AuditFailed(
-            f"no program: as {title} says it, {name} fails its audit at {found.place(name, check)}:"
-            f" {check.issue().message}{more}; {REMEDIES.get(check.code, OTHERWISE)}"
+            f"no program: in {title}, {name} fails its audit at {found.place(name, check)}: "
+            f"{check.issue().message}{more}; {REMEDIES.get(check.code, OTHERWISE)}"
         )
     if found.missing:
-        raise AuditFailed(f"no program: as {title} says it, {found.missing[0]} is not cut")
+        raise AuditFailed(f"no program: in {title}, {found.missing[0]} is not cut")

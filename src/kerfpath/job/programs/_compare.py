@@ -1,4 +1,4 @@
-"""Two programs on disk, compared."""
+"""Compare two programs on disk."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class ProgramComparison:
     Parameters
     ----------
     differences : tuple of Difference
-        Empty: the same.
+        Empty if the programs are the same.
     not_compared : tuple of str
-        What only one of them says.
+        What only one of them states.
     """
 
     differences: tuple[Difference, ...]
@@ -44,14 +44,14 @@ def compare_programs(a: Path, b: Path, job_file: Path) -> ProgramComparison:
     Parameters
     ----------
     a, b : Path
-        The files that are started.
+        The main files of the programs.
     job_file : Path
-        The job that they were made for: its robot, frames and settings of languages.
+        The job that they were made for, with robot, frames and settings of languages.
 
     Raises
     ------
     InputError
-        A file cannot be read, or a line is not of our making.
+        A file cannot be read, or a line was not written by kerfpath.
     """
     job = read_job(job_file)
     (one, settings), (two, other) = language_of(a, job), language_of(b, job)
@@ -61,7 +61,7 @@ def compare_programs(a: Path, b: Path, job_file: Path) -> ProgramComparison:
     ]
     rules: tuple[Rules, ...] = ()
     said = any(move.posture for read in reads for move in read.moves)
-    if one.name != two.name:  # its words of posture mean something else there
+    if one.name != two.name:  # words for postures have another meaning in another language
         rules = (one.rules(settings), two.rules(other))
         reads = [_without_postures(read) for read in reads]
     found, left = differences(*reads, rules=rules), not_compared(*reads)

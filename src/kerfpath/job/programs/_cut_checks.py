@@ -22,25 +22,25 @@ from kerfpath.post import Language, LanguageSettings, Rules
 __all__ = ["check_cut"]
 
 SAME_SPEED = 0.02
-"""Share by which a speed may differ from the one asked for, beyond its digits."""
+"""Share by which a speed may differ from that of the job, beyond its digits."""
 SAME_TIME = 2e-3
-"""How far (s) lead times and waits may differ from those asked for: controllers round them."""
+"""Tolerance (s) of lead times and waits against the job; controllers round them."""
 CLIMB = 0.05
-"""What a step along the path counts beside one away from it, where a place on it is looked for."""
+"""Weight of distances along the path against those from it, in the search for a place on it."""
 
 
 def check_cut(
     job: Job, candidate: Candidate, cut: ReadCut, cell: Cell | None, chosen: Language,
     settings: LanguageSettings,
 ) -> tuple[list[Check], tuple[TargetNodes, Plan] | None]:  # fmt: skip
-    """Return the checks of a cut, and its nodes and plan where it can be compared with the job."""
+    """Return the checks of a cut, and its nodes and plan if it can be compared with the job."""
     unreached = np.flatnonzero(np.isnan(cut.q).any(axis=1))
     if unreached.size:
         said = "targets out of the robot's reach in the posture of the start"
         return [count("reach", said, unreached.size, int(unreached[0]))], None
     reference = candidate.path
     s, ends = _along(cut, reference)
-    rows = [check("ends", "ends of the cut, off those of the contour", ends.max(), 1e-4, "m")]
+    rows = [check("ends", "distance of the ends from those of the contour", ends.max(), 1e-4, "m")]
     if (np.diff(s) <= 0).any():
         node = int(np.flatnonzero(np.diff(s) <= 0)[0])
         said = "stretches that go back along the contour"
@@ -58,22 +58,22 @@ def check_cut(
     rows += check_run(job, cut, made, reference, digits, chosen, settings)
     found = nodes_at_targets(job, candidate, cut, s)
     off, alone = int(np.argmax(found.off)), int(np.argmax(found.alone))
-    said = "targets, off the nodes that the job asks for"
+    said = "distance of the targets from the nodes of the job"
     rows.append(check("nodes", said, found.off[off], allowed.path, "m", int(cut.ends[off])))
-    said = "targets that leave a node of the job out, or are none"
+    said = "targets that skip a node of the job, or are not at a new one"
     rows.append(count("every-node", said, found.alone.sum(), int(cut.ends[alone])))
     return rows, (found, made) if found.complete else None
 
 
 def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
-    """Return arc lengths (K,) of the nodes on the contour, and how far (2,) m its ends are off.
+    """Return arc lengths (K,) m of the nodes on the contour, and distances (2,) m of its ends.
 
-    Where the contour comes by the same place twice, the share of the way decides.
+    If the contour passes the same place twice, the share of the length decides.
     """
     points = cut.T_part_tip[:, :3, 3]
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     guess = reference.s[0] + way / way[-1] * reference.length
-    # A drawn line of a few corners needs samples as close as the nodes that are cut along it.
+    # A drawn line with few corners needs samples as close as the nodes of the cut.
     fine = np.linspace(reference.s[0], reference.s[-1], 8 * max(len(reference), len(points)))
     at = np.unique(np.concatenate([reference.s, fine]))
     tree = cKDTree(np.c_[reference.at(at)[0], CLIMB * at])
@@ -95,7 +95,7 @@ def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
 
 
 def _plan(job: Job, name: str, cut: ReadCut, s: Array, time: Array) -> Plan:
-    """Return what the text says of a cut as a plan, so that it is audited as one."""
+    """Return the cut in the text as a plan, so that it can be audited as one."""
     K = len(cut.q)
     return Plan(
         contour=Contour(cut.T_part_tip[:, :3, 3], cut.T_part_tip[:, :3, 2], s=s, name=name),
@@ -115,7 +115,7 @@ def _plan(job: Job, name: str, cut: ReadCut, s: Array, time: Array) -> Plan:
 
 
 def _rounding(cut: ReadCut, made: Plan, rules: Rules) -> Rounding:
-    """Return what the digits of a language leave of the joints and times of a cut."""
+    """Return the rounding of joints and times of a cut by the digits of a language."""
     jointed = all(move.T_part_tip is None for move in cut.moves)
     time = np.where(np.isnan(cut.speed), 0.0, rules.speed_step / 2 / cut.speed)
     return rounding_of(made, rules.point_step, rules.angle_step, time, jointed=jointed)
@@ -124,9 +124,9 @@ def _rounding(cut: ReadCut, made: Plan, rules: Rules) -> Rounding:
 def _process_checks(
     job: Job, candidate: Candidate, cut: ReadCut, made: Plan, digits: Array, *, ahead: bool
 ) -> list[Check]:
-    """Compare speeds, switches and waits with what the job asks for.
+    """Compare speeds, switches and waits with those of the job.
 
-    Where the language cannot switch `ahead` of a target, it has to do so at the target.
+    If the language cannot switch `ahead` of a target, it must switch at the target.
     """
     s, nodes, path = made.contour.s, candidate.nodes, candidate.path
     middle = (s[1:] + s[:-1]) / 2
@@ -143,21 +143,27 @@ def _process_checks(
     wait = abs(float(cut.waits.sum()) - job.program.pierce_time)
     lengths = np.diff(s)[wrong].sum()
     return [
-        check("speed", "speed, off the one asked for", excess[fast], most, "share", fast),
+        check("speed", "difference of the speed from the job's", excess[fast], most, "share", fast),
         check("laser", "length with the laser wrongly on or off", lengths, 1e-6, "m", node),
         count("laser-off", "laser left on at the end", cut.left_on, len(s) - 1),
-        check("lead-time", "lead time of the laser, off", lead.max(initial=0), SAME_TIME, "s"),
-        check("pierce", "wait at the start, off the one asked for", wait, SAME_TIME, "s"),
+        check(
+            "lead-time",
+            "difference of the laser's lead time from the job's",
+            lead.max(initial=0),
+            SAME_TIME,
+            "s",
+        ),
+        check("pierce", "difference of the wait at the start from the job's", wait, SAME_TIME, "s"),
     ]
 
 
 def _postures(
     job: Job, cut: ReadCut, chosen: Language, settings: LanguageSettings, left: Array
 ) -> list[Check]:
-    """Count targets whose words of posture and turns are not those of the joints there.
+    """Count the targets whose words for posture and turn do not fit the joints there.
 
-    Joints are `left` (K, n) rad to digits: where they are that near to where a word changes, both
-    words are right.
+    Digits leave joints uncertain by `left` (K, n) rad: that near to a change of a word, both words
+    are right.
     """
     moves, q = (*cut.moves, cut.group.path[-1]), np.vstack([cut.q, cut.q_out])
     left = np.vstack([left, left[-1:]])
@@ -172,5 +178,5 @@ def _postures(
         if len(moves[k].posture) != len(words[0])
         or any(said not in right for said, *right in zip(moves[k].posture, *words, strict=True))
     ]
-    said = "targets whose posture or turn is not the motion's"
+    said = "targets whose posture or turn differs from the motion"
     return [count("posture", said, len(wrong), wrong[0] if wrong else 0)]

@@ -1,4 +1,4 @@
-"""What a job asks of the program that cuts along the paths that were read, in its own language."""
+"""The program that a job asks for along the paths that were read from a program."""
 
 from __future__ import annotations
 
@@ -32,33 +32,33 @@ from kerfpath.transfer import TransferMove, back_off
 __all__ = ["TargetNodes", "expect_program", "nodes_at_targets", "whole_cut"]
 
 REACH = 4.0
-"""Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
+"""Distance (m) that no tip has from an axis: the lever of rounded joint angles."""
 POINT = 1e-5
-"""How far (m) a target beside the cut may be from where the job has it, beyond its digits."""
+"""Tolerance (m) of a target beside the cut against the job, beyond its digits."""
 ANGLE = np.radians(0.02)
-"""The same of the tool's orientation, rad."""
+"""Tolerance of the tool's orientation there, rad."""
 SAME_BRANCH = 0.2
-"""How far (rad) joints may be apart that lead to the same pose: digits near a singularity."""
+"""Largest difference (rad) of joints for the same pose, as digits cause near a singularity."""
 SAME_SPEED = 1e-3
-"""Relative difference of speeds that one arc may have."""
+"""Largest relative difference of the speeds in one arc."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TargetNodes:
-    """The nodes that a job asks for along a cut, and which of them its targets stand at.
+    """The nodes that a job asks for along a cut, and the node of each target.
 
     Parameters
     ----------
     nodes : Contour
-        Of K nodes, with what they are.
+        The K nodes, with their kinds.
     time : (K,) s
-        When each is reached at the speed that is asked for.
+        When each is reached at the requested speed.
     at : (m,) int
         The node of each target of the cut.
     off : (m,) m
-        How far each is from it.
+        Distance of each target from its node.
     alone : (m,) bool
-        Targets that do not follow the node before, and are no arc either.
+        Whether a target is not at the next node, or for an arc not at a later one.
     """
 
     nodes: Contour
@@ -78,7 +78,7 @@ class TargetNodes:
 def nodes_at_targets(job: Job, candidate: Candidate, cut: ReadCut, s: Array) -> TargetNodes:
     """Return the nodes that the job asks for along a cut, by the arc lengths s (m,) of its targets.
 
-    Where the job asks for finer intervals, those are taken if there are as many targets.
+    With refine_parts, intervals are divided if there are more targets than nodes.
     """
     nodes, dt, parts = candidate.nodes, candidate.dt, job.options.refine_parts
     targets = cut.ends
@@ -103,21 +103,21 @@ def expect_program(
     job: Job, cuts: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array,
     language: Language, settings: LanguageSettings,
 ) -> ReadProgram:  # fmt: skip
-    """Return what the job's program along the paths of these cuts would say, read back.
+    """Return the job's program along the paths of these cuts, as it would be read back.
 
     The paths, and with [sequence] the corners of the moves between them, are those that were read;
-    they are audited for themselves. All else is by the job: speeds, zones, waits, switches, how far
-    and which way the tool backs off.
+    they are audited separately. All else follows from the job: speeds, zones, waits, switches, and
+    distance and direction of the retract.
 
     Raises
     ------
     InputError
-        There is no such program: joints that leave the path, no way to back off.
+        There is no such program: joints leave the path, or the tool cannot back off.
     """
     rules, options = language.rules(settings), job.program
     plans = [whole_cut(job, cut, asked, plan) for cut, asked, plan in cuts]
     moves = _moves(job, [cut for cut, _, _ in cuts], plans, home)
-    # Arcs are put in where they were read.
+    # Arcs are added below, where they were read.
     program = replace(options, arc_tolerance=None).program(plans, moves)
     sections = []
     for section, (cut, asked, _) in zip(program.sections, cuts, strict=True):
@@ -136,7 +136,7 @@ def expect_program(
 
 
 def whole_cut(job: Job, cut: ReadCut, asked: TargetNodes, plan: Plan) -> Plan:
-    """Return the plan of a cut with a node wherever the job asks for one, along arcs, too."""
+    """Return the plan of a cut with every node that the job asks for, along arcs, too."""
     targets, at = cut.ends, asked.at
     K = len(asked.nodes)
     T, q = np.empty((K, 4, 4)), np.empty((K, cut.q.shape[1]))
@@ -151,7 +151,7 @@ def whole_cut(job: Job, cut: ReadCut, asked: TargetNodes, plan: Plan) -> Plan:
             T[inner] = ToolCourse.through(T[[first, last]], [move.T_part_via]).poses(parts)
             q[inner] = follow_poses(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
     time = asked.time
-    if job.options.feed != "constant":  # it may be slower, which is judged by itself
+    if job.options.feed != "constant":  # it may be slower, which is checked separately
         time = np.interp(np.arange(K), at, _as_fast(cut, asked.nodes.s[at]))
     return replace(
         plan,
@@ -189,7 +189,7 @@ def _moves(
     ways = [[back, *way] for back, way in zip(backs, corners[1:], strict=False)]
     if job.home is not None:
         there = job.home
-        # At the end an endless joint is at home on whichever turn the motion has brought it to.
+        # At the end, an endless joint is at home on any turn that the motion has reached.
         end = home[-1] if len(home) else backs[-1]
         turns = np.round((end - there) / (2 * np.pi)) * job.robot.endless
         ways = [[there, *corners[0][1:]], *ways, [backs[-1], *home[:-1], there + 2 * np.pi * turns]]
@@ -200,9 +200,9 @@ def _moves(
 
 
 def _same_pose(program: Program, asked: Array, read: Array, rules: Rules) -> Array:
-    """Return the joints that were read, where they bring the tool to the pose that is asked for.
+    """Return the joints that were read if they bring the tool to the requested pose.
 
-    Near a singularity the digits of a pose leave more of joints than of the pose.
+    Near a singularity, the digits of a pose leave a larger error in the joints than in the pose.
     """
     T = program.robot.forward(np.array([asked, read])) @ program.T_flange_tip
     left = len(asked) * rules.angle_step
@@ -214,9 +214,9 @@ def _same_pose(program: Program, asked: Array, read: Array, rules: Rules) -> Arr
 
 
 def _with_zones(steps: Sequence[Step], cut: ReadCut, asked: TargetNodes) -> list[Step]:
-    """Return the steps of a cut with the zones that were read, where they are one step away.
+    """Return the steps of a cut with the zones that were read, if they are one step away.
 
-    Zones are rounded to steps, and digits of targets may lead to the next one.
+    Zones are rounded to steps, and digits of targets may lead to the next step.
     """
     path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
     found = list(steps)
@@ -229,7 +229,7 @@ def _with_zones(steps: Sequence[Step], cut: ReadCut, asked: TargetNodes) -> list
 
 
 def _with_arcs(steps: Sequence[Step], cut: ReadCut, asked: TargetNodes) -> list[Step]:
-    """Return the steps of a cut with arcs where it was read with arcs and there may be one."""
+    """Return the steps of a cut with the arcs that were read, if there may be an arc."""
     path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
     found, done = list(steps[: path[0] + 1]), path[0] + 1
     for j, move in enumerate(cut.targets[1:], 1):
@@ -243,7 +243,7 @@ def _with_arcs(steps: Sequence[Step], cut: ReadCut, asked: TargetNodes) -> list[
 
 
 def _is_one(run: Sequence[LinearMove]) -> bool:
-    """Return whether linear moves may be one: passed through, nothing switched, of one speed."""
+    """Return whether linear moves may be one arc: no stop, no switch, and one speed."""
     speeds = [move.speed for move in run]
     through = all(move.zone > 0 and not move.switches for move in run[:-1])
     return through and max(speeds) - min(speeds) <= SAME_SPEED * speeds[0]

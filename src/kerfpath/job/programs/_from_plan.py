@@ -1,4 +1,4 @@
-"""The program of a plan.json, which is audited again; there, or at a measured part."""
+"""Write the program of a plan.json after another audit, as planned or at a measured part."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ MEASURED_NOTE = (
     "program in the cell before running it."
 )
 MEASURED_MOVES_NOTE = (
-    "The moves between contours are straight joint motions between their new ends, and not proved "
-    "clear any more."
+    "The moves between contours are straight joint motions between their new ends, and no longer "
+    "proved free of collisions."
 )
 SAME_PLACE = 1e-6
-"""m: what a plan.json and its job say of the same place differs by rounding at most."""
+"""Difference in m of the same place in a plan.json and its job that is attributed to rounding."""
 
 
 def program_from_file(
@@ -74,27 +74,28 @@ def program_from_file(
     language : str, optional
         Default: that of the job.
     name : str, optional
-        Of the program, where it is not to be that of the job.
+        Name of the program; default: that of the job.
     strict : bool
-        Refuse what is only warned of otherwise.
+        Refuse a program that would only give a warning.
     job_file : Path, optional
-        The job as it is now: its [program] is taken, and the plans are audited against its drawing
-        and in its cell. Default: [program] as it was when the plan was made, and no cell.
+        The current job: its [program] is used, and the plans are audited against its drawing and
+        in its cell. Default: [program] as it was when the plan was made, and no cell.
     dry_share : float, optional
         Make it a dry run at this share of the speed, see `kerfpath.post.dry_run`.
     frame : MeasuredFrame, optional
-        Where the part really stands; the plans are moved there and audited, but for collisions.
+        The measured placement of the part; the plans are moved there and audited, except for
+        collisions.
 
     Raises
     ------
     AuditFailed
-        A contour has no plan, its plan fails the audit, which is run again here, or the program
-        does, as its language says it.
+        A contour has no plan, or its plan or the text of the program fails the audit, which is
+        run again.
     NoFeasiblePath
         The robot does not reach the measured part as planned.
     InputError
-        The file cannot be read, an unknown language, a program that its preflight refuses, or moves
-        around obstacles that cannot be moved to a measured part.
+        The file cannot be read, the language is unknown, the preflight refuses the program, or
+        moves around obstacles cannot be moved to a measured part.
     """
     file = read_plan_file(plan_file)
     if file.missing:
@@ -102,15 +103,15 @@ def program_from_file(
     if file.failed:
         raise AuditFailed(
             f"no program: {', '.join(file.failed)} failed the audit against the drawing when it "
-            "was planned; mend the job and plan it again"
+            "was planned; correct the job and plan it again"
         )
     notes: list[str] = []
     by_job = None
     if job_file is not None:
         if frame is not None:
             raise InputError(
-                f"{job_file}: the cell of a job says nothing of a part that was measured; give "
-                "one of the two"
+                f"{job_file}: expected a job or a measured part, got both, but the cell of a job "
+                "is not known at a measured placement; remove one"
             )
         prepared = _planned_requirements(prepare(read_job(job_file)), file)
         _require_passed(PlanAudit(prepared=prepared).audited(plan_file))
@@ -145,23 +146,21 @@ def program_from_file(
 
 
 def program_language(source: Mapping[str, Any], path: Path) -> str:
-    """Return the language that a job, as it was read, asks for; `path` is where it stands.
+    """Return the language that a parsed job asks for; `path` is its file, for messages.
 
     Raises
     ------
     InputError
-        It asks for none.
+        The job asks for no program.
     """
     name = str(source.get("program", {}).get("language", ProgramTable().language))
     if name == "none":
-        raise InputError(
-            f"{path}: its job asks for no program; say with --language in which one is to be"
-        )
+        raise InputError(f"{path}: its job asks for no program; choose a language with --language")
     return name
 
 
 def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
-    """Return what a plan.json keeps of its job: all but the drawing and the cell."""
+    """Return the job of a plan.json, without its drawing and its cell."""
     first = file.plans[0]
     sequence = None
     if file.job.get("sequence") is not None:
@@ -189,8 +188,8 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
 def _planned_requirements(prepared: PreparedJob, file: PlanFile) -> PreparedJob:
     """Return a job with the [program] that a plan.json was made with.
 
-    Retract, air and pierce times of the plan follow from that one. The program is built with that
-    of the job as it is now, and refused where the planned moves do not meet its retract.
+    The retract, transfer and pierce times of the plan follow from that one. The program is built
+    with the current one of the job, and refused if the planned moves do not fit its retract.
     """
     stem = prepared.job.path.stem
     allowed = table_of(file, "audit", AuditTable, tolerances_of)
@@ -202,7 +201,7 @@ def _planned_requirements(prepared: PreparedJob, file: PlanFile) -> PreparedJob:
 
 def _require_passed(found: AuditReport) -> None:
     for name, table in found.tables.items():
-        # [program] is taken from the job as it is now.
+        # The program uses the current [program] of the job.
         failed = _first_failed([row for row in table if row.code != "job-program"])
         if failed is not None:
             raise AuditFailed(f"no program: {name!r} fails its audit: {failed.issue()}")
@@ -213,7 +212,7 @@ def _at_measured(
 ) -> tuple[PlanFile, list[str]]:
     """Return a plan.json with its plans and the moves between them moved to a measured part.
 
-    A contour that would not pass its audit there is planned again around it; notes say which.
+    A contour that would fail its audit there is planned again; a note names it.
     """
     tolerances, plans, notes = table_of(file, "audit", AuditTable, tolerances_of), [], []
     for p in file.plans:
@@ -226,14 +225,14 @@ def _at_measured(
                     f"contour {p.name!r}: moved to the measured placement {why}, and planned again "
                     f"there: {broken}"
                 ) from None
-            notes.append(f"Contour {p.name!r} was planned again there; only moved there {why}.")
+            notes.append(f"Contour {p.name!r} was planned again there; without planning, {why}.")
         plans.append(moved)
     moves = place_moves(file.moves, plans, retract)
     return replace(file, plans=tuple(plans), moves=moves, in_cell=False), notes
 
 
 def _moved(p: Plan, frame: MeasuredFrame, tolerances: Tolerances) -> tuple[Plan, str]:
-    """Return a plan moved to a measured part, and what then fails; empty where nothing does."""
+    """Return a plan moved to a measured part, and what then fails; empty if nothing does."""
     try:
         moved = placed(p, frame.T_base_part)
     except NoFeasiblePath as away:
@@ -243,7 +242,7 @@ def _moved(p: Plan, frame: MeasuredFrame, tolerances: Tolerances) -> tuple[Plan,
 
 
 def _first_failed(table: Sequence[Check]) -> Check | None:
-    """Return the first check that is an error; None where the plan passes."""
+    """Return the first check that is an error; None if the plan passes."""
     return next((check for check in table if check.level == "error" and not check.ok), None)
 
 
@@ -260,7 +259,7 @@ def _options(file: PlanFile, language: str, stem: str) -> ProgramOptions:
 
 
 def require_same_setup(plan: Plan, job: Job, path: Path) -> None:
-    """Raise InputError where a plan's tool, part or arm is not where the job has it."""
+    """Raise InputError if the tool, the part or the arm of a plan differs from the job."""
     pairs = {
         "tool": (plan.T_flange_tip, job.tool),
         "part": (plan.T_base_part, job.placement),
@@ -269,6 +268,6 @@ def require_same_setup(plan: Plan, job: Job, path: Path) -> None:
     for name, (here, there) in pairs.items():
         if np.abs(here - there).max() > SAME_PLACE:
             raise InputError(
-                f"{job.path}: its {name} is not where that of {path} is; give the job of that "
-                "plan, or plan it again"
+                f"{job.path}: its {name} is not at the place of that in {path}; give the job of "
+                "that plan, or plan it again"
             )

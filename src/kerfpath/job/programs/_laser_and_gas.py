@@ -1,9 +1,8 @@
-"""Beam and gas of a program as a state machine over all of its steps, in the order they run in.
+"""Check beam and gas of a program with a state machine over all its steps, in running order.
 
-The clock is that of the text: moves along the path take their length by their speed, or the time
-that is said, joint moves the least time that the limits leave them. A switch acts its lead time
-before the tip arrives, wherever that is. The source answers after the job's lead time, so that is
-when the beam is on, or off.
+Times follow from the text: a move along the path takes its length divided by its speed, or the
+stated time; a joint move takes the least time within the limits. A switch acts its lead time before
+the tip arrives. The source answers after the job's lead time, and then the beam is on, or off.
 """
 
 from __future__ import annotations
@@ -25,33 +24,33 @@ from kerfpath.transfer import least_time
 __all__ = ["BeamProcess", "check_laser_and_gas"]
 
 SAME_TIME = 2e-3
-"""s: controllers round times."""
+"""Tolerance of times, s; controllers round them."""
 ENDLESS = 60.0
-"""s that a joint move takes whose limits are not known."""
+"""Assumed duration, s, of a move whose speed or limits are not known."""
 
 What = Literal["air", "approach", "start", "cut", "end", "retract"]
 WORDS: dict[What, str] = {
-    "air": "laser on in a transfer move, or where the robot stands there",
-    "approach": "laser on on the way down to the part",
+    "air": "laser on in a transfer move, or while the robot waits there",
+    "approach": "laser on during the approach",
     "start": "laser on at the start for longer than the pierce",
-    "cut": "laser on where the robot waits in the cut",
-    "end": "laser on where the robot waits at the end of the cut",
-    "retract": "laser on while the tool backs off",
+    "cut": "laser on while the robot waits in the cut",
+    "end": "laser on while the robot waits at the end of the cut",
+    "retract": "laser on during the retract",
 }
-"""Where the beam must not be on, and what is said of it."""
+"""Where the beam must not be on, and the title of the check."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeamProcess:
-    """What the job asks of beam and gas.
+    """Requirements of the job on beam and gas.
 
     Parameters
     ----------
     lead_time : float s
-        Of the laser.
+        Lead time of the laser.
     pierce_time : float s
     gas_lead : float s or None
-        How long before the start the gas is to flow; None: it is not switched by the program.
+        How long before the start the gas is to flow; None: the program does not switch it.
     stops : bool
         Whether the job asks for a stop at every node.
     """
@@ -63,7 +62,7 @@ class BeamProcess:
 
     @classmethod
     def of(cls, options: ProgramOptions, *, ahead: bool) -> BeamProcess:
-        """Return what [program] asks for, where the language can switch `ahead` of a target."""
+        """Return the requirements of [program], in a language that can switch `ahead` or not."""
         gas = options.gas_lead
         return cls(
             lead_time=options.lead_time if ahead else 0.0,
@@ -75,7 +74,7 @@ class BeamProcess:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Span:
-    """What the robot does from one time (s) to another, and which step of the program says so."""
+    """What the robot does from one time (s) to another, and the step of the program."""
 
     what: What
     start: float
@@ -87,7 +86,7 @@ class _Span:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Event:
-    """A switch when (s) it acts, and which step of the program says so."""
+    """A switch, the time (s) when it acts, and the step of the program."""
 
     time: float
     signal: Signal
@@ -96,12 +95,12 @@ class _Event:
 
 
 def check_laser_and_gas(read: ReadProgram, robot: Robot, process: BeamProcess) -> list[Check]:
-    """Return the checks of beam and gas over a whole program; their node is the step of it.
+    """Return the checks of beam and gas over a whole program; their node is its step.
 
     Parameters
     ----------
     read : ReadProgram
-        With the tip poses of its path.
+        The program, with the tip poses of its path.
     robot : Robot
     process : BeamProcess
     """
@@ -114,9 +113,9 @@ def check_laser_and_gas(read: ReadProgram, robot: Robot, process: BeamProcess) -
     said = "stop points in the cut with the laser on"
     stops = _row("beam-stop", said, _stops(spans, beam), 0, "count")
     rows.append(replace(stops, level="warning") if process.stops else stops)
-    said = "borders of files in the cut with the laser on"
+    said = "changes of the file in the cut with the laser on"
     rows.append(_row("beam-file", said, _borders(spans, beam), 0, "count"))
-    said = "laser switched on when it is, or off"
+    said = "switches of the laser that change nothing"
     rows.append(_row("beam-twice", said, _idle(events), 0, "count"))
     for signal in ("laser", "gas"):
         left = [event for event in events if event.signal == signal][-1:]
@@ -128,7 +127,7 @@ def check_laser_and_gas(read: ReadProgram, robot: Robot, process: BeamProcess) -
 def _row(
     code: str, title: str, found: Sequence[tuple[float, int]], limit: float, unit: Unit
 ) -> Check:
-    """Return a check of values and the steps they are found at; a count is that of its values."""
+    """Return a check of the largest of values with their steps; counts are summed."""
     value, step = max(found, default=(0.0, 0), key=lambda one: (one[0], -one[1]))
     if unit == "count":
         value = float(sum(one for one, _ in found))
@@ -174,7 +173,7 @@ def _timeline(read: ReadProgram, robot: Robot) -> tuple[list[_Span], list[_Event
 
 
 def _what(at: int, count: int) -> What:
-    """Return what a move is after which `at` of `count` moves of the path are done."""
+    """Return the kind of a move after which `at` of `count` moves of the path are done."""
     if at < 1:
         return "air"
     if at == 1:
@@ -239,7 +238,7 @@ def _wrongly(
 ) -> list[tuple[float, int]]:
     """Return for how long (s) the beam is on where it must not be, and the step there.
 
-    What begins in one span and ends in the next is counted at each.
+    A beam that begins in one span and ends in the next is counted in each.
     """
     found = []
     pierced = 0.0
@@ -261,7 +260,7 @@ def _stops(
     """Return the inner targets of cuts where the robot stops and the beam stays on."""
     moves = [span for span in spans if span.move is not None]
     stops = [a for a, b in pairwise(moves) if a.what == b.what == "cut"]
-    # What is switched at the stop itself may act a little before it or after.
+    # A switch at the stop itself may act slightly before or after it.
     return [
         (1.0, span.step)
         for span in stops
@@ -272,7 +271,7 @@ def _stops(
 def _borders(
     spans: Sequence[_Span], beam: Sequence[tuple[float, float, int]]
 ) -> list[tuple[float, int]]:
-    """Return where a cut goes on in another file while the beam is on."""
+    """Return where a cut continues in another file while the beam is on."""
     moves = [span for span in spans if span.move is not None]
     return [
         (1.0, b.step)
@@ -288,7 +287,7 @@ def _through(time: float, on: Sequence[tuple[float, float, int]]) -> bool:
 
 
 def _idle(events: Sequence[_Event]) -> list[tuple[float, int]]:
-    """Return switches that change nothing: another one is missing, or acts too early or late."""
+    """Return the switches that change nothing: another is missing, or acts too early or late."""
     state = {"laser": False, "gas": False}
     found = []
     for event in events:
@@ -302,11 +301,11 @@ def _gas(
     spans: Sequence[_Span], events: Sequence[_Event], beam: Sequence[tuple[float, float, int]],
     process: BeamProcess,
 ) -> list[Check]:  # fmt: skip
-    """Return whether the gas flows before the beam and for as long, and nowhere else."""
+    """Return the checks that the gas flows before and with the beam, and nowhere else."""
     gas = _on(events, "gas", shift=0.0)
     if process.gas_lead is None:
         found = [(1.0, event.step) for event in events if event.signal == "gas"]
-        return [_row("gas", "switches of a gas that the job does not switch", found, 0, "count")]
+        return [_row("gas", "gas switches that the job does not ask for", found, 0, "count")]
     spread = [(max(on, 0.0), off, step) for on, off, step in beam if off < np.inf]
     without = [(off - on - _overlap(on, off, gas), step) for on, off, step in spread]
     starts = [span for span in spans if span.what == "approach"]
@@ -314,7 +313,7 @@ def _gas(
         (process.gas_lead - _overlap(span.end - process.gas_lead, span.end, gas), span.step)
         for span in starts
     ]
-    # It may come as the tool sets out on its way down, too.
+    # The gas may also start at the beginning of the approach.
     ahead = [(min(span.end - process.gas_lead, span.start), span.end, span.step) for span in starts]
     idle = [
         (_overlap(span.start, span.end, gas) - _overlap(span.start, span.end, _both(gas, ahead)),
@@ -324,7 +323,7 @@ def _gas(
     ]  # fmt: skip
     return [
         _row("gas", "laser on without gas", without, SAME_TIME, "s"),
-        _row("gas-lead", "gas later before the start than asked for", late, SAME_TIME, "s"),
+        _row("gas-lead", "delay of the gas before the start", late, SAME_TIME, "s"),
         _row("gas-idle", "gas on where it is not asked for", idle, SAME_TIME, "s"),
     ]
 
@@ -332,6 +331,6 @@ def _gas(
 def _both(
     one: Sequence[tuple[float, float, int]], two: Sequence[tuple[float, float, int]]
 ) -> list[tuple[float, float, int]]:
-    """Return when both are on."""
+    """Return the times when both are on."""
     found = [(max(a, c), min(b, d), step) for a, b, step in one for c, d, _ in two]
     return [(start, end, step) for start, end, step in found if end > start]

@@ -1,4 +1,4 @@
-"""Whether a program keeps gamma inside the windows that its job pins it to."""
+"""Check that a program keeps gamma inside the windows of its job."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from kerfpath.windows import GammaWindow
 __all__ = ["check_pins"]
 
 OUTSIDE = 1e-5
-"""rad: by how much targets may be outside, beyond their digits."""
+"""Tolerance of targets outside a window, rad, beyond their digits."""
 
 
 def check_pins(
@@ -29,7 +29,7 @@ def check_pins(
 ) -> list[Check]:
     """Return the check of a cut's windows of gamma, at the nodes that the job asks for.
 
-    None where the tool axis may be tilted: a text does not say which way it was meant to be.
+    Empty if the tool axis may be tilted, as a text does not state the nominal axis.
     """
     if not windows or job.options.tilt is not None:
         return []
@@ -37,5 +37,5 @@ def check_pins(
     settings = replace(whole.settings, gamma_windows=tuple(windows))
     pinned = replace(whole, contour=asked.nodes, settings=settings)
     tool = job.robot.forward(pinned.q) @ job.tool
-    # The digits of three angles, or of four numbers of a quaternion.
+    # Digits of three angles, or of the four numbers of a quaternion.
     return window_checks(pinned, tool, slack=OUTSIDE + 4 * rules.angle_step)

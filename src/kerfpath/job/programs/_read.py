@@ -1,4 +1,4 @@
-"""A program on disk, and the motions that its text means."""
+"""Read a program on disk, and the motions that its text means."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ __all__ = [
 ]
 
 ARC_STEP = np.radians(2.0)
-"""Sweep between the nodes that an arc has, where it is not known which contour it is of."""
+"""Sweep between nodes on an arc, rad, if its contour is not known."""
 COARSEST = np.radians(45.0)
-"""The same at most, where it is."""
+"""Largest sweep between nodes on an arc, rad, if its contour is known."""
 
 
 class _Folder(Mapping[str, str]):
@@ -57,7 +57,7 @@ class _Folder(Mapping[str, str]):
             return path.read_bytes().decode("utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             why = " ".join(str(error).split())
-            raise InputError(f"{path}: cannot be read as a text ({why})") from None
+            raise InputError(f"{path}: cannot be read as text ({why})") from None
 
     def __iter__(self) -> Iterator[str]:
         return (path.name for path in self.folder.iterdir())
@@ -72,7 +72,7 @@ def language_of(path: Path, job: Job) -> tuple[Language, LanguageSettings]:
     Raises
     ------
     InputError
-        No language, or none with a reader, writes such files.
+        No language writes files with this suffix.
     """
     known = languages()
     fitting = [each for each in known.values() if each.suffix.lower() == path.suffix.lower()]
@@ -90,12 +90,12 @@ def language_of(path: Path, job: Job) -> tuple[Language, LanguageSettings]:
 def program_on_disk(
     path: Path, chosen: Language, settings: LanguageSettings, robot: Robot
 ) -> ReadProgram:
-    """Return what the program that starts with the file at `path` says.
+    """Return the program whose main file is at `path`.
 
     Raises
     ------
     InputError
-        The file cannot be read, or is not of our making: where, in one line.
+        The file cannot be read, or was not written by kerfpath; the message names the line.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file; give the path of a program or a plan.json")
@@ -104,37 +104,38 @@ def program_on_disk(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReadCut:
-    """One cut of a program: what lies between going down to the part and backing off it.
+    """One cut of a program, between the approach and the retract.
 
     Parameters
     ----------
     name : str
-        Of the routine that it begins in.
+        Name of the routine in which it begins.
     approach : (m, n) rad
-        Corners of the joint moves on the way to it.
+        Corners of the joint moves to it.
     q : (K, n) rad
         Joints at its nodes, on the branch that the joint moves lead to; NaN out of reach.
     T_part_tip : (K, 4, 4) m
+        Tip poses at its nodes.
     took : (K-1,) s
-        How long each stretch takes along its chord, or as long as the text says.
+        Duration of each stretch along its chord, or as the text states it.
     speed : (K-1,) m/s
-        Along each stretch; NaN where the text says times.
+        Speed along each stretch; NaN if the text states times.
     laser : (K-1,) bool
         Whether the laser is on along each stretch.
     left_on : bool
         Whether it is on while the tool backs off.
     lead_times : (s,) s
-        Of the switches of the laser.
+        Lead times of the switches of the laser.
     waits : (w,) s
-        At its first node.
+        Waits at its first node.
     q_out : (n,) rad
-        Where the tool has backed off to.
+        Joints after the retract.
     moves : tuple of ReadMove
         The move to each node.
     ends : (m,) int
-        The node that each target of the text stands at; an arc has nodes between.
+        The node of each target of the text; an arc has more nodes between.
     group : ReadGroup
-        What it was made of.
+        The steps that it was made from.
     """
 
     name: str
@@ -171,7 +172,7 @@ def read_cuts(read: ReadProgram, job: Job) -> tuple[list[ReadCut], Array]:
     Raises
     ------
     InputError
-        Moves in an order that makes no cut: where.
+        The order of the moves makes no cut; the message names the place.
     """
     groups = groups_of(add_tips(read, job))
     home = np.zeros((0, job.robot.joints))
@@ -183,7 +184,7 @@ def read_cuts(read: ReadProgram, job: Job) -> tuple[list[ReadCut], Array]:
             raise InputError(f"{group.path[0].place}: expected a joint move before the path")
         if len(group.path) < 4:
             raise InputError(
-                f"{group.path[-1].place}: expected a way down, a cut and a way back, got "
+                f"{group.path[-1].place}: expected an approach, a cut and a retract, got "
                 f"{len(group.path)} moves"
             )
         cuts.append(_cut(group, job))
@@ -193,7 +194,7 @@ def read_cuts(read: ReadProgram, job: Job) -> tuple[list[ReadCut], Array]:
 def divide_arcs(cut: ReadCut, interval: float, job: Job) -> ReadCut:
     """Return a cut whose arcs have a node at each interval (s), as straight moves would have.
 
-    So rates along arcs, and where arcs end, are judged over the same times as all others.
+    Rates along arcs and at their ends are then checked over the same times as all others.
     """
     if all(move.kind != "circular" for move in cut.moves):
         return cut
@@ -201,7 +202,7 @@ def divide_arcs(cut: ReadCut, interval: float, job: Job) -> ReadCut:
 
 
 def _cut(group: ReadGroup, job: Job, interval: float | None = None) -> ReadCut:
-    """Return the cut of a group; an arc gets nodes of its own along it."""
+    """Return the cut of a group; an arc gets nodes along it."""
     T: list[Array] = []
     took: list[float] = []
     moves: list[ReadMove] = []
@@ -213,9 +214,7 @@ def _cut(group: ReadGroup, job: Job, interval: float | None = None) -> ReadCut:
         assert end is not None
         stops = [end]
         if move.kind == "circular" and job.robot.free.size:
-            raise InputError(
-                f"{move.place}: arcs with {job.robot.free_names} are not of our making"
-            )
+            raise InputError(f"{move.place}: kerfpath writes no arcs with {job.robot.free_names}")
         if T and move.kind == "circular" and move.T_part_via is not None:
             stops = _arc(T[-1], move.T_part_via, end, move, interval)
         for stop in stops:
@@ -252,11 +251,11 @@ def _cut(group: ReadGroup, job: Job, interval: float | None = None) -> ReadCut:
 
 
 def _duration(move: ReadMove, start: Array, end: Array, parts: int) -> float:
-    """Return how long (s) a move, or one of so many parts of it, takes."""
+    """Return the duration (s) of a move, or of one of its parts."""
     if move.duration is not None:
         return move.duration / parts
     if not move.speed:
-        raise InputError(f"{move.place}: neither a speed nor a time is said for the move")
+        raise InputError(f"{move.place}: expected a speed or a time of the move, got neither")
     return float(np.linalg.norm(end[:3, 3] - start[:3, 3])) / move.speed
 
 
@@ -266,28 +265,28 @@ def _speed(move: ReadMove) -> float:
 
 def _q(move: ReadMove) -> Array:
     if move.q is None:
-        raise InputError(f"{move.place}: a joint move says no joints")
+        raise InputError(f"{move.place}: expected the joints of a joint move, got none")
     return move.q
 
 
 def _free(move: ReadMove, robot: Robot) -> Array:
-    """Return the values (E,) rad and m of what a pose leaves free at the target of a move."""
+    """Return the values (E,) rad and m of the free joints at the target of a move."""
     if not robot.free.size:
         return np.zeros(0)
     if move.q is not None:
         return move.q[robot.free]
     if move.external is None or robot.family.given is not None:
-        raise InputError(f"{move.place}: no value of {robot.joint_names[robot.free[0]]} is said")
+        free = robot.joint_names[robot.free[0]]
+        raise InputError(f"{move.place}: expected a value of {free}, got none")
     return move.external
 
 
 def _arc(
     start: Array, via: Array, end: Array, move: ReadMove, interval: float | None
 ) -> list[Array]:
-    """Return poses along the arc after `start`, its end included, the tool turning evenly.
+    """Return poses along the arc after `start`, with its end; the tool turns evenly.
 
-    They are `ARC_STEP` apart, or as far as the robot comes in an interval (s), but no farther than
-    `COARSEST`.
+    They are `ARC_STEP` apart, or as far as the robot moves in an interval (s), at most `COARSEST`.
     """
     arc = ToolCourse.through(np.array([start, end]), [via])
     sweep = float(arc.sweep[0])
@@ -304,7 +303,7 @@ def _arc(
 
 
 def branch_of(robot: Robot, q: Array) -> int:
-    """Return which posture joints (n,) are in; external axes have no part in it."""
+    """Return the posture of joints (n,); external axes have no effect on it."""
     robot, q = robot.alone(), q[: robot.family.joints]
     solved, reach = robot.inverse_all(robot.forward(q)[None], robot.given_of(q[None]))
     apart = np.abs((solved[0] - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
@@ -314,11 +313,11 @@ def branch_of(robot: Robot, q: Array) -> int:
 def follow_poses(robot: Robot, T: Array, q0: Array, free: Array | None = None) -> Array:
     """Return joints (K, n) at flange poses T (K, 4, 4), on the branch of q0; NaN out of reach.
 
-    What poses leave free, joint 3 of a seven-axis arm and external axes, is at the values (K, E)
-    rad and m that are given.
+    `free` (K, E) rad and m has the joints that a pose leaves free: joint 3 of a seven-axis arm, and
+    external axes.
     """
     if free is not None and robot.externals:
-        # Where they have carried base and part, the arm alone sees the poses there.
+        # The poses that the arm alone sees, after external axes have moved base and part.
         inner, external = np.split(free, [len(robot.free) - len(robot.externals)], axis=1)
         seen = np.linalg.inv(base_in_part(robot.externals, external)) @ T
         q = follow_poses(robot.alone(), seen, q0[: robot.family.joints], inner)

@@ -1,4 +1,4 @@
-"""Targets of a program that a person has moved by hand, and the job planned again around them."""
+"""Plan a job again around targets of its program that a person has moved."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from kerfpath.progress import Progress, no_progress
 __all__ = ["MovedTarget", "TouchUp", "touch_up"]
 
 MOVED = 1e-6
-"""A target that is nearer (m) to where it was planned was not moved."""
+"""Least distance (m) of a moved target from the planned one."""
 TURNED = np.radians(1e-3)
-"""The same of its axis, rad."""
+"""Least angle (rad) of a moved target's tool axis to the planned one."""
 MOST_MOVED = 0.1
-"""Share of the targets; where more were moved it is the part that stands elsewhere."""
+"""Largest share of moved targets; if more were moved, the part itself is elsewhere."""
 SAME_PATH = 1e-5
-"""A plan whose nodes leave the drawing's path by more (m) was touched up before."""
+"""Distance (m) of a plan's nodes from the drawn path beyond which it was touched up before."""
 ALONG = ("added", "removed", "order", "kinds")
-"""Differences that are none of moved targets."""
-MEASURE = "a part that stands elsewhere is measured: kerfpath post PLAN.json --measured POINTS.csv"
+"""Codes of differences other than moved targets."""
+MEASURE = "for a part that is elsewhere: kerfpath post PLAN.json --measured POINTS.csv"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,9 +50,9 @@ class MovedTarget:
     place : str
         File and line.
     off : float m
-        From where it was planned.
+        Distance from the planned target.
     turned : float rad
-        Of its tool axis.
+        Angle of its tool axis to the planned one.
     """
 
     contour: str
@@ -74,7 +74,7 @@ class TouchUp:
     outcome : JobResult
     targets : tuple of MovedTarget
     notes : tuple of str
-        What else was changed in the program, and is not kept.
+        Other changes in the program, which are not kept.
     """
 
     part: Part
@@ -93,7 +93,7 @@ def touch_up(
     ease: float = 0.01,
     progress: Progress = no_progress,
 ) -> TouchUp:
-    """Return what comes of planning a job again around the targets moved in its program.
+    """Plan a job again around the targets that were moved in its program.
 
     Moved nodes keep tip and axis as taught, and the path eases back to the planned one; the
     rotation about the beam is planned again. Starts, directions, order and postures stay.
@@ -101,7 +101,7 @@ def touch_up(
     Parameters
     ----------
     program : Path
-        The edited program, the file that is started.
+        The main file of the edited program.
     plan_file : Path
         The plan.json that it was written from.
     job_file : Path
@@ -113,7 +113,8 @@ def touch_up(
     ------
     InputError
         A file cannot be read, does not belong to the others, or is of a kind that cannot be
-        touched up; no target was moved, the start of a contour, a frame, or more than a tenth.
+        touched up; or no target was moved, or the start of a contour, a frame, or more than a
+        tenth of the targets.
     """
     job, file = read_job(job_file), read_plan_file(plan_file)
     _require_kind(job, file)
@@ -130,7 +131,7 @@ def touch_up(
     asked = dict(zip(prepared.names, prepared.contours, strict=True))
     if set(asked) != set(file.contours.values()):
         raise InputError(
-            f"{job.path}: has other contours than {file.path}; give the job of that plan"
+            f"{job.path}: the job has other contours than {file.path}; give the job of that plan"
         )
     contours = [
         _touched_up(asked[p.name], p, moved, group.path, ease)
@@ -142,7 +143,7 @@ def touch_up(
 
 
 def _require_kind(job: Job, file: PlanFile) -> None:
-    """Raise InputError where job and plan do not belong together, or are not for touching up."""
+    """Raise InputError if job and plan do not belong together, or cannot be touched up."""
     options = job.options
     kinds = (
         (options.interruptions != "none", "interruptions"),
@@ -164,7 +165,7 @@ def _require_kind(job: Job, file: PlanFile) -> None:
 
 
 def _read_edits(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup], list[str]]:
-    """Return what an edited program does, a group for each plan, and what else was changed."""
+    """Return the steps of an edited program, a group for each plan, and its other changes."""
     chosen, settings = language_of(program, job)
     options = replace(job.program, language=chosen.name, settings=settings)
     texts, _ = program_of(file.plans, options, file.moves, audit=audit_of_plans(job, file.plans))
@@ -189,7 +190,7 @@ def _read_edits(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup
 
 
 def _taught(p: Plan, moves: Sequence[ReadMove]) -> list[MovedTarget]:
-    """Return the targets of a contour that are not where they were planned."""
+    """Return the targets of a contour that were moved."""
     T = np.array([move.T_part_tip for move in moves])
     off = np.linalg.norm(T[:, :3, 3] - p.contour.points, axis=1)
     turned = angle_between(p.contour.axes, T[:, :3, 2])
@@ -216,15 +217,15 @@ def _require_few(
             if target.node in ends:
                 raise InputError(
                     f"{target.place}: the {'end' if target.node else 'start'} of contour "
-                    f"{target.contour!r} was moved; say another start in the job and plan it again;"
-                    f" {MEASURE}"
+                    f"{target.contour!r} was moved; write another start in the job and plan it "
+                    f"again; {MEASURE}"
                 )
 
 
 def _touched_up(
     asked: CutRequest, p: Plan, moved: Sequence[MovedTarget], moves: Sequence[ReadMove], ease: float
 ) -> CutRequest:
-    """Return what is asked for a contour around its moved targets, in the postures of its plan."""
+    """Return the request for a contour around its moved targets, in the postures of its plan."""
     planned = _path_and_nodes(p, asked)
     if moved:
         k = np.array([target.node for target in moved])
@@ -242,9 +243,9 @@ def _touched_up(
 
 
 def _path_and_nodes(p: Plan, asked: CutRequest) -> Candidate:
-    """Return the candidate that a plan is of.
+    """Return the candidate of a plan.
 
-    That of a plan that was touched up before has its own nodes, with straight lines between.
+    For a plan that was touched up before, its path is straight lines between the plan's nodes.
     """
     for candidate in asked.candidates:
         fits = len(candidate.nodes) == len(p.contour)
@@ -263,7 +264,7 @@ def _sample_touched(path: Contour, nodes: Contour, keep: Ints, speed: float) -> 
 
 
 def _distances(planned: Contour, path: Contour) -> float:
-    """Return how far (m) nodes and axes are from a path at the same arc lengths."""
+    """Return the largest error (m, rad) of nodes and axes on a path at the same arc lengths."""
     points, axes = path.at(planned.s)
     off: Array = np.linalg.norm(planned.points - points, axis=1)
     return float(np.maximum(off, angle_between(planned.axes, axes)).max())

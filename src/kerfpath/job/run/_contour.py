@@ -28,7 +28,7 @@ __all__ = ["GraphOf", "advised", "course_of_plans", "cut_candidate", "cut_in_pos
 
 _T = TypeVar("_T")
 GraphOf = Callable[[Job, Contour, Callable[[int], None]], LayeredGraph]
-"""Returns the graph of a job's nodes, and calls with the number of nodes solved."""
+"""Returns the graph of a job's nodes, and calls its third argument with counts of solved nodes."""
 
 
 def _build(job: Job, nodes: Contour, solved: Callable[[int], None]) -> LayeredGraph:
@@ -43,11 +43,10 @@ def cut_candidate(
     *,
     graph_of: GraphOf = _build,
 ) -> tuple[CutResult, ...]:
-    """Return what came of a candidate: one cut, or several where it is interrupted.
+    """Plan and audit a candidate; return one cut, or one for each piece if it is interrupted.
 
-    Nothing is certified yet: of all candidates one is chosen first. Nor is it known yet what would
-    open the way of one without a plan, see `advised`. A graph that is kept may be had by
-    `graph_of`.
+    Plans are not certified yet, because one candidate is chosen first, and a cut without a plan
+    has no advice yet, see `advised`. `graph_of` may return a graph that was kept.
     """
     options = replace(request.options, certify=None)
     job, cell = replace(prepared.job, options=options), prepared.cell
@@ -121,7 +120,7 @@ def _cut_along_courses(
     solved: Callable[[int], None],
     begin: Callable[[str], None],
 ) -> tuple[CutResult, ...]:
-    """Return what came of a candidate with external axes; its graph is along the course found."""
+    """Plan and audit a candidate with external axes; its graph is along the course found."""
     job, cell, nodes = prepared.job, prepared.cell, candidate.nodes
 
     def planned(by: Callable[..., _T]) -> _T:
@@ -151,14 +150,14 @@ def _cut_along_courses(
 
 
 def _at_nodes(job: Job) -> PlanOptions:
-    """Return how plans of a job are asked for: what is to hold between the nodes comes after."""
+    """Return the options for planning at the nodes; limits between them are handled afterwards."""
     return replace(job.options, between_nodes="reported")
 
 
 def course_of_plans(job: Job, nodes: Contour, plans: Sequence[Plan]) -> Array:
-    """Return where plans have what poses leave free at every node (K, E) rad or m.
+    """Return the free joints of plans at every node, (K, E) rad or m.
 
-    Where none of them is, it is at rest: nearest to zero.
+    At nodes without a plan they are at rest: at zero, or at the limit nearest to it.
     """
     limits, free = job.robot.joint_limits(), job.robot.free
     rest = np.clip(0.0, limits.lower[free], limits.upper[free])
@@ -175,7 +174,7 @@ def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> 
     Raises
     ------
     NoFeasiblePath
-        It cannot be cut so.
+        It cannot be cut in this posture.
     """
     candidate = request.candidates[0]
     job = replace(prepared.job, options=replace(request.options, postures=(posture,), certify=None))
@@ -189,11 +188,12 @@ def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> 
 
 
 def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutResult:
-    """Return a cut with what would open its way, where it has no plan and that is known.
+    """Return a cut without a plan with advice on what would make it feasible, if that is known.
 
-    That is to leave out windows of gamma, and the speed and the limits that would do. With poses
-    everywhere slower would do; for a loop that cannot close, or an axis that may not turn as far,
-    it need not, a reduced feed has tried, and with torque or jerk limits it is not known.
+    The advice is to leave out windows of gamma, and a speed or shares of the limits that are
+    enough. A lower speed helps if every node has poses. It need not help with periodic closure or
+    a limited rotation of endless axes; a reduced feed has tried it already; and with torque or
+    jerk limits it is not known. No speed is looked for in these cases.
     """
     options, graph = replace(cut.request.options, certify=None), cut.graph
     job, cell, run = replace(prepared.job, options=options), prepared.cell, cut.request.run
@@ -205,7 +205,7 @@ def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutRes
     broken = cut.broken
     if broken is None:
         return cut
-    progress(f"{cut.request.task.name}: what would open the way", 0, 0)
+    progress(f"{cut.request.task.name}: looking for a remedy", 0, 0)
     if run is None and opens_without_windows(job, cut.request, cut.candidate, cell):
         cut = replace(cut, advice=Remedy(other_method=False, without_windows=True))
     if not (np.diff(graph.start).all() and plain and constant):
@@ -220,7 +220,7 @@ def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutRes
 def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
     """Return the cut of one plan, at finer intervals if the job asks for them, and its audit."""
     job, candidate, graph = prepared.job, whole.candidate, whole.graph
-    # The postures that the job allows, of which the search may have had only some.
+    # All postures that the job allows; the search may have used only some of them.
     postures, between = job.options.postures, job.options.between_nodes
     settings = replace(made.settings, postures=postures, between_nodes=between)
     made = replace(made, settings=settings)
@@ -241,7 +241,7 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
 
 
 def _divided(made: Plan, path: Contour, parts: int) -> Plan:
-    """Return the plan on nodes that divide its intervals, where one keeps the limits there."""
+    """Return the plan on nodes that divide its intervals, if one keeps the limits there."""
     found = refine(made, nodes=divide_nodes(path, made.contour, parts))
     if found.done:
         return found.plan

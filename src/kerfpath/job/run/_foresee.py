@@ -1,4 +1,4 @@
-"""What is wrong with a job that need not be planned to be known: every fault, and its key."""
+"""Find the faults of a job that are known before planning, each with its key."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from kerfpath.sequence import best_order, distances_between
 __all__ = ["foresee", "require_foreseen"]
 
 HALVINGS = 7
-"""Times that a length is halved, or an interval of lengths, to say which would do."""
+"""Bisections of a length to find one that would do."""
 FINE = np.radians(1.0)
-"""Step of gamma at which poses of both ends are looked at, however coarse that of the job is."""
+"""Largest step of gamma, rad, for the poses of both ends, even if that of the job is coarser."""
 SAME_PLACE = 1e-6
-"""m: what is below the floor by no more is so by rounding."""
+"""Depth in m below the floor that is attributed to rounding."""
 SECONDS = 2.0
-"""s: how long it may take to find that contours can be put in no order."""
+"""Time limit, s, for finding that no order of the contours is possible."""
 
 
 def require_foreseen(prepared: PreparedJob) -> None:
-    """Refuse a job that cannot lead to a program whatever its plans are.
+    """Require that a job has no fault that is known before planning.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def foresee(prepared: PreparedJob) -> list[InputError]:
 
 
 def _program_faults(prepared: PreparedJob) -> Iterator[InputError]:
-    """Yield what the language of the program refuses by names, numbers and outputs."""
+    """Yield the names, numbers and outputs that the language of the program refuses."""
     job, p = prepared.job, prepared.job.program
     if p.language == "none":
         return
@@ -77,7 +77,7 @@ def _program_faults(prepared: PreparedJob) -> Iterator[InputError]:
 
 
 def _floor_faults(prepared: PreparedJob) -> Iterator[InputError]:
-    """Yield that contours reach below the floor; the fault names the lowest."""
+    """Yield a fault if contours reach below the floor; it names the lowest."""
     job, floor = prepared.job, prepared.job.options.floor
     if floor is None:
         return
@@ -93,13 +93,13 @@ def _floor_faults(prepared: PreparedJob) -> Iterator[InputError]:
             ("part", "xyz_mm"),
             f"contour {prepared.names[worst]!r} reaches {(floor - lowest[worst]) * 1e3:.4g} mm "
             f"below the floor, which is at z = {floor * 1e3:g} mm of the robot base ({below} of "
-            f"{len(lowest)} contours reach below it); write floor_mm in [robot] where the floor "
-            "is lower, or floor = false where there is none",
+            f"{len(lowest)} contours reach below it); write floor_mm in [robot] if the floor is "
+            "lower, or floor = false if there is none",
         )
 
 
 def _sampling_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[InputError]:
-    """Yield that the nodes of a contour leave its path by more than the audit allows."""
+    """Yield a fault if chords between the nodes leave the path by more than the audit allows."""
     job, task = prepared.job, request.task
     if job.options.refine_parts > 1:
         return
@@ -116,19 +116,19 @@ def _sampling_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[Inp
         job.path,
         ("contour", _table_of(job, request), key),
         f"contour {task.name!r}: chords between its nodes leave the path by {off * 1e3:.3g} mm, "
-        f"and path_tolerance_mm in [audit] allows {allowed * 1e3:g} mm; {cure}, or raise "
+        f"but path_tolerance_mm in [audit] allows {allowed * 1e3:g} mm; {cure}, or raise "
         "path_tolerance_mm",
     )
 
 
 def _table_of(job: Job, request: CutRequest) -> int:
-    """Return which [[contour]] table of the job a request is of."""
+    """Return the number of a request's [[contour]] table in the job."""
     tables = [spec.table for spec in job.contours]
     return next((i for i, table in enumerate(tables) if table is request.task.table), 0)
 
 
 def _order_faults(prepared: PreparedJob) -> Iterator[InputError]:
-    """Yield that no order of the contours keeps the heat spacing, and up to which one does."""
+    """Yield a fault if no order keeps the heat spacing; it has the largest that one keeps."""
     job, sequence = prepared.job, prepared.job.sequence
     if sequence is None or not sequence.heat_spacing_mm or job.options.interruptions != "none":
         return
@@ -137,24 +137,24 @@ def _order_faults(prepared: PreparedJob) -> Iterator[InputError]:
     if _has_order(prepared, between < spacing):
         return
     apart = np.unique(between[between < spacing])
-    low, high = 0, len(apart)  # of that many pairs one may follow the other in no order
+    low, high = 0, len(apart)  # bisect the distance up to which an order exists
     while high - low > 1:
         middle = (low + high) // 2
         possible = _has_order(prepared, between < apart[middle])
         low, high = (middle, high) if possible else (low, middle)
     most = apart[low] if _has_order(prepared, between < apart[low]) else 0.0
-    order = "the order given" if sequence.order == "given" else "any order"
+    order = "the given order has" if sequence.order == "given" else "every order has"
     yield refusal_at(
         job.path,
         ("sequence", "heat_spacing_mm"),
-        f"no two contours nearer than {spacing * 1e3:g} mm may follow each other, which {order} "
-        f"breaks; write at most heat_spacing_mm = {np.floor(most * 1e4) / 10:g}"
+        f"expected contours that follow each other to be {spacing * 1e3:g} mm apart, but {order} "
+        f"nearer ones; write at most heat_spacing_mm = {np.floor(most * 1e4) / 10:g}"
         + (', or order = "best"' if sequence.order == "given" else ""),
     )
 
 
 def _has_order(prepared: PreparedJob, near: Bools) -> bool:
-    """Return whether contours can be cut in an order in which none follows one near it, (G, G)."""
+    """Return whether an order exists in which no contour follows one that is near it, (G, G)."""
     count = len(near)
     assert prepared.job.sequence is not None
     if prepared.job.sequence.order == "given":
@@ -171,7 +171,7 @@ def _has_order(prepared: PreparedJob, near: Bools) -> bool:
 
 
 def _retract_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[InputError]:
-    """Yield that no pose of an end of a contour leaves room for the retract."""
+    """Yield a fault if no pose at an end of a contour leaves room for the retract."""
     job, asked = prepared.job, prepared.job.options.retract
     if asked is None:
         return

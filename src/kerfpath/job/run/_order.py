@@ -23,15 +23,15 @@ def order_cuts(
     tried: Sequence[Sequence[tuple[CutResult, ...]]],
     progress: Progress,
 ) -> JobResult:
-    """Return one cut (or its pieces) of each contour's candidates, in the order asked for.
+    """Return one cut (or its pieces) of each contour's candidates, in the requested order.
 
-    With the moves between them where the job asks for them and every contour has a plan.
+    The result has the moves between them if the job asks for moves and every contour has a plan.
 
     Parameters
     ----------
     prepared : PreparedJob
     tried : sequence of sequences of tuples of CutResult
-        What came of each candidate of each contour: one cut, or its pieces.
+        The result of each candidate of each contour: one cut, or its pieces.
     progress : callable
     """
     job = prepared.job
@@ -43,9 +43,9 @@ def order_cuts(
     units, owner, before = _units(passed, prepared.inner_first)
 
     longest = longest_search(job.sequence.seconds)
-    progress(f"order and moves, {longest:g} s at most without a way", 0, 0)
+    progress(f"order and moves, at most {longest:g} s without a solution", 0, 0)
     requests = [prepared.contours[i] for i in owner]
-    # A plan that was picked is settled, and a piece follows another in its posture.
+    # Picked plans and pieces are not planned in other postures.
     others = [
         () if r.run is not None or owner.count(i) > 1 else r.options.postures
         for r, i in zip(requests, owner, strict=True)
@@ -87,9 +87,9 @@ def order_cuts(
 def _units(
     passed: Sequence[Sequence[tuple[CutResult, ...]]], inner_first: Sequence[tuple[int, int]]
 ) -> tuple[list[list[CutResult]], list[int], list[tuple[int, int]]]:
-    """Return what is ordered, the contour of each, and which come before which.
+    """Return the units to order, the contour of each, and the pairs in a required order.
 
-    That is the candidates of a contour that are cut in one go, or each piece by itself.
+    A unit is the candidates of a contour that are cut in one go, or a single piece.
     """
     units: list[list[CutResult]] = []
     owner: list[int] = []

@@ -1,4 +1,4 @@
-"""What a job asks for, looked at without planning: its cell, and how its contours begin in it."""
+"""Check a job without planning it: its cell, and the poses at the start of its contours."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from kerfpath.job.format import Job, cell_of_job, places_of
 __all__ = ["ContourStart", "JobPreview", "check_job"]
 
 FAR = 0.05
-"""m beyond the near-miss distance: farther off, how far is not said."""
+"""Distance in m beyond the near-miss distance up to which clearances are measured."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContourStart:
-    """How a contour begins.
+    """The poses at the start of a contour.
 
     Parameters
     ----------
@@ -28,12 +28,12 @@ class ContourStart:
     poses : int
         Admissible poses at its first node.
     clear : int
-        Those of them that keep every near-miss distance.
+        Poses among them that keep every near-miss distance.
     clearance : float m
-        Of the pose that keeps most distance: its least distance among the pairs that must keep the
-        near-miss distance of the cell, up to 50 mm more than that; NaN without poses.
+        Least distance of the best pose, over the pairs that must keep the near-miss distance of
+        the cell, up to 50 mm more than that; NaN without poses.
     pair : (str, str) or None
-        The two bodies that have it.
+        The two bodies at this distance.
     """
 
     name: str
@@ -48,7 +48,7 @@ class ContourStart:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JobPreview:
-    """A job that can be read, its part, its cell if it has one, and how every contour begins."""
+    """A job with its part, its cell if it has one, and the start of every contour."""
 
     job: Job
     part: Part
@@ -59,7 +59,7 @@ class JobPreview:
 
 
 def check_job(job: Job, part: Part | None = None) -> JobPreview:
-    """Return the cell of a job and how its contours begin in it; `part` if it is read already.
+    """Return the cell of a job and the start of its contours; `part` if it is read already.
 
     Raises
     ------

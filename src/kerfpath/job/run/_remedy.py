@@ -1,4 +1,4 @@
-"""What would open a closed way: speeds and shares of the limits, each tried as it is printed."""
+"""Advice for contours without a plan: speeds and shares of the limits, each tried as printed."""
 
 from __future__ import annotations
 
@@ -33,26 +33,26 @@ Share = Literal["eta_velocity", "eta_acceleration"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Remedy:
-    """What opens the way, in figures that a job takes; each alone has given a plan.
+    """What makes a contour feasible, as values for a job; each of them alone has given a plan.
 
     Parameters
     ----------
     other_method : bool
-        All that is said holds for method "exact", and the job asks for another one.
+        Whether all of it holds for method "exact" although the job asks for another one.
     speed : str or None
-        Speed below the one asked for, m/min; None: the way is open at that.
+        Feasible speed below the requested one, m/min; None: the requested speed is feasible.
     binds : str
-        Which limit binds at the higher of both speeds, and where; "" where that is not known.
+        The limit that binds at the higher of both speeds, and where; "" if that is not known.
     refined : str or None
         Higher speed, m/min, at which a motion off the grid was found.
     shares : mapping of str to str
-        Keys of the shares of a limit above those asked for, and their values.
+        Keys of the shares of a limit, and their values above the requested ones.
     closed : tuple of str
-        Keys whose shares up to 1 all leave the way closed.
+        Keys for which no share up to 1 is enough.
     never : str or None
-        Speed, m/min, from which on no motion is possible at any rotation, where that is proved.
+        Speed, m/min, from which on it is proved that no motion is possible at any rotation.
     without_windows : bool
-        Without gamma_windows the way is open, whatever else is said.
+        Whether there is a plan without gamma_windows, whatever the other values.
     """
 
     other_method: bool
@@ -67,7 +67,7 @@ class Remedy:
     __repr__ = short_repr
 
     def __str__(self) -> str:
-        """Say it in one line."""
+        """Return the advice in one line."""
         if self.without_windows:
             alone = self.speed is None and not self.other_method
             rest = "" if alone else f"; with them {replace(self, without_windows=False)}"
@@ -112,7 +112,7 @@ class _Trial:
         return replace(self.job.options, method="exact", refine=False, refine_parts=1)
 
     def opens(self, options: PlanOptions, speed: float) -> bool:
-        """Return whether there is a plan at a speed (m/s), its nodes as a job would have them."""
+        """Return whether there is a plan at a speed (m/s), with the nodes that a job has then."""
         nodes, graph, task = self.candidate.nodes, self.graph, self.request.task
         if task.time_step is not None and speed != task.speed:
             nodes = replace(task, speed=speed).sample(self.candidate.path)
@@ -129,9 +129,9 @@ class _Trial:
         return True
 
     def speed(self, options: PlanOptions, most: float, above: float = 0.0) -> str | None:
-        """Return a speed of `most` m/s or hardly less, in m/min, that has a plan; None if none has.
+        """Return a speed of `most` m/s or slightly less, in m/min, with a plan; None without one.
 
-        It is more than `above` and less than what is asked for.
+        It is above `above` and below the requested speed, m/s.
         """
 
         def fits(figure: str) -> bool:
@@ -141,7 +141,7 @@ class _Trial:
         return _first(values, lambda v: fits(v) and self.opens(options, float(v) / 60))
 
     def share(self, options: PlanOptions, key: Share, least: float) -> str | None:
-        """Return a share of a limit of `least` or hardly more that has a plan; None if none has."""
+        """Return a share of a limit of `least` or slightly more with a plan; None without one."""
         used = options.eta_v if key == "eta_velocity" else options.eta_a
 
         def found(figure: str) -> bool:
@@ -168,18 +168,18 @@ def find_remedy(
     cell: Cell | None,
     relaxation: Relaxation | None = None,
 ) -> tuple[Remedy, FastestSpeed | None] | None:
-    """Return what opens the way of a cut without a plan, and the fastest speed; None if unknown.
+    """Return what makes a cut without a plan feasible, and its fastest speed; None if unknown.
 
-    The graph has poses at every node, and the cut is one at constant speed; `relaxation` is what
-    the refusal says of a motion off the grid.
+    The graph must have poses at every node, and the cut a constant speed. `relaxation` is what
+    `NoFeasiblePath` states about a motion off the grid.
     """
     trial = _Trial(job=job, request=request, candidate=candidate, graph=graph, cell=cell)
     continuous = job.options.method == "continuous"
-    # Where the continuous search finds nothing it goes on on the grid, too.
+    # If the continuous search finds nothing, it also searches the grid.
     other = not continuous and job.options.method != "exact"
     if other and trial.opens(trial.on_grid, trial.asked):
         return Remedy(other_method=True), None
-    # At another speed other nodes follow from a time step: of them nothing would be proved.
+    # With a time step, another speed has other nodes, about which nothing would be proved.
     ceiling = continuous and request.task.time_step is None
     try:
         fastest = fastest_along(
@@ -194,7 +194,7 @@ def find_remedy(
     refined = None
     if fastest.on_grid is not None:
         refined = trial.speed(job.options, fastest.speed, above=float(speed) / 60)
-    # Shares of the limits at which a clear path exists are not looked for.
+    # In a cell, shares of the limits are not looked for.
     shares, closed = ({}, ()) if cell is not None else _shares(trial, relaxation)
     made = Remedy(
         other_method=other,
@@ -211,7 +211,7 @@ def find_remedy(
 def opens_without_windows(
     job: Job, request: CutRequest, candidate: Candidate, cell: Cell | None
 ) -> bool:
-    """Return whether a cut without a plan has one without the windows of gamma that it has."""
+    """Return whether a cut without a plan would have one without its windows of gamma."""
     if not job.options.gamma_windows:
         return False
     free = replace(job, options=replace(job.options, gamma_windows=()))
@@ -221,9 +221,9 @@ def opens_without_windows(
 
 
 def _shares(trial: _Trial, relaxation: Relaxation | None) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return the shares of one limit that open the way, and the limits of which none does.
+    """Return the shares of one limit that are enough, and the keys for which no share is.
 
-    Those of the grid, and of the accelerations less where a motion off it does with less.
+    They are those of the grid; for accelerations less, if a motion off the grid needs less.
     """
     options = trial.on_grid
     least = relaxations(

@@ -1,4 +1,4 @@
-"""What came of a job, and of each of its contours."""
+"""The results of a job and of each of its contours."""
 
 from __future__ import annotations
 
@@ -24,32 +24,31 @@ __all__ = ["CutResult", "JobResult"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CutResult:
-    """What came of one contour of a job, or of one piece of it.
+    """The result of one contour of a job, or of one piece of it.
 
     Parameters
     ----------
     request : CutRequest
-        What was asked for.
+        The request for the contour.
     candidate : Candidate
         The path that is cut and its nodes, or a stretch of it.
     graph : LayeredGraph
     plan : Plan or None
-        None when no feasible path was found.
+        The plan; None if no feasible path was found.
     broken : NoFeasiblePath or None
         Why there is no plan.
     fastest : FastestSpeed or None
-        Where there is no plan but a slower one exists: up to which speed.
+        The fastest feasible speed, if there is no plan but a slower one exists.
     advice : Remedy or None
-        With it: speeds and shares of the limits that open the way.
+        Speeds and shares of the limits that would make it feasible.
     checks : tuple of Check
         The audit's table; empty without a plan.
     clearance : ClearanceMap or None
-        How clear every pose is in the cell, where the job asks for the map.
+        The clearance of every pose in the cell, if the job asks for the map.
     departure : Departure or None
-        How far the nodes leave the CAD curve; measured once it is settled what is cut.
+        How far the nodes leave the CAD curve; measured once the candidate is chosen.
     as_run : AsRun
-        The plan as its program has it run, corners rounded; no plan file keeps it, as it is about
-        the program.
+        The plan as a controller runs its program, with rounded corners; not kept in plan files.
     """
 
     request: CutRequest
@@ -68,17 +67,17 @@ class CutResult:
 
     @property
     def contour(self) -> str:
-        """What the job calls the contour."""
+        """Name of the contour in the job."""
         return self.request.task.name
 
     @property
     def name(self) -> str:
-        """What it is called itself; a piece has a number, too."""
+        """Name of the cut; that of a piece has its number, too."""
         return self.contour if self.plan is None else self.plan.name
 
     @property
     def picked(self) -> bool:
-        """Whether the plan is one of a Pareto set, which aims at something else than the job."""
+        """Whether the plan is one of a Pareto set, with another objective than the job."""
         return self.request.run is not None
 
     @property
@@ -94,7 +93,7 @@ class CutResult:
         ----------
         part : Part
         loop : Departure or None
-            That of the loop as drawn, where operations moved it: the nodes are then measured from
+            Departure of the drawn loop if operations moved it; the nodes are then measured from
             the path as cut.
         """
         nodes = self.candidate.nodes if self.plan is None else self.plan.contour
@@ -107,22 +106,35 @@ class CutResult:
 
     @property
     def failure(self) -> str:
-        """Why there is no plan, and what would help; empty where there is one."""
+        """Why there is no plan, and what would help; empty if there is one."""
         if self.broken is None:
             return ""
         return f"{self.broken}; {self.remedy}" if self.remedy else str(self.broken)
 
     @property
     def remedy(self) -> str:
-        """What would open the way, in words; empty where nothing is known to."""
+        """What would make the contour feasible, in words; empty if nothing is known to."""
         return "" if self.advice is None else str(self.advice)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JobResult:
-    """What came of a job: every cut, in order, its cell, and the part's mesh for pictures.
+    """The result of a job.
 
-    With [sequence]: the moves between the cuts and their audit, or why there is no way.
+    Parameters
+    ----------
+    job : Job
+    cuts : tuple of CutResult
+        Every cut, in the order of cutting.
+    mesh : (vertices, triangles)
+        Mesh of the part, m, for pictures.
+    cell : Cell or None
+    part : PartPlan or None
+        With [sequence]: the order and the moves between the cuts.
+    stuck : NoFeasiblePath or None
+        With [sequence]: why there is no order or no move.
+    air : tuple of Check
+        The audit of the moves.
     """
 
     job: Job
@@ -137,12 +149,12 @@ class JobResult:
 
     @property
     def passed(self) -> bool:
-        """True when every contour has a plan that passes its audit, and every move too."""
+        """True if every contour has a plan that passes its audit, and every move passes, too."""
         moves = self.stuck is None and all(check.ok for check in self.air)
         return moves and all(cut.passed for cut in self.cuts)
 
     def with_cuts(self, cuts: tuple[CutResult, ...]) -> JobResult:
-        """Return the same with other results of its cuts, in the same order."""
+        """Return the result with other results of its cuts, in the same order."""
         if self.part is None:
             return replace(self, cuts=cuts)
         plans = tuple(cut.plan for cut in cuts if cut.plan is not None)
@@ -150,10 +162,10 @@ class JobResult:
 
     @property
     def moves(self) -> tuple[TransferMove, ...]:
-        """The moves between the cuts; none without [sequence], or where there is no way."""
+        """The moves between the cuts; none without [sequence], or if none were found."""
         return () if self.part is None else self.part.moves
 
     @property
     def plans(self) -> tuple[Plan, ...]:
-        """The plans there are, in the order of cutting."""
+        """The plans, in the order of cutting."""
         return tuple(cut.plan for cut in self.cuts if cut.plan is not None)

@@ -18,16 +18,16 @@ __all__ = ["certified", "measured", "run_job", "run_prepared"]
 
 
 def run_job(job: Job, part: Part | None = None, *, progress: Progress = no_progress) -> JobResult:
-    """Return what comes of planning and auditing every contour of a job.
+    """Plan and audit every contour of a job.
 
-    `part` is what its drawing holds, if that is read already. A contour without a feasible path
-    does not stop the others; it is reported as such.
+    `part` is the part in its drawing, if that is read already. A contour without a feasible path
+    does not stop the others; its result has the reason.
 
     Raises
     ------
     InputError
-        The part cannot be read, a loop does not exist, a contour cannot be sampled; or a fault is
-        known before planning, as a contour below the floor or a name that the language reserves.
+        The part cannot be read, a loop does not exist, or a contour cannot be sampled; or a fault
+        is known before planning, such as a contour below the floor or a reserved name.
     """
     prepared = prepare(job, part)
     require_foreseen(prepared)
@@ -35,10 +35,10 @@ def run_job(job: Job, part: Part | None = None, *, progress: Progress = no_progr
 
 
 def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> JobResult:
-    """Return the same of a job with its drawing and cell read, its contours in their order there.
+    """Plan and audit every contour of a prepared job, in the order of its contours.
 
-    Its contours are all that is asked for: a touch-up has other paths in them, a plan picked from
-    a Pareto set other options.
+    Its contours replace those of the job: a touch-up has other paths in them, a plan picked from
+    a Pareto set has other options.
     """
     tried = [
         [
@@ -56,7 +56,7 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
 
 
 def measured(prepared: PreparedJob, result: JobResult) -> JobResult:
-    """Return a result that says how far its nodes leave the CAD curves."""
+    """Return the result with the departures of its nodes from the CAD curves."""
     part = prepared.part
     moved = {
         contour.task.name: part.departure(contour.task.pick, contour.loop)
@@ -69,9 +69,9 @@ def measured(prepared: PreparedJob, result: JobResult) -> JobResult:
 
 
 def certified(cut: CutResult, progress: Progress) -> CutResult:
-    """Return a cut with the bound of its plan, as far as one is asked for.
+    """Return a cut with the bound of its plan, if one is asked for.
 
-    It is audited where plan.json is to carry what proves it.
+    The bound is audited if plan.json is to keep its certificate.
     """
     asked = cut.request.options.certify
     if cut.plan is None or asked is None:

@@ -1,4 +1,4 @@
-"""The fastest speed of a contour at which its program, too, keeps the limits between the nodes."""
+"""A fast speed of a contour at which its program also keeps the limits between the nodes."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from kerfpath.planner import plan
 __all__ = ["speed_as_run"]
 
 HALVINGS = 2
-"""Of what lies between a speed that keeps the limits and one that was not found to."""
+"""Bisections between a speed that keeps the limits and one that was not found to."""
 SLOWER = 0.97
-"""Share of a speed that is tried where the limits are not kept at it."""
+"""Factor on a speed that does not keep the limits, for the next one that is tried."""
 TRIES = 4
 
 
 def speed_as_run(job: Job, nodes: Contour, cell: Cell | None, fastest: float) -> float | None:
-    """Return a speed, m/s, at which a plan of the job keeps the limits as its program has it run.
+    """Return a speed, m/s, at which the program of a plan keeps the limits between the nodes.
 
-    No faster than `fastest`, at which a path exists at the nodes. It is found by planning, and
-    proved for that speed; a faster one may exist. None where the job does not ask for it, or where
-    none is found.
+    It is at most `fastest`, m/s, at which a path exists at the nodes. It is found by planning, and
+    proved for that speed; a faster one may exist. None if the job does not ask for it, or if none
+    is found.
     """
     if not keeps_between_nodes(job):
         return None
@@ -52,7 +52,7 @@ def speed_as_run(job: Job, nodes: Contour, cell: Cell | None, fastest: float) ->
 
 
 def _share(kept: Kept | None) -> float:
-    """Return at which share of its speed a plan keeps the limits as it is, as far as is known."""
+    """Return an estimate of the share of its speed at which a plan keeps the limits."""
     run: Executed | None = None if kept is None else kept.run
     if run is None:
         return SLOWER
@@ -66,7 +66,7 @@ def _keeps(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> bool:
 
 
 def _kept(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Kept | None:
-    """Return what comes of keeping the limits of a plan at a speed; None without one."""
+    """Return a plan at a speed with the limits kept between its nodes; None without a plan."""
     try:
         made = plan(
             nodes, job.robot, tool=job.tool, placement=job.placement, speed=speed,

@@ -28,8 +28,8 @@ class ContourSpeed:
     at_nodes : FastestSpeed or NoFeasiblePath
         The fastest constant speed at which the limits hold at the nodes; or why there is none.
     as_run : float m/s, optional
-        One at which they hold between the nodes, too, see `speed_as_run`; None where the job does
-        not keep them there, or where none was found.
+        A speed at which they hold between the nodes, too, see `speed_as_run`; None if the job does
+        not keep them there, or if none was found.
     """
 
     task: ContourSpec
@@ -50,10 +50,11 @@ def fastest_along(
     ceiling: bool = False,
     enough: float | None = None,
 ) -> FastestSpeed:
-    """Return the fastest constant speed of a contour, clear in the cell where there is one.
+    """Return the fastest constant speed of a contour, free of collisions if there is a cell.
 
-    With `ceiling` also the speed from which on none is possible, where that is proved; off the grid
-    one that is `enough`, m/s, may be returned although there are faster ones.
+    With `ceiling`, the result also has the speed from which on no motion is possible, if that is
+    proved. Off the grid, a speed of at least `enough`, m/s, may be returned although faster ones
+    exist.
     """
     return fastest_speed(
         nodes,
@@ -76,7 +77,7 @@ def leaves_grid(job: Job) -> bool:
 def fastest_speeds(job: Job, *, progress: Progress = no_progress) -> list[ContourSpeed]:
     """Return the fastest constant speed of each contour of a job, at its nodes and as run.
 
-    The speeds that the job asks for, and shares of them, play no part, nor does what comfort costs.
+    The speeds in the job, shares of them, and the penalties of [comfort] have no effect.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """The tables and keys of a job file: units, bounds, and the rules between them.
 
 Units are in the names of the keys. Angles `rpy_deg` are roll, pitch and yaw about the fixed axes
-x, y and z, R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF. A field's description and example are what
-a message about it says was expected and how to write it.
+x, y and z, R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF. Messages about a field show its description
+as the expected value and its example as the way to write it.
 """
 
 from kerfpath.job.format.tables._cell import CellTable as CellTable

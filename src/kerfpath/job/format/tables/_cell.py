@@ -1,4 +1,4 @@
-"""The [cell] table: what stands and moves around, and how near any two of it may come."""
+"""The [cell] table: the bodies of the cell, and the near-miss distance of each pair of them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Pair = Annotated[tuple[Text, ...], Field(strict=False, min_length=2, max_length=
 
 
 def unit_of(table: HeadTable | FixtureTable) -> None:
-    """Require the unit of a mesh file that does not say it, and none without a file.
+    """Require a unit for an STL file, which does not state it, and none without a file.
 
     Raises
     ------
@@ -34,10 +34,10 @@ def unit_of(table: HeadTable | FixtureTable) -> None:
         At the key `unit`.
     """
     if table.file is None and table.unit is not None:
-        raise fault("unit only with file", "no file", "remove it", ("unit",))
+        raise fault("unit only with file", "no file", "remove unit", ("unit",))
     if table.file is not None and table.file.lower().endswith(".stl") and table.unit is None:
         raise fault(
-            "the unit of the STL file, which does not say it itself",
+            "the unit of the STL file, which does not state it",
             "none",
             'add, for example, unit = "mm"',
             ("unit",),
@@ -59,12 +59,12 @@ MESH_FILE = key("the path of an STL or STEP file", '"clamp.stl"')
 
 
 class HeadTable(Table):
-    """[cell.head]: a solid from a file, or the generic head's sizes where they differ."""
+    """[cell.head]: a solid from a file, or sizes that replace those of the generic head."""
 
     file: Annotated[MeshFile | None, MESH_FILE] = None
     unit: Annotated[Unit | None, key("the unit of the file's numbers", '"mm"')] = None
     xyz_mm: Annotated[
-        Three | None, key("3 numbers, where the file's origin is in the flange in mm", "[0, 0, 0]")
+        Three | None, key("3 numbers, the file's origin in the flange in mm", "[0, 0, 0]")
     ] = None
     rpy_deg: Annotated[
         Three | None, key("3 numbers, roll, pitch and yaw in the flange in deg", "[0, 0, 0]")
@@ -93,13 +93,14 @@ class HeadTable(Table):
             generic = ("nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm")
             wrong, why = given(self, *generic), "only without file"
         if wrong:
-            raise fault(f"{wrong[0]} {why}", "another head", "remove it", (wrong[0],))
+            got = "no file" if self.file is None else "a file"
+            raise fault(f"{wrong[0]} {why}", got, f"remove {wrong[0]}", (wrong[0],))
         unit_of(self)
         return self
 
 
 class FixtureTable(Table):
-    """[[cell.fixture]]: a box or a solid from a file, on the ground or on an external axis."""
+    """[[cell.fixture]]: a box or a solid from a file, standing still or on an external axis."""
 
     name: Annotated[Text, key("a name that no other body has", '"table"')]
     size_mm: Annotated[
@@ -110,7 +111,7 @@ class FixtureTable(Table):
     xyz_mm: Annotated[
         Three,
         key(
-            "3 numbers, where the box's centre or the file's origin is in the robot base in mm",
+            "3 numbers, the box's centre or the file's origin in the robot base in mm",
             "[1450, -600, 0]",
         ),
     ] = (0.0, 0.0, 0.0)
@@ -130,7 +131,7 @@ class FixtureTable(Table):
 
 
 class PairTable(Table):
-    """[[cell.pair]]: how near two bodies may come, or why they are not judged."""
+    """[[cell.pair]]: the near-miss distance of two bodies, or the reason why they may touch."""
 
     between: Annotated[Pair, key("the names of two bodies", '["nozzle", "clamp"]')]
     near_miss_mm: Annotated[NotNegative | None, key("a number not below 0, in mm", "2")] = None
@@ -146,18 +147,18 @@ class PairTable(Table):
 
 
 class CellTable(Table):
-    """[cell]: with it, every motion is planned and audited clear of collisions."""
+    """[cell]: with it, every motion is planned and audited to be free of collisions."""
 
     near_miss_mm: Annotated[
-        NotNegative, key("a number not below 0, how near two bodies may come, in mm", "5")
+        NotNegative, key("a number not below 0, the least distance of two bodies, in mm", "5")
     ]
     links: Annotated[
         Literal["capsules", "description"] | None,
-        key("what stands for the robot's links", '"capsules"'),
+        key("the shape of the robot's links", '"capsules"'),
     ] = None
     stand_off_mm: Annotated[Positive, key("a number above 0, in mm", "1")] = 1.0
     share: Annotated[
-        Number, key("a number from 0 to below 1, of the stand-off", "0.5", ge=0, lt=1)
+        Number, key("a share of the stand-off, from 0 to below 1", "0.5", ge=0, lt=1)
     ] = 0.5
     head: HeadTable = HeadTable()
     part: Annotated[bool, key("true or false", "true")] = True

@@ -1,4 +1,4 @@
-"""The [comfort] table: what the arm is to keep away from, and what coming near costs."""
+"""The [comfort] table: margins to singularities, limits and bodies, and penalties beyond them."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from kerfpath.job.format.tables._table import Table
 __all__ = ["LIMITS_MARGIN", "ComfortTable"]
 
 LIMITS_MARGIN = 0.1
-"""deg: what joints keep from their limits unless the table says otherwise. The digits of a
-program move a joint by some thousandths, and by tens of them near a singularity."""
+"""Margin of the joints to their limits, in deg, unless the table sets another. The digits of a
+program move a joint by some thousandths of a degree, near a singularity by some hundredths."""
 
 Angle = Annotated[
     Annotated[Positive, Field(lt=90)] | None, key("a number above 0, below 90, in deg", "5")
@@ -36,11 +36,11 @@ UNITS = {
     "manipulability": ("m3", 1.0),
     "clearance": ("mm", 1e-3),
 }
-"""Of each band of `kerfpath.Comfort`: the unit of its keys, and what that is in SI."""
+"""For each band of `kerfpath.Comfort`: the unit of its keys, and the factor to SI."""
 
 
 class ComfortTable(Table):
-    """[comfort]: margins that are kept, and bands beyond them in which a node costs something."""
+    """[comfort]: margins that are kept, and bands beyond them in which a node has a penalty."""
 
     wrist_margin_deg: Angle = None
     wrist_band_deg: Angle = None
@@ -62,7 +62,7 @@ class ComfortTable(Table):
 
     @model_validator(mode="after")
     def _goes_together(self) -> ComfortTable:
-        """Require a cost and the band that it falls over of each other."""
+        """Require that a cost and its band are given together."""
         for name, (unit, _) in UNITS.items():
             keys = f"{name}_band_{unit}", f"{name}_cost"
             for one, other in (keys, keys[::-1]):
@@ -71,9 +71,9 @@ class ComfortTable(Table):
         return self
 
     def resolve(self, usual: Mapping[str, float] | None = None) -> Comfort | None:
-        """Return what the table asks for, in SI; None where it asks for nothing.
+        """Return the margins and bands of the table, in SI; None if there are none.
 
-        `usual` has margins by measure, in the unit of its keys, of which the table says nothing.
+        `usual` has default margins by measure, in the unit of its keys, where the table sets none.
         """
         bands = {}
         for name, (unit, si) in UNITS.items():

@@ -1,4 +1,4 @@
-"""The [[contour]] tables: which loops are cut, how fast, and how finely."""
+"""The [[contour]] tables: which loops are cut, how fast, and how finely sampled."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["ContourTable"]
 
 
 SHAPES = ("overlap_mm", "lead_in", "lead_out", "micro_joints", "corners")
-"""Keys that give a contour features, whose ends sampling by spacing_mm or time_step_ms keeps."""
+"""Keys that add features to a contour; sampling by spacing_mm or time_step_ms keeps their ends."""
 WIDEST_DEG = 359.999
 """Widest window of gamma."""
 Window = Annotated[list[Number], Field(min_length=4, max_length=4)]
@@ -29,7 +29,7 @@ SAMPLINGS = ("spacing_mm", "time_step_ms", "count", "tolerance_mm")
 
 
 class ContourTable(Table):
-    """[[contour]]: which loop of the part to cut, how fast, how sampled, and what is made of it."""
+    """[[contour]]: a loop of the part to cut, its speed, its sampling and its operations."""
 
     pick: Annotated[Text | None, key("the name of a loop in the part", '"trim"')] = None
     pick_all: PickTable | None = None
@@ -66,7 +66,7 @@ class ContourTable(Table):
 
     @property
     def moves_the_path(self) -> bool:
-        """Whether points or tool axes of the cut are other than those of the loop as drawn."""
+        """Whether points or tool axes of the cut differ from the drawn loop."""
         rounded = self.corners is not None and self.corners.round_mm is not None
         return bool(self.kerf_mm or self.bevel_deg or self.smooth_axes or rounded)
 
@@ -75,7 +75,7 @@ class ContourTable(Table):
         what = "pick (a loop's name) or [contour.pick_all]"
         require_one(self, ("pick", "pick_all"), what, 'pick = "trim"')
         if self.pick_all is not None and self.name is not None:
-            raise fault("name only with pick", "pick_all", "remove it", ("name",))
+            raise fault("name only with pick", "it with pick_all", "remove name", ("name",))
         return self
 
     @model_validator(mode="after")
@@ -96,7 +96,7 @@ class ContourTable(Table):
         features = given(self, *SHAPES)
         if features and found[0] not in SAMPLINGS[:2]:
             raise fault(
-                f"spacing_mm or time_step_ms with {features[0]}, whose ends they keep",
+                f"spacing_mm or time_step_ms with {features[0]}, as they keep the ends of features",
                 found[0],
                 "write, for example, spacing_mm = 1",
                 (found[0],),
@@ -111,15 +111,15 @@ class ContourTable(Table):
             at = ("gamma_windows", number)
             got = f"[{first:g}, {last:g}, {low:g}, {high:g}]"
             if last < first:
-                expected = "from_mm not beyond to_mm (across the start write two windows)"
-                raise fault(expected, got, "exchange them", at)
+                expected = "from_mm not above to_mm (write two windows across the start)"
+                raise fault(expected, got, "swap them", at)
             if max(abs(low), abs(high)) > 360:
                 raise fault("low_deg and high_deg from -360 to 360", got, "correct it", at)
             if max(abs(high - low), (high - low) % 360) > WIDEST_DEG:
-                what = "an interval of gamma that leaves some of the circle out"
+                what = "an interval of gamma of less than a full circle"
                 raise fault(what, got, "narrow it, or remove it", at)
         if self.gamma_windows and "best" in (self.start, self.direction):
             which = "start" if self.start == "best" else "direction"
-            said = f'{which} other than "best" with gamma_windows, which are counted from the start'
-            raise fault(said, '"best"', "say where it begins, for example with start_mm", (which,))
+            said = f'{which} other than "best" with gamma_windows, as they are measured along it'
+            raise fault(said, '"best"', "set a start and a direction, or remove them", (which,))
         return self

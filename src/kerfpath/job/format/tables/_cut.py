@@ -1,4 +1,4 @@
-"""What is made of a loop before it is planned: the tables inside [[contour]]."""
+"""The tables inside [[contour]]: which loops are picked, and the operations on them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Range = Annotated[tuple[Positive, ...], Field(strict=False, min_length=2, max_le
 
 
 class PickTable(Table):
-    """[contour.pick_all]: every loop that is all of this is a contour of its own."""
+    """[contour.pick_all]: every loop that meets all of these conditions becomes a contour."""
 
     kind: Annotated[
         Literal["inner", "outer", "open"] | None,
@@ -43,11 +43,11 @@ class PickTable(Table):
     @model_validator(mode="after")
     def _something(self) -> PickTable:
         if not self.model_fields_set:
-            raise fault("what to pick by", "none", 'add, for example, kind = "inner"', ("kind",))
+            raise fault("a condition", "none", 'add, for example, kind = "inner"', ("kind",))
         return self
 
     def loops(self, part: Part) -> tuple[Loop, ...]:
-        """Return the loops of a part that are all of this."""
+        """Return the loops of a part that meet all conditions."""
         return part.pick(
             kind=self.kind, face=self.face, side=self.side, layer=self.layer, colour=self.colour,
             diameter=_metres(self.diameter_mm), length=_metres(self.length_mm),
@@ -67,7 +67,7 @@ class LeadTable(Table):
     angle_deg: Annotated[NotNegative, key("a number from 0 to 180, in deg", "45", le=180)] = 45.0
     fan_mm: Annotated[Positive | None, key("a number above 0, in mm", "3")] = None
     speed_share: Annotated[
-        Positive, key("a number above 0, at most 1, of the speed", "0.4", le=1)
+        Positive, key("a share of the speed, above 0, at most 1", "0.4", le=1)
     ] = 1.0
 
     @model_validator(mode="after")
@@ -90,16 +90,17 @@ class MicroJointsTable(Table):
 
 
 class CornersTable(Table):
-    """[contour.corners]: rounded, run around in a loop, or slowed down at."""
+    """[contour.corners]: corners are rounded, cut with a loop, or cut at a lower speed."""
 
     round_mm: Annotated[
-        Positive | None, key("a number above 0, how far an arc leaves the corner, in mm", "0.05")
+        Positive | None,
+        key("a number above 0, the distance of the arc from the corner, in mm", "0.05"),
     ] = None
     loop_mm: Annotated[
         Positive | None, key("a number above 0, the radius of a loop, in mm", "2")
     ] = None
     slow_share: Annotated[
-        Positive | None, key("a number above 0 and below 1, of the speed", "0.5", lt=1)
+        Positive | None, key("a share of the speed, above 0 and below 1", "0.5", lt=1)
     ] = None
     slow_mm: Annotated[NotNegative, key("a number not below 0, in mm", "1")] = 1.0
     ramp_mm: Annotated[Positive, key("a number above 0, in mm", "2")] = 2.0

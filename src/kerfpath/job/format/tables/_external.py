@@ -1,6 +1,7 @@
-"""The [[robot.external]] tables: rails, tables and tilts that move with the robot.
+"""The [[robot.external]] tables: rails, turntables and tilts that move with the robot.
 
-A table says all of its axis, or what is not known of one of the library or of a description.
+A table describes its axis completely, or adds what is not known of an axis of the library or of
+a description.
 """
 
 from __future__ import annotations
@@ -42,12 +43,12 @@ KEYS = {
 }  # fmt: skip
 """Keys of each kind: range, speed, acceleration, step of a grid, home."""
 FACTORS = {"linear": 1e-3, "rotary": float(np.pi / 180)}
-"""What a number of these keys times is, in m or rad."""
+"""Factor from the unit of these keys to m or rad."""
 WORDS = ("lower=", "upper=", "velocity=", "acceleration=")
-"""What messages call the first of those keys."""
+"""The Python arguments that messages name in place of the first of these keys."""
 NAME = r"^[A-Za-z][A-Za-z0-9_]{0,15}$"
 WHOLE = ("kind", "carries", "axis", "point_mm", "xyz_mm", "rpy_deg")
-"""Keys that say what an axis is and where; a joint of the description has all of them."""
+"""Keys that define an axis and its place; a joint of a description has all of them."""
 EXAMPLES = {
     "lower_mm": "-2000", "upper_mm": "2000", "velocity_mm_s": "1000", "acceleration_mm_s2": "1500",
     "lower_deg": "-180", "upper_deg": "180", "velocity_deg_s": "120", "acceleration_deg_s2": "200",
@@ -55,7 +56,7 @@ EXAMPLES = {
 
 
 class ExternalTable(Table):
-    """[[robot.external]]: one external axis; of those of one side the first carries the next."""
+    """[[robot.external]]: one external axis; of those on one side, each carries the next."""
 
     model: Annotated[
         str | None,
@@ -74,19 +75,19 @@ class ExternalTable(Table):
     kind: Annotated[Literal["linear", "rotary"] | None, key("a kind of axis", '"linear"')] = None
     carries: Annotated[Literal["robot", "part"] | None, key("what it moves", '"robot"')] = None
     axis: Annotated[
-        Three | None, key("its direction in the robot base, three numbers", "[0, 1, 0]")
+        Three | None, key("3 numbers, its direction in the robot base", "[0, 1, 0]")
     ] = None
     point_mm: Annotated[
         Three | None,
-        key("a point of its axis in the robot base, three numbers in mm", "[1200, 0, 500]"),
+        key("3 numbers, a point of its axis in the robot base in mm", "[1200, 0, 500]"),
     ] = None
     xyz_mm: Annotated[
         Three | None,
-        key("where the product stands in the robot base, three numbers in mm", "[1600, 0, 0]"),
+        key("3 numbers, the position of the product in the robot base in mm", "[1600, 0, 0]"),
     ] = None
     rpy_deg: Annotated[
         Three | None,
-        key("roll, pitch and yaw of the product in the robot base, in deg", "[0, 0, 90]"),
+        key("3 numbers, roll, pitch and yaw of the product in the robot base in deg", "[0, 0, 90]"),
     ] = None
     endless: Annotated[bool | None, key("true or false", "true")] = None
     lower_mm: Annotated[Number | None, key("a number, in mm", "-2000")] = None
@@ -108,36 +109,36 @@ class ExternalTable(Table):
 
     @model_validator(mode="after")
     def _whole(self) -> ExternalTable:
-        """Require all that is not known of the axis; what a description knows is seen later."""
+        """Require all that is not known of the axis; joints of a description are checked later."""
         if self.joint is None:
             self.resolve()
             return self
         for name in given(self, "model", *WHOLE):
-            expected = f"no {name} of a joint of the description"
-            raise fault(expected, "it", f"remove {name} or joint", (name,))
+            expected = f"no {name} with joint"
+            raise fault(expected, "both", f"remove {name} or joint", (name,))
         return self
 
     @property
     def called(self) -> str | None:
-        """Its name: that given, or its own in library or description."""
+        """Its name: the given one, or the one in the library or the description."""
         if self.name is None and self.model is not None:
             return external_axes()[self.model].axis.name
         return self.name or self.joint
 
     @property
     def home(self) -> float | None:
-        """Where it stands when the robot is at home, m or rad; None where nothing is said."""
+        """Its value when the robot is at home, m or rad; None if it is not given."""
         if self.home_mm is not None:
             return FACTORS["linear"] * self.home_mm
         return None if self.home_deg is None else FACTORS["rotary"] * self.home_deg
 
     def resolve(self, described: KnownAxis | None = None) -> tuple[ExternalAxis, Travel]:
-        """Return the axis and its travel, m and rad; `described`: the joint that it is.
+        """Return the axis and its travel, m and rad; `described` is its joint in the description.
 
         Raises
         ------
         PydanticCustomError
-            At the key: one that is missing, or that is not of such an axis; a range reversed.
+            At the key: it is missing, does not fit such an axis, or its range is reversed.
         """
         known = described or (self._own() if self.model is None else self._placed())
         kind, free = known.axis.kind, known.endless if self.endless is None else self.endless
@@ -181,14 +182,14 @@ class ExternalTable(Table):
         return axis, travel
 
     def _own(self) -> KnownAxis:
-        """Return the axis of a table that says all of it, without its limits."""
+        """Return the axis that the table describes completely, without its limits."""
         for name in ("name", "kind", "carries", "axis"):
             if getattr(self, name) is None:
                 field = type(self).model_fields[name]
                 example = f"add, for example, {name} = {(field.examples or [''])[0]}"
                 raise fault(f"{field.description}", "nothing", example, (name,))
         for name in given(self, "xyz_mm", "rpy_deg"):
-            raise fault(f"{name} only with model", "it", "remove it", (name,))
+            raise fault(f"{name} only with model", "it without model", f"remove {name}", (name,))
         assert self.name is not None
         assert self.kind is not None
         assert self.carries is not None
@@ -202,30 +203,33 @@ class ExternalTable(Table):
         return KnownAxis(axis=axis, source="the job")
 
     def _placed(self) -> KnownAxis:
-        """Return the axis of the library where the product stands, or as it was measured."""
+        """Return the axis of the library at the place of its product, or as it was measured."""
         known = external_axes()[self.model or ""]
         kind = known.axis.kind
         for name in given(self, "kind", "carries"):
-            raise fault(f"no {name} with model", "it", "remove it", (name,))
+            raise fault(f"no {name} with model", "both", f"remove {name}", (name,))
         measured, placed = given(self, "axis", "point_mm"), given(self, "xyz_mm", "rpy_deg")
         if kind == "linear" and self.xyz_mm is not None:
-            raise fault("xyz_mm only of a rotary axis", "it", "remove it", ("xyz_mm",))
+            expected, got = "xyz_mm only for a rotary axis", "it for a linear axis"
+            raise fault(expected, got, "remove xyz_mm", ("xyz_mm",))
         if measured and placed:
             ways = "axis and point_mm, or xyz_mm and rpy_deg"
-            raise fault(ways, "both", "remove the one or the other", (placed[0],))
+            raise fault(ways, "both", "remove one pair", (placed[0],))
         if measured:
             axis = replace(known.axis, axis=self._direction(), point=self._point(kind))
             return replace(known, axis=axis)
         for name, example in (("xyz_mm", "[1600, 0, 0]"), ("rpy_deg", "[0, 0, 90]")):
             if getattr(self, name) is None and not (kind == "linear" and name == "xyz_mm"):
-                expected = "where the product stands, or its axis as measured"
+                expected = "the place of the product, or its axis as measured"
                 raise fault(expected, "neither", f"add, for example, {name} = {example}", (name,))
         return known.placed(pose(self.xyz_mm or (0, 0, 0), self.rpy_deg or (0, 0, 0)))
 
     def _direction(self) -> Array:
         if self.axis is None or not any(self.axis):
             got = "none" if self.axis is None else "[0, 0, 0]"
-            raise fault("a direction", got, "give the one it moves along", ("axis",))
+            raise fault(
+                "the direction of the axis", got, "add, for example, axis = [0, 1, 0]", ("axis",)
+            )
         return np.array(self.axis)
 
     def _point(self, kind: str) -> Array:
@@ -239,14 +243,15 @@ class ExternalTable(Table):
         other = "rotary" if kind == "linear" else "linear"
         for name in given(self, *KEYS[other]):
             own = KEYS[kind][KEYS[other].index(name)]
-            raise fault(f"{own} of a {kind} axis", "it", f"write {own}", (name,))
+            raise fault(f"{own} for a {kind} axis", name, f"write {own}", (name,))
         if kind == "linear" and self.point_mm is not None:
-            raise fault("point_mm only of a rotary axis", "it", "remove it", ("point_mm",))
+            expected, got = "point_mm only for a rotary axis", "it for a linear axis"
+            raise fault(expected, got, "remove point_mm", ("point_mm",))
         if kind == "linear" and self.endless:
-            raise fault("false of a linear axis", "true", "remove it", ("endless",))
+            raise fault("false for a linear axis", "true", "remove endless", ("endless",))
         for name in given(self, *KEYS[kind][:2]) if free else ():
-            remedy = "remove one" if self.endless else "write endless = false, too"
-            raise fault(f"no {name} of an endless axis", "it", remedy, (name,))
+            remedy = f"remove {name} or endless" if self.endless else "write endless = false, too"
+            raise fault(f"no {name} for an endless axis", "one", remedy, (name,))
 
 
 def axes_of(
@@ -257,14 +262,14 @@ def axes_of(
     Raises
     ------
     PydanticCustomError
-        A joint that is none of the description's, or is there twice; as `ExternalTable.resolve`.
+        A joint is not in the description or is named twice; or as `ExternalTable.resolve`.
     """
     rows = {table.joint: i for i, table in enumerate(tables) if table.joint is not None}
     joints = [known.axis.name for known in described]
     for i, table in enumerate(tables):
         if table.joint is not None and (table.joint not in joints or rows[table.joint] != i):
             there = f"there are {', '.join(joints)}" if joints else "it has none"
-            expected = "a joint of the description that carries robot or part, once"
+            expected = "a joint of the description that carries robot or part, named once"
             raise fault(expected, f'"{table.joint}"', there, ("external", i, "joint"))
     found = []
     for known in described:
@@ -278,12 +283,12 @@ def axes_of(
 
 
 def require_in_order(tables: Sequence[ExternalTable]) -> None:
-    """Require that the axes of one product come in its order, and stand in one place.
+    """Require that the axes of one product are in its order and at one place.
 
     Raises
     ------
     PydanticCustomError
-        At the second of two that do not.
+        At the second of two axes that are not.
     """
     order = list(external_axes())
     for i, table in enumerate(tables):
@@ -295,16 +300,17 @@ def require_in_order(tables: Sequence[ExternalTable]) -> None:
                 continue
             if order.index(first.model) > order.index(table.model):
                 expected = f'"{table.model}" before "{first.model}", which it carries'
-                raise fault(expected, "it after", "swap the tables", ("external", i, "model"))
+                got = "the reverse order"
+                raise fault(expected, got, "swap the tables", ("external", i, "model"))
             for name in ("xyz_mm", "rpy_deg"):
                 there, here = getattr(first, name), getattr(table, name)
                 if None not in (there, here) and there != here:
-                    expected = f'{list(there)}, where "{first.model}" of the same product stands'
+                    expected = f'{list(there)}, as for "{first.model}" of the same product'
                     raise fault(expected, f"{list(here)}", "correct one", ("external", i, name))
 
 
 def _inside(error: PydanticCustomError, joint: str, i: int | None) -> PydanticCustomError:
-    """Return what is wrong with the table of a joint at its key, or that there should be one."""
+    """Return the error with the place of the joint's table, or that the joint needs a table."""
     if i is None:
         said = f'joint "{joint}": {error.message()}, in [[robot.external]] with joint = "{joint}"'
         return fault_in_words(said, ("urdf",))

@@ -1,4 +1,4 @@
-"""What messages advise to do in Python, in the words of a job."""
+"""Messages that advise Python arguments, translated into the keys of a job."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ IN_KEYS = {
     "choose base= or tip=": "choose base or tip",
     "axis_3_limits=": "axis_3_deg",
 }
-"""What messages about descriptions advise to do, and what that is in a job."""
+"""Python arguments in messages about descriptions, and the keys of a job in their place."""
 
 
 def in_keys(said: str, words: Mapping[str, str] = IN_KEYS) -> str:
-    """Return a message in the words of a job file."""
+    """Return a message with keys of a job file in place of Python arguments."""
     for python, ours in words.items():
         said = said.replace(python, ours)
     return said

@@ -1,4 +1,4 @@
-"""The whole job file: every table, and the rules between tables."""
+"""The complete job file: every table, and the rules between tables."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ __all__ = ["REPEATED", "TABLES", "JobFile"]
 
 
 class JobFile(Table):
-    """The whole job file: robot, part, contours, process, objective, and what stands around."""
+    """The complete job file: robot, tool, part, contours, plan options, cell and program."""
 
     robot: RobotTable
     tool: ToolTable
@@ -79,23 +79,23 @@ class JobFile(Table):
 
     @model_validator(mode="after")
     def _best_is_chosen(self) -> JobFile:
-        """Require [sequence] of what it alone can choose."""
+        """Require [sequence] where a start or a direction is to be chosen."""
         if self.sequence is not None:
             return self
         for i, table in enumerate(self.contour):
             for name in ("start", "direction"):
                 if getattr(table, name) == "best":
                     raise fault(
-                        "[sequence], which chooses what is best",
+                        f'[sequence] with {name} = "best"',
                         "none",
-                        f"add it, or write another {name}",
+                        f"add [sequence], or write another {name}",
                         ("contour", i, name),
                     )
         return self
 
     @model_validator(mode="after")
     def _cell_fits(self) -> JobFile:
-        """Refuse what cannot be planned or known in a cell, at its key."""
+        """Refuse options that cannot be combined with a cell, at their key."""
         if self.cell is None:
             return self
         if (method := self.plan.method) not in EXACT_OR_BETTER:
@@ -104,7 +104,7 @@ class JobFile(Table):
         if self.cell.links == "description" and self.robot.urdf is None:
             raise fault(
                 'links = "description" only with urdf in [robot]',
-                "none there",
+                "none",
                 'write links = "capsules"',
                 ("cell", "links"),
             )
@@ -125,11 +125,11 @@ class JobFile(Table):
 
     @model_validator(mode="after")
     def _movable(self) -> JobFile:
-        """Require of what a layout moves that it is the part, or an axis that carries it."""
+        """Require that a layout moves the part, or an external axis that carries it."""
         name = self.layout.move
         carriers = [axis.name for axis in self.robot.external if axis.carries == "part"]
         if name != "part" and name not in carriers:
-            hint = "vary base_x_mm, base_y_mm, base_z_mm or base_yaw_deg for what carries the robot"
+            hint = "vary base_x_mm, base_y_mm, base_z_mm or base_yaw_deg to move the robot"
             raise fault(
                 f"one of {', '.join(map(repr, ('part', *carriers)))}",
                 f'"{name}"',
@@ -141,11 +141,12 @@ class JobFile(Table):
     @model_validator(mode="after")
     def _clearance_is_measured(self) -> JobFile:
         """Refuse a cost of clearance where the planner would not measure it."""
-        here, why = ("comfort", "clearance_band_mm"), "with clearance_band_mm"
+        here = ("comfort", "clearance_band_mm")
         if self.comfort.clearance_band_mm is None:
             return self
         if self.cell is None:
-            raise fault(f"[cell] {why}, as it is measured there", "none", "change one", here)
+            expected = "[cell] with clearance_band_mm, as clearance is measured in the cell"
+            raise fault(expected, "none", "add [cell], or remove clearance_band_mm", here)
         return self
 
 
@@ -174,4 +175,4 @@ TABLES: dict[str, type[BaseModel]] = {
 }
 """The model of each table of the file."""
 REPEATED = ("contour", "cell.fixture", "cell.pair", "robot.external")
-"""Those that a file may have several of."""
+"""Tables that a file may have several of."""

@@ -1,4 +1,4 @@
-"""The [layout] table: what may be moved and how far, and what the best placement is best in."""
+"""The [layout] table: what may be moved and how far, and the goal of the best placement."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ VARIABLES = (
     "base_x_mm", "base_y_mm", "base_z_mm", "base_yaw_deg",
     "mount_deg",
 )  # fmt: skip
-"""What may vary: offsets of the part, then of the robot's base, then the turn of the head."""
+"""What may vary: offsets of the part, then of the robot's base, then the rotation of the head."""
 
 
 def rising(value: tuple[float, ...]) -> tuple[float, ...]:
-    """Return a range, its ends as they should be.
+    """Return a range whose lower end is below its upper end.
 
     Raises
     ------
     PydanticCustomError
-        Reversed or empty.
+        The range is reversed or empty.
     """
     low, high = value
     if not low < high:
         what = "an empty range" if low == high else "a reversed one"
-        raise fault("[low, high], low below high", what, f"write, for example, [{high:g}, {low:g}]"
+        raise fault("[low, high] with low below high", what, f"write [{high:g}, {low:g}]"
                     if low > high else "leave it out, or widen it")  # fmt: skip
     return value
 
@@ -45,7 +45,7 @@ Millimetres = Annotated[
     Span | None, key("2 numbers, the least and the largest offset in mm", "[-200, 200]")
 ]
 Degrees = Annotated[
-    Span | None, key("2 numbers, the least and the largest turn in deg", "[-30, 30]")
+    Span | None, key("2 numbers, the least and the largest rotation in deg", "[-30, 30]")
 ]
 
 
@@ -54,7 +54,7 @@ class LayoutTable(Table):
 
     goal: Goal = "speed"
     move: Annotated[
-        Text, key('"part", or the name of the external axis that moves with it', '"part"')
+        Text, key('"part", or the name of an external axis that carries it', '"part"')
     ] = "part"
     x_mm: Millimetres = None
     y_mm: Millimetres = None
@@ -80,6 +80,6 @@ class LayoutTable(Table):
 
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """The ranges that are given, by their variables."""
+        """The given ranges by variable, in the units of the keys."""
         spans = {name: getattr(self, name) for name in given(self, *VARIABLES)}
         return {name: (low, high) for name, (low, high) in spans.items()}

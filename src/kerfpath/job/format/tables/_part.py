@@ -32,30 +32,30 @@ class PartTable(Table):
         key("a length unit", '"mm"'),
     ] = None
     gap_mm: Annotated[
-        Positive, key("the largest distance between two ends that a loop bridges, mm", "0.05")
+        Positive, key("the largest gap between two curve ends that a loop bridges, in mm", "0.05")
     ] = GAP * 1000
     outer_towards: Annotated[
         Three | None,
-        key("3 numbers, where the outer sides of its sheets face, in the part", "[0, 0, 1]"),
+        key("3 numbers, the direction that its outer sides face, in the part", "[0, 0, 1]"),
     ] = None
     axis: Annotated[
         Three | None,
-        key("3 numbers, the tool axis of a drawing that has none, in the part", "[0, 0, -1]"),
+        key("3 numbers, the tool axis for a drawing without one, in the part", "[0, 0, -1]"),
     ] = None
     columns: Annotated[
         dict[str, Text] | list[Text] | None,
         key(
-            "what the columns of a table of points are: names by its own, or a list in order",
+            "the columns of a table of points: its own names for them, or a list in order",
             '{ x = "Pos X", y = "Pos Y", z = "Pos Z" }',
         ),
     ] = None
     left_out: Annotated[
         Literal["refuse", "accept"],
-        key("what becomes of a drawing of which something to cut may be left out", '"accept"'),
+        key("what to do if something to cut may be left out of the drawing", '"accept"'),
     ] = "refuse"
     placed_by: Annotated[
         Literal["origin", "centre"],
-        key("what of the part xyz_mm says: its origin, or the middle of its box", '"centre"'),
+        key("the point of the part at xyz_mm: its origin, or the centre of its box", '"centre"'),
     ] = "origin"
     frame: Annotated[
         Text | None,
@@ -72,11 +72,11 @@ class PartTable(Table):
     @model_validator(mode="after")
     def _one_place(self) -> PartTable:
         if self.frame is not None and self.placed_by == "centre":
-            raise fault("frame, or placed_by", "both", "leave one of them out", ("placed_by",))
+            raise fault("frame or placed_by", "both", "remove one", ("placed_by",))
         return self
 
     def drawing(self, folder: Path) -> Drawing:
-        """Return the drawing, its path taken from a folder."""
+        """Return the drawing; its path is relative to `folder`."""
         return Drawing(
             file=folder / self.file,
             unit=self.unit,
@@ -88,12 +88,12 @@ class PartTable(Table):
         )
 
     def resolve(self, drawing: Drawing) -> Array:
-        """Return T_base_part, (4, 4), m; the drawing is read where not its origin is placed.
+        """Return T_base_part, (4, 4), m; the drawing is read unless its origin is placed.
 
         Raises
         ------
         InputError
-            The drawing cannot be read, or names no such coordinate system.
+            The drawing cannot be read, or has no such coordinate system.
         """
         placed = pose(self.xyz_mm, self.rpy_deg)
         if self.frame is not None:

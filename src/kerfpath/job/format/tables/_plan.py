@@ -1,4 +1,4 @@
-"""The [plan] table: what is searched, and which motion is best."""
+"""The [plan] table: the search, the objective and the limits."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ KEYS = {
     "comfort clearance": "clearance_band_mm",
     "comfort costs": "costs in [comfort]",
 }
-"""What the file calls an option whose key has another name, or a unit."""
+"""Keys of the options whose key has another name, or a unit."""
 
 
 def said_in_keys(conflict: OptionConflict, table: PlanTable) -> tuple[tuple[str, str], str]:
-    """Return the key of two options that do not go together, and what is wrong in its words."""
+    """Return the key of two options in conflict, and the message in the words of a job."""
     key = KEYS.get(conflict.option, conflict.option)
     expected = f"no {key}" if conflict.expected is None else f"{key} = {_toml(conflict.expected)}"
     beside = [
@@ -72,7 +72,7 @@ def _toml(value: object) -> str:
 
 
 class PlanTable(Table):
-    """[plan]: what is searched, and which motion is best."""
+    """[plan]: the search, the objective and the limits of every plan."""
 
     gamma_step_deg: Annotated[
         Positive, key("a number above 0, at most 360, in deg", "1", le=360)
@@ -135,12 +135,12 @@ class PlanTable(Table):
         retract: float | None = None,
         floor: float | None = None,
     ) -> PlanOptions:
-        """Return how the table, [comfort], [program] and [robot] ask for a plan, in SI.
+        """Return the plan options of the table, [comfort], [program] and [robot], in SI.
 
         Raises
         ------
         OptionConflict
-            Two options that do not go together.
+            Two options conflict.
         """
         words, angle, piece = self.posture, self.rotation_deg, self.least_piece_mm
         return PlanOptions(
@@ -169,7 +169,7 @@ class PlanTable(Table):
         )
 
     def certified(self) -> Certify | None:
-        """Return how far plans are certified; None where they are not to be."""
+        """Return how far plans are certified; None if they are not."""
         if not self.certify:
             return None
         percent = self.certify_gap_percent

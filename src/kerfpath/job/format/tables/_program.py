@@ -1,4 +1,4 @@
-"""The [program] and [audit] tables: what is written, and what is allowed before it is."""
+"""The [program] and [audit] tables: the robot program, and the tolerances of its audit."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class ProgramTable(Table):
     pierce_time_s: Annotated[NotNegative, key("a number from 0 to 60, in s", "0.3", le=60)] = 0.0
     approach_mm_s: Annotated[Positive, key("a number above 0, in mm/s", "100")] = 100.0
     air_speed: Annotated[
-        Positive | None, key("a number from 0.01 to 1, of the full speed", "0.25", ge=0.01, le=1)
+        Positive | None, key("a share of the full speed, from 0.01 to 1", "0.25", ge=0.01, le=1)
     ] = None
 
     request: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["shutter"]')] = None
@@ -48,11 +48,11 @@ class ProgramTable(Table):
     @classmethod
     def _is_said_once(cls, partners: list[Partner] | None) -> list[Partner] | None:
         if partners and len(set(partners)) < len(partners):
-            raise fault("each partner once", repr(partners), "leave the second out")
+            raise fault("each partner once", repr(partners), "remove the second")
         return partners
 
     def handshakes(self) -> tuple[Handshake, ...]:
-        """Return what is done before each contour."""
+        """Return the handshakes before each contour."""
         requests = (Request(partner=partner, on=True) for partner in self.request or ())
         timeout = self.wait_timeout_s
         waits = (Await(partner=partner, timeout=timeout) for partner in self.wait_for or ())
@@ -76,7 +76,7 @@ class ProgramTable(Table):
         return self
 
     def settings(self) -> LanguageSettings | None:
-        """Return the settings of the language; None where no program is wanted."""
+        """Return the settings of the language; None without a program."""
         if self.language == "none":
             return None
         return _settings(self.language, (self.model_extra or {}).get(self.language, {}))

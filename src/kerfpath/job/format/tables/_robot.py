@@ -54,12 +54,12 @@ SOURCES = {
     "urdf": ("base", "tip", "mount", "part", "packages", "snap_deg", "srdf", *CONTROLLER),
     "kinematics": ("geometry_mm", "sign", "offset_deg", *CONTROLLER),
 }
-"""The three ways to say which robot, and the keys that belong to each."""
+"""The three ways to name the robot, and the keys that belong to each."""
 LIMITS = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2")
 
 
 class RobotTable(Table):
-    """[robot]: which robot, and limits that replace or complete those known of it."""
+    """[robot]: the robot, and limits that replace or complete its known limits."""
 
     model: Annotated[
         str | None,
@@ -80,7 +80,7 @@ class RobotTable(Table):
     part: Annotated[Text | None, key("a link of the description", '"table"')] = None
     packages: Annotated[
         dict[str, Text] | None,
-        key("folders by the name of their package", '{ arm_description = "meshes" }'),
+        key("a table of folders by package name", '{ arm_description = "meshes" }'),
     ] = None
     snap_deg: Annotated[NotNegative | None, key("a number from 0 to 1, in deg", "0.006", le=1)] = (
         None
@@ -98,7 +98,7 @@ class RobotTable(Table):
     offset_deg: Annotated[
         Joints | None, key("an angle for every joint, in deg", "[0, 0, -90, 0, 0]")
     ] = None
-    manufacturer: Annotated[Text | None, key("whose controller moves the robot", '"ABB"')] = None
+    manufacturer: Annotated[Text | None, key("the maker of the robot's controller", '"ABB"')] = None
     axis_3: Annotated[
         Literal["serial", "horizontal"] | None,
         key("what axis 3 of the controller measures", '"horizontal"'),
@@ -158,7 +158,7 @@ class RobotTable(Table):
         Ratio | None, key("a ratio of acceleration to speed, by its name", '"iontec_20_to_70kg"')
     ] = None
     elbow_step_deg: Annotated[
-        Positive | None, key("a number above 0, the step of joint 3 of seven in deg", "10")
+        Positive | None, key("a number above 0, the step of joint 3 of seven, in deg", "10")
     ] = None
     external: External = ()
 
@@ -200,13 +200,13 @@ class RobotTable(Table):
                 raise fault(
                     f"{known.joints} numbers, as {holder}",
                     "none",
-                    "add them from its data sheet",
+                    "add them from the robot's data sheet",
                     (name,),
                 )
         if self.elbow_step_deg is not None and known.family.given is None:
             raise fault(
-                "elbow_step_deg only of an arm of seven axes",
-                f"{known.joints}",
+                "elbow_step_deg only for an arm with seven axes",
+                f"{known.joints} axes",
                 "remove it",
                 ("elbow_step_deg",),
             )
@@ -221,7 +221,7 @@ class RobotTable(Table):
             expected = f"joint accelerations, as {holder}"
             raise fault(expected, "none", remedy, ("acceleration_deg_s2",))
         try:
-            self._arm(folder)  # limits given may contradict those known
+            self._arm(folder)  # given limits may contradict known ones
         except InputError as error:
             raise fault(
                 "lower_deg below upper_deg",
@@ -237,7 +237,7 @@ class RobotTable(Table):
         return self
 
     def _require_one_source(self) -> None:
-        """Require one of the ways to say which robot, and no key of another."""
+        """Require exactly one way to name the robot, and no key of another way."""
         sources = given(self, *SOURCES)
         if len(sources) != 1:
             raise fault(
@@ -259,7 +259,7 @@ class RobotTable(Table):
             raise fault(
                 f'the lengths of an arm of kinematics "{self.kinematics}"',
                 "none",
-                f"add geometry_mm = {{ {lengths} }} with the true ones",
+                f"add geometry_mm = {{ {lengths} }} with the true lengths",
                 ("geometry_mm",),
             )
 
@@ -270,14 +270,14 @@ class RobotTable(Table):
                 raise fault(f"{n} numbers, one for every joint", f"{got}", "give as many", (name,))
         axes = self.endless or ()
         if len(set(axes)) < len(axes):
-            raise fault("each axis once", "one twice", "remove it", ("endless",))
+            raise fault("each axis once", "one twice", "remove the second", ("endless",))
         if max(axes, default=1) > n:
             raise fault(f"axis numbers from 1 to {n}", f"{max(axes)}", "remove it", ("endless",))
         ratio = self.acceleration_ratio
         if ratio is not None and (count := len(acceleration_ratios()[ratio])) != n:
             raise fault(
-                f"accelerations of {n} joints",
-                f"a ratio for {count}",
+                f"a ratio for {n} joints",
+                f"one for {count}",
                 "give acceleration_deg_s2 instead",
                 ("acceleration_ratio",),
             )
@@ -293,14 +293,14 @@ class RobotTable(Table):
         return self.floor_mm / 1000 if self.floor else None
 
     def resolve(self, folder: Path, *, bodies: bool = False) -> Robot:
-        """Return the robot with this table's limits; `bodies`: those of its description, too."""
+        """Return the robot with this table's limits; `bodies` adds those of its description."""
         found = self._arm(folder, bodies=bodies)
         for axis, travel in self.axes(folder):
             found = found.with_external(axis, **travel)
         return found
 
     def axes(self, folder: Path) -> list[tuple[ExternalAxis, Travel]]:
-        """Return its external axes, of the description and of tables, and their travel."""
+        """Return the external axes of the description and of the tables, with their travel."""
         read = None if self.urdf is None else self._description(folder)
         return axes_of(self.external, () if read is None else described_axes(read))
 
@@ -322,7 +322,7 @@ class RobotTable(Table):
         return changed
 
     def _known(self, folder: Path, *, bodies: bool = False) -> Robot:
-        """Return the robot as the library or its lengths have it, or as described and limited."""
+        """Return the robot of the library, of the given lengths, or of the description."""
         if self.model is not None:
             return robot(self.model)
         limits = None if self.axis_3_deg is None else np.radians(self.axis_3_deg)
@@ -360,19 +360,19 @@ class RobotTable(Table):
         )
 
     def joints(self, folder: Path) -> int:
-        """Return how many joints the robot has without its external axes."""
+        """Return the number of joints without external axes."""
         if self.urdf is not None:
             return len(self._description(folder).joints)
         return robot(self.model).joints if self.model else FAMILIES[self.kinematics or ""].joints
 
     def _description(self, folder: Path) -> Description:
-        """Return the description, its bodies left out, its angles as the arm has them."""
+        """Return the description without bodies, its angles snapped as those of the arm."""
         chain = self._chain(folder)
         snap = chain.pop("snap") or 0.0
         return read_urdf(folder / (self.urdf or ""), **chain, meshes=False, snap=snap)
 
     def _chain(self, folder: Path) -> dict[str, Any]:
-        """Return which chain of the description it is, as its reader takes it."""
+        """Return the arguments of the reader that select the chain of the description."""
         return {
             "base": self.base,
             "tip": self.tip,

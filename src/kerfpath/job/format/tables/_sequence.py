@@ -11,10 +11,10 @@ __all__ = ["SequenceTable"]
 
 
 class SequenceTable(Table):
-    """[sequence]: with it, the moves between contours are planned, and audited, too."""
+    """[sequence]: with it, the moves between contours are planned and audited, too."""
 
     order: Annotated[
-        Literal["given", "best"], key("the order of the file, or that of least time", '"best"')
+        Literal["given", "best"], key("the order of the file, or the fastest order", '"best"')
     ] = "best"
     inner_first: Annotated[bool, key("true or false", "true")] = True
     heat_spacing_mm: Annotated[NotNegative, key("a number not below 0, in mm", "40")] = 0.0

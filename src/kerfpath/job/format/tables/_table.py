@@ -1,4 +1,4 @@
-"""What all tables of a job file share."""
+"""The base class of all tables of a job file, and the rules that they share."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ __all__ = ["Table", "given", "require_distinct", "require_one"]
 
 
 class Table(BaseModel):
-    """A table: frozen, strict about the kinds of its values, without unknown keys."""
+    """A table: frozen, strict about the types of its values, without unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 def given(table: Table, *keys: str) -> list[str]:
-    """Return those of the optional keys that the table has."""
+    """Return the optional keys that the table has."""
     return [key for key in keys if getattr(table, key) is not None]
 
 
@@ -28,7 +28,7 @@ def require_one(table: Table, keys: Sequence[str], expected: str, example: str) 
     Raises
     ------
     PydanticCustomError
-        At the first of them.
+        At the first of them, if none or several are given.
     """
     found = given(table, *keys)
     if len(found) != 1:
@@ -39,12 +39,12 @@ def require_one(table: Table, keys: Sequence[str], expected: str, example: str) 
 def require_distinct(
     names: Sequence[str | None], what: str, table: str, keys: Sequence[str]
 ) -> None:
-    """Require that no two tables have one name; None is no name.
+    """Require that no two tables have the same name; None is no name.
 
     Raises
     ------
     PydanticCustomError
-        At the key of the second.
+        At the key of the second table of that name.
     """
     for i, name in enumerate(names):
         if name is not None and name in names[:i]:

@@ -1,4 +1,4 @@
-"""The [tool] table: the cutting head, or where its tip is; and what the flange carries."""
+"""The [tool] table: the cutting head or the pose of its tip, and the load on the flange."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["ToolTable"]
 
 
 class ToolTable(Table):
-    """[tool]: a shipped cutting head, or where the tip is in the flange; what that carries."""
+    """[tool]: a shipped cutting head, or the tip in the flange; and the load on the flange."""
 
     head: Annotated[Head | None, key("a cutting head, by its name", '"laser-head-straight"')] = None
     xyz_mm: Annotated[
@@ -37,16 +37,16 @@ class ToolTable(Table):
     ] = None
 
     mass_kg: Annotated[
-        NotNegative | None, key("0 or a number above it, what the flange carries in kg", "25")
+        NotNegative | None, key("a number not below 0, the load on the flange in kg", "25")
     ] = None
     centre_mm: Annotated[
-        Three | None, key("3 numbers, its centre of mass in the flange in mm", "[0, 0, 120]")
+        Three | None, key("3 numbers, the load's centre of mass in the flange in mm", "[0, 0, 120]")
     ] = None
     inertia_kg_m2: Annotated[
         tuple[Number, ...] | None,
         key(
-            "6 numbers, its inertia xx, yy, zz, xy, xz and yz about the centre of mass, along the "
-            "flange's axes, in kg m^2",
+            "6 numbers, the load's inertia xx, yy, zz, xy, xz and yz about its centre of mass, "
+            "along the flange's axes, in kg m^2",
             "[0.4, 0.5, 0.3, 0, 0, 0]",
             strict=False,
             min_length=6,
@@ -58,7 +58,8 @@ class ToolTable(Table):
     def _one_tip(self) -> ToolTable:
         found = given(self, "xyz_mm", "rpy_deg")
         if self.head is not None and found:
-            raise fault("head alone", "both", f"remove {found[0]} or head", (found[0],))
+            got = f"it with {found[0]}"
+            raise fault("head alone", got, f"remove {found[0]} or head", (found[0],))
         if self.head is None and not found:
             raise fault(
                 "a cutting head",
@@ -73,10 +74,10 @@ class ToolTable(Table):
 
     @model_validator(mode="after")
     def _possible_load(self) -> ToolTable:
-        """Require all that torques need of what the flange carries, once some of it is given."""
+        """Require all values of the load that torques need, once one of them is given."""
         found = given(self, "centre_mm", "inertia_kg_m2")
         if self.mass_kg is None and found:
-            raise fault("mass_kg, too", "none", "add it", ("mass_kg",))
+            raise fault(f"mass_kg with {found[0]}", "none", "add mass_kg", ("mass_kg",))
         if self.mass_kg and self.centre_mm is None:
             raise fault(
                 f"the centre of mass of {self.mass_kg:g} kg in the flange, in mm",
@@ -92,7 +93,7 @@ class ToolTable(Table):
         return self
 
     def load(self) -> Load | None:
-        """Return what the flange carries; None where the job does not say."""
+        """Return the load on the flange; None if the job does not give one."""
         if self.mass_kg is None:
             return None
         centre, tensor = self.centre_mm, None
