@@ -117,6 +117,6 @@ def _mesh_file(
 
 
 def _places(here: Path, package: str) -> list[Path]:
-    """Return where a package may be: `here` or a parent of that name, or a folder in one of them."""
+    """Return where a package may be: `here` or a parent of its name, or a folder in these."""
     above = [here, *here.parents]
     return [folder for folder in above if folder.name == package] + [p / package for p in above]

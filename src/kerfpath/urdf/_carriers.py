@@ -179,7 +179,7 @@ def places(
 
 
 def _fixed_above(tree: Tree, base: str) -> dict[str, Array]:
-    """Return the poses (4, 4) m in the base of itself and of the links above that it is fixed to."""
+    """Return the poses (4, 4) m in the base of itself and of links above that it is fixed to."""
     found = {base: freeze(np.eye(4))}
     link = base
     while link in tree.parent and tree.parent[link].kind == "fixed":

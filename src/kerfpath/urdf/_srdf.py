@@ -21,7 +21,7 @@ LONGEST = 200
 def read_srdf(path: str | PathLike[str], urdf: str | PathLike[str]) -> dict[LinkPair, str]:
     """Return the pairs of links whose collisions an SRDF disables, with its reason for each.
 
-    `kerfpath.cell.allowed_pairs` turns them into pairs of bodies. Nothing else in the file is used.
+    `kerfpath.cell.allowed_pairs` turns them into pairs of bodies. The rest of the file is unused.
 
     Parameters
     ----------
