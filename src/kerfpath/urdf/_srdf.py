@@ -47,8 +47,8 @@ def read_srdf(path: str | PathLike[str], urdf: str | PathLike[str]) -> dict[Link
         )
     if root.find("disable_default_collisions") is not None:
         raise InputError(
-            f"{path}: <disable_default_collisions> disables every pair of a link; list the intended "
-            "pairs as <disable_collisions>"
+            f"{path}: <disable_default_collisions> disables every pair of a link; list the pairs "
+            "that are meant as <disable_collisions>"
         )
     enabled = {frozenset(_links(each, tree.links, path)) for each in root.iter("enable_collisions")}
     found: dict[LinkPair, str] = {}
