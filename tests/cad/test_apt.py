@@ -249,7 +249,7 @@ REFUSED = {
     "geometry": (GOOD + "P1 = POINT/1,2,3\n", "line 6: .* defines geometry"),
     "a cut from home": (GOOD + "GOHOME\nGOTO/1,2,3\n", "line 7: a move at feed from a place"),
     "a move after the end": (GOOD + "FINI\nGOTO/1,2,3\n", "line 7: a move after the end .* line 6"),
-    "an end in a statement": (GOOD + "GOTO/1,2,$\n", r"line 6: continues with \$, but the file ends"),
+    "an end in a statement": (GOOD + "GOTO/1,2,$\n", r"line 6: continues with \$, but the file"),
     "a plunge in a cut": (
         GOOD + "GOTO/10,20,5\nGOTO/0,20,5\n", "line 6: a move along the tool axis within"
     ),

@@ -142,7 +142,7 @@ REFUSED = {
     "a late unit": (S + "G700\n", "line 6: G700 after moves in another unit"),
     "an arc": (S + "G2 X20 I5\n", "line 6: 'G2': a curve; have the CAM system write linear"),
     "another arc": (S + "CIP X20 I1=5\n", "line 6: 'CIP': a curve"),
-    "increments": (S + "G91 X5\n", "line 6: 'G91': increments; write absolute positions"),
+    "increments": (S + "G91 X5\n", "line 6: 'G91': increments; write absolute"),
     "an increment": (S + "X=IC(5)\n", "line 6: X=: expected a number"),
     "a parameter": (S + "X=R1\n", "line 6: X=: expected a number"),
     "a sum": (S + "X=5+R1\n", "line 6: X=: expected a number"),
@@ -181,7 +181,7 @@ REFUSED = {
     "Heidenhain, no unit": (H.replace(" MM", ""), "line 1: expected one BEGIN PGM NAME MM or INCH"),
     "Heidenhain, an arc": (H + "C X5 Y5 DR+\n", r"line 5: 'C X5 Y5 DR\+': a curve, or a move that"),
     "Heidenhain, a rounding": (H + "RND R5\n", "line 5: 'RND R5': a curve, or a move that"),
-    "Heidenhain, increments": (H + "L IX+5\n", r"line 5: 'IX\+5': increments; write absolute positions"),
+    "Heidenhain, increments": (H + "L IX+5\n", r"line 5: 'IX\+5': increments; write absolute"),
     "Heidenhain, compensation": (H + "L X5 RL\n", "line 5: 'RL': the controller would offset"),
     "Heidenhain, a rotary axis": (H + "L B+5 FMAX\n", "line 5: B: the effect of a rotary axis"),
     "Heidenhain, a parameter": (H + "L X+Q5\n", r"line 5: 'X\+Q5': it is not known, and may"),
@@ -196,7 +196,7 @@ REFUSED = {
         H + "LN X5 NX0 NY0 NZ1\n", "line 5: NX NY NZ without TX TY TZ; expected the tool axis"
     ),
     "Heidenhain, a length": (H + "LN X5 TX0 TY0 TZ9\n", "line 5: a tool axis of length 9"),
-    "Heidenhain, the machine's place": (H + "L Z5 M91\n", "line 5: M91 at feed: its position is in"),
+    "Heidenhain, the machine's place": (H + "L Z5 M91\n", "line 5: M91 at feed: its position is"),
     "Heidenhain, no tip any more": (
         H + "M129\nL X5 Y5 Z5\n", "line 6: a move at feed from a place that is not known"
     ),
