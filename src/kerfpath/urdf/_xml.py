@@ -136,7 +136,7 @@ def read_root(path: Path, what: str) -> ElementTree.Element:
     """
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):
-            raise InputError(f"is not a file; expected a {what}")
+            raise InputError(f"is not a regular file; expected a {what}")
         root = ElementTree.fromstring(
             path.read_bytes(), parser=ElementTree.XMLParser(target=_NoDoctype())
         )
