@@ -167,13 +167,13 @@ def test_a_jerk_may_be_known_of_some_joints(tmp_path):
 
 SPOILT = {
     "no inertial, nor has any link fixed to it": ("link_3", ""),
-    "link 'link_3' has a shape and no <inertial>": (
+    "link 'link_3' has a shape but no <inertial>": (
         "link_3", '<visual><geometry><sphere radius="0.1"/></geometry></visual>',
     ),
-    "link 'link_3': its mass is not positive, 0 kg": (
+    "link 'link_3': expected a positive mass, got 0 kg": (
         "link_3", inertial(0.0, (0, 0, 0), np.eye(3)),
     ),
-    "link 'link_3': its mass is not positive, -2 kg": (
+    "link 'link_3': expected a positive mass, got -2 kg": (
         "link_3", inertial(-2.0, (0, 0, 0), np.eye(3)),
     ),
     "link 'link_5': its inertia is not positive definite (least principal moment -0.1 kg m^2)": (
@@ -222,7 +222,9 @@ def test_a_frame_needs_no_mass_and_a_link_on_a_foreign_joint_is_refused(tmp_path
     )
     path.write_text(path.read_text().replace("</robot>", f"{finger}</robot>"))
     found = Robot.from_urdf(path, tip="tool0")
-    with pytest.raises(InputError, match="link 'finger' hangs on the chain by a joint outside it"):
+    with pytest.raises(
+        InputError, match="link 'finger' is attached to the chain by a joint outside it"
+    ):
         found.with_load(LOAD)
 
 

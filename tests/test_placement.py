@@ -187,8 +187,16 @@ def test_a_table_of_measured_points_is_read(tmp_path):
         (TABLE, "", "holds no rows"),
         ("nominal_x_mm", "nominal_x", "line 2: expected columns nominal_x_mm .*, got 'nominal_x'"),
         ("nominal_x_mm", "nominal_x_furlong", "got 'nominal_x_furlong'"),
-        ("nominal_y_mm", "nominal_x_mm", "line 2: expected each once"),
-        ("point;nominal_x_mm;", "point;point;", "line 2: expected each once"),
+        (
+            "nominal_y_mm",
+            "nominal_x_mm",
+            "line 2: expected each of the columns nominal_x_mm .* once",
+        ),
+        (
+            "point;nominal_x_mm;",
+            "point;point;",
+            "line 2: expected each of the columns nominal_x_mm .* once",
+        ),
         ("B;500;0", "B;500", "line 4: expected 7 columns, got 6"),
         ("B;500", "B;5oo", "line 4, column nominal_x: expected a number, got '5oo'"),
         ("1500,5", "nan", "line 4, column measured_x: expected a finite number"),

@@ -138,7 +138,7 @@ def test_inches_and_an_upright_axis(tmp_path: Path) -> None:
     np.testing.assert_array_equal(contour.axes, np.tile([0.0, 0.0, -1.0], (4, 1)))
     assert part.unit == "in"
     other = path(tmp_path, PLAIN, unit="mm")
-    assert "unit mm as asked; the file says in" in other.notes
+    assert "unit mm as given; the file says in" in other.notes
     assert other.contour("cut1", closed=False).length == pytest.approx(0.04)
 
 
@@ -155,7 +155,7 @@ def test_the_axis_is_the_last_that_was_said(tmp_path: Path) -> None:
 def test_a_path_from_anywhere_begins_at_its_first_point(tmp_path: Path) -> None:
     part = path(tmp_path, PLAIN.replace("FROM/0,0,1\nRAPID\n", ""))
     assert part.contour("cut1", closed=False).length == pytest.approx(1.016)
-    assert "contour 'cut1' begins in line 3: no place before it" in part.notes
+    assert "contour 'cut1' begins in line 3: no position before it" in part.notes
     # FROM is no move: the next GOTO is the rapid one.
     part = path(tmp_path, PLAIN.replace("FROM/0,0,1\nRAPID\n", "RAPID\nFROM/-5,0,0\n"))
     assert part.contour("cut1", closed=False).length == pytest.approx(1.016)
@@ -214,7 +214,7 @@ def test_what_is_written_is_read(
 
 GOOD = "UNITS/MM\nRAPID\nGOTO/0,0,0,0,0,1\nGOTO/10,0,0\nGOTO/10,20,0\n"
 REFUSED = {
-    "no unit": (GOOD.replace("UNITS/MM\n", ""), "states no length unit; say it with unit="),
+    "no unit": (GOOD.replace("UNITS/MM\n", ""), "states no length unit; give it with unit="),
     "unknown unit": (GOOD.replace("MM", "PARSECS"), "line 1: UNITS: expected one of MM"),
     "two units": (GOOD + "UNITS/INCHES\n", "line 6: UNITS other than mm before"),
     "a late unit": (GOOD[9:] + "UNITS/MM\n", "line 5: UNITS after points without one"),
@@ -231,10 +231,10 @@ REFUSED = {
     "a word for a number": (GOOD + "GOTO/P1,2,3\n", "line 6: GOTO: expected a number, got 'P1'"),
     "an underscore": (GOOD + "GOTO/1_0,2,3\n", "line 6: GOTO: expected a number, got '1_0'"),
     "infinity": (GOOD + "GOTO/inf,2,3\n", "line 6: GOTO: expected a finite number"),
-    "a circle": (GOOD + "CIRCLE/0,0,0,0,0,1,5,.01,.5,10,0\n", "line 6: 'CIRCLE/.*': a curve; let"),
+    "a circle": (GOOD + "CIRCLE/0,0,0,0,0,1,5,.01,.5,10,0\n", "line 6: 'CIRCLE/.*': a curve; have"),
     "an arc": (GOOD + "TLON,GOFWD/(CIRCLE/0,0,0,5),ON\n", "line 6: 'TLON,GOFWD/.*linear moves"),
     "another arc": (GOOD + "MOVARC/0,0,0,0,0,1,5,ANGLE,90\n", "line 6: 'MOVARC/.*linear moves"),
-    "compensation": (GOOD + "CUTCOM/LEFT\n", "line 6: 'CUTCOM/LEFT': the controller would move"),
+    "compensation": (GOOD + "CUTCOM/LEFT\n", "line 6: 'CUTCOM/LEFT': the controller would offset"),
     "a cycle": (GOOD + "CYCLE/DRILL,5\n", "line 6: 'CYCLE/DRILL,5': a motion that is not written"),
     "increments": (GOOD + "GODLTA/0,0,5\n", "line 6: 'GODLTA/0,0,5': a motion that is not"),
     "moved points": (GOOD + "TRACUT/M1\n", "line 6: 'TRACUT/M1': it moves the points"),
@@ -242,16 +242,16 @@ REFUSED = {
     "two systems": (
         f"MSYS/0,0,0,1,0,0,0,1,0\n{GOOD}MSYS/0,0,5,1,0,0,0,1,0\n", "line 7: another MSYS"
     ),
-    "a word of the controller": (GOOD + "PREFUN/41\n", "line 6: 'PREFUN/41': words for the contr"),
+    "a word of the controller": (GOOD + "PREFUN/41\n", "line 6: 'PREFUN/41': text for the contr"),
     "an unknown word": (GOOD + "WARP/9\n", "line 6: 'WARP/9': the word is not known, and may"),
     "a modal rapid": (GOOD + "RAPID/ON\n", "line 6: 'RAPID/ON': the word is not known"),
     "a rapid feed rate": (GOOD + "FEDRAT/RAPID\n", "line 6: 'FEDRAT/RAPID': the word is not"),
     "geometry": (GOOD + "P1 = POINT/1,2,3\n", "line 6: .* defines geometry"),
     "a cut from home": (GOOD + "GOHOME\nGOTO/1,2,3\n", "line 7: a move at feed from a place"),
     "a move after the end": (GOOD + "FINI\nGOTO/1,2,3\n", "line 7: a move after the end .* line 6"),
-    "an end in a statement": (GOOD + "GOTO/1,2,$\n", r"line 6: goes on with \$, and the file ends"),
+    "an end in a statement": (GOOD + "GOTO/1,2,$\n", r"line 6: continues with \$, but the file"),
     "a plunge in a cut": (
-        GOOD + "GOTO/10,20,5\nGOTO/0,20,5\n", "line 6: a move along the tool axis in the midst"
+        GOOD + "GOTO/10,20,5\nGOTO/0,20,5\n", "line 6: a move along the tool axis within"
     ),
     "a turn on the spot": (
         GOOD + "GOTO/10,20,0,0,0.6,0.8\nGOTO/0,20,0\n", "line 6: the same point as line 5"
@@ -290,7 +290,7 @@ def test_what_does_not_go_with_a_tool_path(tmp_path: Path) -> None:
 
 def test_a_system_of_its_own_is_said(tmp_path: Path) -> None:
     part = path(tmp_path, "MSYS/1,2,3,1,0,0,0,1,0\n" + GOOD)
-    assert part.notes == ("points are taken in the system that MSYS in line 1 names",)
+    assert part.notes == ("points are in the system that MSYS in line 1 defines",)
 
 
 def test_damaged_files_are_read_or_refused(tmp_path: Path) -> None:

@@ -86,7 +86,7 @@ def test_a_face_without_a_plane_is_one_face_less(tmp_path: Path, whole: str) -> 
     assert part.faces == 7
     kinds = [(each.kind, each.count, each.may_cut) for each in part.left_out]
     assert kinds == [("Plane", 1, True), ("AdvancedFace", 1, True)]
-    assert part.left_out[1].reason == "no face is made of it"
+    assert part.left_out[1].reason == "no face could be made from it"
 
 
 def test_a_cylinder_of_no_radius_loses_one_face_alone(tmp_path: Path, whole: str) -> None:
@@ -116,7 +116,7 @@ def test_a_damaged_surface_of_an_iges_file_is_one_face_less(tmp_path: Path) -> N
     part = read(path)
     assert part.faces == 7
     assert all(each.may_cut == (each.kind != "curve") for each in part.left_out)
-    lost = [each.count for each in part.left_out if each.reason == "no face is made of it"]
+    lost = [each.count for each in part.left_out if each.reason == "no face could be made from it"]
     assert lost == [1]
     # Of the surface and what bounds it, which belong to nothing any more.
     assert {each.kind for each in part.left_out} == {"TrimmedSurface", "curve"}

@@ -244,7 +244,7 @@ def test_a_contour_that_is_not_on_the_loop_is_refused_in_one_line(sheet: Part) -
         assert "\n" not in str(caught.value)
         assert name in str(caught.value)
     led = lead_in(drawn, 0.004)
-    with pytest.raises(InputError, match="in the scrap throughout"):
+    with pytest.raises(InputError, match="entirely in the scrap"):
         sheet.departure(name, led.part(0, 3, "tangent"))
 
 

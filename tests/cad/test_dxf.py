@@ -295,7 +295,7 @@ def test_insunits_is_taken_with_a_message(
     assert any(f"unit {unit} taken from $INSUNITS" in note for note in part.notes)
     told = read(part.path, unit="cm")
     assert (told.unit, told.loops[0].diameter) == ("cm", pytest.approx(0.02))
-    assert any(f"unit cm as asked; $INSUNITS says {unit}" in note for note in told.notes)
+    assert any(f"unit cm as given; $INSUNITS says {unit}" in note for note in told.notes)
 
 
 def test_no_unit_is_refused_unless_told(tmp_path: Path) -> None:
@@ -338,7 +338,7 @@ BAD: dict[str, tuple[Callable[[Modelspace], object], str]] = {
         "a CIRCLE on layer 0 leaves the drawing plane",
     ),
     "far away": (lambda space: space.add_line((0, 0), (1e12, 0)), "further than 10 km"),
-    "a block in itself": (block_in_itself, "one holds itself"),
+    "a block in itself": (block_in_itself, "one contains itself"),
     "many blocks": (many_blocks, "inserted 900000000 times"),
 }
 

@@ -101,7 +101,7 @@ def test_a_block_scaled_to_nothing_is_said(tmp_path: Path) -> None:
     path.write_text(f"{text[:place]}\n 41\n0.0{text[place:]}")
     part = read(path)
     assert len(part.loops) == 1
-    assert told(part) == [("INSERT", "it is scaled to nothing, by 0", 1, True)]
+    assert told(part) == [("INSERT", "it is scaled by 0", 1, True)]
 
 
 # --- binary ----------------------------------------------------------------------------------
@@ -224,7 +224,7 @@ def test_lines_that_a_torn_file_loses_are_counted(tmp_path: Path) -> None:
     path.write_text(f"{text[:at]}\n  0\nENDSEC{text[at:]}")
     part = read(path)
     assert len(part.loops) == 1
-    assert told(part) == [("LINE", "the file is damaged where it stands", 2, True)]
+    assert told(part) == [("LINE", "the file is damaged there", 2, True)]
 
 
 def test_every_kind_that_is_no_line_is_said_once(tmp_path: Path) -> None:

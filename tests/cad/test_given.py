@@ -75,7 +75,7 @@ def test_edges_are_a_drawing_of_lines_with_the_axis_that_is_given():
     (loop,) = read([wrapped(edge) for edge in edges], axis=[0, 0, -1]).loops
     assert loop.closed
     assert loop.length == pytest.approx(2 * (0.05 + np.hypot(0.03, 0.01)))
-    with pytest.raises(InputError, match="shape: it has edges and no face; say the tool axis"):
+    with pytest.raises(InputError, match="shape: it has edges but no face; give the tool axis"):
         read(compound(*edges))
 
 
@@ -100,9 +100,9 @@ def vertex(*at):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (lambda: TopoDS_Shape(), "it is empty: nothing has been made of it yet"),
-        (lambda: wrapped(None), "it is empty: nothing has been made of it yet"),
-        (Empty, "it is empty: nothing has been made of it yet"),
+        (lambda: TopoDS_Shape(), "it is empty: nothing has been built yet"),
+        (lambda: wrapped(None), "it is empty: nothing has been built yet"),
+        (Empty, "it is empty: nothing has been built yet"),
         (hollow, "it is empty: it has neither faces nor edges"),
         (list, "it is empty: it has neither faces nor edges"),
         (lambda: vertex(1.0, 2.0, 3.0), "it has neither faces nor edges"),
@@ -113,7 +113,7 @@ def vertex(*at):
         (lambda: b"part.step", "got bytes"),
         (lambda: ["part.step"], "got str"),
         (lambda: np.array(3.0), "got ndarray"),
-        (lambda: SimpleNamespace(part=plate()), "give its .part, .* got SimpleNamespace"),
+        (lambda: SimpleNamespace(part=plate()), "pass the .part .* got SimpleNamespace"),
     ],
 )
 def test_what_is_no_part_is_refused_in_one_line(given, said):

@@ -448,7 +448,7 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
         lambda text: text.replace("#12 =", "#2147483648 ="),
         "2147483648 is more",
     ),
-    "a number twice": (lambda text: text.replace("#12 =", "#13 ="), "#13 is there 2 times"),
+    "a number twice": (lambda text: text.replace("#12 =", "#13 ="), "#13 is defined 2 times"),
     "a number cut": (lambda text: text.replace("(100.,", "(1,5.D,", 1), r"Line \d+: Incorrect"),
     "an empty list in a list": (
         lambda text: text.replace("NAL_REPRESENTATION('',(#38)", "NAL_REPRESENTATION('',(())"),

@@ -103,7 +103,7 @@ def test_one_table_may_hold_several_contours_and_columns_that_are_not_used(tmp_p
     assert [(loop.name, loop.edges) for loop in part.loops] == [("trim", 3), ("slot", 2)]
     assert part.notes == ("columns not used: node",)
     again = text + "trim,9,5,5,5,0,0,1\n"
-    with pytest.raises(InputError, match="line 9: rows of contour 'trim' stand apart"):
+    with pytest.raises(InputError, match="line 9: rows of contour 'trim' are separated"):
         table(tmp_path, again)
 
 
@@ -117,7 +117,7 @@ def test_repeated_points_are_left_out_with_a_message(tmp_path: Path) -> None:
 def test_a_unit_that_is_asked_for_wins_with_a_message(tmp_path: Path) -> None:
     part = table(tmp_path, SQUARE, unit="in")
     assert part.bounding_box[1, 1] == pytest.approx(20 * 0.0254)
-    assert part.notes == ("unit in as asked; the header says mm",)
+    assert part.notes == ("unit in as given; the header says mm",)
 
 
 BAD = {

@@ -152,7 +152,7 @@ def test_lines_on_each_other_in_two_layers_or_colours_are_said(tmp_path: Path) -
 
     part = drawn(tmp_path, draw)
     said = [note for note in part.notes if "lie on each other" in note]
-    assert said == ["CUT/hole1 and OLD/hole1 lie on each other: picked both, cut twice"]
+    assert said == ["CUT/hole1 and OLD/hole1 lie on each other: cut twice if both are picked"]
 
 
 def hanging(part: Part) -> list[str]:

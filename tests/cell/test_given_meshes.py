@@ -49,7 +49,7 @@ def test_trimesh_has_such_meshes(arm):
     [
         ({"faces": np.zeros((0, 3), int)}, "0; the mesh is empty"),
         ({"faces": np.zeros((4, 4), int)}, r"faces: expected .*3.*4"),
-        ({"faces": np.full((4, 3), 999)}, "names a vertex that is not there"),
+        ({"faces": np.full((4, 3), 999)}, "refers to a vertex that does not exist"),
         ({"vertices": np.full((36, 3), np.nan)}, "vertices: every number must be finite"),
         ({"vertices": 1e9 * np.ones((36, 3)) * np.arange(36)[:, None]}, "is its unit right"),
         ({"faces": np.arange(33).reshape(-1, 3)}, "the surface is not closed"),

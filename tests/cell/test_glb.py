@@ -160,9 +160,9 @@ def test_trimesh_reads_the_first_pose(cell, motion):
 @pytest.mark.parametrize(
     ("time", "q", "said"),
     [
-        ([0.0, 0.0], np.zeros((2, 8)), "each after the one before"),
-        ([0.0, 100.0, 100.000001], np.zeros((3, 8)), "by what single precision can count"),
-        ([], np.zeros((0, 8)), "one time or more"),
+        ([0.0, 0.0], np.zeros((2, 8)), "each later than the one before"),
+        ([0.0, 100.0, 100.000001], np.zeros((3, 8)), "the one before in single precision"),
+        ([], np.zeros((0, 8)), "one or more times"),
         ([0.0, np.nan], np.zeros((2, 8)), "time: every number must be finite"),
         ([0.0, 1.0], np.zeros((2, 6)), "q: expected"),
         ([0.0, 1.0], np.zeros((3, 8)), "q: expected"),

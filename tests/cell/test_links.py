@@ -269,7 +269,7 @@ def test_a_described_robot_with_bodies_is_judged_by_them(tmp_path):
         ),
         (lambda f: f.write_bytes(stl_bytes(box([1, 1, 1]))), True, 1e3, "1000 m across, .* unit"),
         (lambda f: f.write_bytes(stl_bytes(box([1, 1, 1]))), True, 1e-6, "is its unit right"),
-        (lambda f: f.write_bytes(b"ply"), True, 1.0, "neither a text STL nor a whole binary"),
+        (lambda f: f.write_bytes(b"ply"), True, 1.0, "neither a text STL nor a complete binary"),
         (lambda f: f.write_bytes(stl_bytes(opened(box([1, 1, 1])))), False, 1.0, "is not closed"),
         (lambda f: f.write_bytes(stl_bytes(opened(box([1, 1, 1]), 2))), True, 1.0, "in one plane"),
         (lambda f: f.unlink(missing_ok=True), True, 1.0, "cannot be read"),
@@ -286,8 +286,8 @@ def test_a_bad_link_mesh_is_refused_by_name(tmp_path, write, hulls, scale, messa
     ("name", "text", "message"),
     [
         ("link.ply", "ply", "expected a mesh as .stl, .dae or .obj, got '.ply'"),
-        ("link.obj", "nothing", "no mesh that can be read as .obj"),
-        ("link.dae", "<COLLADA/>", "no mesh that can be read as .dae"),
+        ("link.obj", "nothing", "the mesh cannot be read as .obj"),
+        ("link.dae", "<COLLADA/>", "the mesh cannot be read as .dae"),
         ("link.dae", None, "cannot be read"),
     ],
 )

@@ -243,7 +243,7 @@ def test_a_body_of_a_wrong_unit_is_warned_of():
         assert all("'bench' is " in said and "is its unit right?" in said for said in found)
     links = [Body(name="forearm", shape=box([30, 20, 20], at([0, 0, 100])), frame=3, kind="robot")]
     (said,) = odd_sizes(cell_of(ARM, tool=tool, links=links))
-    assert "'forearm' is 3e+04 mm long beside an arm of" in said
+    assert "'forearm' is 3e+04 mm long, and the arm" in said
 
 
 def test_what_is_shaved_lies_inside_and_no_deeper_than_asked():

@@ -276,7 +276,7 @@ def test_corners_are_nodes_of_a_sampling_by_spacing_or_time():
 def test_a_stretch_too_short_for_the_spacing_is_named():
     points = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.0002, 0], [0.2, 0.0002, 0]])
     stepped = Contour(points, np.tile(DOWN, (4, 1)))
-    with pytest.raises(InputError, match=r"stretch of 0.2 mm from 100 mm on is too short .* 5 mm"):
+    with pytest.raises(InputError, match=r"0.2 mm that begins at 100 mm is too short .* 5 mm"):
         stepped.resample(spacing=0.005)
 
 
@@ -301,7 +301,7 @@ def test_kinds_and_speed_shares_follow_a_sampling():
 def test_only_the_first_node_can_be_a_pierce():
     with pytest.raises(InputError, match="only the first node"):
         Contour(np.eye(3), np.ones((3, 3)), kind=[0, KINDS.index("pierce"), 0])
-    with pytest.raises(InputError, match="places in KINDS"):
+    with pytest.raises(InputError, match="indices into KINDS"):
         Contour(np.eye(3), np.ones((3, 3)), kind=[0, 0, len(KINDS)])
     with pytest.raises(InputError, match=r"at most 1, got 1\.5"):
         Contour(np.eye(3), np.ones((3, 3)), speed_share=[1, 1, 1.5])

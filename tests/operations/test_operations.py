@@ -200,7 +200,7 @@ def test_micro_joints_are_as_wide_as_asked_and_evenly_spread():
     assert (np.diff(joint.astype(int)) == 1).sum() == 3
     with pytest.raises(InputError, match="3 joints of 30 mm do not fit"):
         micro_joints(hole(), 0.03, count=3)
-    with pytest.raises(InputError, match="one of count= and at="):
+    with pytest.raises(InputError, match="either count= or at="):
         micro_joints(hole(), 0.0004)
 
 

@@ -296,7 +296,7 @@ def test_bodies_are_where_the_links_are(tmp_path):
     c4 = robot("staubli_tx60").geometry["c4"]
     np.testing.assert_allclose(bodies["tool0"].pose[:3, 3], [0, 0, c4 + 0.25], atol=1e-12)
     (tmp_path / "my_robot" / "meshes" / "arm.stl").unlink()
-    with pytest.raises(InputError, match=r"link 'link_1': the mesh .* is not there; .*packages="):
+    with pytest.raises(InputError, match=r"link 'link_1': the mesh .* was not found; .*packages="):
         Robot.from_urdf(path)
     assert Robot.from_urdf(path, meshes=False).bodies == ()
 
@@ -336,30 +336,33 @@ BAD = {
     "a bomb": (whole(BOMB), "a document type .* is refused"),
     "xacro": (whole(XACRO), "expand them first"),
     "mimic": (swap(LIMIT, LIMIT + '<mimic joint="j2"/>'), "'j1' .* mimics 'j2'"),
-    "sliding": (swap('"revolute"', '"prismatic"'), "is prismatic; only chains of revolute"),
-    "unknown type": (swap('"revolute"', '"screw"'), "type 'screw' is none of"),
-    "no axis": (swap('<axis xyz="0.0 0.0 1.0"/>', '<axis xyz="0 0 0"/>'), "0 0 0, which is no"),
+    "sliding": (swap('"revolute"', '"prismatic"'), "is prismatic; an arm must have revolute"),
+    "unknown type": (swap('"revolute"', '"screw"'), "expected a type of .*, got 'screw'"),
+    "no axis": (
+        swap('<axis xyz="0.0 0.0 1.0"/>', '<axis xyz="0 0 0"/>'),
+        "0 0 0 and has no direction",
+    ),
     "words": (swap('velocity="2"', 'velocity="fast"'), "velocity= as a finite number, got 'fast'"),
     "NaN": (swap('lower="-3"', 'lower="nan"'), "lower= as a finite number"),
     "two numbers": (swap('xyz="0.0 0.0 1.0"', 'xyz="0 1"'), "as 3 finite numbers"),
     "reversed": (swap('lower="-3"', 'lower="4"'), "limits of joint 1 are reversed"),
-    "a loop": (add(joint("back", "link_6", "base", np.eye(4))), "hang on each other: a closed"),
+    "a loop": (add(joint("back", "link_6", "base", np.eye(4))), "form a closed loop"),
     "two parents": (
         add(joint("back", "base", "link_4", np.eye(4))),
-        "link 'link_4' hangs on two joints, 'j4' and 'back': a closed loop",
+        "link 'link_4' is the child of two joints, 'j4' and 'back': a closed loop",
     ),
-    "no such link": (swap('<link name="link_2"/>', ""), "the link 'link_2', which is not there"),
-    "a link twice": (swap('<link name="link_2"/>', TWICE), "link 'link_2' is there twice"),
-    "a joint twice": (swap('name="j2"', 'name="j1"'), "joint 'j1' is there twice"),
+    "no such link": (swap('<link name="link_2"/>', ""), "the link 'link_2', which is missing"),
+    "a link twice": (swap('<link name="link_2"/>', TWICE), "two links are called 'link_2'"),
+    "a joint twice": (swap('name="j2"', 'name="j1"'), "two joints are called 'j1'"),
     "no child": (swap('<child link="link_1"/>', ""), "has no <child link"),
     "two tips": (
         add(joint("x", "base", "y", np.eye(4)) + '<link name="y"/>'),
         "2 links can be the tip .tool0, y.; say which with tip=",
     ),
     "an odd shape": (put("<cone/>"), "expected one of mesh, box, cylinder, sphere, got <cone>"),
-    "a flat box": (put('<box size="1 0 1"/>'), "a box of positive size"),
+    "a flat box": (put('<box size="1 0 1"/>'), "a box with positive size"),
     "a mesh elsewhere": (put('<mesh filename="http://a/b.stl"/>'), "is not a local file"),
-    "a mesh without a name": (put("<mesh/>"), "the mesh '' is not there"),
+    "a mesh without a name": (put("<mesh/>"), "the mesh '' was not found"),
 }
 
 

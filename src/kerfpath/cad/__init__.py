@@ -1,6 +1,6 @@
-"""CAD in: what a drawing holds, its loops by name, and each loop as a contour.
+"""Read drawings: their named loops, and each loop as a contour.
 
-Names load when they are first used: the process that translates a file needs none of them.
+Names are loaded on first use, as the process that translates a file needs none of them.
 """
 
 from importlib import import_module

@@ -23,36 +23,36 @@ __all__ = ["read_apt"]
 
 UNITS = {"MM": "mm", "CM": "cm", "INCHES": "in", "INCH": "in", "IN": "in", "FEET": "ft", "M": "m"}
 TEXTS = ("PARTNO", "PPRINT", "REMARK", "TPRINT")
-"""Words whose rest is text, with or without a slash, whatever it holds."""
+"""Words that any text may follow, with or without a slash."""
 HARMLESS = (
     "AUXFUN", "CLAMP", "CLDIST", "COOLNT", "CUTTER", "DELAY", "DISPLY", "DWELL", "FEDRAT",
     "INTOL", "LEADER", "LINTOL", "MACHIN", "MODE", "OFSTNO", "OPSTOP", "OUTTOL", "PAINT",
     "SELCTL", "SELECT", "SEQNO", "SPINDL", "STOP", "TLDATA", "TOLER", "TOOLNO",
 )  # fmt: skip
-"""Words that move nothing."""
+"""Words that do not affect the path."""
 BEGINS = ("END-OF-PATH", "LOAD", "LOADTL", "TOOL PATH")
-"""Words between operations: a cut ends there, and the next one comes from anywhere."""
+"""Words between operations: a cut ends there, and the next one may start anywhere."""
 ENDS = ("END", "FINI")
 REFUSED = {
     **dict.fromkeys(
         ("ARCMOV", "CIRCLE", "GOFWD", "HELIX", "INDIRV", "MOVARC", "NURBS", "SPLINE", "TLON"),
-        "a curve; let the CAM system write linear moves alone",
+        "a curve; have the CAM system write linear moves only",
     ),
     **dict.fromkeys(
-        ("CUTCOM",), "the controller would move the path aside; write the path of the tool's middle"
+        ("CUTCOM",), "the controller would offset the path; write the path of the tool centre"
     ),
     **dict.fromkeys(
         ("COPY", "ORIGIN", "ROTABL", "ROTATE", "ROTHED", "TRACUT", "TRANS"),
-        "it moves the points that follow; write them where they are in the part",
+        "it moves the points that follow; write them in the coordinates of the part",
     ),
     **dict.fromkeys(
-        ("INSERT", "PREFUN"), "words for the controller alone, which may change the path"
+        ("INSERT", "PREFUN"), "text for the controller only, which may change the path"
     ),
     **dict.fromkeys(
         ("CYCLE", "GODLTA", "RETRCT"), "a motion that is not written out; write it as GOTO"
     ),
 }
-"""Words that change the path, and why they are not taken."""
+"""Words that change the path, and why they are refused."""
 UPRIGHT: Triple = (0.0, 0.0, 1.0)
 
 
@@ -64,8 +64,8 @@ def read_apt(
     Raises
     ------
     InputError
-        A word that is not known or that makes the path another (its line is named), no number
-        where one is due, no unit, no tool axis, no cut.
+        A word that is not known or changes the path (its line is named), a missing number, no unit,
+        no tool axis, no cut.
     """
     try:
         return part_of_tool_path(path, _tool_path(lines_of(content)), unit, gap, axis)
@@ -81,7 +81,7 @@ def _tool_path(lines: Sequence[str]) -> ToolPath:
 
 
 def _statements(lines: Sequence[str]) -> Iterator[tuple[int, str, str]]:
-    """Yield line, major word and rest of each statement, lines that go on put together."""
+    """Yield line, major word and rest of each statement, with continued lines joined."""
     begun, whole = 0, ""
     for number, line in enumerate(lines, start=1):
         bare = line.partition("$$")[0].strip()
@@ -91,7 +91,7 @@ def _statements(lines: Sequence[str]) -> Iterator[tuple[int, str, str]]:
             yield begun, *_split(whole)
             whole = ""
     if whole:
-        raise InputError(f"line {begun}: goes on with $, and the file ends")
+        raise InputError(f"line {begun}: continues with $, but the file ends")
 
 
 def _split(statement: str) -> tuple[str, str]:
@@ -104,7 +104,7 @@ def _split(statement: str) -> tuple[str, str]:
 
 
 class _Reader:
-    """What the statements before make of the next one."""
+    """The state of the reader, which the next statement is read with."""
 
     def __init__(self) -> None:
         self.moves: list[Move] = []
@@ -124,7 +124,7 @@ class _Reader:
         Raises
         ------
         InputError
-            One that is not known, or that makes the path another.
+            A statement that is not known, or that changes the path.
         """
         where, values = f"line {line}", [value.strip() for value in rest.upper().split(",")]
         if word in ("GOTO", "FROM"):
@@ -178,14 +178,14 @@ class _Reader:
         unit = UNITS[values[0]]
         if self.unit != unit and (self.unit or self.moves):
             was = f"other than {self.unit} before" if self.unit else "after points without one"
-            raise InputError(f"{where}: UNITS {was}; one unit for the whole file is read")
+            raise InputError(f"{where}: UNITS {was}; use one unit for the whole file")
         self.unit = unit
 
     def _coordinates(self, where: str, system: tuple[float, ...]) -> None:
         if self._system and system != self._system:
             raise InputError(f"{where}: another MSYS; write all operations in one system")
         if not self._system and system != (0, 0, 0, 1, 0, 0, 0, 1, 0):
-            self.notes.append(f"points are taken in the system that MSYS in {where} names")
+            self.notes.append(f"points are in the system that MSYS in {where} defines")
         self._system = system
 
     def _moves_away(self, line: int) -> None:
@@ -219,5 +219,5 @@ def _triple(numbers: Sequence[float]) -> Triple:
 def _refusal(word: str, rest: str) -> str:
     asked = f"{word[:40]}/{rest[:20]}" if rest else word[:40]
     if "=" in word or "=" in rest:
-        return f"{asked!r} defines geometry; expected a cutter-location file, of numbers alone"
+        return f"{asked!r} defines geometry; expected a cutter-location file with numbers only"
     return f"{asked!r}: {REFUSED.get(word.partition(',')[0], UNKNOWN)}"

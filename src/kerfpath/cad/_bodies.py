@@ -1,7 +1,7 @@
-"""Which loose faces make up a body, so that bodies that touch are not sewn to each other.
+"""Find which loose faces make up a body, so that bodies that touch are not sewn to each other.
 
-Along an edge within a body two of its faces meet. Where bodies touch, four or more faces end along
-one line; there, faces go to the body that they close.
+Two faces of a body meet along each of its edges. Where bodies touch, four or more faces end along
+one line; there, each face is assigned to the body that it closes.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from kerfpath.cad._shape import list_shapes
 __all__ = ["bodies_of"]
 
 TIGHT = 1e-3
-"""Edges (mm) that lie closer than this are joined before those that lie within the gap."""
+"""Edges closer than this (mm) are joined before those that are within the gap."""
 ALONG = 9
-"""Points along an edge that must lie on another one for it to be a piece of that."""
+"""Number of points along an edge that must lie on another edge for it to be a piece of that."""
 
 
 def bodies_of(faces: Sequence[TopoDS_Face], gap: float) -> list[list[int]]:
-    """Return the numbers of the faces of each body: those that meet along edges within a gap.
+    """Return the indices of the faces of each body, which meet along edges within a gap.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def bodies_of(faces: Sequence[TopoDS_Face], gap: float) -> list[list[int]]:
 
 
 def _edges(face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
-    """Yield the edges at which a face ends: no seams, no poles."""
+    """Yield the edges that bound a face, without seams and poles."""
     for found in list_shapes(face, TopAbs_ShapeEnum.TopAbs_EDGE):
         edge = TopoDS.Edge(found)
         if not (BRep_Tool.Degenerated_s(edge) or BRep_Tool.IsClosed_s(edge, face)):
@@ -68,7 +68,7 @@ def _edges(face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
 
 
 def _place(edge: TopoDS_Edge) -> Array:
-    """Return where an edge starts, has its middle and ends (3, 3), mm."""
+    """Return the start, middle and end (3, 3) mm of an edge."""
     curve = BRepAdaptor_Curve(edge)
     first, last = curve.FirstParameter(), curve.LastParameter()
     half = GCPnts_AbscissaPoint.Length_s(curve) / 2
@@ -81,7 +81,7 @@ def _points(curve: BRepAdaptor_Curve, at: Sequence[float]) -> Array:
 
 
 def _lines(places: Array, tolerance: float) -> Ints:
-    """Return a number for each edge, the same for those that lie on each other, however they run.
+    """Return a number (E,) for each edge, the same for edges that coincide in either direction.
 
     ``places`` (E, 3, 3) mm are their starts, middles and ends.
     """
@@ -91,12 +91,12 @@ def _lines(places: Array, tolerance: float) -> Ints:
 
 
 class _Meeting:
-    """Bodies in the making, and the lines along which their edges lie.
+    """Bodies while they are assembled, and the lines along which their edges lie.
 
     Parameters
     ----------
     body, line : sequence of int
-        Of each edge.
+        Body and line of each edge.
     """
 
     def __init__(self, body: Sequence[int], line: Sequence[int]) -> None:
@@ -111,7 +111,7 @@ class _Meeting:
             if all(len(self._ending(number)) > 2 for number in self._open(b)):
                 alike[self._open(b)].append(b)
         self.twins = {pair for same in alike.values() for pair in combinations(sorted(same), 2)}
-        """Faces of two bodies that lie on each other, all around."""
+        """Pairs of bodies that lie on each other all around."""
 
     def root(self, b: int) -> int:
         """Return the body that b is a part of."""
@@ -120,10 +120,10 @@ class _Meeting:
         return b
 
     def join(self) -> None:
-        """Join bodies of which an odd number of edges each lie on a line.
+        """Join bodies that each have an odd number of edges on a common line.
 
-        Two that are alone on a line belong together. Where there are more, first those of which
-        the one with fewer lines is closed the most, and of these the ones of fewest lines.
+        Two bodies that are alone on a line belong together. If there are more, the pair that closes
+        most of its body with fewer lines comes first, and of several the one with fewest lines.
         """
         waiting = sorted(self.on)
         while waiting:
@@ -143,11 +143,11 @@ class _Meeting:
                 self._unite(*chosen[2:])
 
     def _open(self, b: int) -> frozenset[int]:
-        """Return the lines on which an odd number of edges of a body lie."""
+        """Return the lines with an odd number of edges of a body."""
         return frozenset(number for number in self.lines[b] if self.on[number][b] % 2)
 
     def _ending(self, number: int) -> list[int]:
-        """Return the bodies of which an odd number of edges lie on a line."""
+        """Return the bodies with an odd number of edges on a line."""
         return sorted(b for b, count in self.on[number].items() if count % 2)
 
     def _rank(self, pair: tuple[int, int]) -> tuple[float, int, int, int]:
@@ -157,7 +157,7 @@ class _Meeting:
         return -closed, len(self.lines[a]) + len(self.lines[b]), *pair
 
     def _unite(self, a: int, b: int) -> None:
-        """Let b become a part of a."""
+        """Merge b into a."""
         for number in self.lines.pop(b):
             self.on[number][a] += self.on[number].pop(b)
             self.lines[a].add(number)
@@ -167,7 +167,7 @@ class _Meeting:
 def _pieces(
     edges: Sequence[TopoDS_Edge], loose: Sequence[int], gap: float
 ) -> Iterator[tuple[int, int]]:
-    """Yield pairs of loose edges of which one is a piece of the other, which is drawn longer."""
+    """Yield pairs of loose edges of which the first is a piece of the second."""
     curves = {k: BRepAdaptor_Curve(edges[k]) for k in loose}
     along = [
         _points(curve, np.linspace(curve.FirstParameter(), curve.LastParameter(), ALONG).tolist())

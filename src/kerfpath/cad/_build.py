@@ -1,4 +1,4 @@
-"""Loops by name, and parts without faces: built from the traces that the readers find."""
+"""Build named loops, and parts without faces, from the traces that the readers find."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kerfpath.errors import InputError
 __all__ = ["loop_of", "named_loops", "part_without_faces"]
 
 STEMS: dict[Kind, str] = {"outer": "outer", "inner": "hole", "open": "line"}
-"""What the names of loops end with, before their number."""
+"""Last part of the names of loops, before their number."""
 
 
 def loop_of(
@@ -32,12 +32,12 @@ def loop_of(
     layer: str = "",
     colour: str = "",
 ) -> Loop:
-    """Return the loop along `trace`, measured; it is closed where no gap (m) is larger.
+    """Return the loop along `trace` with its measures; it is closed if no gap is above `gap` (m).
 
     Raises
     ------
     InputError
-        A trace that is longer or reaches further than any part does.
+        A trace that is too long or reaches too far for any part.
     """
     length, box, widest = float(trace.lengths.sum()), trace.bounds(), trace.gaps.max(initial=0.0)
     if not (length <= LARGEST and (np.abs(box) <= LARGEST).all()):
@@ -67,7 +67,7 @@ def loop_of(
 def named_loops(
     found: Sequence[tuple[Kind, Trace, str]], *, face: str, surface: str, gap: float, layer: str
 ) -> list[Loop]:
-    """Return the loops of a face, a skin or a layer: outer before inner, numbered by their places.
+    """Return the loops of a face, a skin or a layer, outer before inner, numbered by position.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def part_without_faces(
     notes: Sequence[str],
     left_out: Sequence[LeftOut] = (),
 ) -> Part:
-    """Return the part that is drawn by lines or points alone."""
+    """Return a part that is drawn by lines or points only."""
     boxes = np.array([loop.bounding_box for loop in loops])
     return Part(
         path=path,

@@ -1,4 +1,4 @@
-"""Tables as text: what their rows are split by, comments, decimal commas, numbers."""
+"""Read tables from text: delimiters, comments, decimal commas and numbers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COMMENTS = ("#", "%", "//")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableCells:
-    """The cells of a table, and the line that each row stands in."""
+    """The cells of a table, and the line number of each row."""
 
     lines: Sequence[int]
     rows: Sequence[Sequence[str]]
@@ -29,7 +29,7 @@ class TableCells:
     __repr__ = short_repr
 
     def is_numbers(self, row: int) -> bool:
-        """Return whether all cells of a row are numbers: whether it is no header."""
+        """Return whether all cells of a row are numbers, so that it is no header."""
         try:
             for cell in self.rows[row]:
                 _number(cell, self.has_decimal_comma)
@@ -46,24 +46,24 @@ class TableCells:
         return True
 
     def without_header(self) -> TableCells:
-        """Return the rows behind the first."""
+        """Return the table without its first row."""
         return TableCells(
             lines=self.lines[1:], rows=self.rows[1:], has_decimal_comma=self.has_decimal_comma
         )
 
     def require_width(self, columns: int) -> None:
-        """Raise InputError where a row has not so many cells."""
+        """Raise InputError if a row has another number of cells."""
         for line, row in zip(self.lines, self.rows, strict=True):
             if len(row) != columns:
                 raise InputError(f"line {line}: expected {columns} columns, got {len(row)}")
 
     def number(self, row: int, column: int, name: str) -> float:
-        """Return a cell as a finite number; `name` is what its column is called.
+        """Return a cell as a finite number; `name` is the name of its column.
 
         Raises
         ------
         InputError
-            Something else: line and column.
+            A cell that is not a finite number (the message has line and column).
         """
         where, cell = f"line {self.lines[row]}, column {name}", self.rows[row][column]
         try:
@@ -76,12 +76,12 @@ class TableCells:
 
 
 def cells_of(content: bytes, expected: str) -> TableCells:
-    """Return the cells of a table, split by what its first line is split by.
+    """Return the cells of a table, split at the delimiter of its first line.
 
     Raises
     ------
     InputError
-        Not text, no rows (`expected` says of what columns), quotes that span lines.
+        Not text, no rows (the message lists the `expected` columns), quotes that span lines.
     """
     numbered = [
         (number, line)
@@ -121,6 +121,6 @@ def _number(cell: str, has_decimal_comma: bool) -> float:
         if "." in cell:
             raise ValueError(cell)
         cell = cell.replace(",", ".")
-    if "_" in cell:  # which Python takes between digits
+    if "_" in cell:  # Python accepts it between digits
         raise ValueError(cell)
     return float(cell)

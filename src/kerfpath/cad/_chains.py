@@ -1,4 +1,4 @@
-"""From loose flat curves to loops: chained end to end, nested, turned the right way, named."""
+"""Build named, nested, consistently oriented loops from loose flat curves."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from kerfpath.errors import InputError
 __all__ = ["loops_in"]
 
 SAID = 3
-"""Open lines whose ends are said where they hang, those with the next end nearest."""
+"""Number of open lines whose ends are reported, those with the nearest next end."""
 LARGER = 1.05
-"""Times the area of another: a loop in the same box that is larger lies around it."""
+"""Of two loops in the same box, one with an area larger by this factor lies around the other."""
 Look = tuple[str, str]
-"""Layer and colour: curves that are not drawn alike are not chained."""
+"""Layer and colour; only curves with the same ones are chained."""
 Stroke = tuple[Curve, ...]
 """The curves of one entity, each of which ends where the next starts."""
 Chain = EdgeChain[Curve]
@@ -45,10 +45,15 @@ def loops_in(
     left_out: Sequence[LeftOut] = (),
     axis: Array | None = None,
 ) -> Part:
-    """Return the part that strokes make up, by layer and colour; `gap` in m.
+    """Return the part that strokes, given by layer and colour, make up; `gap` is in m.
 
-    Closed loops run counter-clockwise about what they enclose, or clockwise about a hole: one that
-    lies within an odd number of others. They are seen against the tool axis (3,): from above.
+    Seen against the tool axis (3,), that is from above, closed loops run counter-clockwise, and
+    those around holes, which lie within an odd number of others, run clockwise.
+
+    Raises
+    ------
+    InputError
+        Nothing to cut.
     """
     R = np.eye(3) if axis is None else _against(axis)
     chains: list[tuple[Look, Chain]] = []
@@ -90,7 +95,7 @@ def loops_in(
 
 
 def _against(axis: Array) -> Array:
-    """Return the rotation (3, 3) that makes a tool axis point along -z."""
+    """Return the rotation (3, 3) that turns a tool axis to -z."""
     z = -axis / np.linalg.norm(axis)
     x = np.eye(3)[0 if abs(z[0]) < 0.9 else 1]
     x = x - (x @ z) * z
@@ -106,11 +111,11 @@ def _turned_back(chain: Chain, R: Array) -> Chain:
 def _cut_twice(loops: Sequence[Loop]) -> Iterator[str]:
     """Yield a note for each loop that lies on one of another layer or colour."""
     for i, j in same_lines([loop._trace for loop in loops]):
-        yield f"{loops[i].name} and {loops[j].name} lie on each other: picked both, cut twice"
+        yield f"{loops[i].name} and {loops[j].name} lie on each other: cut twice if both are picked"
 
 
 def _hanging(loops: Sequence[Loop]) -> Iterator[str]:
-    """Yield notes of where open lines end."""
+    """Yield notes on where open lines end."""
     chains = [(loop.name, loop._trace) for loop in loops if loop.kind == "open"]
     hanging = [(c.next_away, name, c.next_end) for name, c in chains if isinstance(c, EdgeChain)]
     for _, name, where in sorted(hanging)[:SAID]:
@@ -160,7 +165,7 @@ def _count(strokes: Sequence[Sequence[Curve]]) -> int:
 
 
 def _in_line(stroke: Stroke) -> Stroke:
-    """Return the curves that have a length, each turned to go on where the one before ends."""
+    """Return the curves that have a length, each reversed if needed to continue the one before."""
     left = [curve for curve in stroke if curve.length > NOTHING]
     if len(left) > 1 and _far(left[0].ends[1], left[1]) > _far(left[0].ends[0], left[1]):
         left[0] = backwards(left[0])
@@ -181,7 +186,7 @@ def _is_closed(stroke: Stroke) -> bool:
 
 
 def _doubles(strokes: Sequence[Stroke]) -> tuple[list[Stroke], list[Stroke], list[Stroke]]:
-    """Return the strokes of which none lies on another, open ones that do, and what is too much."""
+    """Return strokes that lie on no other, open ones that lie on one, and those to leave out."""
     marks = [tuple(curve.mark for curve in stroke) for stroke in strokes]
     within = {mark for each in marks if len(each) > 1 for mark in each}
     times: Counter[tuple[Mark, ...]] = Counter()
@@ -207,9 +212,9 @@ def _ends(strokes: Sequence[Stroke]) -> Array:
 def _hanging_together(
     loose: Sequence[Stroke], spare: Sequence[Stroke], gap: float
 ) -> Iterator[tuple[list[Stroke], list[Stroke]]]:
-    """Yield the strokes that hang together, and the spare ones that end where they do."""
+    """Yield each group of connected strokes, with the spare strokes that end where they do."""
     places = [_places(_ends(strokes), gap) for strokes in (loose, spare)]
-    first = len(loose) + len(spare)  # of the numbers that places have
+    first = len(loose) + len(spare)  # the first number of a place
     links = [[end // 2, first + at] for end, at in enumerate(places[0].tolist())]
     first += len(places[0])
     links += [[len(loose) + end // 2, first + at] for end, at in enumerate(places[1].tolist())]
@@ -224,12 +229,12 @@ def _hanging_together(
 
 
 def _is_even(strokes: Sequence[Stroke], gap: float) -> bool:
-    """Return whether an even number of ends meet wherever one is."""
+    """Return whether an even number of ends meet at each place."""
     return not (np.bincount(_places(_ends(strokes), gap)) % 2).any()
 
 
 def _linked(strokes: Sequence[Stroke], gap: float, next_end: _NextEnd) -> Iterator[Chain]:
-    """Yield the chains of open strokes that hang together."""
+    """Yield the chains of connected open strokes."""
     place = _places(_ends(strokes), gap)
     marks: dict[tuple[Mark, ...], int] = {}
     alike = [
@@ -239,7 +244,7 @@ def _linked(strokes: Sequence[Stroke], gap: float, next_end: _NextEnd) -> Iterat
     used = np.zeros(len(strokes), dtype=bool)
 
     def walk(end: int) -> list[int]:
-        """Return the ends, from `end` on, at which strokes are entered, to a stop."""
+        """Return the ends at which strokes are entered, from `end` until the chain stops."""
         entered: list[int] = []
         while not used[end // 2]:
             used[end // 2] = True
@@ -249,7 +254,7 @@ def _linked(strokes: Sequence[Stroke], gap: float, next_end: _NextEnd) -> Iterat
             end = partner[end ^ 1]
         return entered
 
-    # From the places where a chain must end, then around what is closed.
+    # First the chains from places where one must end, then the closed ones.
     for end in range(len(place)):
         if end not in partner and (entered := walk(end)):
             edges = _edges(strokes, entered)
@@ -262,7 +267,7 @@ def _linked(strokes: Sequence[Stroke], gap: float, next_end: _NextEnd) -> Iterat
 
 
 def _edges(strokes: Sequence[Stroke], entered: Sequence[int]) -> list[Curve]:
-    """Return the curves of strokes, each entered at an end of it."""
+    """Return the curves of strokes, each entered at one of its ends."""
     edges: list[Curve] = []
     for end in entered:
         stroke = strokes[end // 2]
@@ -271,7 +276,7 @@ def _edges(strokes: Sequence[Stroke], entered: Sequence[int]) -> list[Curve]:
 
 
 def _parted(entered: Sequence[int], place: Ints) -> Iterator[list[int]]:
-    """Yield the loops of one that comes to a place more than once."""
+    """Split a loop that passes a place more than once, and yield the parts."""
     path: list[int] = []
     since: dict[int, int] = {}
     for end in entered:
@@ -287,8 +292,8 @@ def _parted(entered: Sequence[int], place: Ints) -> Iterator[list[int]]:
 def _places(ends: Array, gap: float) -> Ints:
     """Return a number (E,) for each end, the same for those that meet.
 
-    Ends that lie on another meet it; only ends left alone look within `gap`, or the two ends of a
-    curve shorter than it would meet.
+    Ends that coincide meet; only the remaining ends are joined within `gap`, as the two ends of a
+    curve shorter than it would meet otherwise.
     """
     if not len(ends):
         return np.empty(0, dtype=np.int64)
@@ -301,12 +306,12 @@ def _places(ends: Array, gap: float) -> Ints:
 
 
 class _NextEnd:
-    """Why open chains do not go on.
+    """Reasons why open chains end.
 
     Parameters
     ----------
     loose : sequence of Stroke
-        All that are not closed.
+        All open strokes.
     gap : float mm
     R : (3, 3)
         The rotation by which they were turned.
@@ -319,9 +324,9 @@ class _NextEnd:
         self._crowd, self._tree = np.bincount(place)[place], cKDTree(ends)
 
     def of(self, chain: Sequence[Curve]) -> tuple[float, str]:
-        """Return how far (mm) the next end is from the end of a chain that it is nearer to.
+        """Return the distance (mm) from an end of a chain to the nearest other end, and a message.
 
-        With it goes what is there, in words.
+        Of the two ends of the chain, the one with the smaller distance is taken.
         """
         breaks = []
         for end in (chain[0].ends[0], chain[-1].ends[1]):
@@ -337,9 +342,9 @@ class _NextEnd:
 
 
 def _depths(chains: Sequence[Chain]) -> list[int]:
-    """Return within how many of the others each closed chain lies.
+    """Return how many of the others enclose each closed chain.
 
-    Chains may touch, or lie on each other: it is a point inside that is looked at.
+    Chains may touch or coincide, so a point inside each decides.
     """
     boxes = np.array([chain.bounds() for chain in chains]).reshape(-1, 2, 3)
     areas = np.array([abs(chain.area[2]) for chain in chains])
@@ -348,7 +353,7 @@ def _depths(chains: Sequence[Chain]) -> list[int]:
         point = inner_point(chain.around)
         larger = np.stack([boxes[k, 0] - boxes[:, 0], boxes[:, 1] - boxes[k, 1]])
         is_around = (larger > -SAME).all(axis=(0, 2))
-        # Of two in one box, as a circle and what is inscribed, one is clearly larger; or neither.
+        # Of two chains in one box, such as a circle and an inscribed one, the larger is around.
         is_around &= (larger > SAME).any(axis=(0, 2)) | (areas > LARGER * areas[k])
         is_around[k] = False
         around = np.flatnonzero(is_around).tolist()

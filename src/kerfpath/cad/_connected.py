@@ -1,4 +1,4 @@
-"""Groups of things that pairs connect."""
+"""Connected groups of numbered things."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["label_connected"]
 
 
 def label_connected(pairs: NDArray[np.integer], count: int) -> Ints:
-    """Return a number (count,) for each thing, the same for those that `pairs` (P, 2) connect."""
+    """Return a group number (count,) for each thing, equal for those joined by `pairs` (P, 2)."""
     ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
     links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)

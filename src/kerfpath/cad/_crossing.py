@@ -10,7 +10,7 @@ from kerfpath._arrays import Array, Ints
 __all__ = ["find_crossing"]
 
 APART = 20.0
-"""Stretches closer than this along the line, in tolerances, are neighbours and may be near."""
+"""Stretches closer than this along the line, in tolerances, are neighbours and may be close."""
 
 
 def find_crossing(points: Array, tolerance: float) -> Array | None:
@@ -19,9 +19,9 @@ def find_crossing(points: Array, tolerance: float) -> Array | None:
     Parameters
     ----------
     points : (K, 3)
-        Of a closed polyline the first is repeated at the end.
+        Nodes; a closed polyline repeats the first at the end.
     tolerance : float
-        Stretches that come this near meet.
+        Stretches that are this close meet.
     """
     a, b = points[:-1], points[1:]
     length = np.linalg.norm(b - a, axis=1)
@@ -43,7 +43,7 @@ def find_crossing(points: Array, tolerance: float) -> Array | None:
 
 
 def _near(points: Array, s: Array, tolerance: float) -> tuple[Ints, Ints]:
-    """Return pairs of segments that may meet, by way of cells of even length along the line."""
+    """Return pairs of segments that may meet, found by cells of equal length along the line."""
     count = max(8, (len(points) - 1) // 2)
     cell = s[-1] / count
     middle = (np.arange(count) + 0.5) * cell
@@ -51,7 +51,7 @@ def _near(points: Array, s: Array, tolerance: float) -> tuple[Ints, Ints]:
     pairs = cKDTree(middles).query_pairs(cell + tolerance, output_type="ndarray")
     same = np.arange(count)
     pairs = np.vstack([pairs, np.stack([same, same], axis=1)])
-    # Segments of each cell: those from its start to its end, both cut ones included.
+    # Segments of each cell, including those that its start and end cut.
     first = np.maximum(np.searchsorted(s, same * cell, side="right") - 1, 0)
     last = np.minimum(np.searchsorted(s, (same + 1) * cell, side="left"), len(s) - 1)
     sizes = last - first
@@ -64,7 +64,7 @@ def _near(points: Array, s: Array, tolerance: float) -> tuple[Ints, Ints]:
 
 
 def _distance(p0: Array, p1: Array, q0: Array, q1: Array) -> tuple[Array, Array]:
-    """Return the distances between segments, row by row, and where on the first they are.
+    """Return the distances between segments, row by row, and the closest points on the first.
 
     Closest points of two segments: C. Ericson, Real-Time Collision Detection, section 5.1.9.
     """

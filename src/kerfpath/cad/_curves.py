@@ -1,4 +1,4 @@
-"""Lines, arcs and splines; the plane of a flat drawing faces up, along +z."""
+"""Lines, arcs and splines; the normal of a flat drawing is +z."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ __all__ = ["NOTHING", "UP", "Arc", "Curve", "Line", "Mark", "Spline", "backwards
 
 Mark = tuple[float, ...]
 NOTHING = 1e-6
-"""Curves shorter than this, mm, are none; those that lie closer are the same."""
+"""mm: shorter curves have no length; curves that differ by less are the same."""
 UP = (0.0, 0.0, 1.0)
 """The normal of a flat drawing."""
 GAUSS = np.polynomial.legendre.leggauss(12)
 """Nodes and weights on (-1, 1); 12 per smooth stretch give the length of drawn curves to 1e-9."""
 LOOK = 64
-"""Points per stretch of a spline from which its bounding box is taken."""
+"""Number of points per stretch of a spline from which its bounding box is taken."""
 
 
 class _Flat(ABC):
-    """The base of curves, see `Edge`; each gives start, end, normal `up`, `at` and `speed`."""
+    """Base class of curves (see `Edge`); each has start, end, normal `up`, `at` and `speed`."""
 
     start: float
     end: float
@@ -39,7 +39,7 @@ class _Flat(ABC):
 
     @cached_property
     def mark(self) -> Mark:
-        """Numbers that two curves share when they lie on each other, whichever way they run."""
+        """Numbers that are the same for two curves that coincide, in either direction."""
         points = self.at(np.linspace(self.start, self.end, 5))
         rounded = (np.round(points / (10 * NOTHING)) + 0.0).tolist()
         ends, inner = sorted(rounded[::4]), sorted(rounded[1:4])
@@ -122,12 +122,12 @@ class Arc(_Flat):
         return np.asarray(np.linalg.norm(d, axis=1))
 
     def breaks(self) -> Array:
-        """Return quarters: an ellipse is nearly a straight line at its flat sides."""
+        """Return quarters, because the flat sides of an ellipse are nearly straight."""
         quarters = int(np.ceil(abs(self.end - self.start) / (np.pi / 2) - 1e-9))
         return np.linspace(self.start, self.end, max(1, quarters) + 1)
 
     def extremes(self) -> Array:
-        """Return the ends, and where x, y or z turns round between them."""
+        """Return the ends, and the extremes of x, y and z between them."""
         low, high = sorted((self.start, self.end))
         turns = np.arctan2(self.minor, self.major)
         k = np.arange(np.floor(low / np.pi) - 1, np.ceil(high / np.pi) + 1)
@@ -162,7 +162,7 @@ class Spline(_Flat):
         return t if self.start < self.end else t[::-1]
 
     def extremes(self) -> Array:
-        """Return many parameters: within a thousandth of a stretch of the true extremes."""
+        """Return many parameters, some within a thousandth of a stretch of the true extremes."""
         breaks = self.breaks()
         part = np.linspace(0.0, 1.0, LOOK, endpoint=False)
         inside = (breaks[:-1, None] + np.diff(breaks)[:, None] * part).ravel()
@@ -173,12 +173,12 @@ Curve = Line | Arc | Spline
 
 
 def backwards(curve: Curve) -> Curve:
-    """Return the curve travelled the other way."""
+    """Return the curve in the opposite direction."""
     return replace(curve, start=curve.end, end=curve.start)
 
 
 def turned(curve: Curve, R: Array, up: tuple[float, ...]) -> Curve:
-    """Return the curve turned by a rotation (3, 3), with a normal."""
+    """Return the curve turned by a rotation (3, 3), with the normal `up`."""
     if isinstance(curve, Line):
         return replace(curve, p=R @ curve.p, q=R @ curve.q, up=up)
     if isinstance(curve, Arc):

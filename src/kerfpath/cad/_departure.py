@@ -1,4 +1,4 @@
-"""The distance of a contour's chords from the curve that it samples."""
+"""Deviation of a contour's chords from the curve that it samples."""
 
 from __future__ import annotations
 
@@ -24,44 +24,47 @@ Reference = Literal["CAD curve", "points of the drawing", "path as cut"]
 TINY = np.finfo(float).tiny
 
 ON_CURVE = 1e-5
-"""How far (m) a node that lies on a curve may be off it; samples of samples are some micrometres
-off."""
+"""Largest distance (m) of a node from the curve that it lies on; a contour that was sampled twice
+is off by some micrometres."""
 CHORD, ANGLE = 0.02, 0.05
-"""Within a cell the curve bends by no more than this (mm, rad), so that few points suffice."""
+"""Largest bend of the curve within a cell (mm, rad), so that few points are enough."""
 CELLS = 200
-"""Least number of cells along a loop; a node looks for its place in those around it."""
+"""Smallest number of cells along a loop; the place of a node is searched in the nearby ones."""
 POLISH = 6
-"""Steps to a node's own place in its cell; each leaves a small share of the error, the curve being
-nearly straight and even there."""
+"""Iterations for the place of a node in its cell; each leaves a small share of the error, because
+the curve is nearly straight there."""
 LOOKS = 8
-"""Intervals at whose ends each piece is looked at: what bends evenly has its worst at a middle."""
+"""Intervals of each piece in a first search; an even bend is worst in its middle."""
 CLOSER, PEAKS = 128, 16
-"""Intervals on the pieces with the largest errors, looked at again; how many these are."""
+"""Intervals for a finer search of the pieces with the largest errors, and the number of these."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Departure:
-    """The largest errors of a contour's nodes, joined by chords, against what they sample.
+    """Largest errors of a contour, as chords between its nodes, against what it samples.
 
-    Tool axes turn evenly along each chord. Nodes are counted from 0; an error between two nodes is
-    counted at the first of them.
+    Tool axes turn evenly along each chord. Nodes are counted from 0; an error between two nodes has
+    the index of the first.
 
     Parameters
     ----------
     against : "CAD curve", "points of the drawing" or "path as cut"
-        What was measured against: the curve; the lines through the points of a table, which knows
-        nothing between them; or the path that operations made of a loop.
+        Reference of the measurement: the curve; the lines through the points of a table, which
+        defines nothing between them; or the path that operations made from a loop.
     chord_error : float m
         Largest distance of the curve from its chord.
     chord_node : int
+        Node of that error.
     axis_error : float rad
         Largest angle between the axis along a chord and that of the curve beside it.
     axis_node : int
+        Node of that error.
     axis_step : float rad
-        Largest angle between the axes of two nodes that follow each other.
+        Largest angle between the axes of two consecutive nodes.
     step_node : int
+        First of these nodes.
     path : Departure or None
-        That of the loop from which the path as cut was made, before it was changed.
+        Departure of the path as cut from the loop that it was made from, before operations.
     """
 
     against: Reference
@@ -77,14 +80,14 @@ class Departure:
 
 
 def departure(trace: Trace, contour: Contour, tolerance: float) -> Departure:
-    """Return how far the nodes of a contour leave the trace of a loop, see `Part.departure`.
+    """Return how far a contour deviates from the trace of a loop, see `Part.departure`.
 
     Parameters
     ----------
     trace : Trace
     contour : Contour
     tolerance : float m
-        How far its nodes may lie off the trace.
+        Largest distance of a node from the trace.
     """
     against: Reference = "points of the drawing" if isinstance(trace, Points) else "CAD curve"
     nodes, beside = _cut_nodes(contour), tolerance / MM
@@ -97,28 +100,30 @@ def departure(trace: Trace, contour: Contour, tolerance: float) -> Departure:
 
 
 def departure_from(path: Contour, contour: Contour, drawn: Departure) -> Departure:
-    """Return how far the nodes of a contour leave a dense path that operations made of a loop.
+    """Return how far a contour deviates from the dense path that operations made from a loop.
 
     Parameters
     ----------
     path : Contour
-        As it was sampled.
+        The dense path that was sampled.
     contour : Contour
-        Its nodes, or some of them in a row; `s` says where each lies on the path.
+        All its nodes or some consecutive ones; `s` is their arc length on the path.
     drawn : Departure
-        That of the loop that the path was made of, from the drawing.
+        Departure of the dense loop from the drawing.
 
     Raises
     ------
     InputError
-        The contour does not lie on the path (says where).
+        A contour that does not lie on the path (the message names the node), or that is entirely in
+        the scrap.
     """
     off = np.linalg.norm(path.at(contour.s)[0] - contour.points, axis=1)
     if off.max() > ON_CURVE:
         k = int(np.argmax(off))
         raise InputError(
             f"node {k} of contour {contour.name!r} lies {off[k] / MM:.3g} mm off the path "
-            f"{path.name!r} at its s (allowed {ON_CURVE / MM:g} mm); give what samples this path"
+            f"{path.name!r} at its s (allowed {ON_CURVE / MM:g} mm); give a contour that samples "
+            "this path"
         )
     nodes = _cut_nodes(contour)
     cells = _cells([Polyline(line=replace(path, points=path.points / MM, time=None, x=None))])
@@ -128,7 +133,7 @@ def departure_from(path: Contour, contour: Contour, drawn: Departure) -> Departu
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _ShortSpans:
-    """Curves end to end in short cells.
+    """Consecutive curves, divided into short cells.
 
     Parameters
     ----------
@@ -136,11 +141,11 @@ class _ShortSpans:
     of : (C,) int
         Curve of each cell.
     t : (C, 2)
-        Parameters where it starts and ends.
+        Parameters at its start and end.
     ends : (C, 2, 3) mm
         Points there.
     s : (C + 1,) mm
-        Length along all cells; gaps between curves have none.
+        Length along all cells; gaps between curves count as zero.
     """
 
     curves: Sequence[Curve]
@@ -160,7 +165,7 @@ class _ShortSpans:
 
 
 def _chords(contour: Contour) -> Ints:
-    """Return the first nodes of the chords that do not run in the scrap."""
+    """Return the first nodes of the chords that are not in the scrap."""
     return np.flatnonzero(~np.isin(contour.kind[:-1], IN_SCRAP))
 
 
@@ -168,14 +173,14 @@ def _cut_nodes(contour: Contour) -> Ints:
     """Return the nodes at the ends of those chords."""
     chords = _chords(contour)
     if not chords.size:
-        raise InputError(f"contour {contour.name!r} runs in the scrap throughout; nothing is cut")
+        raise InputError(f"contour {contour.name!r} is entirely in the scrap; nothing is cut")
     return np.union1d(chords, chords + 1)
 
 
 def _measure_chords(
     cells: _ShortSpans, at: Array, nodes: Ints, contour: Contour, against: Reference
 ) -> Departure:
-    """Return how far the chords leave the cells; `nodes` lie at places `at` (mm) along them."""
+    """Return how far the chords deviate from the cells; `at` (mm) are the places of `nodes`."""
     points, axes, chords = contour.points / MM, contour.axes, _chords(contour)
     a, b, cell, chord = _pieces(cells.s, at)
     chord = nodes[chord]
@@ -183,7 +188,7 @@ def _measure_chords(
     a, b, cell, chord = a[keep], b[keep], cell[keep], chord[keep]
 
     def errors(of: Ints, looks: int) -> Array:
-        """Return chord errors (mm) and axis errors (rad) all along some pieces, (2, P, looks)."""
+        """Return chord errors (mm) and axis errors (rad) along some pieces, (2, P, looks + 1)."""
         part = np.linspace(0.0, 1.0, looks + 1)
         share = a[of, None] + (b - a)[of, None] * part
         k = np.broadcast_to(chord[of, None], share.shape)
@@ -212,7 +217,7 @@ def _measure_chords(
 
 
 def _cells(curves: Sequence[Curve]) -> _ShortSpans:
-    """Return the curves in cells that bend little, none longer than its share of the whole."""
+    """Divide the curves into cells that bend little and are at most 1 / `CELLS` of the length."""
     fine = [sample_curve(curve, CHORD, ANGLE)[:2] for curve in curves]
     lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1) for _, points in fine]
     longest = sum(float(each.sum()) for each in lengths) / CELLS
@@ -231,7 +236,7 @@ def _cells(curves: Sequence[Curve]) -> _ShortSpans:
 
 
 def _places(cells: _ShortSpans, points: Array, nodes: Ints, tolerance: float, name: str) -> Array:
-    """Return where along the cells (mm) each node is nearest to them."""
+    """Return the place along the cells (mm) that is nearest to each node."""
     p, ends = points[nodes], cells.ends
     # The middle of the nearest cell is no farther than this from a node that lies on it.
     reach = float(np.diff(cells.s).max()) / 2 + CHORD + tolerance
@@ -263,7 +268,7 @@ def _places(cells: _ShortSpans, points: Array, nodes: Ints, tolerance: float, na
 
 
 def _unroll_places(at: Array, around: float, length: float, tolerance: float, name: str) -> Array:
-    """Return places along a loop that rise or fall all along: at its end another turn begins.
+    """Return places along a loop as increasing or decreasing values that continue past its end.
 
     Parameters
     ----------
@@ -271,9 +276,9 @@ def _unroll_places(at: Array, around: float, length: float, tolerance: float, na
     around : float mm
         Length of the loop, infinite for an open one.
     length : float mm
-        Of the contour but for what runs in the scrap, by which its direction is found.
+        Length of the contour outside the scrap, which determines its direction.
     tolerance : float mm
-        Steps back that are only inaccurate are none.
+        Steps back within twice this are taken as inaccuracy.
     name : str
     """
     slack = 2 * tolerance
@@ -297,9 +302,9 @@ def _pieces(s: Array, at: Array) -> tuple[Array, Array, Ints, Ints]:
     Parameters
     ----------
     s : (C + 1,) mm
-        Of the ends of the cells, along the loop.
+        Places of the ends of the cells along the loop.
     at : (M,) mm
-        Of the nodes, rising or falling.
+        Places of the nodes, increasing or decreasing.
     """
     falls = at[-1] < at[0]
     nodes = at[::-1] if falls else at

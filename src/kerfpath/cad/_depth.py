@@ -1,8 +1,8 @@
-"""How deep a side of a sheet lies inside it: what distinguishes its outer side from its inner one.
+"""Depth of a side of a sheet inside the part, which distinguishes its outer and inner sides.
 
-Seen along the outward normal, nothing of a channel lies beyond its outside, and all of the channel
-beyond its inside. Holes, countersinks and flanges change that little, unlike the length of the rims
-or the areas.
+Seen along the outward normal, nothing of a channel lies beyond its outer side, and all of it lies
+beyond its inner side. Holes, countersinks and flanges hardly change that, unlike the length of the
+rims or the areas.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from kerfpath.cad._loops import REVERSED
 __all__ = ["depth_of", "joined", "patches_of", "weighed"]
 
 GRID = 5
-"""Patches in either direction of a face that is not plane."""
+"""Number of patches in each direction of a face that is not plane."""
 ACCURACY = 1e-2
-"""Relative accuracy of areas: they distinguish sheets from blocks, and are not shown."""
+"""Relative accuracy of areas, which only distinguish sheets from blocks and are not shown."""
 EDGE = 1e-9
-"""What lies this close to an edge, in the surface's own parameters, lies on it."""
+"""A point this close to an edge, in the parameters of the surface, is on it."""
 CHUNK = 256
-"""Points at once: memory does not grow with the part, and BLAS starts no threads for so few."""
+"""Points treated together: memory does not grow with the part, and BLAS starts no threads."""
 DIRECTIONS = 512
-"""Directions in which the ends of a sheet are looked for: within 5 deg of any."""
+"""Number of directions in which the ends of a sheet are searched, one within 5 deg of any."""
 
 
 class Patches(NamedTuple):
-    """What a face is made of: areas (K,) mm^2, middles (K, 3) mm, outward unit normals (K, 3)."""
+    """Patches of a face: areas (K,) mm^2, middles (K, 3) mm, outward unit normals (K, 3)."""
 
     area: Array
     middle: Array
@@ -50,11 +50,11 @@ def weighed(face: TopoDS_Face) -> tuple[float, gp_Pnt]:
     """Return the area of a face, mm^2, and its centre of mass."""
     props = GProp_GProps()
     BRepGProp.SurfaceProperties_s(face, props, ACCURACY)
-    return abs(props.Mass()), props.CentreOfMass()  # damaged, it may count as less than nothing
+    return abs(props.Mass()), props.CentreOfMass()  # negative for some damaged faces
 
 
 def patches_of(face: TopoDS_Face, area: float, middle: gp_Pnt) -> Patches:
-    """Return the patches of a face of known area and centre: one of a plane, else a grid's."""
+    """Return the patches of a face of known area and centre: one for a plane, else a grid."""
     surface = BRepAdaptor_Surface(face)
     out = -1.0 if face.Orientation() == REVERSED else 1.0
     if surface.GetType() == GeomAbs_SurfaceType.GeomAbs_Plane:
@@ -94,14 +94,14 @@ def joined(parts: Sequence[Patches]) -> Patches:
 
 
 def depth_of(patches: Patches, points: Array) -> float:
-    """Return how far points (K, 3) mm reach beyond each patch along its normal, on the mean, mm."""
+    """Return the mean distance (mm) that points (K, 3) mm reach beyond patches, along normals."""
     ends = points[_farthest(points)]
     beyond = (patches.normal @ ends.T).max(axis=1) - (patches.normal * patches.middle).sum(axis=1)
     return float(patches.area @ np.maximum(beyond, 0.0) / patches.area.sum())
 
 
 def _farthest(points: Array) -> Ints:
-    """Return which of points (K, 3) lie farthest in any of many directions."""
+    """Return the indices of points (K, 3) that lie farthest in one of many directions."""
     directions = _directions()
     best, which = np.full(len(directions), -np.inf), np.zeros(len(directions), dtype=np.int64)
     for first in range(0, len(points), CHUNK):
@@ -114,7 +114,7 @@ def _farthest(points: Array) -> Ints:
 
 
 def _directions() -> Array:
-    """Return unit vectors (D, 3) that are spread evenly, on a spiral."""
+    """Return unit vectors (D, 3) that are evenly spread, on a spiral."""
     z = 1 - (2 * np.arange(DIRECTIONS) + 1) / DIRECTIONS
     turn = np.pi * (3 - np.sqrt(5)) * np.arange(DIRECTIONS)
     r = np.sqrt(1 - z * z)

@@ -1,6 +1,7 @@
-"""Read DXF files: flat contours in millimetres, with layers and colours, chained to loops.
+"""Read DXF files: flat curves with layers and colours, chained to loops.
 
-What is left out is counted by kind and reason, also what ezdxf drops in repairing a file.
+Entities that are left out, also those that ezdxf drops when it repairs a file, are counted by kind
+and reason.
 """
 
 from __future__ import annotations
@@ -35,36 +36,36 @@ __all__ = ["read_dxf"]
 INSUNITS = {
     1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 9: "mil", 13: "um", 14: "dm",
 }  # fmt: skip
-"""Units by the header variable $INSUNITS."""
+"""Units by value of the header variable $INSUNITS."""
 COLOURS = {1: "red", 2: "yellow", 3: "green", 4: "cyan", 5: "blue", 6: "magenta", 7: "white"}
 """Names of the first colours of the AutoCAD colour index."""
 LOOSE = ("0", "white")
-"""Layer and colour of what stands in no block."""
+"""Layer and colour of entities outside blocks."""
 DEEPEST = 32
-"""Blocks inside blocks; more means that a block holds itself."""
+"""Deepest nesting of blocks; more means that a block contains itself."""
 MOST = 200_000
-"""Curves and blocks in a drawing; more is a slip in the rows and columns of a block."""
+"""Most curves and blocks in a drawing; more is an error in the rows and columns of a block."""
 FLAT = 1e-6
-"""How far (mm) a curve may leave the drawing plane: what writers round to."""
+"""How far (mm) a curve may leave the drawing plane, as writers round numbers."""
 NEVER_CUT = frozenset([
     "TEXT", "MTEXT", "ATTDEF", "ATTRIB", "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION",
     "LEADER", "MLEADER", "MULTILEADER", "TOLERANCE", "POINT", "VIEWPORT", "IMAGE", "WIPEOUT",
     "PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "RAY", "XLINE", "ACAD_TABLE", "LIGHT", "SUN",
     "HATCH", "MPOLYGON",
 ])  # fmt: skip
-"""Kinds of entities that say something about a part, and are no line of it; others may be."""
+"""Kinds of entities that annotate a part and are no lines to cut; others may be."""
 
 
 def read_dxf(
     path: Path, content: bytes, unit: str | None, gap: float, axis: Array | None = None
 ) -> Part:
-    """Return the loops of a DXF drawing; the tool axis is -z of its plane, or the one asked for.
+    """Return the part in a DXF drawing; the tool axis is -z of its plane, or the given `axis`.
 
     Raises
     ------
     InputError
-        Not a DXF file, a damaged one, one without curves, curves that leave the plane, or no unit
-        known.
+        Not a DXF file, a damaged one, one without curves, curves that leave the plane, or no known
+        unit.
     """
     try:
         document, repairs, lost = document_of(content)
@@ -78,13 +79,13 @@ def read_dxf(
     if unit is None and not declared:
         raise InputError(
             f"{path}: states no length unit ($INSUNITS is {insunits}); "
-            f"say what its numbers mean with unit= one of {', '.join(UNITS_MM)}"
+            f"give the unit of its numbers with unit= one of {', '.join(UNITS_MM)}"
         )
     notes = []
     if unit is None:
-        notes.append(f"unit {declared} taken from $INSUNITS, which is no more than a hint: check")
+        notes.append(f"unit {declared} taken from $INSUNITS, which is only a hint: check it")
     elif declared and declared != unit:
-        notes.append(f"unit {unit} as asked; $INSUNITS says {declared}")
+        notes.append(f"unit {unit} as given; $INSUNITS says {declared}")
     if repairs:
         notes.append(f"{len(repairs)} faults of the file repaired, the first: {repairs[0]}")
     sheet = _Sheet(document, is_flat=axis is None)
@@ -113,7 +114,7 @@ def _frame(ucs: UCSTableEntry, scale: float) -> Array:
 
 
 def _reason(error: Exception) -> str:
-    """Return what an exception says, short enough for a line."""
+    """Return the message of an exception, short enough for a line."""
     return " ".join(str(error).split())[:80] or type(error).__name__
 
 
@@ -129,7 +130,7 @@ class _Sheet:
     count: int = 0
 
     def summed(self) -> tuple[LeftOut, ...]:
-        """Return what was left out by kind and reason, first what may have been cut."""
+        """Return what was left out by kind and reason, first what may have been a line to cut."""
         found = [
             LeftOut(
                 kind=kind, reason=reason, count=count, may_cut=doubtful and kind not in NEVER_CUT
@@ -140,7 +141,7 @@ class _Sheet:
         return tuple(sorted(found, key=lambda one: not one.may_cut))
 
     def look_on_paper(self) -> None:
-        """Count what stands on sheets to print, beside the model."""
+        """Count the entities on the sheets for printing, outside the model."""
         for layout in self.document.layouts:
             if not layout.is_modelspace:
                 for entity in layout:
@@ -149,12 +150,12 @@ class _Sheet:
     def add(
         self, entities: Iterable[DXFGraphic], T: Array, inside: Look = LOOSE, depth: int = 0
     ) -> None:
-        """Add entities; those of a block stand `inside` the layer and colour of its insertion.
+        """Add entities; `inside` is the layer and colour of the insertion of their block.
 
         T (4, 4) maps their coordinates to those of the drawing, mm; it may scale.
         """
         if depth > DEEPEST:
-            raise InputError(f"blocks nest deeper than {DEEPEST}: one holds itself; repair it")
+            raise InputError(f"blocks nest deeper than {DEEPEST}: one contains itself; repair it")
         for entity in entities:
             kind = entity.dxftype()
             try:
@@ -184,7 +185,7 @@ class _Sheet:
             self.strokes.setdefault(look, []).append(tuple(curves))
 
     def _insert(self, insert: Insert, T: Array, look: Look, depth: int) -> None:
-        """Add a block wherever it is inserted: once, or in rows and columns."""
+        """Add a block wherever it is inserted, once or in rows and columns."""
         block = insert.block()
         if block is None or block.block is None:
             self.left_out["INSERT", "its block is not in the file"] += 1
@@ -193,10 +194,10 @@ class _Sheet:
             self.left_out["INSERT", "its block is in another file (XREF)"] += 1
             return
         if not (insert.dxf.xscale and insert.dxf.yscale):
-            self.left_out["INSERT", "it is scaled to nothing, by 0"] += 1
+            self.left_out["INSERT", "it is scaled by 0"] += 1
             return
         if XClip(insert).has_clipping_path:
-            self.left_out["INSERT", "not itself, but its clipping: the block is read whole"] += 1
+            self.left_out["INSERT", "only its clipping: the whole block is read"] += 1
         ocs, own = insert.ocs(), np.array([*insert.matrix44()]).reshape(4, 4).T
         rows = max(insert.dxf.row_count, 1) if insert.dxf.row_spacing else 1
         columns = max(insert.dxf.column_count, 1) if insert.dxf.column_spacing else 1
@@ -236,6 +237,6 @@ class _Sheet:
         if self.is_flat and box[1, 2] - box[0, 2] > FLAT:
             raise InputError(
                 f"a {kind} on layer {layer} leaves the drawing plane, z from {box[0, 2]:g} to "
-                f"{box[1, 2]:g} mm; expected a flat drawing: project it to one plane, or say the "
+                f"{box[1, 2]:g} mm; expected a flat drawing: project it to one plane, or give the "
                 "tool axis with axis"
             )

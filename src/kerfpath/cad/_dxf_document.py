@@ -1,4 +1,4 @@
-"""A DXF as ezdxf opens it, text or binary: what it repaired, and what it dropped in doing so."""
+"""Open a DXF, text or binary, with ezdxf, and find what ezdxf repaired and dropped."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ DAMAGED = (
     DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, RecursionError,
     TypeError, ValueError, struct.error,
 )  # fmt: skip
-"""What ezdxf and splines raise on values that are none, and on structures that are torn."""
+"""Exceptions that ezdxf and splines raise on bad values and on damaged structures."""
 BINARY = b"AutoCAD Binary DXF"
 LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE", "INSERT")
-"""Kinds that a cut is drawn by; none of them may get lost without a word."""
+"""Kinds of entities that are lines to cut; none of them may be lost without a note."""
 STANDS = re.compile(
     rf"^[ \t]*0[ \t]*\r?\n[ \t]*({'|'.join(LINES)})[ \t]*\r?$".encode(), re.MULTILINE
 )
 MARKERS = {b"LWPOLYLINE": b"AcDbPolyline", b"SPLINE": b"AcDbSpline"}
-"""Kinds that ezdxf reads only behind the marker of their class, which some writers leave out."""
+"""Kinds that ezdxf reads only after the marker of their class, which some writers leave out."""
 MARKED = re.compile(
     rb"^([ \t]*0[ \t]*\r?\n[ \t]*(%s)[ \t]*\r?\n)(.*?)(?=^[ \t]*0[ \t]*\r?\n[ \t]*[A-Z])"
     % b"|".join(MARKERS),
@@ -41,20 +41,20 @@ COMMON = frozenset(map(str, (
     5, 6, 8, 48, 60, 62, 67, 92, 100, 102, 160, 284, 310, 330, 347, 348, 360, 370, 390, 410, 420,
     430, 440,
 )))  # fmt: skip
-"""Codes that stand in front of the marker, the same for all kinds (DXF reference, common codes)."""
+"""Codes before the marker, the same for all kinds (DXF reference, common group codes)."""
 DROPPED = re.compile(
     r"(?:Removed|Deleted) (?:[a-zDXF]+ )*([A-Z][A-Z0-9_]+)(?:\(#\w+\))? (?:entity )?(.*)"
 )
-"""How ezdxf says that it dropped an entity."""
+"""Message of ezdxf when it drops an entity."""
 
 
 def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, str]]]:
-    """Return the drawing, what was repaired, and how many of each kind were lost, with the reason.
+    """Return the drawing, the repaired faults, and the count of lost entities by kind and reason.
 
     Raises
     ------
     one of DAMAGED
-        No DXF, or one that cannot be repaired.
+        Not a DXF, or one that cannot be repaired.
     """
     is_binary = content.startswith(BINARY)
     if not (is_binary or b"SECTION" in content[:4096]):
@@ -71,7 +71,7 @@ def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, 
 
 
 def _with_markers(entity: re.Match[bytes]) -> bytes:
-    """Return an entity with the markers of its classes, put in where they are missing."""
+    """Return an entity with the markers of its classes, adding those that are missing."""
     head, kind, body = entity.groups()
     if MARKERS[kind] in body:
         return entity[0]
@@ -99,12 +99,12 @@ def _lost(document: Drawing, content: bytes, faults: list[str]) -> Counter[tuple
     for kind, count in stand.items():
         explained = sum(n for (lost_kind, _), n in lost.items() if lost_kind == kind)
         if (missing := count - kept[kind] - explained) > 0:
-            lost[kind, "the file is damaged where it stands"] += missing
+            lost[kind, "the file is damaged there"] += missing
     return lost
 
 
 class _Listener(logging.Handler):
-    """Keeps what is logged."""
+    """Keep the messages that are logged."""
 
     def __init__(self, level: int) -> None:
         super().__init__(level)
@@ -117,7 +117,7 @@ class _Listener(logging.Handler):
 
 @contextmanager
 def _overheard() -> Iterator[list[str]]:
-    """Collect what ezdxf logs about faults, which would go to the terminal otherwise."""
+    """Collect what ezdxf logs about faults, instead of printing it on the terminal."""
     handler = _Listener(logging.WARNING)
     propagates, logger.propagate = logger.propagate, False
     logger.addHandler(handler)

@@ -1,4 +1,4 @@
-"""The entities of a DXF that are lines to cut, as curves."""
+"""Convert the entities of a DXF that are lines to cut to curves."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ __all__ = ["curves_of"]
 
 
 def curves_of(entity: DXFGraphic, T: Array) -> Iterator[Curve]:
-    """Yield the curves (mm) of an entity, none if it is not one.
+    """Yield the curves (mm) of an entity, or none if it is no line to cut.
 
-    T (4, 4) maps its coordinates to mm. Blocks may be scaled by factors of their own in x and y:
-    arcs, ellipses and splines stay exact under any such map, which needs no division.
+    T (4, 4) maps its coordinates to mm. Blocks may have different scales in x and y; arcs, ellipses
+    and splines stay exact under any such map, without division.
     """
 
     def point(at: Iterable[float]) -> Array:
@@ -36,7 +36,7 @@ def curves_of(entity: DXFGraphic, T: Array) -> Iterator[Curve]:
 
     if isinstance(entity, DxfLine):
         yield Line(point(entity.dxf.start), point(entity.dxf.end))
-    elif isinstance(entity, Circle):  # of which ARC is a kind
+    elif isinstance(entity, Circle):  # ARC is a subclass
         first, last = 0.0, 360.0
         if isinstance(entity, DxfArc):
             first, last = float(entity.dxf.start_angle), float(entity.dxf.end_angle)

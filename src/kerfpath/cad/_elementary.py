@@ -1,6 +1,6 @@
 """Points and normals along curves on planes, cylinders and cones, many at once.
 
-Most edges of drawn parts lie on these; OCCT evaluates one point at a time.
+Most edges of parts lie on these surfaces, and OCCT evaluates only one point at a time.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ CYLINDER, CONE = GeomAbs_SurfaceType.GeomAbs_Cylinder, GeomAbs_SurfaceType.GeomA
 
 
 def parameters_on(curve: Geom2d_Curve, t: Array) -> Array:
-    """Return the parameters (K, 2) of a surface at those (K,) of a curve on it."""
+    """Return the surface parameters (K, 2) at the parameters t (K,) of a curve on the surface."""
     adaptor = Geom2dAdaptor_Curve(curve)
     if adaptor.GetType() == LINE:
         line = adaptor.Line()
@@ -44,7 +44,7 @@ class ElementarySurface:
     ----------
     position : gp_Ax3
     radius, slope, rise : float
-        Of a cylinder or cone, mm and 1; all 0 of a plane.
+        Radius (mm), and slope and rise (no unit) of a cylinder or cone; all 0 for a plane.
     """
 
     def __init__(self, position: gp_Ax3, radius: float, slope: float, rise: float) -> None:
@@ -58,7 +58,7 @@ class ElementarySurface:
 
     @classmethod
     def of(cls, surface: BRepAdaptor_Surface) -> ElementarySurface | None:
-        """Return the surface as one of these, None if it is another."""
+        """Return the surface if it is one of these, else None."""
         kind = surface.GetType()
         if kind == PLANE:
             return cls(surface.Plane().Position(), 0.0, 0.0, 0.0)
@@ -72,7 +72,7 @@ class ElementarySurface:
         return None
 
     def at(self, uv: Array) -> tuple[Array, Array]:
-        """Return points (K, 3) mm and du x dv (K, 3) at parameters (K, 2), of any length."""
+        """Return points (K, 3) mm and normals du x dv (K, 3), of any length, at uv (K, 2)."""
         u, v = uv[:, :1], uv[:, 1:]
         if not self._rise:
             normals = np.empty((len(uv), 3))

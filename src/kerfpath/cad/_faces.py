@@ -1,4 +1,4 @@
-"""From faces to a part: the loops of every face, and those of the skins that faces make up."""
+"""Build a part from faces: the loops of every face, and of the skins that faces make up."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from kerfpath.progress import Progress, no_progress
 __all__ = ["part_of"]
 
 MESHES = 2
-"""Meshes of a part that are kept: one for its cell, one for its pictures."""
+"""Number of meshes of a part that are kept: one for its cell, one for its pictures."""
 
 SURFACES = {
     GeomAbs_SurfaceType.GeomAbs_Plane: "plane",
@@ -54,7 +54,7 @@ def part_of(
     outer_towards: tuple[float, float, float] | None = None,
     progress: Progress = no_progress,
 ) -> Part:
-    """Return the part that is drawn, every face, skin and loop given its name; `gap` in m."""
+    """Return the part in a drawing, with names for every face, skin and loop; `gap` is in m."""
     faces, found, unread = _readable(drawn.faces, progress)
     towards = None if outer_towards is None else np.array(outer_towards)
     skins = skins_of([named.face for named in faces], found, towards)
@@ -90,7 +90,7 @@ def part_of(
 def _in_order(
     drawn: NamedShape, faces: Sequence[NamedFace], names: Sequence[str]
 ) -> tuple[str, ...]:
-    """Return the names of faces in the order in which they are meshed, "" for what is left out."""
+    """Return the names of faces in the order in which they are meshed, "" for those left out."""
     numbered = ShapeMap()
     for named in faces:
         numbered.Add(named.face)
@@ -102,7 +102,7 @@ def _in_order(
 def _readable(
     faces: Sequence[NamedFace], progress: Progress
 ) -> tuple[list[NamedFace], list[list[FaceLoop]], list[LeftOut]]:
-    """Return the faces whose loops can be read, their loops, and what is left out for it."""
+    """Return the faces whose loops can be read, their loops, and the faces that are left out."""
     kept: list[NamedFace] = []
     loops: list[list[FaceLoop]] = []
     left_out: Counter[tuple[str, str, bool]] = Counter()
@@ -124,8 +124,8 @@ def _readable(
 def _doubts(skins: Sequence[Skin], skin_names: Sequence[str], names: Sequence[str]) -> list[str]:
     """Return a note for each sheet whose outer side is not certain."""
     return [
-        f"{name or names[skin.faces[0]]}: which side of its sheet is the outer one is not certain: "
-        f"{skin.doubt}; look at it, and say it with outer_towards where it is the other"
+        f"{name or names[skin.faces[0]]}: the outer side of its sheet is not certain: "
+        f"{skin.doubt}; check it, and set outer_towards if it is the other side"
         for skin, name in zip(skins, skin_names, strict=True)
         if skin.doubt
     ]

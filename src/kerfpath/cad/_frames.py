@@ -1,4 +1,4 @@
-"""The coordinate systems that a drawing names: of STEP files their placements."""
+"""Named coordinate systems of STEP files: their placements."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from kerfpath.cad._units import MM
 __all__ = ["step_frames"]
 
 PARALLEL = 1e-9
-"""Sine of the angle between the axes of a placement below which they say no orientation."""
+"""Sine of the angle between the axes of a placement below which they define no orientation."""
 
 
 def step_frames(entities: Entities, mm: float) -> Mapping[str, Array]:
     """Return T_part_frame (4, 4) m of each coordinate system that a STEP file names.
 
-    They are the named placements among the items of representations; of an assembly those of the
-    whole, not those of its components. One name given twice is numbered.
+    They are the named placements among the items of representations; in an assembly, only those of
+    the assembly itself, not of its components. Repeated names are numbered.
 
     Parameters
     ----------
     entities : Entities
     mm : float
-        Of the unit that coordinates have.
+        The unit of coordinates, in mm.
 
     Notes
     -----
@@ -56,7 +56,7 @@ def _placements(
 
 
 def _pose(placement: StepGeom_Axis2Placement3d, scale: float) -> Array | None:
-    """Return the pose of a placement, (4, 4) m; None where its axes are parallel."""
+    """Return the pose (4, 4) m of a placement, or None if its axes are parallel."""
     point = placement.Location()
     z = _vector(placement.Axis() if placement.HasAxis() else None, [0.0, 0.0, 1.0])
     across = [1.0, 0.0, 0.0] if abs(z[0]) < 1 - PARALLEL else [0.0, 1.0, 0.0]

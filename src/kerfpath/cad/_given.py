@@ -1,4 +1,4 @@
-"""Shapes of other packages in memory: what OCP has, bare or wrapped as build123d wraps it."""
+"""Read shapes in memory: those of OCP, bare or wrapped as by build123d."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ from kerfpath.errors import InputError
 __all__ = ["drawn_of_given"]
 
 EXPECTED = (
-    "expected a file, or a shape: a TopoDS_Shape of OCP, what has one as .wrapped (build123d, "
-    "CadQuery), or a list of these; of a builder give its .part, of a Workplane its .vals()"
+    "expected a file, or a shape: a TopoDS_Shape of OCP, an object that has one as .wrapped "
+    "(build123d, CadQuery), or a list of these; pass the .part of a builder, the .vals() of a "
+    "Workplane"
 )
 
 
 def drawn_of_given(given: object, unit: str | None, gap: float) -> NamedShape:
-    """Return what a shape holds, or several do, as a copy; its numbers are in `unit`, or mm.
+    """Return a copy of the content of one or several shapes; numbers are in `unit`, or in mm.
 
     Raises
     ------
@@ -45,7 +46,7 @@ def drawn_of_given(given: object, unit: str | None, gap: float) -> NamedShape:
         if not (np.abs(here) <= LARGEST).all():
             raise InputError(
                 f"a point lies at {here} mm, further than {LARGEST / 1e6:g} km from the origin or "
-                "nowhere; look at the shape, or at unit"
+                "not finite; check the shape and unit"
             )
     faces = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE)
     if not faces and not list_shapes(shape, TopAbs_ShapeEnum.TopAbs_EDGE):
@@ -63,7 +64,7 @@ def _whole(given: object) -> TopoDS_Shape:
     if isinstance(shape, TopoDS_Shape) and not shape.IsNull():
         return shape
     if isinstance(shape, TopoDS_Shape) or (shape is None and given is not None):
-        raise InputError("it is empty: nothing has been made of it yet")
+        raise InputError("it is empty: nothing has been built yet")
     if not isinstance(given, Sequence) or isinstance(given, str | bytes):
         raise InputError(f"{EXPECTED}; got {type(given).__name__}")
     compound, builder = TopoDS_Compound(), BRep_Builder()

@@ -1,4 +1,4 @@
-"""The surface around a loop, healed: it goes on where the loop cuts a hole or the face ends."""
+"""The healed surface around a loop, which continues over holes and past the ends of faces."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from kerfpath.cad._units import MM
 __all__ = ["HealedSurface"]
 
 STEP = 0.5
-"""mm between the places on the loop from which the nearest face is found."""
+"""Distance (mm) between the places on the loop from which the nearest face is found."""
 PRECISION = 1e-6
-"""mm of a projection."""
+"""Precision (mm) of a projection."""
 BESIDE = 1e-3
-"""mm off the normal at its foot from which on a point lies beyond the end of a surface."""
+"""A point farther than this (mm) from the normal at its foot is beyond the end of a surface."""
 ENDS = 0.3
-"""How far a surface may be from the plane tangent to it at the loop, as a part of the way from the
-loop and of `STEP`; beyond that it is taken to have ended."""
+"""How far a surface may be from its tangent plane at the loop, as a share of the distance from the
+loop plus `STEP`; beyond that, it counts as ended."""
 
 
 class HealedSurface:
-    """The untrimmed surfaces of the faces along a loop; each holds nearest to its own edges.
+    """The untrimmed surfaces of the faces along a loop; each is valid nearest to its own edges.
 
-    Where such a surface ends, it goes on in the plane tangent at the nearest place of the loop.
+    Where such a surface ends, the tangent plane at the nearest place of the loop continues it.
 
     Parameters
     ----------
     edges : sequence of OrientedEdge
-        Of the loop.
+        Edges of the loop.
     """
 
     def __init__(self, edges: Sequence[OrientedEdge]) -> None:

@@ -1,4 +1,4 @@
-"""Read IGES files: loose faces, their unit and names, and a clear word for every bad file."""
+"""Read IGES files: loose faces, their unit and names, and a clear error for every bad file."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ __all__ = ["read_iges"]
 FLAGS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm"}
 """Units by the flag of the global section (IGES 5.3, table 2)."""
 GLOBAL = "Global Section"
-"""How OCCT begins what it says of the global section, whose number is that of the whole file."""
+"""First words of OCCT's messages on the global section, which have the number of the whole file."""
 FACES = (143, 144, 510)
-"""Types of entities that faces are made of: bounded and trimmed surfaces, and faces of solids."""
+"""Types of entities that become faces: bounded and trimmed surfaces, and faces of solids."""
 SAID = ("IGESDimen", "IGESDraw", "IGESGraph", "IGESDefs", "IGESAppli")
-"""How the names of OCCT's classes begin for what says something about a part."""
+"""Prefixes of OCCT's classes for annotations of a part."""
 WIDTH = 80
-"""Columns of a line; the 73rd names its section, the rest number it there."""
+"""Columns of a line; the 73rd names its section, the rest are its number in it."""
 
 
 def read_iges(path: Path, unit: str | None, gap: float) -> NamedShape:
-    """Return what an IGES file holds, its loose faces sewn together.
+    """Return the content of an IGES file, with its loose faces sewn together within `gap` (m).
 
     Raises
     ------
     InputError
         Not an IGES file, a truncated or damaged one, one without faces, or one whose header
-        declares no known unit while `unit` is not given: what of it, without the file's name.
+        declares no known unit while `unit` is not given. The message lacks the file's name.
     """
     _require_whole(path.read_bytes())
     with occt():
@@ -75,7 +75,7 @@ def _require_whole(content: bytes) -> None:
                 f"{line}, got {got or 'nothing'}; copy or export it again"
             )
 
-    # Columns 65 to 72 of the parameters tell the directory entry that each line belongs to.
+    # Columns 65 to 72 of the parameters hold the directory entry that each line belongs to.
     owners = [line[64:72].strip() for line in lines if line[72:73] == b"P"]
     entries = [int(owner) if owner.isdigit() else 0 for owner, _ in groupby(owners)]
     known = range(1, int(sizes[3]) + 1, 2)
@@ -97,7 +97,7 @@ def _read(path: Path, unit: str | None, gap: float) -> NamedShape:
     if unit is None and not header:
         raise InputError(
             f"the header's unit flag is {flag}, expected one of "
-            f"{', '.join(map(str, FLAGS))}; say what the numbers mean with unit="
+            f"{', '.join(map(str, FLAGS))}; give the unit of the numbers with unit="
         )
     reader.TransferRoots()
     shape = reader.OneShape()
@@ -119,20 +119,20 @@ def _read(path: Path, unit: str | None, gap: float) -> NamedShape:
             NamedFace(face=TopoDS.Face(moved.ModifiedShape(named.face)), name=named.name)
             for named in faces
         ]
-        notes.append(f"unit {unit} as asked; the header says {header or 'nothing'}")
+        notes.append(f"unit {unit} as given; the header says {header or 'nothing'}")
     return drawn_of(unit or header, shape, faces, gap=gap, notes=notes, left_out=left_out)
 
 
 def _damaged(reader: IGESControl_Reader) -> list[LeftOut]:
-    """Return what fails OCCT's checks.
+    """Return the entities that fail OCCT's checks.
 
-    Of the global section only the unit is used, and looked at: dates, names and sizes that are odd
+    Faults in the global section are ignored: only its unit is used, and odd dates, names and sizes
     say nothing about the part.
 
     Raises
     ------
     InputError
-        The file as a whole fails them.
+        The whole file fails them.
     """
     found: Counter[tuple[str, str, bool]] = Counter()
     for number, reason in failures(reader.WS().ModelCheckList()):
@@ -147,7 +147,7 @@ def _damaged(reader: IGESControl_Reader) -> list[LeftOut]:
 
 
 def _faces(reader: IGESControl_Reader) -> Iterator[IGESData_IGESEntity]:
-    """Yield the entities that faces are made of."""
+    """Yield the entities that become faces."""
     model = reader.IGESModel()
     for number in range(1, model.NbEntities() + 1):
         entity = model.Entity(number)
@@ -156,7 +156,7 @@ def _faces(reader: IGESControl_Reader) -> Iterator[IGESData_IGESEntity]:
 
 
 def _lost_faces(reader: IGESControl_Reader) -> list[LeftOut]:
-    """Return the faces of the file of which no shape was made."""
+    """Return the faces of the file that OCCT made no shape from."""
     process = reader.WS().TransferReader().TransientProcess()
     made = {
         process.Mapped(number)

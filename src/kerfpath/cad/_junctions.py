@@ -1,8 +1,8 @@
-"""Where more than two ends of curves meet: which of them go on into each other.
+"""Decide which ends of curves continue each other where more than two meet.
 
-Where an even number of ends meets at every place, the curves bound regions: those that the even-odd
-rule fills. An end goes on with the one across such a region, and loops that touch at a place part
-there: squares drawn side by side, each with all its sides, are squares again.
+If an even number of ends meet at every place, the curves bound the regions that the even-odd rule
+fills. An end is continued by the one across such a region, so that loops that touch at a place are
+separated there: squares drawn side by side, each with all its sides, become squares again.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ from kerfpath.cad._sample import sample_curve
 __all__ = ["encloses", "inner_point", "partners"]
 
 NEAR = 0.02
-"""How far from a place curves are put in order around it, as a part of the shortest there."""
+"""Distance from a place at which curves are ordered around it, as a share of the shortest curve."""
 SAMPLED = 0.05
-"""Chord error of curves for what they enclose, as a part of that distance."""
+"""Chord error of curves for enclosed regions, as a share of that distance."""
 LOOK = 257
-"""Points on a curve among which the one at that distance is looked for."""
+"""Number of points on a curve among which the one at that distance is searched."""
 
 
 def partners(
     strokes: Sequence[Sequence[Curve]], alike: Sequence[int], place: Ints
 ) -> dict[int, int]:
-    """Return for each end (2 k: start of stroke k, 2 k + 1: its end) the one that it goes on with.
+    """Return for each end (2 k: start of stroke k, 2 k + 1: its end) the end that continues it.
 
-    Ends that go on nowhere are left out: where they are alone or, unless an even number meet at
-    each place, where more than two do.
+    Ends without continuation are left out. These are ends that are alone and, unless an even number
+    meet at every place, ends where more than two meet.
 
     Parameters
     ----------
     strokes : sequence of sequence of Curve
-        That hang together.
+        Connected strokes.
     alike : sequence of int
-        The same number for those that lie on each other.
+        A number for each stroke, the same for those that lie on each other.
     place : (2 K,)
-        The same number for ends that meet.
+        A number for each end, the same for those that meet.
     """
     at: dict[int, list[int]] = {}
     for end, where in enumerate(place.tolist()):
@@ -60,7 +60,7 @@ def partners(
 
 
 def _chords(strokes: Sequence[Sequence[Curve]]) -> tuple[Array, Array]:
-    """Return the chords of all curves, from (K, 3) to (K, 3), for what they enclose."""
+    """Return the chords of all curves, from (K, 3) to (K, 3), which bound the regions."""
     curves = [curve for stroke in strokes for curve in stroke]
     chord = SAMPLED * NEAR * min(curve.length for curve in curves)
     lines = [sample_curve(curve, chord, np.pi)[1] for curve in curves]
@@ -81,7 +81,7 @@ def _across(
     angle_of: dict[tuple[int, bool], float] = {}
     keys = {}
     for end, curve in curves.items():
-        # Strokes on each other come in one order at the one end, and in the other at the other.
+        # Strokes that lie on each other have opposite orders at their two ends.
         starts_here = bool(place[end] < place[end ^ 1])
         line = alike[end // 2], starts_here
         angle = angle_of.setdefault(line, _angle(curve, end % 2, at, near))
@@ -98,7 +98,7 @@ def _across(
 
 
 def _angle(curve: Curve, is_end: int, at: Array, near: float) -> float:
-    """Return the direction (rad) in which a curve leaves a place (3,), seen so far (mm) from it."""
+    """Return the direction (rad) in which a curve leaves a place (3,), at distance `near` (mm)."""
     start, stop = (curve.end, curve.start) if is_end else (curve.start, curve.end)
     points = curve.at(np.linspace(start, stop, LOOK)) - at
     away = np.linalg.norm(points[:, :2], axis=1)

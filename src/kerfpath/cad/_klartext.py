@@ -1,4 +1,4 @@
-"""Moves of Heidenhain's plain-language programs: L and LN, the tool axis as TX TY TZ."""
+"""Read moves of Heidenhain's plain-language programs: L and LN, with tool axis TX TY TZ."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TCPM = re.compile(r"FUNCTION TCPM\b|M128\b")
 ENDS = ("M2", "M02", "M30")
 IN_MACHINE = ("M91", "M92")
 CHANGING = ("M89", "M99", "M114", "M118", "M130", "M140", "M144")
-"""Cycles called, tool axes counterbalanced, handwheel, other systems: moves that are not read."""
+"""Called cycles, compensated tool axes, handwheel, other systems: moves that are not supported."""
 NO_TCPM = re.compile(r"FUNCTION RESET TCPM$|M129$")
 WORD = re.compile(r"([TN]?[XYZ]|[ABCFM])([-+]?[\d.,]+|MAX)|(R[0LR])$")
 
@@ -38,7 +38,7 @@ def klartext_path(lines: Sequence[str]) -> ToolPath:
     Raises
     ------
     InputError
-        A block that is not known, that makes the path another, or that needs the kinematics of the
+        A block that is not known, that changes the path, or that needs the kinematics of the
         machine (its line is named).
     """
     program = _Program()
@@ -50,7 +50,7 @@ def klartext_path(lines: Sequence[str]) -> ToolPath:
 
 
 class _Program:
-    """What the blocks before make of the next one."""
+    """The state of the program, which the next block is read with."""
 
     def __init__(self) -> None:
         self.tip = Tip()
@@ -65,7 +65,7 @@ class _Program:
         Raises
         ------
         InputError
-            One that is not known, or that makes the path another.
+            A block that is not known, or that changes the path.
         """
         if self._end and not text.startswith("END PGM"):
             raise InputError(f"{where}: a block after the end of the program in line {self._end}")
@@ -93,7 +93,7 @@ class _Program:
             raise InputError(f"{where}: {text[:40]!r}: {_reason(kind)}")
 
     def _line(self, line: int, where: str, words: Sequence[str]) -> None:
-        """Take a straight line: its place, tool axis, feed and what else it says."""
+        """Take a straight line: its position, tool axis, feed and other words."""
         values: dict[str, float] = {}
         extras: set[str] = set()
         is_rapid = False
@@ -104,8 +104,8 @@ class _Program:
             name, text = found[1], found[2]
             if name in ("A", "B", "C"):
                 raise InputError(
-                    f"{where}: {name}: what a rotary axis does is known with the kinematics of the "
-                    "machine alone; let the CAM system write LN with TX TY TZ, or APT"
+                    f"{where}: {name}: the effect of a rotary axis depends on the kinematics of "
+                    "the machine; have the CAM system write LN with TX TY TZ, or APT"
                 )
             if name in ("M", "F"):
                 is_rapid |= (name, text) == ("F", "MAX")
@@ -136,14 +136,14 @@ class _Program:
             if missing := [name for name in AXIS if name not in values]:
                 raise InputError(f"{where}: TX, TY and TZ belong together; {missing[0]} is missing")
             if not self._keeps_tip:
-                raise InputError(f"{where}: TX TY TZ without M128, which gives them a meaning")
+                raise InputError(f"{where}: TX TY TZ without M128, which they need")
             axis = unit_axis((values["TX"], values["TY"], values["TZ"]), where)
         elif any(name in values for name in NORMAL):
             raise InputError(f"{where}: NX NY NZ without TX TY TZ; expected the tool axis")
         if any(each in extras for each in IN_MACHINE):
             if not is_rapid:
                 raise InputError(
-                    f"{where}: M91 at feed: a place in the machine is none in the part"
+                    f"{where}: M91 at feed: its position is in machine coordinates, not in the part"
                 )
             self.tip.go_away(line)
         elif place or axis:
@@ -152,9 +152,9 @@ class _Program:
 
 def _reason(word: str) -> str:
     if word in ("C", "CC", "CR", "CT", "CP", "RND", "CHF", "APPR", "DEP", "SPL"):
-        return "a curve, or a move that is not written out; let the CAM system write lines alone"
+        return "a curve, or a move that is not written out; have the CAM system write lines only"
     if word in ("RL", "RR"):
-        return "the controller would move the path aside; write the tip's path"
+        return "the controller would offset the path; write the path of the tip"
     if word.startswith("I"):
-        return "increments; write places"
+        return "increments; write absolute positions"
     return "it is not known, and may change the path"

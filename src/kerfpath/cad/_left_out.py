@@ -10,8 +10,8 @@ from kerfpath.errors import InputError
 
 __all__ = ["LOST", "LeftOut", "counted", "kind_of", "nothing_drawn"]
 
-LOST = "no face is made of it"
-"""Why a face of a file is left out that OCCT makes nothing of."""
+LOST = "no face could be made from it"
+"""Reason for a face of a file that OCCT cannot convert."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,11 +21,13 @@ class LeftOut:
     Parameters
     ----------
     kind : str
-        As the format calls it: SPLINE, TEXT, INSERT (a block), ...
+        Name of the kind in the format: SPLINE, TEXT, INSERT (a block), ...
     reason : str
+        Why they are left out.
     count : int
+        Number of them.
     may_cut : bool
-        Whether it may have been a line to cut; texts, dimensions and the like are none.
+        Whether they may have been lines to cut, unlike texts, dimensions and the like.
     """
 
     kind: str
@@ -34,12 +36,12 @@ class LeftOut:
     may_cut: bool
 
     def __str__(self) -> str:
-        doubt = "; this may have been to cut" if self.may_cut else ""
+        doubt = "; this may have been a line to cut" if self.may_cut else ""
         return f"left out: {self.count} {self.kind} ({self.reason}){doubt}"
 
 
 def counted(found: Counter[tuple[str, str, bool]]) -> list[LeftOut]:
-    """Return what is left out, of how many there are of each kind, reason and `may_cut`."""
+    """Return what is left out, from the counts by kind, reason and `may_cut`."""
     return [
         LeftOut(kind=kind, reason=reason, count=count, may_cut=may_cut)
         for (kind, reason, may_cut), count in found.items()
@@ -47,14 +49,14 @@ def counted(found: Counter[tuple[str, str, bool]]) -> list[LeftOut]:
 
 
 def kind_of(entity: object) -> str:
-    """Return what OCCT calls the kind of an entity: without its package."""
+    """Return OCCT's name for the kind of an entity, without its package."""
     return type(entity).__name__.partition("_")[2]
 
 
 def nothing_drawn(left_out: Sequence[LeftOut]) -> InputError:
-    """Return the error of a file without faces, with what was left out of it."""
+    """Return the error for a file without faces, with what was left out of it."""
     why = f" ({'; '.join(map(str, left_out[:2]))})" if left_out else ""
     return InputError(
         f"the file holds no face{why}; export the part as a solid or a "
-        "surface, or, if it is drawn by lines, say the tool axis with axis"
+        "surface, or give the tool axis with axis if it is drawn with lines"
     )

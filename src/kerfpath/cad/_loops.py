@@ -1,4 +1,4 @@
-"""The loops of a face: its wires without seams, each edge in the direction of travel."""
+"""Loops of a face: its wires without seams, with each edge in the direction of travel."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ FORWARD, REVERSED = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs
 LINE, PLANE = GeomAbs_CurveType.GeomAbs_Line, GeomAbs_SurfaceType.GeomAbs_Plane
 
 SINGULAR = 1e-9
-"""Sine of the angle between the surface's two directions below which they leave no normal, as at
-a pole or the tip of a cone."""
+"""Sine of the angle between the two directions of a surface below which they define no normal, as
+at a pole or the tip of a cone."""
 EVENLY = np.linspace(0.0, 1.0, AROUND + 1)
-"""Where an edge is looked at, from its start to its end."""
+"""Places at which an edge is evaluated, from its start to its end."""
 NUDGE = 1e-4
-"""How far from such a point the normal is taken, as a part of the edge."""
+"""Distance from a point without normal at which the normal is taken, as a share of the edge."""
 
 
 class FaceSurface:
@@ -56,16 +56,16 @@ class FaceSurface:
 class OrientedEdge:
     """An edge of a face in the direction of travel, evaluated on the face.
 
-    Travel keeps the face on the left, seen with its outward normal up.
+    The face is on the left of the direction of travel, seen with its outward normal up.
 
     Parameters
     ----------
     edge : TopoDS_Edge
-        As it lies in the face taken FORWARD.
+        The edge as oriented in the FORWARD face.
     face : TopoDS_Face
         The face in its own orientation.
     surface : FaceSurface
-        Of the face; one for all its edges, since making it looks at every edge.
+        Surface of the face; one for all its edges, because building it inspects every edge.
     """
 
     def __init__(self, edge: TopoDS_Edge, face: TopoDS_Face, surface: FaceSurface) -> None:
@@ -109,7 +109,7 @@ class OrientedEdge:
     def _require_near(points: Array) -> None:
         if not (np.abs(points) <= LARGEST).all():
             raise InputError(
-                f"an edge strays further than {LARGEST / 1e6:g} km from the origin; the file is "
+                f"an edge reaches further than {LARGEST / 1e6:g} km from the origin; the file is "
                 "damaged, or its unit is wrong"
             )
 
@@ -137,7 +137,7 @@ class OrientedEdge:
         return t if self.start < self.end else t[::-1]
 
     def in_parameters(self) -> Array:
-        """Return how far (2,) the edge goes in the parameters (u, v) of its surface."""
+        """Return the change (2,) of the surface parameters (u, v) along the edge."""
         start, end = self._curve.Value(self.start), self._curve.Value(self.end)
         return np.array([end.X() - start.X(), end.Y() - start.Y()])
 
@@ -167,8 +167,8 @@ def bounds_of(shape: TopoDS_Shape) -> Array:
 def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
     """Return the loops of `face`, each edge in the direction of travel.
 
-    Outer ones run counter-clockwise about its outward normal, inner ones clockwise. Seams are no
-    cut: without them a tube has two outer loops, and a hole across the seam is an inner one.
+    Outer loops run counter-clockwise about its outward normal, inner ones clockwise. Seams are not
+    cut: without them, a tube has two outer loops, and a hole across the seam is an inner loop.
     """
     forward = TopoDS.Face(face.Oriented(FORWARD))
     outer_wire = BRepTools.OuterWire_s(forward)
@@ -186,7 +186,7 @@ def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
 def _runs(
     wire: TopoDS_Wire, forward: TopoDS_Face, face: TopoDS_Face, surface: FaceSurface
 ) -> tuple[list[list[OrientedEdge]], bool]:
-    """Return the edges of `wire` as travelled, broken at each seam, and whether it has a seam."""
+    """Return the edges of `wire` in travel order, split at each seam, and whether it has a seam."""
     turned = (FORWARD, REVERSED)
     everything = [TopoDS.Edge(e) for e in children(wire) if e.Orientation() in turned]
     ordered = everything if len(everything) == 1 else list(_in_order(wire, forward))
@@ -214,7 +214,7 @@ def _in_order(wire: TopoDS_Wire, face: TopoDS_Face) -> Iterator[TopoDS_Edge]:
 
 
 def join_runs(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
-    """Join runs into closed chains: each end goes on at the nearest start, its own included."""
+    """Join runs into closed chains: each end continues at the nearest start, its own included."""
     if len(runs) == 1:
         yield runs[0]
         return
@@ -229,7 +229,7 @@ def join_runs(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
             left[following] = following == first
             far = np.linalg.norm(starts - chain[-1].ends[1], axis=1)
             far[~left] = np.inf
-            # Where several start, the chain closes rather than go on.
+            # If several starts are equally near, the chain is closed.
             following = first if far[first] <= far.min() else int(np.argmin(far))
         left[first] = False
         yield chain

@@ -1,4 +1,4 @@
-"""Read tables of measured points: where points of the part are in the robot base."""
+"""Read tables of measured points: points of the part as measured in the robot base."""
 
 from __future__ import annotations
 
@@ -24,15 +24,17 @@ EXPECTED = (
 
 
 def read_measured(path: str | Path) -> tuple[Array, Array]:
-    """Return the points of a table, nominal (K, 3) m in the part and measured (K, 3) m.
+    """Return the points of a table: nominal (K, 3) m in the part, measured (K, 3) m in the base.
 
-    Its first line names the columns with their unit, as ``nominal_x_mm``, in any order; one named
-    ``point`` may hold names. Delimiters, decimal commas and comments are as in tables of contours.
+    The first line names the columns with their unit, such as ``nominal_x_mm``, in any order; a
+    column ``point`` may hold names. Delimiters, decimal commas and comments are as in tables of
+    contours.
 
     Raises
     ------
     InputError
-        No such file, other columns, no unit, or a cell that is no number: line and column.
+        No such file, other columns, no unit, or a cell that is not a number (the message has line
+        and column).
     """
     path = Path(path)
     content = content_of(path, "a table of measured points")
@@ -64,5 +66,5 @@ def _header(table: TableCells) -> tuple[list[str], dict[str, float]]:
             raise InputError(f"line {table.lines[0]}: expected columns {EXPECTED}, got {cell!r}")
         columns.append(name)
     if sorted(set(columns) - {"point"}) != sorted(COLUMNS) or len(set(columns)) < len(columns):
-        raise InputError(f"line {table.lines[0]}: expected each once, columns {EXPECTED}")
+        raise InputError(f"line {table.lines[0]}: expected each of the columns {EXPECTED} once")
     return columns, mm

@@ -1,4 +1,4 @@
-"""Triangles of a shape, for pictures."""
+"""Triangulate a shape for pictures."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ ANGLE = 0.35
 def triangulate(shape: TopoDS_Shape, deflection: float) -> tuple[Array, Ints, Ints]:
     """Return vertices (V, 3) mm and outward triangles (F, 3), within `deflection` mm.
 
-    The third answer (f,) says how many of the triangles are of each face, in their order.
+    The third array (f,) has the number of triangles of each face, in their order.
     """
-    # OCCT keeps the finest mesh so far on the shape; the answer must not depend on that.
+    # OCCT keeps the finest mesh so far on the shape; the result must not depend on it.
     BRepTools.Clean_s(shape)
     BRepMesh_IncrementalMesh(shape, deflection, False, ANGLE, False)
     vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)], 0

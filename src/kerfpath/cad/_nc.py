@@ -1,4 +1,4 @@
-"""Read programs for 5-axis machines that say the tool axis as a vector: Siemens, Heidenhain."""
+"""Read programs for 5-axis machines with the tool axis as a vector: Siemens, Heidenhain."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ WORD = re.compile(
     rf"|(?P<comment>\([^)]*\)))"
 )
 TEXT = re.compile(r'MSG\s*\(.*\)|T\s*=\s*"[^"]*"')
-"""What holds text: a message, the name of a tool."""
+"""Words with text: a message, the name of a tool."""
 HEADER = re.compile(r"%|[O:]\d+\s*$|\$PATH")
 AXIS = ("A3", "B3", "C3")
 UNITS = {20: "in", 21: "mm", 70: "in", 71: "mm", 700: "in", 710: "mm"}
@@ -40,9 +40,9 @@ HARMLESS_G = (
     *(601, 602, 603, 641, 642, 643, 644, 645),
 )
 REFUSED_G: dict[float, str] = {
-    **dict.fromkeys((2, 3, 5, 6), "a curve; let the CAM system write linear moves alone"),
-    **dict.fromkeys((41, 42), "the controller would move the path aside; write the tip's path"),
-    91: "increments; write places, under G90",
+    **dict.fromkeys((2, 3, 5, 6), "a curve; have the CAM system write linear moves only"),
+    **dict.fromkeys((41, 42), "the controller would offset the path; write the path of the tip"),
+    91: "increments; write absolute positions, under G90",
 }
 AWAY = ("G28", "G30", "G74", "G75")
 MACHINE = ("G53", "G153", "SUPA")
@@ -53,9 +53,9 @@ HARMLESS = (
 )
 REFUSED = {
     **dict.fromkeys(("AROT", "ASCALE", "ATRANS", "MIRROR", "ROT", "SCALE", "TRANS", "CYCLE800"),
-                    "it moves the points that follow; write them where they are in the part"),
+                    "it moves the points that follow; write them in the coordinates of the part"),
     **dict.fromkeys(("BSPLINE", "CIP", "CSPLINE", "CT", "POLY", "ASPLINE"),
-                    "a curve; let the CAM system write linear moves alone"),
+                    "a curve; have the CAM system write linear moves only"),
     "ORIMKS": "tool axes in the machine, not in the part; write ORIWKS",
 }  # fmt: skip
 ENDS = (2, 17, 30)
@@ -73,8 +73,8 @@ def read_nc(
     Raises
     ------
     InputError
-        A word that is not known, that makes the path another, or that needs the kinematics of the
-        machine (its line is named), no unit, no tool axis, no cut.
+        A word that is not known, that changes the path, or that needs the kinematics of the machine
+        (its line is named), no unit, no tool axis, no cut.
     """
     try:
         lines = lines_of(content)
@@ -91,7 +91,7 @@ def _siemens_path(lines: Sequence[str]) -> ToolPath:
         if not text or HEADER.match(text):
             continue
         if text.startswith("/"):
-            raise InputError(f"line {number}: a block that a switch of the machine may skip")
+            raise InputError(f"line {number}: a block that the machine may skip (/)")
         block = _Block(number)
         for name, value in _words(number, text):
             block.add(name, value)
@@ -106,7 +106,7 @@ def _words(line: int, text: str) -> Iterator[tuple[str, str]]:
         found = WORD.match(text, place)
         if found is None:
             raise InputError(
-                f"line {line}: expected words as X1.5 or A3=0.5, got {text[place:][:30]!r}"
+                f"line {line}: expected words such as X1.5 or A3=0.5, got {text[place:][:30]!r}"
             )
         place = found.end()
         if found["named"]:
@@ -136,7 +136,7 @@ class _Block:
         Raises
         ------
         InputError
-            A word that is there already.
+            A repeated word.
         """
         if len(name) > 1 and not name[1:].isdigit():
             self.keywords[name] = value
@@ -149,7 +149,7 @@ class _Block:
 
 
 class _Program:
-    """What the blocks before make of the next one."""
+    """The state of the program, which the next block is read with."""
 
     def __init__(self) -> None:
         self.tip = Tip()
@@ -166,7 +166,7 @@ class _Program:
         Raises
         ------
         InputError
-            A word that is not known, or that makes the path another.
+            A word that is not known, or that changes the path.
         """
         line, where, words = block.line, block.where, block.words
         if self._end:
@@ -181,7 +181,7 @@ class _Program:
             raise InputError(f"{where}: {_word_refusal(unknown[0])}")
         self.unused |= {name.rstrip("0123456789") for name in words} | ({"M"} if block.m else set())
         if called := [m for m in block.m if m in CALLS]:
-            raise InputError(f"{where}: M{called[0]:g}: a program in another place is not read")
+            raise InputError(f"{where}: M{called[0]:g}: a program that is called is not read")
         if 4 in block.g and place:
             raise InputError(f"{where}: G4 with X, Y or Z: expected G4 F")
         if away and (place or not any(keyword in MACHINE for keyword in block.keywords)):
@@ -194,7 +194,7 @@ class _Program:
             self._end = line
 
     def _keywords(self, block: _Block) -> bool:
-        """Return whether the block's places are those of the machine."""
+        """Take the keywords; return whether the positions are in machine coordinates."""
         for keyword, arguments in block.keywords.items():
             if keyword == "TRAORI":
                 self._is_oriented = True
@@ -211,7 +211,7 @@ class _Program:
         return "SUPA" in block.keywords
 
     def _g(self, block: _Block, g: float) -> bool:
-        """Take one G word; return whether the block's places are not those of the part."""
+        """Take one G word; return whether the positions are not in part coordinates."""
         where = block.where
         if g in (0, 1):
             if 1 - g in block.g:
@@ -219,7 +219,7 @@ class _Program:
             self._feed = g == 1
         elif g in UNITS:
             if self.unit != UNITS[int(g)] and (self.unit or self.tip.has_places):
-                raise InputError(f"{where}: G{g:g} after moves in another unit, or in none")
+                raise InputError(f"{where}: G{g:g} after moves in another unit, or without one")
             self.unit = UNITS[int(g)]
         elif g in OFFSETS:
             if g != self._offset and self.tip.has_places:
@@ -235,20 +235,19 @@ class _Program:
         machine = [f"G{g:g}" for g in block.g if f"G{g:g}" in MACHINE] + list(block.keywords)
         if self._feed and machine:
             raise InputError(
-                f"{block.where}: {machine[0]} at feed: a place in the machine is none in the part"
+                f"{block.where}: {machine[0]} at feed: its position is in machine coordinates, not "
+                "in the part"
             )
         self.tip.go_away(block.line)
 
     def _move(self, block: _Block, place: dict[str, float], vector: Sequence[float | None]) -> None:
         if self._feed is None:
-            raise InputError(f"{block.where}: a place before any G0 or G1")
+            raise InputError(f"{block.where}: a position before any G0 or G1")
         axis: Triple | None = None
         if any(value is not None for value in vector):
             if not self._is_oriented:
-                raise InputError(
-                    f"{block.where}: A3 B3 C3 without TRAORI, which gives them a meaning"
-                )
-            a, b, c = (value or 0.0 for value in vector)  # as the controller takes what is missing
+                raise InputError(f"{block.where}: A3 B3 C3 without TRAORI, which they need")
+            a, b, c = (value or 0.0 for value in vector)  # the controller takes missing ones as 0
             axis = unit_axis((a, b, c), block.where, any_length=True)
         self.tip.go(block.line, feed=self._feed, place=place, axis=axis)
 
@@ -256,7 +255,7 @@ class _Program:
 def _word_refusal(name: str) -> str:
     if ROTARY.fullmatch(name):
         return (
-            f"{name}: what a rotary axis or angle does is known with the kinematics of the machine "
-            "alone; let the CAM system write the tool axis as a vector (A3= B3= C3=), or as APT"
+            f"{name}: the effect of a rotary axis or angle depends on the kinematics of the "
+            "machine; have the CAM system write the tool axis as a vector (A3= B3= C3=), or APT"
         )
     return f"{name!r}: {UNKNOWN}"

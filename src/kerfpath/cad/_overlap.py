@@ -1,4 +1,4 @@
-"""Loops that lie on each other, however each is drawn."""
+"""Find loops that lie on each other, however each is drawn."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from kerfpath.cad._sample import Trace, off_chord
 __all__ = ["SAME", "same_lines"]
 
 SAME = 1e-3
-"""Lines whose extent, length and points differ by less (mm) are one."""
+"""Lines whose extent, length and points differ by less (mm) are the same."""
 CHORD = 1e-4
-"""mm by which chords stray from the curves that are compared."""
+"""Deviation (mm) of chords from the curves that are compared."""
 LOOKED_AT = 100
-"""Points of a line that are compared with the other, at most."""
+"""Largest number of points of a line that are compared with the other."""
 
 
 def same_lines(traces: Sequence[Trace]) -> Iterator[tuple[int, int]]:

@@ -1,4 +1,4 @@
-"""The part: what a drawing holds, its loops by name and by what they are, contours along them."""
+"""The part in a drawing: its loops, by name or by their properties, and contours along them."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ Kind = Literal["outer", "inner", "open"]
 Side = Literal["outer", "inner", "edge", ""]
 
 TOUCH = 1e-5
-"""Stretches of one loop that come nearer to each other than this (m) cross or touch."""
+"""Stretches of one loop that are closer than this (m) cross or touch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Loop:
-    """A line to cut: around a face or a skin, around one of its holes, or an open one.
+    """A line to cut: around a face or a skin, around one of its holes, or open.
 
     Parameters
     ----------
@@ -42,11 +42,11 @@ class Loop:
     face : str
         Name of the face or skin whose normal the tool axis opposes; in a DXF the layer.
     kind : "outer", "inner" or "open"
-        Around the face (counter-clockwise about its outward normal), a hole (clockwise), or a line
-        that was drawn open.
+        Around the face (counter-clockwise about its outward normal), around a hole (clockwise), or
+        drawn as an open line.
     surface : str
-        plane, cylinder, cone, sphere, torus, bspline, ...; skin where it is made of several;
-        points; lines in space.
+        Kind of surface: plane, cylinder, cone, sphere, torus, bspline, ...; skin for several faces,
+        points for a table or tool path, lines for lines in space.
     length : float m
     bounding_box : (2, 3) m
         Least and greatest coordinates.
@@ -56,16 +56,16 @@ class Loop:
     largest_gap : float m
         Largest distance between the end of an edge and the start of the next.
     closed : bool
-        Whether it is a closed line, its largest gap small enough to be cut.
+        Whether it is a closed line whose largest gap is small enough to be cut.
     diameter : float m or None
-        Where the loop is a circle, seen along its mean normal.
+        Diameter, if the loop is a circle seen along its mean normal.
     side : {"outer", "inner", "edge", ""}
-        Of a sheet: its outer (larger) side, its inner side, or its thickness; "" if no sheet.
+        Side of a sheet that the loop is on: outer, inner, or its thickness; "" if it is no sheet.
     skin : str
-        Of the loop of a face that is a piece of a skin: the skin's name.
+        Name of the skin that the face of the loop is a piece of, or "".
     layer, colour : str
-        In a DXF and of a STEP's face: where and how it is drawn (red, ..., white, #ff8000, aci30),
-        "" where that is not said, or not the same all over a skin.
+        Layer and colour (red, ..., white, #ff8000, aci30) in a DXF or of a STEP face; "" if the
+        file has none, or if they differ within a skin.
     """
 
     name: str
@@ -88,7 +88,7 @@ class Loop:
     __repr__ = short_repr
 
     def line(self, chord_tolerance: float = 1e-4) -> Array:
-        """Return points (K, 3) m along the loop for pictures, whether or not it can be cut.
+        """Return points (K, 3) m along the loop for pictures, even if it cannot be cut.
 
         Parameters
         ----------
@@ -102,26 +102,26 @@ class Loop:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Part:
-    """A drawing as read: its loops by name, in the part's own frame.
+    """The part in a drawing: its named loops, in the part's own frame.
 
     Parameters
     ----------
     path : Path
-        The file it came from.
+        The file that it was read from.
     unit : str
-        Length unit that the file's numbers were taken for.
+        Length unit of the numbers in the file.
     bounding_box : (2, 3) m
         Least and greatest coordinates.
     faces : int
         Number of faces; 0 in a drawing of lines.
     loops : tuple of Loop
-        Those of the skins, then those of the faces in their order; outer before inner.
+        Loops of the skins, then of the faces in their order; outer before inner.
     notes : tuple of str
         What was assumed, repaired or left out in reading.
     left_out : tuple of LeftOut
-        What was left out, by kind and reason; in the notes, too.
+        What was left out, by kind and reason; the notes list it, too.
     frames : mapping of str to (4, 4) m
-        T_part_frame of the coordinate systems that a STEP or DXF file names.
+        T_part_frame of the named coordinate systems of a STEP or DXF file.
     """
 
     path: Path
@@ -139,12 +139,12 @@ class Part:
     _face_names: tuple[str, ...] = field(default=(), repr=False)
 
     def frame(self, name: str) -> Array:
-        """Return T_part_frame (4, 4) m of a coordinate system that the drawing names.
+        """Return T_part_frame (4, 4) m of a named coordinate system of the drawing.
 
         Raises
         ------
         InputError
-            There is none of that name.
+            No such coordinate system.
         """
         if name not in self.frames:
             known = ", ".join(map(repr, self.frames)) or "none"
@@ -201,10 +201,10 @@ class Part:
         colour: str | None = None,
         near: ArrayLike | None = None,
     ) -> tuple[Loop, ...]:
-        """Return the loops that are all that is asked for, in the order of `loops`.
+        """Return the loops that meet all given criteria, in the order of `loops`.
 
         Loops of faces that are pieces of a skin, and those around the thickness of a sheet, are
-        left out unless `face` or `side` asks for them.
+        left out unless `face` or `side` selects them.
 
         Parameters
         ----------
@@ -213,20 +213,21 @@ class Part:
         kind : {"outer", "inner", "open"}
             Trim lines, holes, or open lines.
         side : {"outer", "inner", "edge"}
-            Of a sheet.
+            Side of a sheet.
         diameter : (float, float) m
-            Round ones from the one to the other, both included.
+            Smallest and largest diameter of round loops, both included.
         length : (float, float) m
-            Their length, likewise.
+            Smallest and largest length, both included.
         layer, colour : str
-            As drawn in a DXF or STEP.
+            Layer and colour in a DXF or STEP.
         near : (3,) m
-            Of all the others that fit, the one that passes this point most closely.
+            Of the loops that meet the other criteria, only the one that passes closest to this
+            point.
 
         Raises
         ------
         InputError
-            Nothing fits, or a range that is none.
+            No loop meets the criteria, or a range whose limits are reversed.
         """
         asked: dict[str, object] = {
             "face": face, "kind": kind, "side": side, "layer": layer, "colour": colour,
@@ -259,27 +260,27 @@ class Part:
         chord_tolerance: float = 2e-6,
         axis_tolerance: float = 0.002,
     ) -> Contour:
-        """Return the loop called `name` as a contour: dense points and tool axes.
+        """Return the loop called `name` as a contour of dense points and tool axes.
 
-        The tool axis is the face's outward normal turned round: from the nozzle into the part.
+        The tool axis is opposite to the face's outward normal: from the nozzle into the part.
 
         Parameters
         ----------
         name : str
-            Of one of the part's loops.
+            Name of one of the part's loops.
         closed : bool
-            Whether it must be closed; False lets a line pass that was drawn open.
+            Whether the loop must be closed; False also accepts a line that was drawn open.
         chord_tolerance : float m
             Largest distance between the contour's chords and the curve.
         axis_tolerance : float rad
             Largest angle between the axes of neighbouring nodes on an edge. Where the faces of a
-            skin meet, it may turn by up to 2 deg at once.
+            skin meet, the axis may turn by up to 2 deg at once.
 
         Raises
         ------
         InputError
             No such loop, a tolerance that is not positive, a loop that is not closed, or one that
-            crosses itself (says where).
+            crosses itself (the message has the place).
         """
         loop = self.loop(name)
         chord = scalar(chord_tolerance, "chord_tolerance", unit="m", above=0.0)
@@ -303,25 +304,25 @@ class Part:
         return contour
 
     def departure(self, name: str, contour: Contour, *, tolerance: float = ON_CURVE) -> Departure:
-        """Return how far the nodes of a contour leave the loop called `name`, at most.
+        """Return the largest deviation of a contour from the loop called `name`.
 
-        Measured against the CAD curve itself, between the nodes, not against samples of it; of a
-        table, which knows nothing between its points, against the lines through them.
+        It is measured between the nodes against the CAD curve itself, not against samples of it. A
+        table defines nothing between its points, so the lines through them are the reference.
 
         Parameters
         ----------
         name : str
-            Of one of the part's loops.
+            Name of one of the part's loops.
         contour : Contour
-            Nodes on that loop or a part of it: begun and sampled anyhow, either way round. Its
-            leads and loops in the scrap are not measured.
+            Contour with nodes on that loop or a part of it, with any start, sampling and direction.
+            Its leads and loops in the scrap are not measured.
         tolerance : float m
-            How far a node may lie off the curve, besides half the loop's largest gap.
+            How far a node may lie off the curve, in addition to half the loop's largest gap.
 
         Raises
         ------
         InputError
-            No such loop, or a contour that does not lie on it (says where).
+            No such loop, or a contour that does not lie on it (the message names the node).
         """
         loop = self.loop(name)
         beside = scalar(tolerance, "tolerance", unit="m", above=0.0) + loop.largest_gap / 2
@@ -331,10 +332,10 @@ class Part:
             raise InputError(f"{self.path}: loop {name!r}: {error}") from None
 
     def surface(self, name: str) -> Surface:
-        """Return the surface around a loop, healed, for leads (see `kerfpath.operations`).
+        """Return the healed surface around a loop, for leads (see `kerfpath.operations`).
 
-        The surfaces of its faces go on where the loop cuts a hole; where they end, and in drawings
-        of lines and points, the plane tangent at the nearest place of the loop does.
+        The surfaces of its faces continue over holes. Where they end, and in drawings of lines and
+        points, the tangent plane at the nearest place of the loop continues them.
 
         Raises
         ------
@@ -343,7 +344,7 @@ class Part:
         """
         trace = self.loop(name)._trace
         if isinstance(trace, EdgeChain):
-            # OCP takes half a second to load, and drawings of points are read without it.
+            # OCP takes half a second to load, and drawings of points do not need it.
             from kerfpath.cad._healed import HealedSurface
             from kerfpath.cad._loops import OrientedEdge
 
@@ -368,15 +369,15 @@ class Part:
         return freeze(vertices * MM), freeze(triangles)
 
     def mesh_faces(self, deflection: float = 5e-4) -> tuple[tuple[str, int], ...]:
-        """Return whose the triangles of `mesh` are: runs of them in their order.
+        """Return which faces the triangles of `mesh` belong to, as runs in their order.
 
-        Each run has the name of a face, or of the skin that the face is a piece of, and the number
-        of its triangles. A face that could not be read is called "".
+        Each run is the name of a face, or of the skin that the face is a piece of, and the number
+        of its triangles. The name of a face that could not be read is "".
 
         Parameters
         ----------
         deflection : float m
-            That of the mesh.
+            Deflection of the mesh.
         """
         size = scalar(deflection, "deflection", unit="m", above=0.0)
         if self._triangulate is None:
@@ -395,5 +396,5 @@ def _range(value: tuple[float, float] | None, name: str) -> tuple[float, float] 
 
 
 def _within(value: float | None, bounds: tuple[float, float] | None) -> bool:
-    # A nanometre of leave: a hole of 10 mm measures 9.9999999996 mm.
+    # A nanometre is tolerated: a hole of 10 mm measures 9.9999999996 mm.
     return bounds is None or (value is not None and bounds[0] - 1e-9 <= value <= bounds[1] + 1e-9)

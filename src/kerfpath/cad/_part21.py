@@ -1,4 +1,4 @@
-"""The grammar of STEP files (ISO 10303-21): what breaks it, in words, where OCCT gives none."""
+"""Check the grammar of STEP files (ISO 10303-21), to explain faults that OCCT does not."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ SECTION = re.compile(rb";DATA(?:\([^;]*\))?;(.*?)ENDSEC;", re.DOTALL | re.IGNORE
 NUMBER = rb"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?"
 ITEM = rb"(?:\$++|\*|#\d++|%s|\.\w++\.|\"[0-9A-Fa-f]*+\")" % NUMBER
 LIST = re.compile(rb"!?(?:[A-Za-z_]\w*+)?\((?:%s(?:,%s)*+)?\)" % (ITEM, ITEM))
-"""A list without lists in it; with its type in front, an entity."""
+"""A list without inner lists; with a type in front of it, an entity."""
 ENTITY = re.compile(rb"#\d+=\$+")
 DEEPEST = 32
-"""Lists inside lists; files have about six."""
+"""Deepest nesting of lists; files have about six levels."""
 LARGEST = 2**31 - 1
-"""OCCT keeps the numbers of entities in 32 bits."""
+"""Largest number of an entity: OCCT keeps them in 32 bits."""
 
 
 def require_grammar(content: bytes) -> None:
@@ -28,8 +28,8 @@ def require_grammar(content: bytes) -> None:
     Raises
     ------
     InputError
-        No data, something that is no entity, a number out of range or used twice, a reference to
-        nothing.
+        No data, a statement that is no entity, a number out of range or used twice, a reference to
+        a missing entity.
     """
     plain = BLANKS.sub(lambda found: b"$" if found[0][:1] == b"'" else b"", content)
     data = b"".join(SECTION.findall(plain))
@@ -46,7 +46,7 @@ def require_grammar(content: bytes) -> None:
     made = Counter(map(int, re.findall(rb"#(\d+)=", data)))
     number, times = made.most_common(1)[0]
     if times > 1:
-        raise _damaged(f"#{number} is there {times} times")
+        raise _damaged(f"#{number} is defined {times} times")
     if (largest := max(made)) > LARGEST:
         raise _damaged(f"#{largest} is more than {LARGEST}")
     if missing := set(map(int, re.findall(rb"#(\d+)(?![\d=])", data))) - made.keys():
@@ -54,7 +54,7 @@ def require_grammar(content: bytes) -> None:
 
 
 def _line(content: bytes, statement: bytes) -> str:
-    """Return where the entity stands that a statement begins with, as far as that is known."""
+    """Return the line of the entity of a statement, or how the statement begins."""
     number = re.match(rb"#\d+", statement)
     place = number and re.search(number[0] + rb"\s*=", content)
     if not place:

@@ -1,4 +1,4 @@
-"""Contours of points that are taken as they come: repeated points, flipped axes, closed ends."""
+"""Contours through given points: repeated points, flipped axes, closed ends."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from kerfpath.errors import InputError
 __all__ = ["REPEATED", "kind_of_points", "trace_of_points"]
 
 REPEATED = 1e-6
-"""Points that follow each other closer than this, mm, are one: they leave no direction."""
+"""mm: consecutive points closer than this are one, because they define no direction."""
 TURNED = float(np.radians(2.0))
-"""Axes at one point that differ by less are one axis."""
+"""rad: axes at the same point that differ by less are the same."""
 FLIP = float(np.radians(90.0))
-"""An axis that turns by more from one point to the next has flipped."""
+"""rad: an axis that turns by more from one point to the next has flipped."""
 
 
 def trace_of_points(
     points: Array, normals: Array, lines: Array, gap: float
 ) -> tuple[Points, list[str]]:
-    """Return the points without repeated ones, closed if they end where they began; and notes.
+    """Return the trace of points without repeated ones, closed if its ends meet, and notes.
 
     Parameters
     ----------
     points, normals : (K, 3) mm, unit vectors
     lines : (K,) int
-        The line of the file that each stands in.
+        Line of each point in the file.
     gap : float mm
-        Largest distance between its ends over which it is closed.
+        Largest distance between the ends of a closed trace.
 
     Raises
     ------
     InputError
-        One point alone, an axis that flips or turns on the spot, ends that meet with other axes.
+        A single point, an axis that flips or turns on the spot, ends that meet with different axes.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     turns = angle_between(normals[:-1], normals[1:])
@@ -58,7 +58,7 @@ def trace_of_points(
         if angle > FLIP:
             raise InputError(
                 f"line {lines[k + 1]}: the axis turns by {np.degrees(angle):.0f} deg from line "
-                f"{lines[k]}; turn it round, or add points between"
+                f"{lines[k]}; reverse it, or add points between"
             )
     is_closed = len(points) > 3 and float(np.linalg.norm(points[-1] - points[0])) <= gap
     if is_closed:
@@ -71,7 +71,7 @@ def trace_of_points(
 
 
 def kind_of_points(trace: Points) -> Kind:
-    """Return how a closed line runs about its mean normal: an outer one counter-clockwise."""
+    """Return the kind of a trace: a closed one is outer if counter-clockwise about its normals."""
     if not trace.is_closed:
         return "open"
     area = vector_area(trace.points)

@@ -1,4 +1,4 @@
-"""Read any drawing: by its suffix, after a look at the file itself."""
+"""Read any drawing, by the suffix of its file, or a shape in memory."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ __all__ = ["content_of", "read"]
 Columns = Mapping[str, str] | Sequence[str]
 Direction = tuple[float, float, float]
 KEPT = 4
-"""Parts that are kept for when a file of the same content is read again, those read last."""
+"""Number of parts, those read last, that are kept in case a file with the same content is read."""
 
 
 class Wrapping(Protocol):
-    """What build123d and CadQuery call a shape."""
+    """A shape of build123d or CadQuery."""
 
     @property
     def wrapped(self) -> Any:
@@ -53,39 +53,39 @@ def read(
     columns: Columns | None = None,
     progress: Progress = no_progress,
 ) -> Part:
-    """Return the part that a drawing holds: STEP, IGES, DXF, points, a tool path; or a shape.
+    """Return the part in a drawing (STEP, IGES, DXF, a table of points, a tool path) or a shape.
 
     Parameters
     ----------
     path : str, Path or shape
         .step, .stp, .iges, .igs, .dxf; a table: .csv, .tsv or .txt; a tool path: .apt, .aptsource,
         .cl or .cls; a program of a machine: .h, .mpf, .nc, .spf or .tap. Or a shape of OCP in
-        memory, what has one as `.wrapped` (build123d, CadQuery), or a list of these: faces, or
-        edges. It is copied, and read in this process, where OCCT may crash on what is damaged.
+        memory, an object with one as `.wrapped` (build123d, CadQuery), or a list of these: faces,
+        or edges. A shape is copied and read in this process, where OCCT may crash if it is damaged.
     unit : str, optional
-        What the numbers in the file mean, instead of what its header says: um, mm, cm, dm, m, km,
-        mil, in or ft. A shape says none: its numbers are taken for mm.
+        Unit of the numbers in the file, instead of that in its header: um, mm, cm, dm, m, km, mil,
+        in or ft. A shape has no unit: its numbers are in mm by default.
     gap : float m
-        Distance between the ends of two curves that a loop bridges; loose faces (IGES) are sewn
-        together over it.
+        Largest distance between the ends of two curves that a loop bridges, and over which loose
+        faces (IGES) are sewn together.
     outer_towards : (3,), optional
-        Where the outer sides of sheets face, on the whole, in the part. Without it the outer side
-        is the one that lies less deep in the part, of a flat sheet the one that faces up.
+        Direction in the part that the outer sides of sheets face on the whole. By default the outer
+        side is the one that lies less deep in the part, or faces up if the sheet is flat.
     axis : (3,), optional
-        The tool axis of drawings that have none: lines in space of a DXF, STEP or IGES file, a
-        table without axes, or what of a tool path has none.
+        Tool axis for drawings without one: lines in space of a DXF, STEP or IGES file, a table
+        without axes, or moves of a tool path without one.
     columns : mapping of str to str or sequence of str, optional
-        Of a table: how its header names x, y, z, nx, ...; or, without a header, what its columns
-        are, in their order, "-" for one that is not used.
+        For a table: the names in its header of x, y, z, nx, ...; or, without a header, the columns
+        in their order, "-" for one that is not used.
     progress : callable
-        Takes what is being done, and of how many faces; see `kerfpath.progress`.
+        Called with the current step and the number of faces; see `kerfpath.progress`.
 
     Raises
     ------
     InputError
-        No such file, another format than its suffix says, a damaged one, nothing to cut in it,
-        no length unit known, a direction that is none, or something that does not go with it; no
-        shape, an empty one, or one with a point that is not finite.
+        No such file, another format than its suffix says, a damaged file, nothing to cut in it, no
+        known length unit, a direction of length zero, or an argument that does not suit the file;
+        no shape, an empty one, or one with a point that is not finite.
     """
     require_unit(unit)
     scalar(gap, "gap", unit="m", above=0.0)
@@ -116,7 +116,7 @@ def read(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Asked:
-    """How a drawing is to be read: `read` says of each what it is, the gap in m."""
+    """Arguments of `read`, which describes them."""
 
     unit: str | None
     gap: float
@@ -137,10 +137,10 @@ def _direction(value: ArrayLike | None, name: str) -> Direction | None:
 
 
 def content_of(path: Path, expected: str) -> bytes:
-    """Return the bytes of a file, or raise InputError that says what it is expected to be."""
+    """Return the bytes of a file, or raise InputError with the `expected` kind of file."""
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):
-            raise InputError(f"{path}: is no file, which would never end; expected {expected}")
+            raise InputError(f"{path}: is not a regular file; expected {expected}")
         return path.read_bytes()
     except InputError:
         raise
@@ -154,9 +154,9 @@ def content_of(path: Path, expected: str) -> bytes:
 
 
 def _drawn(kind: str, path: Path, content: bytes, asked: _Asked, progress: Progress) -> Part:
-    """Return the part; each reader is loaded when a file asks for it, as OCCT takes over a second.
+    """Return the part; each reader is loaded when it is needed, as OCCT takes over a second.
 
-    OCCT may crash, so STEP and IGES are translated apart from this process.
+    STEP and IGES are translated in another process, because OCCT may crash.
     """
     progress(f"reading {path.name}", 0, 0)
     unit, gap = asked.unit, asked.gap
@@ -200,7 +200,7 @@ def _drawn(kind: str, path: Path, content: bytes, asked: _Asked, progress: Progr
 
 
 def _given(given: object, asked: _Asked, progress: Progress) -> Part:
-    """Return the part that a shape in memory is."""
+    """Return the part in a shape in memory."""
     require_extra("cad", "shape: reading it")
     from kerfpath.cad._given import drawn_of_given
     from kerfpath.cad._shape import occt, uncollected
@@ -209,14 +209,14 @@ def _given(given: object, asked: _Asked, progress: Progress) -> Part:
         with occt(), uncollected():
             drawn = drawn_of_given(given, asked.unit, asked.gap)
             if not drawn.faces and asked.axis is None:
-                raise InputError("it has edges and no face; say the tool axis with axis")
+                raise InputError("it has edges but no face; give the tool axis with axis")
             return _part_of(Path("shape"), drawn, asked, progress)
     except InputError as error:
         raise InputError(f"shape: {error}") from None
 
 
 def _part_of(path: Path, drawn: NamedShape, asked: _Asked, progress: Progress) -> Part:
-    """Return the part that faces, or lines with an axis, make up."""
+    """Return the part made of faces, or of lines with an axis."""
     from kerfpath.cad._faces import part_of
     from kerfpath.cad._wires import part_of_wires
 
@@ -230,7 +230,7 @@ def _part_of(path: Path, drawn: NamedShape, asked: _Asked, progress: Progress) -
 
 
 def _in_words(kind: str, content: bytes, error: InputError) -> InputError:
-    """Return what breaks the grammar of a STEP file that cannot be read, else the error itself."""
+    """Return the fault in the grammar of a STEP file that cannot be read, else the error itself."""
     from kerfpath.cad._part21 import require_grammar
 
     try:

@@ -1,4 +1,4 @@
-"""Round holes among loops."""
+"""Recognise round holes among loops."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from kerfpath._arrays import Array
 __all__ = ["diameter", "may_be_round"]
 
 ROUND = 5e-5
-"""How far (m) a loop may stray from a circle and still be a round hole."""
+"""Largest deviation (m) of a round hole from a circle."""
 FLAT = 0.1
-"""How far a round hole may stray from its mean plane, as a part of its diameter: one drilled into a
-curved sheet does."""
+"""Largest deviation of a round hole from its mean plane, as a share of its diameter; a hole drilled
+into a curved sheet deviates."""
 
 
 LONG = 1.2
-"""Ratio of what a circle as long as a loop encloses to what the loop does: 1.27 of a square."""
+"""Largest ratio of the area of a circle as long as a loop to that of the loop; a square: 1.27."""
 
 
 def may_be_round(length: float, area: float) -> bool:
-    """Return whether a loop of some length encloses as much, nearly, as a circle of that length."""
+    """Return whether a loop encloses nearly as much as a circle of the same length."""
     return length * length <= LONG * 4 * np.pi * area
 
 
 def diameter(points: Array) -> float | None:
-    """Return the diameter (m) of the circle through `points` (K, 3) m, None if they are on none."""
+    """Return the diameter (m) of the circle through `points` (K, 3) m, or None if there is none."""
     centred = points - points.mean(axis=0)
     axes = np.linalg.svd(centred, full_matrices=False)[2]
     x, y, height = (centred @ axes.T).T

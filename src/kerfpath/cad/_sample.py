@@ -1,4 +1,4 @@
-"""Traces of loops: a chain of curves, or points as they came; facts and dense samples."""
+"""Traces of loops: a chain of curves, or given points; their measures and dense samples."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ __all__ = [
 ]
 
 FIRST_CELLS = 4
-"""Cells per smooth stretch to begin with: one could hide an S whose middle lies on its chord."""
+"""First number of cells per smooth stretch: one could hide an S with its middle on its chord."""
 MARGIN = 0.8
-"""Share of the tolerance allowed at the middle of a cell; a curve may stray more beside it."""
+"""Share of the tolerance allowed at the middle of a cell; a curve may deviate more beside it."""
 SHORTEST = 1e-3
-"""Cells below this (mm) are not divided: a crease of the surface turns its normal in no length."""
+"""Cells below this (mm) are not divided, as a crease turns the normal of a surface in no length."""
 MOST = 500_000
-"""Nodes on one edge; a broken edge would ask for them without end."""
+"""Largest number of nodes on one edge; a broken edge would need more without end."""
 AROUND = 24
-"""Points on each edge for what need not be exact: middles, and whether a loop is round."""
+"""Points on each edge for approximate results: middles, and whether a loop is round."""
 
 
 class Curve(Protocol):
@@ -86,11 +86,11 @@ class Trace(Protocol):
 
     @property
     def curves(self) -> Sequence[Curve]:
-        """What it is made of, in the order of travel."""
+        """Its curves, in the order of travel."""
 
     @property
     def is_closed(self) -> bool:
-        """Whether the last of them ends where the first starts."""
+        """Whether the last curve ends where the first starts."""
 
     @property
     def lengths(self) -> Array:
@@ -102,27 +102,27 @@ class Trace(Protocol):
 
     @property
     def around(self) -> Array:
-        """Some points (K, 3) mm all along."""
+        """Some points (K, 3) mm along the whole trace."""
 
     @property
     def area(self) -> Array:
-        """Vector area (3,) mm^2 that the polygon around encloses, if it is closed."""
+        """Vector area (3,) mm^2 of the polygon `around`, if the trace is closed."""
 
     def bounds(self) -> Array:
         """Return the least and greatest coordinates (2, 3) mm."""
 
     def break_at(self) -> str:
-        """Return in words where its largest gap is."""
+        """Return a message on where its largest gap is."""
 
     def sample(self, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
-        """Return points (K, 3) mm and outward normals (K, 3); a closed trace's first ends it not.
+        """Return points (K, 3) mm and outward normals (K, 3); the first point is not repeated.
 
         Parameters
         ----------
         chord_tolerance : float mm
             Largest distance between the chord of two nodes and the edge.
         axis_tolerance : float rad
-            Largest angle between the normals of two nodes that follow each other on an edge.
+            Largest angle between the normals of two consecutive nodes on an edge.
         """
 
 
@@ -135,9 +135,9 @@ class EdgeChain(Generic[E]):
     edges : sequence of Edge
     is_closed : bool
     next_end : str
-        Of an open chain: how far it is to what could follow, and where, for messages.
+        For an open chain: a message on the distance and place of the next end.
     next_away : float mm
-        Of an open chain: how far that is.
+        For an open chain: that distance.
     """
 
     edges: Sequence[E]
@@ -165,12 +165,12 @@ class EdgeChain(Generic[E]):
 
     @cached_property
     def around(self) -> Array:
-        """Points (K, 3) mm all along, as many on each edge."""
+        """Points (K, 3) mm along the whole chain, equally many on each edge."""
         return np.vstack([edge.around for edge in self.edges])
 
     @cached_property
     def area(self) -> Array:
-        """Vector area (3,) mm^2 that a closed chain encloses, of the polygon around it."""
+        """Vector area (3,) mm^2 of the polygon `around`, for a closed chain."""
         return vector_area(self.around)
 
     def bounds(self) -> Array:
@@ -204,7 +204,7 @@ class EdgeChain(Generic[E]):
 
 @dataclass(frozen=True, kw_only=True)
 class Polyline:
-    """The lines through the nodes of `line`, the axis turning evenly along each.
+    """The straight segments between the nodes of `line`; the axis turns evenly along each.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ class Polyline:
 
 @dataclass(frozen=True, kw_only=True)
 class Points:
-    """Points (K, 3) mm and outward normals (K, 3) that are given as they are."""
+    """Given points (K, 3) mm and outward normals (K, 3)."""
 
     points: Array
     normals: Array
@@ -242,17 +242,17 @@ class Points:
 
     @cached_property
     def curves(self) -> Sequence[Curve]:
-        """The lines through them."""
+        """The segments between the points."""
         return [Polyline(line=Contour(self.points, -self.normals, closed=self.is_closed))]
 
     @property
     def gaps(self) -> Array:
-        """No gaps, by nature."""
+        """Always zero: given points have no gaps."""
         return np.zeros(1)
 
     @cached_property
     def around(self) -> Array:
-        """The points, and the middles between them: any three points are on a circle."""
+        """The points and the middles between them, as any three points alone lie on a circle."""
         following = np.roll(self.points, -1, axis=0)
         both = np.stack([self.points, (self.points + following) / 2], axis=1).reshape(-1, 3)
         return both if self.is_closed else both[:-1]
@@ -266,7 +266,7 @@ class Points:
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
 
     def break_at(self) -> str:
-        """Return in words how far its ends lie apart."""
+        """Return a message on how far its ends are apart."""
         first, last = self.points[[0, -1]]
         return (
             f"ends {np.linalg.norm(last - first):.3f} mm from its start, "
@@ -274,7 +274,7 @@ class Points:
         )
 
     def sample(self, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
-        """Return the points and normals; they know nothing between them."""
+        """Return the given points and normals, whatever the tolerances."""
         return self.points, self.normals
 
 
@@ -283,7 +283,12 @@ def sample_curve(
 ) -> tuple[Array, Array, Array]:
     """Return parameters, points and normals along one edge, both ends included, by halving cells.
 
-    Parameters and raises as `Trace.sample`.
+    Parameters are those of `Trace.sample`.
+
+    Raises
+    ------
+    InputError
+        An edge that needs too many nodes.
     """
     stretch = edge.breaks()
     t = np.concatenate(
@@ -317,26 +322,26 @@ def sample_curve(
 
 
 def off_chord(p0: Array, p1: Array, p: Array) -> Array:
-    """Return the distances of `p`, one or as many, from the segments p0 p1."""
+    """Return the distances of `p`, one point or one for each segment, from the segments p0 p1."""
     d = p1 - p0
     along = ((p - p0) * d).sum(1) / np.maximum((d * d).sum(1), np.finfo(float).tiny)
     return np.asarray(np.linalg.norm(p0 + np.clip(along, 0, 1)[:, None] * d - p, axis=1))
 
 
 def _angle(n0: Array, n1: Array) -> Array:
-    """Return the angles between unit vectors, exact also where they are tiny."""
+    """Return the angles between unit vectors, accurate for tiny ones too."""
     return np.asarray(2 * np.arcsin(np.minimum(np.linalg.norm(n1 - n0, axis=1) / 2, 1.0)))
 
 
 def distance(trace: Trace, point: Array) -> float:
-    """Return the distance (mm) of `point` from the chords through the points around a trace."""
+    """Return the distance (mm) of `point` from the chords between the points `around` a trace."""
     off = off_chord(trace.around, np.roll(trace.around, -1, axis=0), point)
     return float((off if trace.gaps.size == len(trace.lengths) else off[:-1]).min())
 
 
 def vector_area(points: Array) -> Array:
     """Return the vector area (3,) that a closed polygon (K, 3) encloses."""
-    middle = points.mean(axis=0)  # about which little is lost of small loops far off
+    middle = points.mean(axis=0)  # about the middle, small loops far away keep their digits
     x, y, z = (points - middle).T
     after = [np.concatenate([values[1:], values[:1]]) for values in (x, y, z)]
     return (

@@ -1,4 +1,4 @@
-"""Loose faces sewn together, body by body."""
+"""Sew loose faces together, body by body."""
 
 from __future__ import annotations
 
@@ -32,9 +32,14 @@ def drawn_of(
     notes: Sequence[str] = (),
     left_out: Sequence[LeftOut] = (),
 ) -> NamedShape:
-    """Return a shape and its faces, sewn within `gap` (m) where there is no solid.
+    """Return a shape and its faces, which are sewn within `gap` (m) if there is no solid.
 
-    It may have lines instead of faces.
+    The shape may have lines instead of faces.
+
+    Raises
+    ------
+    InputError
+        Neither faces nor lines, or no face left after sewing.
     """
     lines = len(list_shapes(shape, EDGE, avoid=FACE))
     if not (faces or lines):
@@ -57,9 +62,9 @@ def drawn_of(
 
 
 def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[NamedFace], str]:
-    """Return the faces with edges shared where they lie within `gap`, and what was done.
+    """Return the sewn shape, its faces, and a note; edges within `gap` (m) are shared.
 
-    Each body is sewn by itself: bodies that touch stay apart.
+    Each body is sewn separately, so that bodies that touch stay apart.
     """
     bodies = bodies_of([named.face for named in faces], gap / MM)
     whole, builder = TopoDS_Compound(), BRep_Builder()
@@ -78,7 +83,7 @@ def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[Na
             shape = solid
         builder.Add(whole, shape)
         joined, free = joined + sewing.NbContigousEdges(), free + sewing.NbFreeEdges()
-        # Sewing turns faces round so that neighbours agree: each is taken as it lies in the result.
+        # Sewing reverses faces so that neighbours agree: take each as oriented in the result.
         sewn = ShapeMap()
         for face in list_shapes(shape, FACE):
             sewn.Add(face)

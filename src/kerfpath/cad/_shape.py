@@ -1,8 +1,7 @@
 """The content of STEP and IGES files: a shape and its named faces.
 
-OCCT crashes on some damaged files, so they are read in a process of its own (`kerfpath.apart`), and
-what was read comes from there as OCCT's own binary text. This module and those that translate are
-all that the process has to import.
+OCCT crashes on some damaged files, so files are read in a separate process (`kerfpath.apart`),
+which returns OCCT's binary format. That process imports only this module and the translators.
 """
 
 from __future__ import annotations
@@ -48,11 +47,11 @@ class NamedFace:
     ----------
     face : TopoDS_Face
     name : str
-        As the file says, "" if it does not.
+        Name in the file, or "".
     component : str
-        The part of an assembly that it belongs to, "" if there is only one.
+        Component of an assembly that the face belongs to, "" if there is only one.
     layer, colour : str
-        As the file says, "" if it does not.
+        Layer and colour in the file, or "".
     """
 
     face: TopoDS_Face
@@ -66,19 +65,19 @@ class NamedFace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NamedShape:
-    """A shape and its faces, each named, as they lie in it.
+    """A shape and its named faces, oriented as in the shape.
 
     Parameters
     ----------
     unit : str
-        Length unit that the file's numbers were taken for; the shape is in mm.
+        Length unit of the numbers in the file; the shape is in mm.
     shape : TopoDS_Shape
     faces : sequence of NamedFace
     notes : sequence of str
     left_out : sequence of LeftOut
-        What is in the file and not in the shape.
+        What is in the file but not in the shape.
     frames : mapping of str to (4, 4) m
-        T_part_frame of the coordinate systems that the file names.
+        T_part_frame of the named coordinate systems of the file.
     """
 
     unit: str
@@ -89,7 +88,7 @@ class NamedShape:
     frames: Mapping[str, Array] = field(default_factory=dict)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what to make it of again, in another process."""
+        """Return what is needed to rebuild the shape in another process."""
         both, faces, builder = TopoDS_Compound(), TopoDS_Compound(), BRep_Builder()
         builder.MakeCompound(faces)
         for named in self.faces:
@@ -127,13 +126,13 @@ def _copy_with_names(
 
 
 def children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
-    """Return what a shape is directly made of."""
+    """Return the direct sub-shapes of a shape."""
     return list(_each(TopoDS_Iterator(shape)))
 
 
 @contextmanager
 def uncollected() -> Iterator[None]:
-    """Keep Python from looking for cycles while very many things are made that have none."""
+    """Pause garbage collection while very many objects without cycles are created."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -145,7 +144,7 @@ def uncollected() -> Iterator[None]:
 
 @contextmanager
 def occt() -> Iterator[None]:
-    """Keep OCCT's own messages off the terminal, and put its failures in one line."""
+    """Keep OCCT's messages off the terminal, and turn its failures into one-line errors."""
     messenger = Message.DefaultMessenger_s()
     printers = list(messenger.Printers())
     messenger.ChangePrinters().Clear()
@@ -166,7 +165,7 @@ def list_shapes(
     kind: TopAbs_ShapeEnum,
     avoid: TopAbs_ShapeEnum = TopAbs_ShapeEnum.TopAbs_SHAPE,
 ) -> list[TopoDS_Shape]:
-    """Return the faces, edges, ... of a shape, without those in what is to `avoid`."""
+    """Return the sub-shapes of a `kind` in a shape, without those inside shapes to `avoid`."""
     return list(_each(TopExp_Explorer(shape, kind, avoid)))
 
 
@@ -187,7 +186,7 @@ def _each(shapes: TopExp_Explorer | TopoDS_Iterator) -> Iterator[TopoDS_Shape]:
 
 
 def unique(names: list[str]) -> list[str]:
-    """Return `names` with a number behind each repeated one."""
+    """Return `names` with a number appended to each repeated one."""
     taken, unique = set(names), []
     seen: set[str] = set()
     for name in names:

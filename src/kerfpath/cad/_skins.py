@@ -1,4 +1,4 @@
-"""Skins: faces that go on smoothly into each other, their loops, and the two sides of a sheet."""
+"""Skins: faces that join smoothly, their loops, and the two sides of a sheet."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from kerfpath.cad._sample import EdgeChain
 __all__ = ["SMOOTH", "Skin", "skins_of"]
 
 SMOOTH = float(np.radians(2.0))
-"""Faces whose normals differ by less (rad) all along their shared edge belong to one skin."""
+"""Faces whose normals differ by less (rad) along their whole shared edge belong to one skin."""
 OPPOSITE = 0.2
-"""How far the vector areas of a sheet's two sides may be from cancelling, as a part of an area;
-by how much the areas may differ."""
+"""How far the vector areas of a sheet's two sides may be from cancelling, as a share of an area,
+and how much the areas may differ."""
 THIN = 0.2
-"""A sheet is thinner than this part of the square root of its area."""
+"""A sheet is thinner than this share of the square root of its area."""
 EVEN, UNSURE = 0.01, 0.1
-"""By how much two sides differ in depth, as a share of both together: below the first, they are
-distinguished by where they face; below the second, a note says that it is not certain."""
+"""Differences of the depths of two sides, as shares of their sum: below the first, their direction
+distinguishes them; below the second, a note says that the outer side is not certain."""
 FLATNESS = 1e-3
-"""Sides that lie less deep in a sheet than this part of the square root of its area are flat."""
+"""Sides that lie less deep in a sheet than this share of the square root of its area are flat."""
 LEANING = 0.05
-"""Share of its area that a side must show to where the outer one is said to face."""
+"""Share of its area that a side must show in the direction given for the outer side."""
 LEVEL = 1e-4
-"""Share of a vector area below which one of its coordinates is none."""
+"""Coordinates of a vector area below this share of its length count as zero."""
 NOWHERE = 1e9
-"""Place (mm) of what has no loops, far from all that has."""
+"""Place (mm) of skins without loops, far from all others."""
 HOLE = -0.25
 """Cosine between a loop's vector area and its mean normal below which it runs about a hole: for
 holes it is near -1, for a trim line near 1, for the rim of a tube near 0."""
@@ -45,18 +45,18 @@ holes it is near -1, for a trim line near 1, for the rim of a tube near 0."""
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Skin:
-    """Faces that go on smoothly into each other.
+    """Faces that join smoothly.
 
     Parameters
     ----------
     faces : tuple of int
-        Numbers of the faces.
+        Indices of the faces.
     side : {"outer", "inner", "edge", ""}
-        Of a sheet; "" if it is none.
+        Side of a sheet; "" if it is no sheet.
     inside : set of (int, int, int)
-        Face, loop and edge numbers of what lies inside the skin, and is no cut.
+        Face, loop and edge numbers of the edges inside the skin, which are not cut.
     doubt : str
-        Why `side` might be the other one; "" where it is sure.
+        Why `side` might be the other one; "" if it is certain.
     """
 
     faces: tuple[int, ...]
@@ -79,7 +79,7 @@ class Skin:
         chains = [EdgeChain(edges=edges) for edges in join_runs(runs)]
         loops = [(_is_hole(chain), chain) for chain in chains]
         if loops and all(hole for hole, _ in loops):
-            # A trim line may face away from its sheet, as that of a C-shaped channel does.
+            # A trim line may face away from its sheet, as on a C-shaped channel.
             longest = max(loops, key=lambda loop: float(loop[1].lengths.sum()))
             loops = [(hole and loop is not longest[1], loop) for hole, loop in loops]
         return [("inner" if hole else "outer", loop) for hole, loop in loops]
@@ -96,9 +96,9 @@ def skins_of(
     ----------
     faces : sequence of TopoDS_Face
     found : sequence of list of FaceLoop
-        The loops of each.
+        The loops of each face.
     outer_towards : (3,), optional
-        Where the outer sides of sheets face, on the whole, instead of what their shape says.
+        Direction that the outer sides of sheets face on the whole; default: by their shape.
     """
     uses = _uses(found)
     pairs = [(a, b) for at in uses if len(at) == 2 for a, b in [at] if a[0] != b[0]]
@@ -138,7 +138,7 @@ def _numbers(loop: EdgeChain[OrientedEdge]) -> range:
 
 def _is_smooth(a: OrientedEdge, b: OrientedEdge) -> bool:
     most = 2 * np.sin(SMOOTH / 2)
-    for end, normal in a.end_normals.items():  # most edges are sharp, and so where they end
+    for end, normal in a.end_normals.items():  # most edges are sharp, at their ends too
         if end in b.end_normals and np.linalg.norm(normal - b.end_normals[end]) > most:
             return False
     t = np.linspace(a.start, a.end, 5)
@@ -147,7 +147,7 @@ def _is_smooth(a: OrientedEdge, b: OrientedEdge) -> bool:
 
 
 def _outside(edges: Sequence[OrientedEdge], inside: list[bool]) -> list[list[OrientedEdge]]:
-    """Return the stretches of a closed loop that are no inside edges."""
+    """Return the stretches of a closed loop without its inside edges."""
     if not any(inside):
         return [list(edges)]
     runs: list[list[OrientedEdge]] = []
@@ -181,9 +181,9 @@ def _sides(
     whole: Ints,
     outer_towards: Array | None,
 ) -> list[tuple[Side, str]]:
-    """Return which side of a sheet each skin is: opposite ones, large and close, are a sheet's.
+    """Return which side of a sheet each skin is, and why it might be the other one, or "".
 
-    With it goes why it might be the other one, "" where that is sure.
+    Two opposite skins that are large and close are the sides of a sheet.
     """
     weights = [weighed(face) for face in faces]
     areas = np.array([sum(weights[f][0] for f in numbers) for numbers in members])
@@ -232,9 +232,9 @@ def _sides(
 
 
 def _beside(low: Array, high: Array, areas: Array) -> list[Ints]:
-    """Return for each skin those of at least nearly its area that may be as close as a sheet's.
+    """Return for each skin the others, not much smaller, that are close enough for a sheet.
 
-    Skins of about one size are looked up together, by the middles of their boxes (K, 3).
+    Skins of similar size are looked up together, by the middles of their boxes (K, 3).
     """
     has_loops = np.asarray((low <= high).all(axis=1))
     middle = np.where(has_loops[:, None], (low + high) / 2, NOWHERE)
@@ -257,9 +257,10 @@ def _beside(low: Array, high: Array, areas: Array) -> list[Ints]:
 def _is_outer(
     depths: Sequence[float], vector: Array, area: float, outer_towards: Array | None
 ) -> tuple[bool, str]:
-    """Return whether a side of a sheet is its outer one, and why that is not certain.
+    """Return whether a side of a sheet is its outer one, and why that is not certain, or "".
 
-    ``depths`` (mm) are its own and the other's, ``vector`` (3,) mm^2 and ``area`` mm^2 its own.
+    ``depths`` (mm) are those of this side and of the other one, ``vector`` (3,) mm^2 and ``area``
+    mm^2 are the areas of this side.
     """
     if outer_towards is not None:
         along = float(vector @ outer_towards)
@@ -272,20 +273,20 @@ def _is_outer(
     is_even = abs(share) < EVEN
     chosen = "the one that faces up" if is_even else "the one that lies less deep"
     doubt = (
-        f"its sides lie {min(depths):.1f} and {max(depths):.1f} mm deep in it, on the mean; "
-        f"taken is {chosen}"
+        f"its sides lie {min(depths):.1f} and {max(depths):.1f} mm deep in it on average; "
+        f"{chosen} is taken"
     )
     return (_faces_up(vector) if is_even else share > 0), doubt if abs(share) < UNSURE else ""
 
 
 def _usual_distance(a: Array, b: Array) -> float:
-    """Return how far points (K, 3) usually are from the nearest of others."""
+    """Return the median distance of points (K, 3) from the nearest of others."""
     if not len(a) or not len(b):
         return float("inf")
     return float(np.median(cKDTree(b).query(a)[0]))
 
 
 def _faces_up(vector: Array) -> bool:
-    """Return whether a vector area points up, along +z; if it is level, along +y, then +x."""
+    """Return whether a vector area points towards +z or, if it is level, towards +y, then +x."""
     level = LEVEL * np.linalg.norm(vector)
     return bool(next((v > 0 for v in vector[::-1] if abs(v) > level), True))

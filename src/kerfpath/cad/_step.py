@@ -1,4 +1,4 @@
-"""Read STEP files: length units, placements, face names, and a clear word for every bad file."""
+"""Read STEP files: length units, placements, face names, and a clear error for every bad file."""
 
 from __future__ import annotations
 
@@ -45,20 +45,20 @@ HEADER_UNITS = {
     "inch": "in",
     "foot": "ft",
 }
-"""The same units as STEP headers spell them, in lower case."""
+"""Units by their names in STEP headers, in lower case."""
 
 STARTS = re.compile(rb"#\d+\s*=")
-"""How entities start."""
+"""Start of an entity."""
 
 
 def read_step(path: Path, unit: str | None, gap: float) -> NamedShape:
-    """Return what a STEP file (AP203, AP214, AP242) holds, its placements applied.
+    """Return the content of a STEP file (AP203, AP214, AP242), with its placements applied.
 
     Raises
     ------
     InputError
         Not a STEP file, a truncated or damaged one, one without faces, or one whose header declares
-        no single unit while `unit` is not given: what of it, without the name of the file.
+        no single unit while `unit` is not given. The message lacks the name of the file.
     """
     content = path.read_bytes()
     _require_whole(content)
@@ -81,13 +81,13 @@ def _require_whole(text: bytes) -> None:
 
 def _read(path: Path, content: bytes, unit: str | None, gap: float) -> NamedShape:
     reader = STEPControl_Reader()
-    # Else OCCT moves the part by a coordinate system that stands beside its solids.
+    # Otherwise OCCT moves the part by a coordinate system that is listed with its solids.
     Interface_Static.SetIVal_s("read.step.root.transformation", 0)
     if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise InputError("the file cannot be parsed; export the part as STEP again")
     model = reader.WS().Model()
     if model.NbEntities() != len(STARTS.findall(content)):
-        require_grammar(content)  # which says what OCCT has passed over, if anything
+        require_grammar(content)  # reports what OCCT has skipped, if anything
     del content
     entities = Entities(model)
     left_out, has_styles = damaged(reader)
@@ -95,14 +95,14 @@ def _read(path: Path, content: bytes, unit: str | None, gap: float) -> NamedShap
     if unit is None and header not in UNITS_MM:
         raise InputError(
             f"the header declares {header or 'no length unit'}, expected one of "
-            f"{', '.join(UNITS_MM)}; say what the numbers mean with unit="
+            f"{', '.join(UNITS_MM)}; give the unit of the numbers with unit="
         )
     require_drawable(entities, UNITS_MM[unit or header])
     notes = [] if has_styles else ["colours and layers are damaged and not read"]
     if unit is not None and unit != header:
-        # OCCT scales by the header's unit over this one: what it takes for mm is then `unit`.
+        # OCCT scales by the header's unit divided by this one, so its mm are `unit` then.
         reader.SetSystemLengthUnit(UNITS_MM.get(header, 1.0) / UNITS_MM[unit])
-        notes.append(f"unit {unit} as asked; the header says {header or 'nothing'}")
+        notes.append(f"unit {unit} as given; the header says {header or 'nothing'}")
     reader.TransferRoots()
     shape = reader.OneShape()
     left_out += lost_faces(reader, entities)
@@ -120,10 +120,9 @@ def _faces(
     layers: Mapping[object, str],
     colours: Mapping[object, str],
 ) -> Iterator[NamedFace]:
-    """Yield every face with its name; in an assembly with that of its component, numbered.
+    """Yield every face with its name and, in an assembly, the numbered name of its component.
 
-    A face has the layer and the colour that it is given, else those of its shell, solid or
-    component.
+    A face has its own layer and colour, or else those of its shell, solid or component.
     """
     components: list[tuple[str, list[NamedFace]]] = [("", [])]
 

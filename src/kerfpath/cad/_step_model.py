@@ -1,7 +1,7 @@
-"""The entities of a STEP file as OCCT holds them: which are damaged, and what became of them.
+"""Entities of a STEP file in OCCT: which are damaged, and which shapes were made from them.
 
-OCCT makes shapes of most entities, also of some that fail its own checks. What fails, and each
-face that no shape was made of, is counted, so that nothing is left out without a word.
+OCCT makes shapes from most entities, also from some that fail its own checks. Entities that fail,
+and faces without a shape, are counted, so that nothing is left out without a note.
 """
 
 from __future__ import annotations
@@ -53,17 +53,17 @@ __all__ = [
 ]
 
 ALONE = (TopAbs_ShapeEnum.TopAbs_FACE, TopAbs_ShapeEnum.TopAbs_SHELL)
-"""What no component of an assembly is."""
+"""Kinds of shapes that are never a component of an assembly."""
 STYLES = "StepVisual"
 UNNAMED = ("", "none")
-"""What CAD systems write for an item without a name, in lower case."""
+"""Names that CAD systems write for items without a name, in lower case."""
 DRAWN = ("StepGeom", "StepShape")
-"""How the names of OCCT's classes begin, by what entities are for."""
+"""Prefixes of OCCT's classes for entities that are drawn."""
 E = TypeVar("E", bound=Standard_Transient)
 
 
 class Entities:
-    """The entities of a model by their kind, looked through once.
+    """The entities of a model by their kind, listed once.
 
     Parameters
     ----------
@@ -84,13 +84,13 @@ class Entities:
 
 
 def require_drawable(entities: Entities, mm: float) -> None:
-    """Raise InputError for what OCCT crashes on, or spends minutes on.
+    """Raise InputError for entities on which OCCT crashes or spends minutes.
 
     Parameters
     ----------
     entities : Entities
     mm : float
-        Of the unit that coordinates have.
+        The unit of coordinates, in mm.
     """
     for point in entities.of(StepGeom_CartesianPoint):
         here = [point.CoordinatesValue(k) * mm for k in range(1, point.NbCoordinates() + 1)]
@@ -108,12 +108,12 @@ def require_drawable(entities: Entities, mm: float) -> None:
 
 
 def damaged(reader: STEPControl_Reader) -> tuple[list[LeftOut], bool]:
-    """Return what fails OCCT's checks, and whether styles do not.
+    """Return the entities that fail OCCT's checks, and whether all styles pass them.
 
     Raises
     ------
     InputError
-        The file as a whole fails them.
+        The whole file fails them.
     """
     model = reader.WS().Model()
     found: Counter[tuple[str, str, bool]] = Counter()
@@ -130,7 +130,7 @@ def damaged(reader: STEPControl_Reader) -> tuple[list[LeftOut], bool]:
 
 
 def lost_faces(reader: STEPControl_Reader, entities: Entities) -> list[LeftOut]:
-    """Return the faces of the file of which no shape was made."""
+    """Return the faces of the file that OCCT made no shape from."""
     process = reader.WS().TransferReader().TransientProcess()
     found: Counter[tuple[str, str, bool]] = Counter()
     for face in entities.of(StepShape_FaceSurface):
@@ -141,7 +141,7 @@ def lost_faces(reader: STEPControl_Reader, entities: Entities) -> list[LeftOut]:
 
 
 def name_of(entity: object) -> str:
-    """Return the name of an item that something was read from, "" if it has none."""
+    """Return the name of an item, "" if it has none."""
     if not isinstance(entity, StepRepr_RepresentationItem) or entity.Name() is None:
         return ""
     name = entity.Name().ToCString().strip()
@@ -149,7 +149,7 @@ def name_of(entity: object) -> str:
 
 
 def outside_components(entities: Entities) -> Iterator[StepRepr_Representation]:
-    """Yield the representations that lie in the part's own frame: not those of its components."""
+    """Yield the representations in the part's own frame, without those of its components."""
     uses = list(entities.of(StepRepr_NextAssemblyUsageOccurrence))
     components = {use.RelatedProductDefinition() for use in uses}
     drawn = _representations(entities)
@@ -160,12 +160,12 @@ def outside_components(entities: Entities) -> Iterator[StepRepr_Representation]:
 
 
 class Origins:
-    """Which entity each shape was made of.
+    """The entity that each shape was made from.
 
     Parameters
     ----------
     reader : STEPControl_Reader
-        That has made the shapes.
+        The reader that made the shapes.
     entities : Entities
     """
 
@@ -187,17 +187,17 @@ class Origins:
                 self._entities.append(entity)
 
     def of(self, shape: TopoDS_Shape) -> Standard_Transient | None:
-        """Return what a shape was drawn as, wherever it is placed; None if as nothing by itself."""
+        """Return the entity of a shape, wherever it is placed, or None if it has none."""
         number = self._shapes.FindIndex(_unplaced(shape))
         return self._entities[number - 1] if number else None
 
     def product_of(self, shape: TopoDS_Shape) -> StepBasic_ProductDefinition | None:
-        """Return the product of which a shape is all, in an assembly; None if it is of none."""
+        """Return the product in an assembly whose whole shape this is, or None."""
         if not self._is_assembly or shape.ShapeType() in ALONE:
             return None
         product = self._products.get(self.of(shape))
         if product is None:
-            # OCCT looks through all that it has made: it is asked once for each assembly.
+            # OCCT searches everything that it has made, so it is asked once for each shape.
             number = self._asked.Add(_unplaced(shape))
             if number > len(self._answers):
                 used = self._reader.EntityFromShapeResult(shape, -1)
@@ -211,7 +211,7 @@ class Origins:
 def _products(
     entities: Entities,
 ) -> dict[Standard_Transient | None, StepBasic_ProductDefinition]:
-    """Return the products of an assembly by what alone makes up the shape of each."""
+    """Return the products of an assembly by their solid, if it is their whole shape."""
     found: dict[Standard_Transient | None, StepBasic_ProductDefinition] = {}
     for representation, product in _representations(entities).items():
         numbers = range(1, representation.NbItems() + 1)
@@ -236,7 +236,7 @@ def _representations(
             drawn[shape.UsedRepresentation()] = product
     for same in entities.of(StepRepr_ShapeRepresentationRelationship):
         if type(same) is not StepRepr_ShapeRepresentationRelationship:
-            continue  # one that places the one in the other
+            continue  # a subtype that places one in the other
         for one, other in ((same.Rep1(), same.Rep2()), (same.Rep2(), same.Rep1())):
             if one in drawn and other is not None:
                 drawn.setdefault(other, drawn[one])

@@ -1,4 +1,4 @@
-"""Colours and layers in STEP files, by the entities that they are given to."""
+"""Colours and layers in STEP files, by entity."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ COLOURS = {
     "#FF00FF": "magenta",
     "#FFFFFF": "white",
 }
-"""Those that DXF drawings name, too."""
+"""Colours that have names in DXF drawings, too."""
 
 
 def styles_in(entities: Entities) -> tuple[dict[object, str], dict[object, str]]:
-    """Return the layer and the colour that entities are given.
+    """Return the layers and the colours of entities.
 
-    An entity is the same object wherever OCCT gives it, as long as one of these holds it.
+    OCCT always returns the same object for an entity, as long as one of these mappings holds it.
     """
     layers: dict[object, str] = {}
     colours: dict[object, str] = {}

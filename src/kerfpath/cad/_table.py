@@ -1,4 +1,4 @@
-"""Read tables of points and axes: CSV, TSV and the like, with or without a header."""
+"""Read tables of points and axes (CSV, TSV and similar), with or without a header."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ QUATERNION = ("qx", "qy", "qz", "qw")
 NAME = "contour"
 KNOWN = (*POSITION, *NORMAL, *AXIS, *QUATERNION, NAME)
 UNUSED = "-"
-"""What stands for a column that is not used."""
+"""Name of a column that is not used."""
 UNIT = re.compile(r"[_\[( ]\s*([a-z]+)\s*[\])]?$")
 """The unit at the end of the name of a column."""
 UNNAMED = {6: POSITION + NORMAL, 7: POSITION + QUATERNION}
-"""What the columns are where no header says, by their number."""
+"""Columns of a table without a header, by their number."""
 EXPECTED = (
     "x y z, then nx ny nz (outward normal), axis_x axis_y axis_z (tool axis) or qx qy qz qw (pose, "
     "its z the tool axis)"
 )
 UNIT_QUATERNION = 1e-2
-"""How far a quaternion's length may be from one: rounded digits pass, other columns fail."""
+"""Largest deviation of a quaternion's length from one: rounded digits pass, other columns fail."""
 
 
 def read_table(
@@ -51,23 +51,23 @@ def read_table(
 ) -> Part:
     """Return the contours of a table of points, one per name in its column `contour`.
 
-    The tool axis (3,) is that of points whose columns have none; `columns` as in `cad.read`.
+    `axis` (3,) is the tool axis of tables without columns for it; `columns` is as in `cad.read`.
 
     Raises
     ------
     InputError
-        Anything wrong with a row (its line is named), columns that are not known, no unit known.
+        Anything wrong with a row (its line is named), unknown columns, or no known unit.
     """
     try:
         names, declared, table = _rows(cells_of(content, EXPECTED), columns, axis is not None)
         if not (unit or declared):
             raise InputError(
-                f"states no length unit; say it with unit= one of {', '.join(UNITS_MM)}, "
+                f"states no length unit; give it with unit= one of {', '.join(UNITS_MM)}, "
                 "or in the header, as x_mm"
             )
         notes = []
         if unit and declared and unit != declared:
-            notes.append(f"unit {unit} as asked; the header says {declared}")
+            notes.append(f"unit {unit} as given; the header says {declared}")
         if unknown := [name for name in names if name not in (*KNOWN, UNUSED)]:
             notes.append(f"columns not used: {', '.join(unknown)}")
         points, normals = _numbers(names, table, UNITS_MM[unit or declared], axis)
@@ -101,7 +101,7 @@ def _rows(
     else:
         raise InputError(
             f"line {table.lines[0]}: without a header expected 6 columns (x y z nx ny nz) or 7 "
-            f"(x y z qx qy qz qw), got {count}; say what they are with columns"
+            f"(x y z qx qy qz qw), got {count}; name them with columns"
         )
     if not table.rows:
         raise InputError("holds a header but no rows of points")
@@ -110,7 +110,7 @@ def _rows(
 
 
 def _renamed(table: TableCells, given: Mapping[str, str]) -> TableCells:
-    """Return the table with the columns of its header called as they are here."""
+    """Return the table with the columns of its header renamed to the names known here."""
     header = [cell.strip("\"' ") for cell in table.rows[0]]
     chosen: dict[int, str] = {}
     for name, theirs in given.items():
@@ -138,7 +138,7 @@ def _renamed(table: TableCells, given: Mapping[str, str]) -> TableCells:
 def _in_order(
     table: TableCells, names: Sequence[str], has_axis: bool
 ) -> tuple[tuple[str, ...], str, TableCells]:
-    """Return the columns as they are named in order, no unit, and the rows, without a header."""
+    """Return the given names of the columns, no unit, and the rows without a header."""
     if unknown := [name for name in names if name not in (*KNOWN, UNUSED)]:
         raise InputError(
             f"columns: expected names of {' '.join(KNOWN)}, or {UNUSED}, got {unknown[0]!r}"
@@ -159,13 +159,13 @@ def _require_columns(columns: Sequence[str], has_axis: bool) -> None:
     has_axes = has_axis or any(set(axes) <= set(columns) for axes in (NORMAL, AXIS, QUATERNION))
     if not (set(POSITION) <= set(columns) and has_axes):
         raise InputError(
-            f"expected columns {EXPECTED}; got {' '.join(columns)}; say with columns which of "
-            "them are these, and with axis the tool axis where there is none"
+            f"expected columns {EXPECTED}; got {' '.join(columns)}; map their names with columns, "
+            "and give the tool axis with axis if there is none"
         )
 
 
 def _header(table: TableCells, has_axis: bool) -> tuple[tuple[str, ...], str]:
-    """Return the names of the columns and their unit, nothing if the first row is numbers."""
+    """Return the names of the columns and their unit, or nothing if the first row is numbers."""
     if table.is_numbers(0):
         return (), ""
     columns, units = [], []
@@ -186,7 +186,7 @@ def _header(table: TableCells, has_axis: bool) -> tuple[tuple[str, ...], str]:
 def _numbers(
     columns: Sequence[str], table: TableCells, mm: float, axis: Array | None
 ) -> tuple[Array, Array]:
-    """Return points (K, 3) mm and outward unit normals (K, 3); an axis where no columns say it."""
+    """Return points (K, 3) mm and outward unit normals (K, 3), by `axis` if no columns have it."""
     at = {name: k for k, name in enumerate(columns)}
     axes = next((a for a in (AXIS, NORMAL, QUATERNION) if set(a) <= set(at)), ())
     wanted = [at[name] for name in (*POSITION, *axes)]
@@ -232,7 +232,7 @@ def _contours(columns: Sequence[str], table: TableCells) -> Iterator[tuple[str, 
     for name, group in groupby(row[column] for row in table.rows):
         last = first + len(list(group))
         if not name or name in seen:
-            what = f"rows of contour {name!r} stand apart" if name else "no name of a contour"
+            what = f"rows of contour {name!r} are separated" if name else "no name of a contour"
             raise InputError(f"line {table.lines[first]}: {what}; put its rows together")
         seen.add(name)
         yield name, slice(first, last)

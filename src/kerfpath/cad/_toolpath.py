@@ -1,4 +1,4 @@
-"""Contours of a tool path: each run of feed moves between two rapid moves is one."""
+"""Contours of a tool path: one for each run of feed moves between two rapid moves."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ __all__ = [
 
 Triple = tuple[float, float, float]
 UNKNOWN = "the word is not known, and may change the path"
-"""Why a word is refused that no reader knows."""
+"""Why an unknown word is refused."""
 ALONG = float(np.radians(1.0))
-"""A move that leaves the tool axis by less cuts nothing beside its start: approach or retract."""
+"""rad: a move closer to the tool axis than this cuts nothing new: an approach or retract."""
 UNIT_AXIS = 1e-2
-"""How far the length of an axis may be from one: rounded digits pass, angles do not."""
+"""Largest deviation of the length of an axis from one: rounded digits pass, angles do not."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,15 +50,16 @@ class Move:
     Parameters
     ----------
     line : int
+        Line in the file.
     kind : {"feed", "rapid", "away", "begin"}
-        At feed; rapidly, or a place that is set; to a place that the file does not say; or no
-        move: an operation begins, wherever the tool comes from.
+        A feed move; a rapid move or a set position; a move to a position that is not in the file;
+        or no move, but the begin of an operation, wherever the tool comes from.
     point : (3,) or None
-        Where the tip goes.
+        Target of the tip.
     axis : (3,) or None
-        Unit vector from the tip towards the spindle; None where the file says none.
+        Unit vector from the tip towards the spindle; None if the file has none.
     operation : str
-        What the file calls what is done.
+        Name of the operation in the file.
     """
 
     line: int
@@ -72,7 +73,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolPath:
-    """The moves of a file, the unit that it states ("" for none), notes, and words not used."""
+    """The moves of a file, its unit ("" for none), notes, and the words that are not used."""
 
     moves: Sequence[Move]
     unit: str
@@ -83,7 +84,7 @@ class ToolPath:
 
 
 class Tip:
-    """The tip of a tool as a program for a machine moves it: what a block leaves out stays."""
+    """The tip of a tool, moved by the program of a machine; what a block leaves out is kept."""
 
     def __init__(self) -> None:
         self.moves: list[Move] = []
@@ -91,18 +92,18 @@ class Tip:
         self._axis: Triple | None = None
 
     def go(self, line: int, *, feed: bool, place: dict[str, float], axis: Triple | None) -> None:
-        """Move to a place of coordinates "X", "Y", "Z", some of them or none.
+        """Move to `place`, of which any of the coordinates "X", "Y" and "Z" may be missing.
 
         Raises
         ------
         InputError
-            At feed, a coordinate that was never said.
+            A feed move with a coordinate that was never given.
         """
         self._place |= place
         self._axis = axis or self._axis
         unknown = [name for name in "XYZ" if name not in self._place]
         if unknown and feed:
-            raise InputError(f"line {line}: a move at feed, and {unknown[0]} was not said before")
+            raise InputError(f"line {line}: a move at feed, but {unknown[0]} was not given before")
         if unknown:
             self.moves.append(Move(line=line, kind="away"))
             return
@@ -111,35 +112,35 @@ class Tip:
         self.moves.append(Move(line=line, kind=kind, point=point, axis=self._axis))
 
     def go_away(self, line: int) -> None:
-        """Move to a place that is not said in the part."""
+        """Move to a position that is not known in the part."""
         self._place, self._axis = {}, None
         self.moves.append(Move(line=line, kind="away"))
 
     def forget(self, line: int) -> None:
-        """Take places for unknown from here on, as those before mean something else."""
+        """Forget the position, because earlier coordinates have another meaning from here on."""
         if self.moves:
             self.go_away(line)
 
     @property
     def has_places(self) -> bool:
-        """Whether a place in the part was said."""
+        """Whether any position in the part was given."""
         return any(move.point is not None for move in self.moves)
 
 
 def lines_of(content: bytes) -> list[str]:
-    """Return the lines of a file; letters in no known code, as in comments, are replaced."""
+    """Return the lines of a file; characters that cannot be decoded are replaced."""
     wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     text = content.decode("utf-16" if wide else "utf-8-sig", errors="replace")
     return re.split(r"\r\n|\r|\n", text)
 
 
 def finite(text: str, where: str) -> float:
-    """Return a number as CAM systems write it, with the exponents of Fortran.
+    """Return a finite number as CAM systems write it, also with the exponents of Fortran.
 
     Raises
     ------
     InputError
-        Something else; `where` says which number.
+        Something else; the message begins with `where`.
     """
     try:
         value = float("_" if "_" in text else text.upper().replace("D", "E"))
@@ -151,12 +152,12 @@ def finite(text: str, where: str) -> float:
 
 
 def unit_axis(vector: Triple, where: str, *, any_length: bool = False) -> Triple:
-    """Return a tool axis at length one; without `any_length` it must nearly have it.
+    """Return a tool axis at length one; without `any_length` its length must be nearly one.
 
     Raises
     ------
     InputError
-        No direction, or a vector of another length, which is none.
+        A vector of length zero, or of another length than one.
     """
     size = max(map(abs, vector))
     if size == 0:
@@ -178,27 +179,27 @@ def part_of_tool_path(
     path : Path
     tool_path : ToolPath
     unit : str or None
-        What its numbers mean, instead of what it says.
+        Unit of its numbers, instead of the one that the file states.
     gap : float m
-        Largest distance between the ends of a cut over which it is closed.
+        Largest distance between the ends of a closed cut.
     axis : (3,) or None
-        The tool axis, into the part, where the file says none.
+        The tool axis, into the part, where the file has none.
 
     Raises
     ------
     InputError
-        No unit or no tool axis known, no cut, a cut from a place that is not known, or one that
-        is no contour (its line is named).
+        No known unit or tool axis, no cut, a cut from an unknown position, or one that is no
+        contour (its line is named).
     """
     if not (unit or tool_path.unit):
-        raise InputError(f"states no length unit; say it with unit= one of {', '.join(UNITS_MM)}")
+        raise InputError(f"states no length unit; give it with unit= one of {', '.join(UNITS_MM)}")
     notes = list(tool_path.notes)
     if tool_path.unused:
         notes.append(f"words not used: {', '.join(sorted(tool_path.unused))}")
     if unit and tool_path.unit and unit != tool_path.unit:
-        notes.append(f"unit {unit} as asked; the file says {tool_path.unit}")
+        notes.append(f"unit {unit} as given; the file says {tool_path.unit}")
     if axis is not None and all(move.axis for move in tool_path.moves if move.kind == "feed"):
-        raise InputError("axis: expected a tool path without tool axes; this one says them")
+        raise InputError("axis: expected a tool path without tool axes, but this one has them")
     loops: list[Loop] = []
     holes = 0
     for run in _runs(tool_path.moves):
@@ -214,7 +215,7 @@ def part_of_tool_path(
         _require_across(points[inner], normals[inner], lines[inner])
         notes += [f"contour {name!r}: {what}" for what in repaired]
         if first == 0 and run[0].kind == "feed":
-            notes.append(f"contour {name!r} begins in line {run[0].line}: no place before it")
+            notes.append(f"contour {name!r} begins in line {run[0].line}: no position before it")
         kind = kind_of_points(trace)
         loops.append(
             loop_of(
@@ -222,11 +223,11 @@ def part_of_tool_path(
                 layer=run[-1].operation,
             )
         )  # fmt: skip
-    none = Counter({("feed move", "along the tool axis alone, as of a hole", True): holes})
+    none = Counter({("feed move", "along the tool axis only, as for a hole", True): holes})
     left_out = counted(+none)
     if not loops:
         why = f" ({left_out[0]})" if left_out else ""
-        raise InputError(f"holds no cut{why}; expected feed moves from place to place")
+        raise InputError(f"holds no cut{why}; expected feed moves across the tool axis")
     return part_without_faces(
         path, unit or tool_path.unit, loops, gap=gap,
         notes=[*notes, *map(str, left_out)], left_out=left_out,
@@ -234,7 +235,7 @@ def part_of_tool_path(
 
 
 def _runs(moves: Sequence[Move]) -> list[list[Move]]:
-    """Return the feed moves that follow each other, each run after the place it starts from."""
+    """Return the runs of consecutive feed moves, each with the position that it starts from."""
     runs: list[list[Move]] = []
     before: Move | None = None
     for move in moves:
@@ -248,7 +249,7 @@ def _runs(moves: Sequence[Move]) -> list[list[Move]]:
             else:
                 raise InputError(
                     f"line {move.line}: a move at feed from a place that is not known, after "
-                    f"line {before.line}; let a rapid move come before it"
+                    f"line {before.line}; put a rapid move before it"
                 )
         before = move
     return runs
@@ -264,7 +265,7 @@ def _arrays(run: Sequence[Move], mm: float, axis: Array | None) -> tuple[Array, 
             normals.append(-axis / np.linalg.norm(axis))
         else:
             raise InputError(
-                f"line {move.line}: no tool axis is known here; say it in the file, or with axis"
+                f"line {move.line}: no tool axis is known here; give it in the file, or with axis"
             )
     points = np.array([move.point for move in run]) * mm
     if (far := np.flatnonzero((np.abs(points) > LARGEST).any(axis=1))).size:
@@ -276,7 +277,7 @@ def _arrays(run: Sequence[Move], mm: float, axis: Array | None) -> tuple[Array, 
 
 
 def _along(points: Array, normals: Array) -> Array:
-    """Return of each move (K - 1,) whether the tip stays on its own axis; no move stays, too."""
+    """Return for each move (K - 1,) whether it is along the tool axis, or has no length."""
     steps = np.diff(points, axis=0)
     length = np.linalg.norm(steps, axis=1)
     aside = np.maximum(
@@ -287,7 +288,7 @@ def _along(points: Array, normals: Array) -> Array:
 
 
 def _trimmed(points: Array, normals: Array) -> tuple[int, int]:
-    """Return first and last point of a cut: approach and retract are no part of it."""
+    """Return the first and last index of a cut without approach and retract."""
     across = np.flatnonzero(np.logical_not(_along(points, normals)))
     return (int(across[0]), int(across[-1]) + 1) if across.size else (0, 0)
 
@@ -295,7 +296,7 @@ def _trimmed(points: Array, normals: Array) -> tuple[int, int]:
 def _left_out_of(
     name: str, points: Array, normals: Array, lines: Array, first: int, last: int
 ) -> list[str]:
-    """Return notes of what is left out at the start and the end of a cut."""
+    """Return notes on what is left out at the start and the end of a cut."""
     notes = []
     for where, part in (("start", slice(0, first + 1)), ("end", slice(last, None))):
         length = float(np.linalg.norm(np.diff(points[part], axis=0), axis=1).sum())
@@ -311,10 +312,10 @@ def _left_out_of(
 
 
 def _require_across(points: Array, normals: Array, lines: Array) -> None:
-    """Raise InputError where the tip moves along its own axis in the midst of a cut."""
+    """Raise InputError if the tip moves along the tool axis within a cut."""
     moved = np.linalg.norm(np.diff(points, axis=0), axis=1) > REPEATED
     if (bad := np.flatnonzero(moved & _along(points, normals))).size:
         raise InputError(
-            f"line {lines[bad[0] + 1]}: a move along the tool axis in the midst of a cut; where "
-            "it is an approach or a retract, let a rapid move come before or after it"
+            f"line {lines[bad[0] + 1]}: a move along the tool axis within a cut; if it is an "
+            "approach or a retract, put a rapid move before or after it"
         )

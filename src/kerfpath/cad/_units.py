@@ -7,11 +7,11 @@ from kerfpath._arrays import require_one_of
 __all__ = ["GAP", "LARGEST", "MM", "UNITS_MM", "require_unit"]
 
 MM = 1e-3
-"""OCCT works in mm, and so does this package; every length that leaves it is in m."""
+"""OCCT and this package work in mm; every length that leaves the package is in m."""
 GAP = 5e-5
 """Distance (m) between the ends of two curves that a loop bridges by default: half a kerf."""
 LARGEST = 1e7
-"""No drawing reaches further than this, mm; a damaged number or a wrong unit soon makes it so."""
+"""mm: no drawing reaches farther; larger numbers are damaged or have a wrong unit."""
 
 UNITS_MM = {
     "um": 1e-3,

@@ -1,4 +1,4 @@
-"""Lines of STEP and IGES files that bound no face: as curves of drawings of lines."""
+"""Read lines of STEP and IGES files that bound no face, as a drawing of lines."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from kerfpath.cad._shape import NamedShape, list_shapes
 __all__ = ["part_of_wires"]
 
 LOOK = ("curves", "")
-"""What stands for the layer and the colour of lines, by which loops are named."""
+"""Layer and colour of these lines, by which loops are named."""
 
 
 def part_of_wires(path: Path, drawn: NamedShape, gap: float, axis: Array) -> Part:
@@ -36,11 +36,11 @@ def part_of_wires(path: Path, drawn: NamedShape, gap: float, axis: Array) -> Par
     ----------
     path : Path
     drawn : NamedShape
-        Without faces.
+        A shape without faces.
     gap : float m
         Distance between ends that a loop bridges.
     axis : (3,)
-        The tool axis all along.
+        The tool axis of all lines.
     """
     edges = ShapeMap()
     for edge in list_shapes(drawn.shape, TopAbs_ShapeEnum.TopAbs_EDGE):

@@ -1,4 +1,4 @@
-"""The cell as solids: which bodies may come how near, at a joint vector and along a motion."""
+"""The cell as solids: the clearance of pairs of bodies, at a joint vector and along a motion."""
 
 from kerfpath.cell._bodies import Body as Body
 from kerfpath.cell._build import cell_of as cell_of

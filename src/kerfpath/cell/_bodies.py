@@ -23,18 +23,19 @@ class Body:
     Parameters
     ----------
     name : str
-        Unique in the cell.
+        Name of the body, unique in the cell.
     shape : Shape
-        In coordinates of the frame, m.
+        Shape in coordinates of the frame, m.
     frame : int
-        0 the robot base, where all that stands still is; i the link that joint i moves. With
-        external axes the frames that they carry come before, see `kerfpath.robots.CarriedChain`.
+        Index of the frame: 0 is the robot base, which does not move, i the link that joint i moves.
+        With external axes, the frames that they carry come first, see
+        `kerfpath.robots.CarriedChain`.
     kind : {"robot", "head", "part", "fixture", "floor"}
     approximate : bool
-        The shape stands in for one that is not known, or is the hull around it.
+        Whether the shape replaces an unknown one, or is the hull around the real one.
     holds : bool
-        The shape holds the real body whole. Where it need not, what is clear of it is not proved
-        clear of the body.
+        Whether the shape encloses the real body. If not, clearance to the shape proves nothing
+        about the body.
     """
 
     name: str

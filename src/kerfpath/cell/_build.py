@@ -1,4 +1,4 @@
-"""The cell of a robot: its links, head and part, and what stands around or goes with an axis."""
+"""Build the cell of a robot: its links, head, part, fixtures and floor."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from kerfpath.urdf import KinematicChain
 __all__ = ["cell_of"]
 
 FLOOR_REACH, THICK = 2.0, 0.5
-"""Of the lengths of the arm, how far a floor reaches to each side, and farther where axes carry
-the robot or the part there; m: how thick it is."""
+"""How far a floor reaches to each side, in lengths of the arm (farther with external axes), and its
+thickness, m."""
 
 
 def cell_of(
@@ -40,14 +40,14 @@ def cell_of(
     may_touch: Sequence[Pair] | Mapping[Pair, str] = (),
     floor: float | None = None,
 ) -> Cell:
-    """Return the cell of a robot with a cutting head, a part and what else stands around.
+    """Return the cell of a robot with a cutting head, a part, fixtures and a floor.
 
-    The nozzle works at stand-off, so it is judged against the part by that: it must keep the
-    head's `share` of the stand-off to it. All else must keep the near-miss distance.
+    The nozzle works at its stand-off from the part, so it must keep only the head's `share` of the
+    stand-off to the part. All other pairs must keep the near-miss distance.
 
-    The part goes with all external axes that carry the part, the robot's base with all that carry
-    the robot; a fixture with the axis that it stands `on`, else it stands still. All are placed as
-    they are with every such axis at zero.
+    The part moves with all external axes that carry it, and the robot's base with all that carry
+    the robot. A fixture moves with the axis that it stands `on`, or does not move. Places are given
+    with every such axis at zero.
 
     Parameters
     ----------
@@ -57,25 +57,25 @@ def cell_of(
     head : CuttingHead, MeshHead or sequence of Body, optional
         Default: the generic head.
     part : Mesh, optional
-        In the part frame.
+        Mesh in the part frame.
     placement : (4, 4), optional
         T_base_part, m; needed with a part.
     fixtures : mapping of name to Shape, optional
-        In the robot base.
+        Shapes in the robot base.
     on : mapping of fixture to external axis, optional
-        By their names: what moves with an axis, and with those that carry it.
+        Names of the fixtures that move with an axis, and with those that carry it.
     links : sequence of Body, optional
         Default: `link_bodies(robot)`, the robot's description or else capsules.
     near_miss, near_miss_of, may_touch
         As in `Cell`.
     floor : float m, optional
-        Height in the robot base of a floor, a body of this name; default: there is none.
+        Height in the robot base of a floor, a body named "floor"; default: no floor.
 
     Raises
     ------
     InputError
-        A part without its placement; a body of another package; a fixture on an axis that is not
-        there; as `Cell`.
+        A part without its placement; a body of another package; a fixture on an axis that does not
+        exist; whatever `Cell` raises.
     """
     chain = chain_of(robot)
     head = CuttingHead() if head is None else head
@@ -122,7 +122,7 @@ def _require_solid(shape: object, what: str) -> None:
     if not isinstance(shape, Capsule | Hull | Mesh):
         raise InputError(
             f"cell: {what}: expected a solid of kerfpath.cell, got {type(shape).__name__}; "
-            "mesh_of(mesh, unit) makes one of a mesh of another package"
+            "convert a mesh of another package with mesh_of(mesh, unit)"
         )
 
 

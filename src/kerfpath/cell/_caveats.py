@@ -1,4 +1,4 @@
-"""Caveats: what a cell does not prove, in words for readers of plans, reports and audits."""
+"""Caveats: sentences for plans, reports and audits about what a cell does not prove."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from kerfpath.cell._pairs import BY_DESIGN, MEANT
 __all__ = ["UNPROVED", "caveats", "odd_sizes"]
 
 UNPROVED = "links drawn as capsules need not hold the real ones"
-"""What follows "clear" wherever links are not known."""
+"""Text that follows "clear" wherever links are not known."""
 
 LARGE, SMALL = {"robot": 1.0, "head": 1.0, "part": 5.0, "fixture": 20.0}, 0.005
-"""Of the arm's length: what is longer, or shorter, is likely to have been read in a wrong unit."""
+"""Largest and smallest likely sizes in lengths of the arm; others suggest a wrong unit."""
 
 
 def caveats(cell: Cell) -> tuple[str, ...]:
-    """Return, a sentence each, what a cell does not prove or does not ask for though it was asked.
+    """Return a sentence for each thing that a cell does not prove, or keeps less than requested.
 
-    Bodies that need not hold the real ones; pairs of the head, or listed, that are not judged;
-    those that may overlap by design; those that cannot be as far apart as asked.
+    These are bodies that need not hold the real ones, pairs of the head or listed pairs that are
+    not judged, pairs that may overlap by design, and pairs that cannot keep the requested distance.
     """
     said = []
     if cell.unproved:
         said.append(
             f"Not proved for the real links: {', '.join(cell.unproved)} are capsules of typical "
-            "sizes, which need not hold the real ones; that these are clear of each other, of "
-            "head, part and fixtures must be tried in a simulation, or planned with the meshes of "
-            "the robot's description."
+            "sizes, which need not hold the real ones. Check in a simulation that the links are "
+            "clear of each other and of head, part and fixtures, or plan with the meshes of the "
+            "robot's description."
         )
     kind = {body.name: body.kind for body in cell.bodies}
     left = {pair: why for pair, why in cell.unjudged.items() if why == BY_DESIGN}
@@ -49,15 +49,15 @@ def caveats(cell: Cell) -> tuple[str, ...]:
             less.append(f"{a} - {b} {required * 1e3:.3g} of {asked * 1e3:g} mm")
     if deep:
         said.append(
-            f"Judged only beyond what overlaps by design, to a depth of: {', '.join(deep)}."
+            f"Judged only for overlaps deeper than by design, which are: {', '.join(deep)}."
         )
     if less:
-        said.append(f"Nearer than asked by design, so that all they keep is: {', '.join(less)}.")
+        said.append(f"Closer than requested by design, so these keep only: {', '.join(less)}.")
     return tuple(said)
 
 
 def odd_sizes(cell: Cell) -> tuple[str, ...]:
-    """Return a sentence for each body whose size is hardly one beside the arm's length."""
+    """Return a sentence for each body whose size is unlikely, given the arm's length."""
     arm = cell.chain.length
     said = []
     for body in (body for body in cell.bodies if body.kind != "floor"):
@@ -65,7 +65,7 @@ def odd_sizes(cell: Cell) -> tuple[str, ...]:
         most = LARGE[body.kind] * arm
         if not SMALL * arm <= size <= most:
             said.append(
-                f"{body.name!r} is {size * 1e3:.4g} mm long beside an arm of {arm * 1e3:.4g} mm: "
+                f"{body.name!r} is {size * 1e3:.4g} mm long, and the arm {arm * 1e3:.4g} mm: "
                 "is its unit right?"
             )
     return tuple(said)

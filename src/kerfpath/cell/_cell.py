@@ -1,4 +1,4 @@
-"""The cell: bodies, which of them are judged against each other, and how near they may come."""
+"""The cell: bodies, the pairs of them that are judged, and the distance that each pair keeps."""
 
 from __future__ import annotations
 
@@ -33,48 +33,48 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cell:
-    """Robot, head, part and fixtures as solids, and how near any two may come.
+    """Robot, head, part and fixtures as solids, and the distance that each pair must keep.
 
-    A joint vector is clear when every judged pair is farther apart than its near-miss distance. No
-    setting that asks for more lets anything pass that was refused: the pairs that are judged, and
-    what the arm's design leaves them, do not depend on the distances asked for.
+    A joint vector is clear when every judged pair is farther apart than its near-miss distance. A
+    larger requested distance never admits what a smaller one refused, because the judged pairs and
+    the distances that the arm's design leaves them do not depend on it.
 
     Parameters
     ----------
     chain : KinematicChain
-        Moves the frames that bodies are fixed in.
+        The chain that moves the frames of the bodies.
     bodies : sequence of Body
     near_miss : float m
-        How near two bodies may come.
+        Distance that two bodies must keep.
     near_miss_of : mapping of (name, name) to float m
         The same for single pairs.
     may_touch : sequence of (name, name), or mapping of these to str
-        Pairs that are not judged, and why, beside those that do not move against each other and
-        those of the arm that touch at every pose.
+        Pairs that are not judged, and why. Pairs without relative motion, and pairs of the arm that
+        touch at every pose, need not be listed.
     endless : (n,) bool
         Joints that go the short way round between nodes.
     T_flange_tip, T_base_part : (4, 4) m, optional
-        Where the bodies of head and part were put, for a plan to be held against.
+        Poses at which the bodies of head and part were placed, to be compared with a plan's.
 
     Attributes
     ----------
     pairs : (P, 2) int
-        The judged pairs, as places in `bodies`.
+        The judged pairs, as indices into `bodies`.
     asked, required : (P,) m
-        The near-miss distance of each, as asked for and as kept: less where no pose leaves what is
-        asked for, by the arm's design.
+        The near-miss distance of each pair, as requested and as kept; less is kept if the arm's
+        design leaves less at every pose.
     depth : (P,) m
-        How deep each may overlap, as it does by design; its distance is less by no more than this.
+        Depth to which each pair may overlap, because it does so by design.
     own : (P,) bool
-        Those that have a near-miss distance of their own, asked for or by the arm's design.
+        Whether a pair has its own near-miss distance, requested or by the arm's design.
     unjudged : mapping of (name, name) to str
         Every other pair, and why it need not, or cannot, be judged.
 
     Raises
     ------
     InputError
-        Two bodies of one name, a pair that names none, a distance for a pair that is not judged, a
-        part or fixture that overlaps the robot's base.
+        Two bodies with the same name, a pair with an unknown name, a distance for a pair that is
+        not judged, a part or fixture that overlaps the robot's base.
     """
 
     chain: KinematicChain
@@ -139,17 +139,17 @@ class Cell:
 
     @property
     def approximate(self) -> tuple[str, ...]:
-        """Names of the bodies whose shape only stands in for the real one."""
+        """Names of the bodies whose shape is only approximate."""
         return tuple(body.name for body in self.bodies if body.approximate)
 
     @property
     def unproved(self) -> tuple[str, ...]:
-        """Names of bodies that need not hold the real ones, so that clear of them proves little."""
+        """Names of bodies that need not hold the real ones, so clearance to them proves little."""
         return tuple(body.name for body in self.bodies if not body.holds)
 
     @property
     def queries(self) -> int:
-        """How many distances between two bodies coal has been asked for so far."""
+        """Number of distances between two bodies that coal has computed so far."""
         return self._scene.queries
 
     def distances(
@@ -161,14 +161,14 @@ class Cell:
         ----------
         q : (B, n) rad
         enough : float or (B, P) m
-            From there on any lower bound on the distance will do: far fewer are computed.
+            Above it, any lower bound on the distance may be returned; far fewer are computed.
         wanted : (B, P) bool, optional
-            Which to find; the others are NaN.
+            Which distances to find; the others are NaN.
 
         Raises
         ------
         InputError
-            A distance that is not a number: it is never taken for free.
+            A distance that is not a number, which is never taken as clear.
         """
         return self._scene.distances(self.frames(q), enough, wanted)
 
@@ -178,9 +178,9 @@ class Cell:
         Returns
         -------
         clearance : (B,) m
-            Least distance beyond what its pair must keep; not clear where it is 0 or less.
+            Smallest distance beyond what its pair must keep; 0 or less is not clear.
         pair : (B,) int
-            Which pair that is, a row of `pairs`.
+            The pair with that distance, a row of `pairs`; -1 if no pair is judged.
         """
         q = floats(q, "q", (None, self.chain.joints))
         if not len(self.pairs):
@@ -190,20 +190,20 @@ class Cell:
         return over[np.arange(len(q)), pair], pair
 
     def clear(self, q: ArrayLike) -> Bools:
-        """Return for each of q (B, n) rad whether every pair keeps its near-miss distance."""
+        """Return whether every pair keeps its near-miss distance, (B,), at each of q (B, n) rad."""
         enough = float(self.required.max(initial=0.0)) + 1e-9
         return np.asarray((self.distances(q, enough=enough) > self.required).all(axis=1))
 
     def clear_motion(self, q0: ArrayLike, q1: ArrayLike) -> Bools:
-        """Return for each straight joint motion q0 to q1, (B, n) rad, whether it is proved clear.
+        """Return whether each straight joint motion from q0 to q1, (B, n) rad, is proved clear.
 
-        Endless joints go the short way round. Clear is what keeps more than the near-miss
-        distances all the way; what keeps them by less than 0.1 mm may be refused.
+        Endless joints go the short way round. A motion is clear if it keeps more than the near-miss
+        distances all the way; a motion that exceeds them by less than 0.1 mm may be refused.
         """
         n = self.chain.joints
         first, last = floats(q0, "q0", (None, n)), floats(q1, "q1", (None, n))
         if len(first) != len(last):
-            raise InputError(f"q0, q1: expected as many of each, got {len(first)}, {len(last)}")
+            raise InputError(f"q0, q1: expected equal lengths, got {len(first)} and {len(last)}")
         return self._sweep.clear(
             first, first + self.increments(first, last), self.required, self._scene.distances
         )
@@ -211,7 +211,7 @@ class Cell:
     def clear_through(self, q: ArrayLike) -> bool:
         """Return whether the straight joint motions through q (m, n) rad are all proved clear.
 
-        As in `clear_motion`, but endless joints turn as q says.
+        This is as in `clear_motion`, but endless joints turn as q says.
         """
         corners = floats(q, "q", (None, self.chain.joints))
         motions = self._sweep.clear(corners[:-1], corners[1:], self.required, self._scene.distances)
@@ -225,13 +225,13 @@ class Cell:
     def frames(self, q: ArrayLike) -> Array:
         """Return the poses (B, n+1, 4, 4) of the frames at q (B, n) rad.
 
-        In the robot base; with external axes, in the base as it stands with each at zero.
+        They are in the robot base; with external axes, in the base with each axis at zero.
         """
         return self.chain.frames(floats(q, "q", (None, self.chain.joints)))
 
     @property
     def sweep(self) -> MotionBounds:
-        """Bounds on how far bodies move against each other."""
+        """Bounds on the motion of bodies relative to each other."""
         return self._sweep
 
     @property
@@ -242,7 +242,7 @@ class Cell:
     def _sorted_out(
         self, own: Mapping[Places, float]
     ) -> tuple[dict[Places, str], dict[Places, tuple[float, DesignClearance]]]:
-        """Return why pairs are not judged; of others what each is asked to keep, and its design."""
+        """Return why pairs are not judged; for the others, the requested distance and design."""
         bodies, names, touching = self.bodies, self.names, self.may_touch
         reasons = touching if isinstance(touching, Mapping) else dict.fromkeys(touching, MEANT)
         why = {self._pair(pair, "may_touch"): words for pair, words in reasons.items()}
@@ -282,7 +282,7 @@ class Cell:
         return a, b
 
     def _require_room_for_the_base(self) -> None:
-        """Raise InputError where a part or fixture overlaps what stands still of the robot."""
+        """Raise InputError if a part or fixture overlaps the fixed base of the robot."""
         free = {self._pair(pair, "may_touch") for pair in self.may_touch}
         base = self.chain.base
         still = [body for body in self.bodies if body.frame == base and body.kind != "floor"]
@@ -301,7 +301,7 @@ class Cell:
             about = " (an approximate shape)" if one.approximate else ""
             raise InputError(
                 f"cell: {two.name!r} overlaps the robot's {one.name!r}{about}; move it away from "
-                f"the robot, or list ({one.name!r}, {two.name!r}) in may_touch where the robot "
+                f"the robot, or list ({one.name!r}, {two.name!r}) in may_touch if the robot "
                 "stands on it"
             )
 

@@ -1,9 +1,9 @@
-"""Vertices and motions asked of a cell at as few distances as proofs allow.
+"""Check vertices and motions of a search in a cell with as few distance queries as proofs allow.
 
-A pair that was found d apart is between d - delta and d + delta apart wherever no corner of its
-second body has come farther than delta, seen from the first. So what was measured at one joint
-vector clears or closes its neighbours, along gamma as along the contour, pair by pair; only what it
-leaves open is measured.
+If a pair is d apart at one joint vector, it is between d - delta and d + delta apart wherever no
+corner of its second body, seen from the first, has moved by more than delta. So a distance measured
+at one joint vector proves its neighbours, along gamma and along the contour, clear or blocked for
+that pair; only what stays open is measured.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from kerfpath.errors import InputError
 __all__ = ["CollisionChecker"]
 
 FAR = 0.1
-"""m beyond what is required: distances are not refined above it, as they clear enough already."""
+"""m beyond what is required: larger distances are not refined, as they clear enough already."""
 STRIDE = 64
-"""Of a run of vertices first one in so many is looked at, to clear those between; then one in a
-quarter as many."""
+"""Of a run of vertices, one in `STRIDE` is measured first, to clear those between; then one in a
+quarter of that, and so on."""
 NEAREST = 4
-"""Joint vectors measured before that a new one is compared with."""
+"""Number of joint vectors measured before that a new one is compared with."""
 
 
 class CollisionChecker:
@@ -37,17 +37,17 @@ class CollisionChecker:
     q : (N, n) rad
         Joint vectors of the vertices.
     comfort : float m
-        Where pairs come nearer than this to their near-miss distance, the vertex costs something;
-        pairs that have a near-miss distance of their own do not count.
+        Clearance below which a vertex costs something; pairs that have their own near-miss distance
+        do not count.
     comfort_cost : float
-        What it costs where the near-miss distance is all but reached; less in proportion before.
+        Cost at zero clearance; it falls linearly to zero at `comfort`.
 
     Attributes
     ----------
     asked, measured : int
-        Vertices asked about, and those of them at which any distance had to be found.
+        Number of vertices checked, and of those at which a distance had to be measured.
     motions_asked, motions_measured : int
-        The same of motions.
+        The same for motions.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class CollisionChecker:
         self.asked = self.measured = self.motions_asked = self.motions_measured = 0
 
     def price(self, vertices: Ints) -> Array:
-        """Return the price (B,) of vertices: infinite where they are not clear."""
+        """Return the cost (B,) of vertices, infinite if they are not clear."""
         new = np.unique([v for v in vertices.tolist() if v not in self._price]).astype(np.int64)
         self.asked += len(new)
         stride = STRIDE
@@ -82,7 +82,7 @@ class CollisionChecker:
     def passable(self, p: Ints, j: Ints) -> Bools:
         """Return which of the motions from vertices p to vertices j, (B,) each, are clear.
 
-        Pairs that closed a motion before are looked at half way first: there most motions hit.
+        Pairs that blocked a motion before are checked half way first, where most motions collide.
         """
         cell = self._cell
         self.motions_asked += len(p)
@@ -108,9 +108,9 @@ class CollisionChecker:
         return passable
 
     def blocked(self, p: Ints, j: Ints) -> Bools:
-        """Return which motions, (B,) each, are seen at little cost not to be clear.
+        """Return which motions from p to j, (B,) each, are found not to be clear at little effort.
 
-        Half way, pairs that closed a motion before are too near.
+        Only pairs that blocked a motion before are checked, half way.
         """
         self.motions_asked += len(p)
         self.motions_measured += len(p) if self._closing.any() else 0
@@ -119,13 +119,13 @@ class CollisionChecker:
         return np.asarray(self._hit(half, np.tile(self._closing, (len(p), 1))).any(axis=1))
 
     def _hit(self, frames: Array, wanted: Bools) -> Bools:
-        """Return which pairs (B, P) of those wanted are too near; of each row one at least."""
+        """Return which of the wanted pairs (B, P) are too close; at least one of each such row."""
         required = self._cell.required
         low, _ = self._cell.scene.bounds(frames, required, wanted, required)
         return np.asarray(wanted & (low <= required))
 
     def _look(self, vertices: Ints) -> None:
-        """Find the prices of vertices, from what was measured nearby or by measuring."""
+        """Find the costs of vertices from distances measured nearby, or by measuring."""
         cell, q = self._cell, self._q[vertices]
         frames = cell.frames(q)
         low, high = self._known(q, frames)
@@ -152,7 +152,7 @@ class CollisionChecker:
         return np.asarray(self._comfort_cost * np.clip(1 - over / self._comfort, 0.0, 1.0))
 
     def _known(self, q: Array, frames: Array) -> tuple[Array, Array]:
-        """Return bounds (B, P) on the distances at q by what was measured nearby."""
+        """Return bounds (B, P) m on the distances at q, from what was measured nearby."""
         B, P = len(q), len(self._cell.pairs)
         if not self._at:
             return np.full((B, P), -np.inf), np.full((B, P), np.inf)

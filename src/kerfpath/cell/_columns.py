@@ -1,9 +1,8 @@
-"""Points inside a closed surface: a line upwards counts the triangles it crosses.
+"""Test whether points are inside a closed surface, by the triangles that an upward line crosses.
 
-Triangles are sorted into columns along z, so that a line meets a few only. Where it passes an edge
-too closely to count, the winding number decides, over all triangles: the solid angle under which a
-point sees the surface is a full one from inside and zero from outside (van Oosterom and Strackee
-1983).
+Triangles are sorted into columns along z, so that a line meets only a few of them. If it passes too
+close to an edge, the winding number over all triangles decides: the solid angle of the surface is a
+full one from inside and zero from outside (van Oosterom and Strackee 1983).
 """
 
 from __future__ import annotations
@@ -15,15 +14,15 @@ from kerfpath._arrays import Array, Ints
 __all__ = ["TriangleColumns"]
 
 CLOSE = 1e-9
-"""Of the body's size squared: twice the area of a triangle that is too thin to count with."""
+"""Twice the area of a triangle that is too thin to count, as a share of the body's size squared."""
 MOST = 256
-"""Columns along x and y."""
+"""Largest number of columns along x and along y."""
 SPREAD = 64
-"""Columns that a triangle may stand in on average: of wide ones there are fewer columns."""
+"""Columns that a triangle may be in on average; with wide triangles there are fewer columns."""
 
 
 class TriangleColumns:
-    """Triangles with corners (F, 3, 3) m, sorted by where they stand in x and y."""
+    """Triangles with corners (F, 3, 3) m, sorted into columns by x and y."""
 
     def __init__(self, corners: Array) -> None:
         self._corners = corners

@@ -1,4 +1,4 @@
-"""A cell in motion as a binary glTF 2.0 file: each body a mesh, each frame a node that moves.
+"""Write a cell in motion as a binary glTF 2.0 file: bodies are meshes, frames are animated nodes.
 
 Format: Khronos Group, glTF 2.0 specification (ISO/IEC 12113:2022). Lengths in m, time in s.
 """
@@ -30,26 +30,27 @@ COLOURS: Mapping[Kind, tuple[float, float, float]] = {
     "fixture": (0.27, 0.39, 0.55),
     "floor": (0.75, 0.75, 0.75),
 }
-"""Of each kind of body, linear red, green and blue."""
+"""Colour of each kind of body: linear red, green and blue."""
 UP = (-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5))
-"""Quaternion x, y, z, w that turns z up, as robots have it, into y up, as glTF has it."""
+"""Quaternion x, y, z, w from z up, as in robotics, to y up, as in glTF."""
 FLOAT, UNSIGNED = 5126, 5125
 VERTICES, INDICES = 34962, 34963
-"""What numbers are, and what they are for, as the format counts it."""
+"""Codes of the format for the type of numbers and for their use."""
 
 
 def glb_of(cell: Cell, time: ArrayLike, q: ArrayLike) -> bytes:
-    """Return a .glb file of a cell whose robot moves: for viewers, browsers and Blender.
+    """Return a .glb file of a moving cell, for viewers, browsers and Blender.
 
-    Every body is drawn as it is judged: capsules and hulls where those stand in for a link. Between
-    the times each joint goes evenly, the short way round: less than half a turn.
+    Every body is drawn with the shape that is judged, so a link may be a capsule or a hull. Between
+    the times, each joint moves evenly by the short way round, which is less than half a turn.
 
     Parameters
     ----------
     cell : Cell
     time : (K,) s
-        Increasing.
-    q : (K, n) rad, m of linear axes
+        Increasing times.
+    q : (K, n) rad
+        Joints; linear axes in m.
 
     Raises
     ------
@@ -60,12 +61,11 @@ def glb_of(cell: Cell, time: ArrayLike, q: ArrayLike) -> bytes:
     frames = cell.frames(floats(q, "q", (len(at), cell.chain.joints)))
     if not len(at) or (np.diff((at - at[0]).astype(np.float32)) <= 0).any():
         raise InputError(
-            "time: expected one time or more, each after the one before by what single precision "
-            "can count"
+            "time: expected one or more times, each later than the one before in single precision"
         )
     file, chain = _File(), cell.chain
     root = chain.joints + 1
-    # A node that moves for each frame, the root, and one in each frame that stands on its pivot.
+    # The nodes: one that moves for each frame, the root, and one at the pivot in each frame.
     pivots = [_pivot(chain, frame) for frame in range(root)]
     nodes: list[dict[str, object]] = [{"name": chain.moves_with(frame)} for frame in range(root)]
     nodes.append({"name": "cell", "rotation": UP, "children": [chain.still]})
@@ -89,7 +89,7 @@ def glb_of(cell: Cell, time: ArrayLike, q: ArrayLike) -> bytes:
         meshes.append({"name": body.name, "primitives": [drawn]})
     for frame in range(root):
         if not inside[frame]:
-            del nodes[root + 1 + frame]["children"]  # the format knows no empty list
+            del nodes[root + 1 + frame]["children"]  # the format has no empty lists
     moves = _moves(file, at, _steps(chain, frames, pivots), nodes)
     return file.written(
         {
@@ -134,13 +134,13 @@ def _steps(chain: KinematicChain, frames: Array, pivots: Sequence[Array]) -> Ite
 def _moves(
     file: _File, time: Array, steps: Iterable[Array], nodes: Sequence[dict[str, object]]
 ) -> dict[str, object]:
-    """Return the animation of nodes, whose poses (K, 4, 4) are given; they stand at the first."""
+    """Return the animation of nodes with poses (K, 4, 4), and set each node to its first pose."""
     samplers: list[dict[str, object]] = []
     channels: list[dict[str, object]] = []
     input_ = file.add(time[:, None] - time[0], "SCALAR", bounds=True)
     for i, T in enumerate(steps):
         turned = Rotation.from_matrix(T[:, :3, :3]).as_quat()
-        # A quaternion and its negative are one rotation; the nearer one is the way to go.
+        # A quaternion and its negative are the same rotation; take the nearer one.
         flips = np.einsum("ki,ki->k", turned[1:], turned[:-1]) < 0
         turned[1:] *= np.where(np.cumsum(flips) % 2, -1.0, 1.0)[:, None]
         for path, kind, values in (
@@ -154,7 +154,7 @@ def _moves(
 
 
 class _File:
-    """The numbers of a file, one behind the other, and where each array of them lies."""
+    """The binary data of a file, and the place of each array in it."""
 
     def __init__(self) -> None:
         self._data = bytearray()
@@ -182,7 +182,7 @@ class _File:
         return len(self._accessors) - 1
 
     def written(self, head: dict[str, object]) -> bytes:
-        """Return the file: a header, what it holds as JSON, and the numbers."""
+        """Return the file: a header, its content as JSON, and the binary data."""
         lying = {
             "buffers": [{"byteLength": len(self._data)}],
             "bufferViews": self._views,

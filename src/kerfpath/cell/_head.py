@@ -1,4 +1,4 @@
-"""The cutting head: a generic one by its measures, or a mesh."""
+"""Cutting heads: a generic one given by dimensions, or a mesh."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from kerfpath.urdf import KinematicChain
 __all__ = ["CuttingHead", "MeshHead"]
 
 PAST = 1e-5
-"""m: a mesh may reach this far beyond the stand-off point; files round their numbers."""
+"""m: a mesh may reach this far past the stand-off point, as files round their numbers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Head:
-    """The base of cutting heads: a nozzle, at a stand-off above the part."""
+    """Base class of cutting heads: a nozzle at a stand-off above the part."""
 
     stand_off: float = 1e-3
     share: float = 0.5
@@ -47,20 +47,25 @@ class _Head:
 class CuttingHead(_Head):
     """A generic cutting head: a conical nozzle, a round body above it, an arm to the flange.
 
-    Everything lies along the beam, the tip's z axis. The tip is where the beam meets the part; the
-    nozzle ends at the stand-off above it, and must keep `share` of the stand-off to the part.
+    Nozzle and body lie along the beam, the tip's z axis. The tip is where the beam meets the part;
+    the nozzle ends at the stand-off above it, and must keep `share` of the stand-off to the part.
 
     Parameters
     ----------
     stand_off : float m
-        From the nozzle's end to the part.
+        Distance from the end of the nozzle to the part.
     share : float
-        Of the stand-off, what the nozzle may come down to.
+        Share of the stand-off that the nozzle must keep, from 0 to below 1.
     nozzle_length : float m
     nozzle_radii : (2,) m
-        At its end and where it meets the body.
+        Radii at the end of the nozzle and where it meets the body.
     body_length, body_radius : float m
     arm_radius : float m
+
+    Raises
+    ------
+    InputError
+        A length that is not positive, or a share out of range.
     """
 
     nozzle_radii: tuple[float, float] = (2.5e-3, 16e-3)
@@ -71,7 +76,10 @@ class CuttingHead(_Head):
     __repr__ = short_repr
 
     def bodies(self, chain: KinematicChain, T_flange_tip: ArrayLike) -> tuple[Body, ...]:
-        """Return nozzle, head and, from the flange to the head, the arm."""
+        """Return the nozzle, the head, and the arm from the flange to the head.
+
+        `T_flange_tip` is a pose (4, 4), m.
+        """
         tip = as_pose(T_flange_tip, "T_flange_tip")
         beam, at = tip[:3, 2], tip[:3, 3]
         end = at - self.stand_off * beam
@@ -87,19 +95,19 @@ class CuttingHead(_Head):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MeshHead(_Head):
-    """A cutting head as a closed mesh, cut in two across the beam: the nozzle, and all above it.
+    """A cutting head as a closed mesh, cut across the beam into the nozzle and the rest above it.
 
-    The nozzle is what lies within `nozzle_length` of the stand-off point along the beam. It must
-    keep `share` of the stand-off to the part, the rest the near-miss distance.
+    The nozzle is the part of the mesh within `nozzle_length` of the stand-off point along the beam.
+    It must keep `share` of the stand-off to the part; the rest must keep the near-miss distance.
 
     Parameters
     ----------
     mesh : Mesh
-        In the flange frame.
+        Mesh in the flange frame.
     stand_off : float m
-        From the nozzle's end to the part.
+        Distance from the end of the nozzle to the part.
     share : float
-        Of the stand-off, what the nozzle may come down to.
+        Share of the stand-off that the nozzle must keep, from 0 to below 1.
     nozzle_length : float m
     """
 
@@ -108,12 +116,12 @@ class MeshHead(_Head):
     __repr__ = short_repr
 
     def bodies(self, chain: KinematicChain, T_flange_tip: ArrayLike) -> tuple[Body, ...]:
-        """Return the nozzle and the head above it.
+        """Return the nozzle and the head above it; `T_flange_tip` is a pose (4, 4), m.
 
         Raises
         ------
         InputError
-            The mesh reaches past the stand-off point, or does not come near it.
+            The mesh reaches past the stand-off point, or ends too far before it.
         """
         tip, mesh = as_pose(T_flange_tip, "T_flange_tip"), self.mesh
         beam = tip[:3, 2]
@@ -127,16 +135,16 @@ class MeshHead(_Head):
             )
         if past < -self.nozzle_length:
             raise InputError(
-                f"head {mesh.name}: ends {-past * 1e3:.3g} mm before the stand-off point, so that "
-                f"no nozzle lies in the {self.nozzle_length * 1e3:g} mm above it; the mesh must be "
-                "in the flange frame, m"
+                f"head {mesh.name}: ends {-past * 1e3:.3g} mm before the stand-off point, so there "
+                f"is no nozzle in the {self.nozzle_length * 1e3:g} mm above it; the mesh must be "
+                "in the flange frame, in m"
             )
         nozzle, above = mesh.cut(end - self.nozzle_length * beam, beam)
         return _mounted({"nozzle": nozzle, "head": above}, chain)
 
 
 def _mounted(shapes: Mapping[str, Shape | None], chain: KinematicChain) -> tuple[Body, ...]:
-    """Return the bodies of shapes in the flange frame, those that are there."""
+    """Return bodies of the shapes in the flange frame that are not None."""
     return tuple(
         Body(name=name, shape=shape.moved(chain.end), frame=chain.joints, kind="head")
         for name, shape in shapes.items()

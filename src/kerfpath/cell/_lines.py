@@ -1,4 +1,4 @@
-"""Distances between straight lines with ends, as of capsules: in bulk, by a formula."""
+"""Distances between many line segments, such as the axes of capsules, by a formula."""
 
 from __future__ import annotations
 
@@ -12,21 +12,22 @@ from kerfpath.cell._shapes import Capsule
 __all__ = ["CapsuleLines", "lines_apart"]
 
 PARALLEL = 1e-12
-"""Of the squared sine of two lines: below it they are parallel, and nearest at an end."""
+"""Squared sine of the angle below which two segments are parallel, and nearest at an end."""
 
 
 class CapsuleLines:
-    """The lines of capsules, each in a frame of an arm.
+    """The axes of capsules, each in a frame of an arm.
 
     Parameters
     ----------
     frames : (R,) int
+        Frame of each capsule.
     capsules : sequence of Capsule
 
     Attributes
     ----------
     thick : (R,) m
-        Their radii.
+        Radii of the capsules.
     """
 
     def __init__(self, frames: Sequence[int], capsules: Sequence[Capsule]) -> None:
@@ -44,13 +45,13 @@ class CapsuleLines:
 
 
 def lines_apart(p: Array, u: Array, q: Array, v: Array) -> Array:
-    """Return distances (...) m between lines from p along u and from q along v, (..., 3) m."""
+    """Return distances (...) m between segments from p to p + u and from q to q + v, (..., 3) m."""
     uu, vv, uv = (u * u).sum(-1), (v * v).sum(-1), (u * v).sum(-1)
     ends = [
         _to_line(p - q, v, vv), _to_line(p + u - q, v, vv),
         _to_line(q - p, u, uu), _to_line(q + v - p, u, uu),
     ]  # fmt: skip
-    # Where the lines are nearest to each other between their ends, that is nearer.
+    # If the nearest points lie between the ends of both segments, their distance is smaller.
     w = p - q
     uw, vw = (u * w).sum(-1), (v * w).sum(-1)
     sine = uu * vv - uv**2
@@ -64,6 +65,6 @@ def lines_apart(p: Array, u: Array, q: Array, v: Array) -> Array:
 
 
 def _to_line(w: Array, v: Array, vv: Array) -> Array:
-    """Return squared distances of points at w from lines along v from the origin."""
+    """Return squared distances of points w from segments from the origin to v; vv is v . v."""
     t = np.clip((w * v).sum(-1) / np.where(vv > 0, vv, 1.0), 0.0, 1.0)
     return np.asarray(((w - t[..., None] * v) ** 2).sum(-1))

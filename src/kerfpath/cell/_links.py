@@ -1,4 +1,4 @@
-"""The links of a robot as bodies: those of its description, or capsules along its joint chain."""
+"""Links of a robot as bodies: those of its description, or capsules along its joint chain."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ Line = tuple[str, int, tuple[float, ...], tuple[float, ...], float]
 """Name, frame of the model, start and end in it (m), radius (m)."""
 
 FRACTIONS = (0.10, 0.09, 0.07, 0.055, 0.055, 0.04, 0.04)
-"""Radius of each link's capsule over the length of the arm's two long links: typical of heavy arms,
-drawn rather too thick than too thin. Real links jut out of them all the same: by makers' meshes, up
-to half of the poses collide that they call clear."""
+"""Radius of each link's capsule, as a share of the length of the arm's two long links: typical of
+heavy arms, and rather too thick than too thin. Real links still project from them: by makers'
+meshes, up to half of the poses that are clear by capsules collide."""
 POINT = 1e-9
-"""m: joints nearer than this have no link between them to draw."""
+"""m: there is no link to draw between joints closer than this."""
 
 
 def link_bodies(robot: Robot, *, hulls: bool = True) -> tuple[Body, ...]:
-    """Return the links: bodies of the description, and capsules for those that have none there.
+    """Return the links: bodies of the description, and capsules for links that have none there.
 
     Parameters
     ----------
     robot : Robot
     hulls : bool
-        Take the convex hull of each link's mesh, which holds the link, and mark it approximate.
-        False: the meshes as they are, which must be closed.
+        Use the convex hull of each link's mesh, which encloses the link, and mark it approximate.
+        False: use the meshes themselves, which must be closed.
 
     Raises
     ------
     InputError
-        A mesh that cannot be read, is empty or too large or small, or is not closed where it must
-        be; an arm without length.
+        A mesh that cannot be read, is empty, too large or too small, or is not closed although it
+        must be; an arm without length.
     """
     found = [
         Body(
@@ -61,15 +61,16 @@ def link_bodies(robot: Robot, *, hulls: bool = True) -> tuple[Body, ...]:
 
 
 def allowed_pairs(robot: Robot, links: Mapping[Pair, str]) -> dict[Pair, str]:
-    """Return the pairs of bodies of `link_bodies(robot)` that pairs of links are, for `may_touch`.
+    """Turn pairs of links into pairs of bodies of `link_bodies(robot)`, for `may_touch`.
 
-    A link without a body in the description has no pair, though a capsule may stand for it.
+    A link without a body in the description has no pair, even if a capsule replaces it.
 
     Parameters
     ----------
     robot : Robot
     links : mapping of (link, link) to str
-        By their names in the description, and why they may touch; see `kerfpath.urdf.read_srdf`.
+        Names of the links in the description, and why they may touch; see
+        `kerfpath.urdf.read_srdf`.
     """
     bodies: dict[str, list[str]] = {}
     for name, described in _named(robot):
@@ -83,7 +84,7 @@ def allowed_pairs(robot: Robot, links: Mapping[Pair, str]) -> dict[Pair, str]:
 
 
 def _named(robot: Robot) -> Iterator[tuple[str, Described]]:
-    """Yield the bodies of a description by the names of their links, numbered from the second."""
+    """Yield the bodies of a description with the names of their links, numbered from the second."""
     count: Counter[str] = Counter()
     for described in robot.bodies:
         count[described.link] += 1
@@ -92,17 +93,22 @@ def _named(robot: Robot) -> Iterator[tuple[str, Described]]:
 
 
 def link_capsules(robot: Robot) -> tuple[Body, ...]:
-    """Return the links as capsules along the joint chain, marked as not holding the real ones.
+    """Return the links as capsules along the joint chain, marked as not enclosing the real ones.
 
-    Radii are typical ones over the arm's lengths; for judging a cell in earnest, take the meshes
-    of the robot's description.
+    Radii are typical for the arm's lengths; for reliable results, use the meshes of the robot's
+    description.
+
+    Raises
+    ------
+    InputError
+        An arm without length.
     """
     arm, base = robot.alone(), len(robot.externals)
     chain, zero = chain_of(arm), np.zeros((1, arm.joints))
     places = np.tile(np.eye(4), (arm.joints + 1, 1, 1))
     if robot.kinematics in _LINES:
         lines = _LINES[robot.kinematics](robot.geometry)
-        # Model and description name the same links by frames that are turned, and set, otherwise.
+        # Model and description have frames of different pose for the same links.
         model = model_chain(robot).frames(zero)[0]
         places = np.linalg.inv(chain.frames(zero)[0]) @ model
         places[0] = robot.T_base_foot
@@ -110,7 +116,7 @@ def link_capsules(robot: Robot) -> tuple[Body, ...]:
         lines = _along(chain.origins[:, :3, 3], chain.end[:3, 3])
     if not all(radius > 0 for *_, radius in lines):
         raise InputError(
-            f"robot {robot.id!r}: its links have no length, so none can be drawn; give links="
+            f"robot {robot.id!r}: its links have no length, so none can be drawn; pass links="
         )
     return tuple(
         Body(
@@ -126,7 +132,7 @@ def link_capsules(robot: Robot) -> tuple[Body, ...]:
 
 
 def _along(steps: Array, end: Array) -> list[Line]:
-    """Return a line from each joint to the next; their places (n, 3) and the flange's (3,), m."""
+    """Return a line from each joint to the next, given by `steps` (n, 3) m and `end` (3,) m."""
     lengths = np.linalg.norm([*steps, end], axis=1)
     arm = float(np.sort(lengths[1:-1])[-2:].sum())
     return [
@@ -151,7 +157,7 @@ def _opw(g: Mapping[str, float]) -> list[Line]:
 
 
 def _srs(g: Mapping[str, float]) -> list[Line]:
-    """Return lines from joint to joint; the outer halves of both long links turn with axes 3, 5."""
+    """Return lines from joint to joint; the outer halves of the long links turn with axes 3, 5."""
     arm = g["c2"] + g["c3"]
     base, shoulder, upper, fore, _, wrist, _ = (fraction * arm for fraction in FRACTIONS)
     here = (0.0, 0.0, 0.0)
@@ -169,8 +175,8 @@ def _srs(g: Mapping[str, float]) -> list[Line]:
 def _ur(g: Mapping[str, float]) -> list[Line]:
     """Return lines beside the Denavit-Hartenberg ones: the links lie next to each other along d4.
 
-    After the extents of the maker's meshes of UR3, UR5 and UR10; corners of the joint housings jut
-    out, as capsules that held them would overlap at many a pose that is clear.
+    Sizes follow the maker's meshes of UR3, UR5 and UR10. Corners of the joint housings project,
+    because capsules that enclosed them would overlap at many clear poses.
     """
     d, upper, fore = g["d4"], 1.15 * g["d4"], 0.08 * g["d4"]
     return [
@@ -193,7 +199,7 @@ _LINES: dict[str, Callable[[Mapping[str, float]], list[Line]]] = {
 
 
 def _frame(robot: Robot, body: Described) -> int:
-    """Return the frame of a body of a description: on the arm, on an external axis, the ground."""
+    """Return the frame of a body of a description: the arm's, an external axis's or the ground."""
     if body.on is None:
         return len(robot.externals) + body.joint
     chain = chain_of(robot)
@@ -203,8 +209,8 @@ def _frame(robot: Robot, body: Described) -> int:
         if axis.joint == body.on and isinstance(chain, CarriedChain):
             return chain.frame_on(axis.name)
     raise InputError(
-        f"robot {robot.id!r}: link {body.link!r} moves with joint {body.on!r}, which is none of "
-        "its external axes; read the description with them, or take Robot.alone()"
+        f"robot {robot.id!r}: link {body.link!r} moves with joint {body.on!r}, which is not one of "
+        "its external axes; read the description with that axis, or use Robot.alone()"
     )
 
 
@@ -219,7 +225,7 @@ def _shape(body: Described, hulls: bool) -> Shape:
         half = length / 2 * body.pose[:3, 2]
         return frustum(body.pose[:3, 3] - half, body.pose[:3, 3] + half, (radius, radius))
     if body.path is None:
-        raise InputError(f"link {body.link!r}: a mesh without its file")
+        raise InputError(f"link {body.link!r}: expected the file of its mesh, got none")
     name = f"link {body.link!r}, {body.path.name}"
     vertices, triangles = read_surface(body.path, name)
     if not hulls:

@@ -1,12 +1,13 @@
-"""Clearances of very many joint vectors, at as few distances as proofs allow.
+"""Compute clearances of very many joint vectors with as few distance queries as proofs allow.
 
-One pair of bodies at a time: seen from its first body, the second takes a cloud of poses, one for
-each joint vector. A block of that cloud is measured at its middle, d. No point of the second body
-comes farther than delta from there to another pose of the block, so there the distance is between
-d - delta and d + delta. What this leaves open is halved, twice, along its widest direction, and
-each part is measured alike. Poses that only look the same from the first body, as those of a head
-whose arm stands in another posture, or of a round nozzle that turns about the beam, fall on one
-place of the cloud by themselves. A joint vector at which one pair collides is asked no more.
+Pairs of bodies are treated one at a time. Seen from its first body, the second takes a cloud of
+poses, one for each joint vector. A block of that cloud is measured at its middle, with distance d.
+No point of the second body moves by more than delta from there to another pose of the block, so the
+distance at that pose is between d - delta and d + delta. Where this is not enough, the block is
+halved twice along its widest direction, and each part is treated in the same way. Poses that look
+the same from the first body, such as those of a head in different postures of the arm, or of a
+round nozzle that turns about the beam, coincide in the cloud. A joint vector at which one pair
+collides is not measured any more.
 """
 
 from __future__ import annotations
@@ -27,21 +28,21 @@ from kerfpath.cell._shapes import RING, Hull, Shape
 __all__ = ["Clearances", "clearances"]
 
 AT_ONCE = 40_000
-"""Joint vectors worked through together: many against the overhead, few against the memory."""
+"""Joint vectors treated together: more cost memory, fewer cost overhead."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Clearances:
-    """Bounds on what joint vectors leave beyond the near-miss distances.
+    """Bounds on the clearance of joint vectors.
 
     Parameters
     ----------
     lower, upper : (B,) m
-        Of the least distance of any pair beyond what it must keep, leaving pairs out that have a
-        near-miss distance of their own. Where any pair comes too near, `upper` is 0 or less and
-        `lower` minus infinity.
+        Bounds on the smallest distance of any pair beyond what it must keep, without pairs that
+        have their own near-miss distance. If any pair is too close, `upper` is 0 or less and
+        `lower` is minus infinity.
     pair : (B,) int
-        The pair that `upper` is of, a row of `Cell.pairs`; -1 where it is infinite.
+        The pair of `upper`, a row of `Cell.pairs`; -1 where `upper` is infinite.
     """
 
     lower: Array
@@ -59,18 +60,18 @@ def clearances(
     resolution: float,
     progress: Callable[[int], None] | None = None,
 ) -> Clearances:
-    """Return how clear each of q (B, n) rad is.
+    """Return bounds on the clearance of each of q (B, n) rad.
 
-    Neighbours should follow each other in q: it is worked through piece by piece.
+    Neighbouring joint vectors should follow each other in q, which is treated piece by piece.
 
     Parameters
     ----------
     cell : Cell
     q : (B, n) rad
     band : float m
-        Beyond this much clearance, no upper bound is sought.
+        Clearance above which no upper bound is sought.
     resolution : float m
-        Below it, the bounds of what is clear are to be this close to each other.
+        Largest difference of the two bounds for clear joint vectors below `band`.
     progress : callable, optional
         Called with the number of joint vectors done since the last call.
     """
@@ -87,7 +88,7 @@ def clearances(
 def _judge(
     cell: Cell, q: Array, band: float, resolution: float, out: tuple[Array, Array, Ints]
 ) -> None:
-    """Find lower, upper and pair (B,) of joint vectors, one pair of bodies after the other."""
+    """Write lower, upper and pair (B,) of joint vectors to `out`, one pair of bodies at a time."""
     lower, upper, pair = out
     frames = cell.frames(q)
     cheap = cell.scene.cheap(frames) - cell.required
@@ -109,7 +110,7 @@ def _judge(
 
 
 class _Cloud:
-    """The poses of a pair's second body, seen from its first."""
+    """Poses of the second body of a pair, seen from its first."""
 
     def __init__(self, cell: Cell, p: int, frames: Array) -> None:
         one, two = (cell.bodies[i] for i in cell.pairs[p])
@@ -124,8 +125,8 @@ class _Cloud:
     def bounds(self, aim: Array, resolution: float) -> tuple[Array, Array]:
         """Return bounds (B,) m on the distances beyond the required one.
 
-        They settle on which side of zero it is; and where it is between zero and `aim`, the bounds
-        are `resolution` or less apart.
+        They determine its sign; if it is between zero and `aim`, they are at most `resolution`
+        apart.
         """
         over, above = np.full(len(aim), -np.inf), np.full(len(aim), np.inf)
         left, block = np.arange(len(aim)), np.zeros(len(aim), np.int64)
@@ -134,7 +135,7 @@ class _Cloud:
             count = np.diff(start, append=len(left))
             middle = left[self._middles(left, block, start)]
             delta = self._shift(np.repeat(middle, count), left) + ACCURACY
-            # A distance this large clears the whole block up to its aim: a bound on it will do.
+            # A distance this large clears the whole block up to its aim, so a bound is enough.
             enough = np.maximum.reduceat(delta, start) + np.maximum.reduceat(aim[left], start)
             low, high = self._scene.pair_bounds(
                 self._p, self._frames[middle], self._required + enough + ACCURACY
@@ -150,7 +151,7 @@ class _Cloud:
         return over, above
 
     def _middles(self, left: Ints, block: Ints, start: Ints) -> Ints:
-        """Return which of `left` is next to the middle of each block."""
+        """Return which of `left` is closest to the middle of each block."""
         x = self._place[left]
         count = np.diff(start, append=len(left))
         mean = np.add.reduceat(x, start) / count[:, None]
@@ -158,7 +159,7 @@ class _Cloud:
         return np.asarray(np.lexsort((off, block))[start])
 
     def _halved(self, left: Ints, block: Ints) -> tuple[Ints, Ints]:
-        """Return the same with every block cut in two: across its widest direction, if any."""
+        """Return `left` and `block` with every block halved across its widest direction, if any."""
         if not left.size:
             return left, block
         x, i = self._place[left], np.arange(len(left))
@@ -175,7 +176,7 @@ class _Cloud:
         return left[order], block[order]
 
     def _shift(self, one: Ints, two: Ints) -> Array:
-        """Return how far (b,) m any point of the body comes from poses `one` to poses `two`."""
+        """Return bounds (b,) m on the motion of any point of the body from poses `one` to `two`."""
         D = self._rows[:, :, two] - self._rows[:, :, one]
         body = self._body
         far = _length([body.tips @ row for row in D]).max(axis=0)
@@ -184,16 +185,16 @@ class _Cloud:
 
 
 class _Outline(NamedTuple):
-    """The outline by which motions are bounded: points that hold a body, or a round one's cylinder.
+    """The outline that bounds motions: points around a body, or the cylinder of a round one.
 
     Parameters
     ----------
     tips : (c, 4) m
-        Homogeneous: the body is in their hull, or in that of the two discs about them.
+        Homogeneous points; the body is in their hull, or in that of the two discs about them.
     axis : (3,)
-        Of a round body: it may turn about it unnoticed, but for what it is uneven.
+        Axis of a round body; rotation about it changes the body only by `uneven`.
     radius, uneven : float m
-        Of the discs, and how much nearer than that to the axis it comes between corners.
+        Radius of the discs, and how much closer to the axis the body is between corners.
     spread : (3, s) m
         Vectors that turn with the body, as long as it is wide.
     """

@@ -1,7 +1,7 @@
-"""Closed triangle meshes as solids: what they must be, welding, and which points lie inside.
+"""Closed triangle meshes as solids: checks, welding, and which points lie inside.
 
-Collision libraries see the triangles only: to them a body deep inside a closed mesh is free. A body
-that does not touch the surface is inside or outside as a whole, so one of its points decides.
+Collision libraries see only the triangles: to them, a body deep inside a closed mesh is clear. A
+body that does not touch the surface is entirely inside or outside, so one of its points decides.
 """
 
 from __future__ import annotations
@@ -23,15 +23,16 @@ from kerfpath.errors import InputError
 __all__ = ["SAME", "Mesh", "size_of", "weld"]
 
 LARGEST = 100.0
-"""m: nothing in a cell is larger; a mesh that is has the wrong unit."""
+"""m: a mesh larger than this has the wrong unit."""
 SMALLEST = 1e-4
-"""m: a whole body smaller than this has the wrong unit, too."""
+"""m: a mesh smaller than this has the wrong unit."""
 SAME = 1e-6
-"""Vertices closer than this share of the body's size are one, as single precision has it."""
+"""Vertices closer than this share of the body's size are one, as files have single precision."""
 CROWDED = 64
-"""Vertices within the tolerance of each that welding takes, on average: memory grows with them."""
+"""Average number of vertices within the tolerance of each that welding accepts; memory grows with
+it."""
 MOST = 2_000_000
-"""Triangles: more take minutes and gigabytes, and no cell needs them."""
+"""Largest number of triangles; more take minutes and gigabytes, and no cell needs them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,9 +45,9 @@ class Mesh:
     triangles : (F, 3) int
         Vertices of each triangle; neighbours run through a common edge in opposite directions.
     deviation : float m
-        How far the true surface may be from the triangles; distances are lessened by it.
+        How far the true surface may be from the triangles; it is subtracted from distances.
     name : str
-        What messages call it.
+        Name in messages.
 
     Raises
     ------
@@ -88,7 +89,7 @@ class Mesh:
 
     @property
     def seeds(self) -> Array:
-        """A point (s, 3) m of each piece that hangs together."""
+        """One point (s, 3) m of each connected piece."""
         edges = self.triangles[:, [0, 1]], self.triangles[:, [1, 2]]
         pairs = np.vstack(edges)
         V = len(self.vertices)
@@ -98,7 +99,7 @@ class Mesh:
         return freeze(self.vertices[self.triangles[first, 0]])
 
     def moved(self, T: ArrayLike) -> Mesh:
-        """Return the mesh in coordinates b of a pose T (4, 4) that maps its own into b."""
+        """Return the mesh in the coordinates b that a pose T (4, 4) m maps its own to."""
         pose = as_pose(T, "pose")
         return Mesh(
             vertices=self.vertices @ pose[:3, :3].T + pose[:3, 3],
@@ -112,23 +113,23 @@ class Mesh:
         return freeze(np.array([self._columns.contains(p) for p in points], dtype=np.bool_))
 
     def cut(self, point: Array, normal: Array) -> tuple[Mesh | None, Mesh | None]:
-        """Return the parts of the solid before and behind a plane, None where there is none.
+        """Return the parts of the solid in front of and behind a plane, None for an empty part.
 
         Parameters
         ----------
         point : (3,) m
-            In the plane.
+            Point in the plane.
         normal : (3,)
-            Unit vector to what is before it.
+            Unit normal, towards the front.
         """
         height = (self.vertices - point) @ normal
         return self._above(height), self._above(-height)
 
     def _above(self, height: Array) -> Mesh | None:
-        """Return the part where the height (V,) m of the vertices over a plane is positive.
+        """Return the part where the height (V,) m of the vertices above a plane is positive.
 
-        The section is closed by triangles from its rim to one point of the plane: whatever its
-        outline, what they cover twice they cover in opposite directions.
+        Triangles from the rim to one point of the plane close the section: for any outline, areas
+        that they cover twice are covered in opposite directions.
         """
         inside = height > 0
         if inside.all() or not inside.any():
@@ -136,7 +137,7 @@ class Mesh:
         count = inside[self.triangles].sum(axis=1)
         cut = self.triangles[(count == 1) | (count == 2)]
         alone = inside[cut] == (inside[cut].sum(axis=1) == 1)[:, None]
-        # Turned such that the first corner is the one on a side of its own.
+        # Rotated so that the first corner is the one that is alone on its side.
         turn = (np.argmax(alone, axis=1)[:, None] + np.arange(3)) % 3
         cut = np.take_along_axis(cut, turn, axis=1)
         edges = np.sort(cut[:, [[0, 1], [0, 2]]].reshape(-1, 2), axis=1)
@@ -174,7 +175,7 @@ def size_of(vertices: Array, triangles: Ints, name: str) -> float:
     Raises
     ------
     InputError
-        No triangles or too many, one without vertices, a size that no body of a cell has.
+        No triangles or too many, a vertex index out of range, a size that no body of a cell has.
     """
     if not 0 < len(triangles) <= MOST:
         raise InputError(
@@ -182,7 +183,7 @@ def size_of(vertices: Array, triangles: Ints, name: str) -> float:
             + ("simplify the mesh" if len(triangles) else "the mesh is empty")
         )
     if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise InputError(f"{name}: a triangle names a vertex that is not there")
+        raise InputError(f"{name}: a triangle refers to a vertex that does not exist")
     with np.errstate(over="ignore", invalid="ignore"):
         size = float(np.ptp(vertices[triangles.ravel()], axis=0).max())
     if not SMALLEST <= size <= LARGEST:
@@ -195,19 +196,33 @@ def size_of(vertices: Array, triangles: Ints, name: str) -> float:
 def weld(
     vertices: ArrayLike, triangles: ArrayLike, tolerance: float, name: str = "mesh"
 ) -> tuple[Array, Ints]:
-    """Return the mesh with vertices closer than `tolerance` (m) made one, slivers left out."""
+    """Merge the vertices of a mesh that are closer than `tolerance` (m), and remove slivers.
+
+    Parameters
+    ----------
+    vertices : (V, 3) m
+    triangles : (F, 3) int
+    tolerance : float m
+    name : str
+        Name in messages.
+
+    Raises
+    ------
+    InputError
+        Too many vertices within the tolerance of each other.
+    """
     points = floats(vertices, "vertices", (None, 3))
     corners = integers(triangles, "triangles", (None, 3))
     if not len(points):
         return points, corners
-    # An STL file says each vertex once per triangle: the very same ones need no search.
+    # An STL file repeats each vertex for each triangle: identical ones need no search.
     points, same = np.unique(points, axis=0, return_inverse=True)
     corners = same.reshape(-1)[corners]
     tree = cKDTree(points)
     if (count := int(tree.count_neighbors(tree, tolerance))) > CROWDED * len(points):
         raise InputError(
-            f"{name}: its vertices lie too close, on average {count // len(points)} of them within "
-            f"{tolerance:.3g} m of each; simplify the mesh"
+            f"{name}: its vertices are too close together, on average {count // len(points)} of "
+            f"them within {tolerance:.3g} m of each; simplify the mesh"
         )
     pairs = tree.query_pairs(tolerance, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
@@ -219,10 +234,10 @@ def weld(
 
 
 def _require_closed(triangles: Ints, name: str) -> None:
-    """Raise InputError unless every edge is run through as often one way as the other."""
+    """Raise InputError unless every edge is used equally often in both directions."""
     edges, open_ = edges_of(triangles)
     if count := np.count_nonzero(open_):
         raise InputError(
             f"{name}: the surface is not closed, {count} of its {len(edges)} edges have a triangle "
-            "on one side only; its inside is not known, so mend the mesh"
+            "on one side only, so its inside is not defined; repair the mesh"
         )

@@ -1,17 +1,17 @@
-"""Swept motions: a bound on how far bodies stray between two poses, and bisection under it.
+"""Swept motions: bounds on the distance of bodies between two poses, and bisection by them.
 
-While the joints run evenly from q0 to q1, a point x of a body leaves the straight line from x(0) to
-x(1) by no more than M s (1 - s) / 2, M bounding its second derivative. A body is held by the hull
-of its corners, so with delta the farthest that a corner comes, the distance of a pair is all the
-way at least
+While the joints move evenly from q0 to q1, a point x of a body deviates from the straight line from
+x(0) to x(1) by at most M s (1 - s) / 2, where M bounds its second derivative. A body lies in the
+hull of its corners. If delta is the largest displacement of a corner, the distance of a pair is at
+least
 
-    (d(0) + d(1) - delta) / 2 - M / 8.
+    (d(0) + d(1) - delta) / 2 - M / 8
 
-Where that does not clear a pair, its distance half way is found, and each half is judged alike:
-delta halves and M goes down to a quarter. The second derivatives of a chain of revolute joints are
-z_i x (z_j x (x - o_j)) for i <= j, hence M = sum over i, j of |dq_i| |dq_j| r_max(i,j), r_j
-bounding the distance of the point from axis j. A linear joint j has z_i x d_j with those before it,
-and nothing with those after it, nor with itself.
+all the way. If that does not clear a pair, its distance half way is measured, and each half is
+judged in the same way: delta is halved, and M falls to a quarter. The second derivatives of a chain
+of revolute joints are z_i x (z_j x (x - o_j)) for i <= j, hence M = sum over i, j of
+|dq_i| |dq_j| r_max(i,j), where r_j bounds the distance of the point from axis j. A linear joint j
+contributes z_i x d_j with the joints before it, and nothing with those after it or with itself.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ __all__ = ["TOLERANCE", "MotionBounds", "relative"]
 TOLERANCE = 1e-4
 """m: a motion that is not proved clear at this resolution is refused."""
 HALVINGS = 24
-"""Never reached by motions of a robot; a motion not proved clear by then is refused."""
+"""Largest number of bisections, which no motion of a robot reaches; then a motion is refused."""
 
 Distances = Callable[[Array, Array, Bools], Array]
 
 
 class MotionBounds:
-    """Bounds on the motion of judged pairs against each other.
+    """Bounds on the relative motion of judged pairs.
 
     Parameters
     ----------
     chain : KinematicChain
     bodies : sequence of Body
     pairs : (P, 2) int
-        The second of a pair is in the later frame.
+        Indices of bodies; the second of a pair is in the later frame.
     """
 
     def __init__(self, chain: KinematicChain, bodies: Sequence[Body], pairs: Ints) -> None:
@@ -62,15 +62,15 @@ class MotionBounds:
 
     @property
     def arms(self) -> Array:
-        """The longest reach (n,) m of any body from each joint's axis; 1 of a linear one."""
+        """Largest reach (n,) m of any body from each joint's axis; 1 for a linear joint."""
         longest = np.empty(len(self._order))
         longest[self._order] = self._reach.max(axis=0, initial=0.0)
         return longest
 
     def shift(self, frames0: Array, frames1: Array) -> Array:
-        """Return how far (B, P) m any corner comes from poses (B, n+1, 4, 4) to others.
+        """Return the largest displacement (B, P) m of any corner between poses (B, n+1, 4, 4).
 
-        Seen from the first body of the pair; the distance of the pair changes by no more.
+        It is seen from the first body of the pair; the distance of the pair changes by no more.
         """
         out = np.empty((len(frames0), len(self._ways)))
         seen: dict[tuple[int, int], Array] = {}
@@ -94,7 +94,7 @@ class MotionBounds:
     def least(
         self, d0: Array, d1: Array, frames0: Array, frames1: Array, dq: Array
     ) -> tuple[Array, Array]:
-        """Return lower bounds (B, P) m on the distances along motions, and what they leave off."""
+        """Return lower bounds (B, P) m on the distances along motions, and their slack (B, P) m."""
         delta, bow = self.shift(frames0, frames1), self.bend(dq) / 8
         return (d0 + d1 - delta) / 2 - bow - ACCURACY, delta / 2 + bow
 
@@ -108,7 +108,7 @@ class MotionBounds:
     ) -> Bools:
         """Return which of the motions q0 to q1 (B, n) rad are proved to keep more than `required`.
 
-        Of pairs that are not `wanted` (B, P) it is known already.
+        Pairs that are not `wanted` (B, P) are known to keep it already.
         """
         clear = self._chain.bounded(q0) & self._chain.bounded(q1)
         if not len(self._way):
@@ -140,7 +140,7 @@ class MotionBounds:
         return clear
 
     def _spent(self, frames0: Array, frames1: Array, dq: Array) -> Array:
-        """Return distances (B, P) m of which one at either end is as good as any larger one."""
+        """Return the distances (B, P) m beyond `required` that clear a motion, at either end."""
         return self.shift(frames0, frames1) + self.bend(dq) / 4 + 4 * ACCURACY
 
 

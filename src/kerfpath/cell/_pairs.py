@@ -1,13 +1,13 @@
 """The distances that an arm's design leaves between its bodies, hence which pairs can be judged.
 
-Links of a compact wrist overlap as convex hulls, a head touches the link that it is mounted before,
-capsules are drawn too thick. What is so by design is so whatever the joints do: distances are found
-at poses spread over whole turns of all joints, limits ignored, and never depend on what a cell asks
-for. A pair that is apart at any pose is judged. Where it is never as far apart as asked, it keeps
-nearly the most that a pose leaves it. Links that touch at every pose do so by their maker's design.
-A head is not the maker's: where it touches a link at every pose it is judged, too, except for the
-depth of that overlap, by which one of the two is shaved; so is any pair that touches at most poses
-by a skin's depth.
+Links of a compact wrist overlap as convex hulls, a head touches the link that it is mounted on, and
+capsules are drawn too thick. Such overlaps do not depend on the joints, so distances are measured
+at poses spread over full turns of all joints, without limits, and never depend on the requested
+distances. A pair that is apart at any pose is judged. If it is never as far apart as requested, it
+keeps nearly the largest distance of any pose. Links that touch at every pose do so by their maker's
+design and are not judged. A head is not the maker's: if it touches a link at every pose, the pair
+is judged except for the depth of that overlap, by which one of the two bodies is shaved. The same
+holds for any pair that overlaps by a small depth at most poses.
 """
 
 from __future__ import annotations
@@ -37,54 +37,53 @@ __all__ = [
 ]
 
 Places = tuple[int, int]
-"""Two bodies by their places in the cell, the one in the earlier frame first."""
+"""Indices of two bodies of the cell, the one in the earlier frame first."""
 
 ARM = {"robot", "head", "floor"}
-"""Kinds of which the design says how near they are: an arm stands on its floor, too."""
+"""Kinds of bodies whose distances the design determines; an arm stands on its floor, too."""
 JOINTS = 3
-"""Bodies with more joints between them are not near each other by design."""
+"""Bodies with more joints between them are not close to each other by design."""
 POSES, FIRST = 128, 32
-"""Poses tried, a power of two, so that each joint stands at as many even steps of a turn; and how
-many come first, to settle most pairs."""
+"""Number of poses tried, a power of two so that each joint takes evenly spaced values; and how many
+are tried first, to settle most pairs."""
 TOUCH = 2 * TOLERANCE
-"""m: nearer than this, hardly any motion could be proved clear, so it is as good as contact."""
+"""m: a smaller distance counts as contact, because hardly any motion could be proved clear."""
 SPARED = 0.1
-"""Of the most that the design leaves a pair, what it need not keep, or no pose would be clear."""
+"""Share of the largest distance by design that a pair need not keep; else no pose is clear."""
 SKIN = (5e-4, 1e-3, 2e-3)
 """m: depths to which bodies that touch by design may overlap."""
 DEEPER = (3e-3, 4e-3, 6e-3, 8e-3, 0.012, 0.016, 0.024, 0.032, 0.048, 0.064, 0.096, 0.128)
-"""m: depths to which a head may overlap a link at every pose and still be judged for more."""
+"""m: depths to which a head may overlap a link at every pose and still be judged beyond them."""
 HALVED = 3
-"""Times that the step before a depth is halved to find the least that does."""
+"""Number of bisections between two depths to find the smallest sufficient one."""
 OFTEN, GONE, FREE = 0.5, 0.5, 0.25
-"""Shares of the poses: at so many a pair touches that may do so by design, and of those so many are
-freed by a skin where it does; of all, so many where a head touches a link at every pose.
-"""
+"""Shares of poses: a pair that touches at `OFTEN` of all poses touches by design; shaving must free
+`GONE` of these, or `FREE` of them if the pair touches at every pose."""
 ARCS = 72
-"""Pieces of a turn that a proof for a whole one begins with."""
+"""Number of arcs with which a proof for a full turn begins."""
 FAIR = 0.1
-"""m beyond what is required: greater distances are not distinguished."""
+"""m beyond what is required: larger distances are not distinguished."""
 BY_DESIGN = "they touch at every pose tried, by design"
-"""Why links, and a head that cannot be judged otherwise, are not judged."""
+"""Why links, and a head that cannot be shaved enough, are not judged."""
 MEANT = "they may touch"
-"""Why pairs are not judged that are listed without a reason."""
+"""Why pairs that are listed without a reason are not judged."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DesignClearance:
-    """The distance that the design leaves between two bodies, and what of them is judged.
+    """The distance that the design leaves between two bodies, and how the pair is judged.
 
     Parameters
     ----------
     most : float m
-        The largest distance at any pose tried; infinite where that is more than is asked for, or
-        they are shaved, and so asked for no distance at all.
+        Largest distance at any pose tried; infinite if it is more than requested, or if one body is
+        shaved, since no distance is required then.
     depth : float m
-        To which they overlap by design: so far they are not judged.
+        Depth to which the bodies overlap by design, which is not judged.
     solid : (int, Shape) or None
-        Which of the two is shaved by that depth, by its place in the cell, and what is left of it.
+        Index of the body that is shaved by that depth, and what is left of it.
     judged : bool
-        Whether anything is left that can be judged.
+        Whether the pair can be judged.
     """
 
     most: float = np.inf
@@ -93,7 +92,7 @@ class DesignClearance:
     judged: bool = True
 
     def keeps(self, asked: float) -> float:
-        """Return what (m) of a distance asked for such a pair keeps: no more than there is."""
+        """Return the distance (m) that the pair keeps of a requested one: at most what there is."""
         if self.solid is not None:
             return 0.0
         if self.most == np.inf:
@@ -102,21 +101,21 @@ class DesignClearance:
 
 
 def stand_still(one: Body, two: Body) -> str:
-    """Return why two bodies need no judging whatever their shapes; "" where they do."""
+    """Return why two bodies need not be judged whatever their shapes, or "" if they must be."""
     return "they do not move against each other" if one.frame == two.frame else ""
 
 
 def designs(
     chain: KinematicChain, bodies: Sequence[Body], asked: Mapping[Places, float]
 ) -> dict[Places, DesignClearance]:
-    """Return what the design leaves between the bodies of the arm that few joints are between.
+    """Return the design clearance of the pairs of the arm's bodies with few joints between them.
 
     Parameters
     ----------
     chain : KinematicChain
     bodies : sequence of Body
     asked : mapping of (int, int) to float m
-        What each pair is asked to keep: more is not told apart.
+        Distance requested of each pair; larger ones are not distinguished.
     """
     pairs = [
         (a, b)
@@ -151,7 +150,7 @@ def say_kept_all_round(
     asked: float,
     design: DesignClearance,
 ) -> str:
-    """Return what a pair is proved to keep at every angle of the one joint between; "" if not."""
+    """Return in words what a pair provably keeps at every angle of the one joint between, or ""."""
     a, b = (bodies[i].frame for i in pair)
     if b - a != 1 or chain.slides[a] or not {bodies[i].kind for i in pair} <= ARM:
         return ""
@@ -159,7 +158,7 @@ def say_kept_all_round(
     scene = Scene(two, np.array([[0, 1]]), chain.still)
     q = chain.spread(np.full((ARCS + 1, chain.joints), 0.5))
     q[:, chain.order[a]] = np.linspace(-np.pi, np.pi, ARCS + 1)
-    # Not worth a proof where it is not so, or hardly.
+    # No proof is tried if samples keep too little.
     if not (scene.distances(chain.frames(q), needed + FAIR) > needed + TOLERANCE).all():
         return ""
     sweep = MotionBounds(chain, two, np.array([[0, 1]]))
@@ -185,14 +184,14 @@ def shaved_pair(bodies: Sequence[Body], pair: Places, design: DesignClearance) -
 
 
 def _poses(chain: KinematicChain) -> Array:
-    """Return joint vectors (POSES, n) rad, spread evenly over whole turns; zero is one."""
-    from scipy.stats import qmc  # a quarter of a second to load, and not every job has a cell
+    """Return joint vectors (POSES, n) rad, spread evenly over full turns; zero is one of them."""
+    from scipy.stats import qmc  # takes a quarter of a second to load; not every job has a cell
 
     return chain.spread(qmc.Sobol(chain.joints, scramble=False).random(POSES))
 
 
 def _enough(asked: float) -> float:
-    """Return the distance (m) from which on the design leaves what is asked for."""
+    """Return the distance (m) by design that is enough for the requested one."""
     return max(asked / (1 - SPARED), asked + TOUCH) + ACCURACY
 
 
@@ -227,7 +226,7 @@ def _touching(
         return DesignClearance(most=most, judged=False)
 
     def freed(depth: float) -> DesignClearance | None:
-        """Return the design where shaving by a depth frees as many poses as it must."""
+        """Return the design if shaving by a depth frees enough poses, else None."""
         solid = _first_shaved(bodies, pair, depth)
         if solid is None:
             return None
@@ -239,7 +238,7 @@ def _touching(
     less = 0.0
     for depth in (*SKIN, *(DEEPER if always else ())):
         if (found := freed(depth)) is not None:
-            # No more than need be, unless the shapes are but typical ones.
+            # As little as necessary, unless the shapes are only typical ones.
             for _ in range(HALVED if all(bodies[i].holds for i in pair) and less > 0 else 0):
                 middle = (less + found.depth) / 2
                 nearer = freed(middle)
@@ -250,7 +249,7 @@ def _touching(
 
 
 def _first_shaved(bodies: Sequence[Body], pair: Places, depth: float) -> tuple[int, Shape] | None:
-    """Return what is left of one of two bodies, a convex one if there is, and its place."""
+    """Return index and shaved shape of one of two bodies, a convex one if there is one."""
     for i in sorted(pair, key=lambda i: isinstance(bodies[i].shape, Mesh)):
         if (shape := shave(bodies[i].shape, depth)) is not None:
             return i, shape

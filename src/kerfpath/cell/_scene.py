@@ -1,7 +1,7 @@
-"""Distances between the bodies of a cell, by coal, where cheap bounds do not suffice.
+"""Distances between the bodies of a cell, by coal where cheap bounds are not enough.
 
-A distance here is a lower bound on the true one: exact to coal's tolerance where it is below
-`enough`, lessened by what meshes may deviate from what they stand for, negative where solids
+A distance here is a lower bound on the true one. It is exact to coal's tolerance if it is below
+`enough`, reduced by the deviation of meshes from their true surfaces, and negative if solids
 overlap.
 """
 
@@ -26,17 +26,17 @@ __all__ = ["ACCURACY", "Scene"]
 coal = imported("coal", "cells", "cells and their distances")
 
 ACCURACY = 1e-6
-"""m: coal stops refining a distance here; every bound made from distances leaves it off."""
+"""m: accuracy at which coal stops; every bound made from distances subtracts it."""
 THIN = 1e-5
-"""m: what the box around a flat mesh is thickened by, so that it is a solid at all."""
+"""m: thickness added to the box around a flat mesh, so that it is a solid."""
 
 AT_ONCE = 500
-"""Poses that cheap bounds are found for together: as many as caches hold."""
+"""Number of poses for which cheap bounds are computed together, limited by the caches."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solid:
-    """A body as coal takes it: a geometry, its pose in the body's frame, and bounds around it."""
+    """A body for coal: a geometry, its pose in the body's frame, and bounds around it."""
 
     geometry: Any
     place: Array
@@ -57,13 +57,14 @@ class Scene:
     ----------
     bodies : sequence of Body
     pairs : (P, 2) int
-        Which of them are judged against each other; frames do not decrease along a pair.
+        Indices of the bodies that are judged against each other; the frame of the first is not
+        later than that of the second.
     still : int
-        The frame that stands still: its pose is the identity always.
+        Index of the fixed frame, whose pose is always the identity.
     """
 
     round: Bools
-    """(P,): pairs of two capsules, whose distances follow from a formula."""
+    """(P,): whether a pair is two capsules, whose distance a formula gives."""
 
     def __init__(self, bodies: Sequence[Body], pairs: Ints, still: int) -> None:
         self._names = [body.name for body in bodies]
@@ -94,7 +95,7 @@ class Scene:
 
     @property
     def order(self) -> Ints:
-        """The pairs (P,), those with meshes last: they take longest."""
+        """Indices (P,) of the pairs, those with meshes last, as they take longest."""
         return np.asarray(self._order)
 
     def distances(self, frames: Array, enough: float | Array, wanted: Bools | None = None) -> Array:
@@ -104,9 +105,9 @@ class Scene:
         ----------
         frames : (B, n+1, 4, 4)
         enough : float or (B, P) m
-            Above it any lower bound will do.
+            Above it, any lower bound may be returned.
         wanted : (B, P) bool, optional
-            Which to find; the others are NaN.
+            Which distances to find; the others are NaN.
         """
         wanted = np.ones((len(frames), len(self._pairs)), bool) if wanted is None else wanted
         low, _ = self.bounds(frames, enough, wanted)
@@ -115,17 +116,17 @@ class Scene:
     def bounds(
         self, frames: Array, enough: float | Array, wanted: Bools, stop: Array | None = None
     ) -> tuple[Array, Array]:
-        """Return distances (B, P) m, and how far apart (B, P) m the pairs are at most.
+        """Return distances (B, P) m, and upper bounds (B, P) m on them.
 
-        The upper bound is one that neighbours keep, too: moved by no more than delta, a pair is no
-        farther apart than it and delta together. It is infinite where only a lower bound was found.
+        The upper bound also holds for neighbours: a pair that has moved by at most delta is at most
+        delta farther apart. It is infinite where only a lower bound was found.
 
         Parameters
         ----------
         frames, enough, wanted
             As in `distances`; pairs that are not wanted have cheap lower bounds.
         stop : (P,) m, optional
-            Where a pair is this near or nearer, the others need not be found.
+            If a pair is this close or closer, the others of its row need not be found.
         """
         low = self.cheap(frames)
         high = np.where(self.round, low, np.inf)
@@ -142,7 +143,7 @@ class Scene:
         return low, high
 
     def pair_bounds(self, p: int, frames: Array, enough: Array) -> tuple[Array, Array]:
-        """Return what `bounds` does of one pair, (B,) m each, with `enough` (B,) m."""
+        """Return the result of `bounds` for pair p, (B,) m each, with `enough` (B,) m."""
         if self.round[p]:
             apart = self.cheap(frames)[:, p]
             return apart, apart
@@ -151,9 +152,9 @@ class Scene:
         return low, high
 
     def cheap(self, frames: Array) -> Array:
-        """Return lower bounds (B, P) m by balls, and by boxes around what stands still.
+        """Return lower bounds (B, P) m from balls around bodies and boxes around fixed ones.
 
-        Of the pairs that are `round`, two capsules each, these are the distances themselves.
+        For `round` pairs, of two capsules, these are the distances themselves.
         """
         parts = range(0, max(len(frames), 1), AT_ONCE)
         return np.vstack([self._cheap(frames[i : i + AT_ONCE]) for i in parts])
@@ -184,7 +185,7 @@ class Scene:
                 T = frames[solid.frame] @ solid.place
                 poses[i] = coal.Transform3s(T[:3, :3], T[:3, 3])
         if one.mesh is None and two.mesh is None:
-            # Of convex solids the depth of an overlap, too, changes by no more than they move.
+            # The depth of an overlap of convex solids also changes by no more than they move.
             apart = self._query(one.geometry, poses[a], two.geometry, poses[b], p)
             return apart, apart
         around = self._query(one.hull, poses[a], two.hull, poses[b], p)
@@ -205,8 +206,8 @@ class Scene:
         if not np.isfinite(apart):
             a, b = (self._names[i] for i in self._pairs[p])
             raise InputError(
-                f"cell: the distance between {a!r} and {b!r} came out as {apart}; nothing is "
-                "called free on that, so look at their shapes"
+                f"cell: the distance between {a!r} and {b!r} came out as {apart}, which proves "
+                "nothing clear; check their shapes"
             )
         return float(apart) - float(self._slack[p])
 
@@ -223,7 +224,7 @@ def _inside(inner: _Solid, outer: _Solid, frames: Array) -> bool:
 def _solid(body: Body) -> _Solid:
     shape: Shape = body.shape
     if isinstance(shape, Hull) and shape.crowded:
-        # Coal has no such convex solid. Its surface bounds the same one, at more work a query.
+        # Coal has no such convex solid. Its surface bounds the same solid, but queries take longer.
         shape = Mesh(vertices=shape.points, triangles=shape.triangles, name=body.name)
     low, high = (f(shape.corners, axis=0) for f in (np.min, np.max))
     centre = (low + high) / 2
@@ -262,7 +263,7 @@ def _geometry(shape: Shape, name: str) -> tuple[Any, Array]:
     tree.addTriangles(shape.triangles)
     tree.endModel()
     if tree.num_tris != len(shape.triangles):
-        raise InputError(f"{name}: the collision library took only {tree.num_tris} triangles")
+        raise InputError(f"{name}: the collision library accepted only {tree.num_tris} triangles")
     return tree, np.eye(4)
 
 

@@ -17,22 +17,22 @@ from kerfpath.errors import InputError
 __all__ = ["Capsule", "Hull", "Shape", "box", "box_between", "frustum", "surface"]
 
 RING = 24
-"""Corners of the polygon drawn around a circle; it juts out by less than 1 % of the radius."""
+"""Corners of the polygon drawn around a circle; it projects by less than 1 % of the radius."""
 SAME = 1e-7
-"""m: corners that differ by this are the same, except for rounding."""
+"""m: corners that differ by less are the same, except for rounding."""
 
 MOST_NEIGHBOURS = 254
-"""Of a corner of a convex solid in coal, which counts them in a byte."""
+"""Most neighbours of a corner of a convex solid in coal, which counts them in a byte."""
 CORNERS = 64
-"""A hull of more corners is followed along motions by those of the box around it: far fewer, and
-hardly farther out."""
+"""A hull with more corners is bounded along motions by the box around it, which has far fewer and
+is hardly larger."""
 BALL = 48
-"""Number of points on a ball, of which a capsule is drawn."""
+"""Number of points on each ball from which a capsule is drawn."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Capsule:
-    """A ball swept along a straight line, or resting where both ends are the same.
+    """A ball swept along a line segment; a ball if both ends are the same.
 
     Parameters
     ----------
@@ -72,8 +72,13 @@ class Capsule:
 class Hull:
     """The convex hull of points (P, 3) m that do not lie in one plane.
 
-    If the points are rings of `RING` even corners about a line, `axis` (2, 3) m may be two points
-    of it: the solid is known to be all but round then.
+    If the points are rings of `RING` evenly spaced corners about a line, `axis` (2, 3) m may be two
+    points of that line: the solid is then known to be almost round.
+
+    Raises
+    ------
+    InputError
+        Fewer than four points, points in one plane, or an axis that the points do not fit.
     """
 
     points: Array
@@ -107,7 +112,7 @@ class Hull:
 
     @property
     def corners(self) -> Array:
-        """Points (c, 3) m whose hull holds the shape: its own, or of the box around many."""
+        """Points (c, 3) m whose hull holds the shape: its own, or those of the box around many."""
         if len(self.points) <= CORNERS:
             return self.points
         return box_between(self.points.min(axis=0), self.points.max(axis=0)).points
@@ -120,7 +125,7 @@ class Hull:
     @property
     def crowded(self) -> bool:
         """Whether a corner has too many neighbours for coal's convex solids, as a cone's tip."""
-        # Around a corner of a closed surface there are as many triangles as neighbours.
+        # A corner of a closed surface has as many triangles as neighbours.
         return int(np.bincount(self.triangles.ravel()).max()) > MOST_NEIGHBOURS
 
     def moved(self, T: ArrayLike) -> Hull:
@@ -133,7 +138,7 @@ Shape = Capsule | Hull | Mesh
 
 
 def surface(shape: Shape) -> tuple[Array, Ints]:
-    """Return vertices (V, 3) m and triangles (F, 3) to draw a shape by; balls have few corners."""
+    """Return vertices (V, 3) m and triangles (F, 3) for drawing a shape; balls have few corners."""
     if isinstance(shape, Mesh):
         return shape.vertices, shape.triangles
     if isinstance(shape, Capsule):
@@ -146,14 +151,14 @@ def surface(shape: Shape) -> tuple[Array, Ints]:
 
 
 def box(size: ArrayLike, T: ArrayLike | None = None) -> Hull:
-    """Return a box of edges size (3,) m, its centre at the origin of pose T (4, 4)."""
+    """Return a box with edges `size` (3,) m, centred at the origin of pose T (4, 4) m."""
     half = positive(size, "box size", (3,)) / 2
     whole = box_between(-half, half)
     return whole if T is None else whole.moved(T)
 
 
 def box_between(low: ArrayLike, high: ArrayLike) -> Hull:
-    """Return the box with edges along the axes from one corner (3,) m to the opposite one."""
+    """Return the box along the axes between two opposite corners `low` and `high` (3,) m."""
     a, b = floats(low, "box corner", (3,)), floats(high, "box corner", (3,))
     if not (a < b).all():
         raise InputError(f"box: {a.tolist()} must lie below {b.tolist()} on every axis")
@@ -161,9 +166,14 @@ def box_between(low: ArrayLike, high: ArrayLike) -> Hull:
 
 
 def frustum(start: ArrayLike, end: ArrayLike, radii: tuple[float, float]) -> Hull:
-    """Return a cone cut off at both ends: from a point (3,) m to another, a radius (m) at each.
+    """Return a truncated cone from `start` to `end` (3,) m with a radius (m) at each end.
 
-    A polygon of 24 corners is drawn around each circle, so that the solid holds the round one.
+    Each circle is replaced by a polygon of 24 corners around it, so that the solid holds the cone.
+
+    Raises
+    ------
+    InputError
+        Both ends at the same point, or a radius that is not positive.
     """
     a, b = floats(start, "frustum start", (3,)), floats(end, "frustum end", (3,))
     radii = tuple(positive(radii, "frustum radii", (2,)))
@@ -181,13 +191,15 @@ def frustum(start: ArrayLike, end: ArrayLike, radii: tuple[float, float]) -> Hul
 
 
 def _axis(value: ArrayLike, points: Array) -> Array:
-    """Return the axis (2, 3) m of a hull, turned about which by one corner it is the same."""
+    """Return the axis (2, 3) m of a hull; a turn by one corner maps the points to themselves."""
     axis = floats(value, "hull axis", (2, 3))
     along = axis[1] - axis[0]
     turn = Rotation.from_rotvec(2 * np.pi / RING * along / np.linalg.norm(along))
     off, _ = cKDTree(points).query(turn.apply(points - axis[0]) + axis[0])
     if not np.max(off) < SAME:
-        raise InputError(f"hull axis: the points are not rings of {RING} even corners about it")
+        raise InputError(
+            f"hull axis: the points are not rings of {RING} evenly spaced corners about it"
+        )
     return axis
 
 

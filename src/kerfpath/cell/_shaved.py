@@ -1,4 +1,4 @@
-"""Solids shaved: what is left of one when its skin is taken off to a depth."""
+"""Shave solids: remove material from their surface to a depth."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from kerfpath.errors import InputError
 __all__ = ["shave"]
 
 DEEPEST = 8e-3
-"""m: a mesh is not shaved deeper; its walls may be thin."""
+"""m: a mesh is not shaved deeper, as its walls may be thin."""
 EVEN = 3e-3
-"""Holds a vertex where its triangles hardly differ in direction, so that it does not slide."""
+"""Regularisation: it keeps a vertex from sliding if its triangles hardly differ in direction."""
 FARTHEST = 2.0
-"""Times the depth: a vertex of a sharp corner goes no farther."""
+"""Largest motion of a vertex at a sharp corner, in multiples of the depth."""
 CORE = 1e-4
 """m: radius of the ball that must be left of a convex solid."""
 
 
 def shave(shape: Shape, depth: float) -> Shape | None:
-    """Return what is left of a solid whose faces go in by `depth` (m).
+    """Return what is left of a solid when its faces are moved inwards by `depth` (m).
 
-    Exact for capsules and convex solids: no point is left out that is deeper behind every face. Of
-    a mesh the triangles go in as well as its vertices allow, no point of it farther than twice the
-    depth. None where nothing would be left, or the depth is too much for a mesh.
+    This is exact for capsules and convex solids: every point deeper behind all faces stays. The
+    triangles of a mesh move as well as its vertices allow, no vertex by more than twice the depth.
+    None if nothing would be left, or if the depth is too large for a mesh.
     """
     if isinstance(shape, Capsule):
         left = shape.radius - depth
@@ -48,7 +48,7 @@ def shave(shape: Shape, depth: float) -> Shape | None:
 
 
 def _inward(mesh: Mesh) -> Array:
-    """Return how (V, 3) vertices move for the triangles about each to go in by one, or nearly."""
+    """Return vertex motions (V, 3) that move the triangles about each vertex inwards by about 1."""
     corners = mesh.vertices[mesh.triangles]
     a, b, c = np.moveaxis(corners, 1, 0)
     normal = np.cross(b - a, c - a)
@@ -57,7 +57,7 @@ def _inward(mesh: Mesh) -> Array:
     area = np.linalg.norm(normal, axis=1)
     held = area > 0
     unit = normal[held] / area[held, None]
-    # Around a vertex, the least squares of n . x = 1, each triangle by its angle there.
+    # At each vertex, solve n . x = 1 by least squares, each triangle weighted by its angle there.
     planes, pull = np.zeros((len(mesh.vertices), 3, 3)), np.zeros((len(mesh.vertices), 3))
     for i in range(3):
         one, two = (corners[held, (i + k) % 3] - corners[held, i] for k in (1, 2))
@@ -86,9 +86,9 @@ def _core(hull: Hull, depth: float) -> Hull | None:
 
 @lru_cache(maxsize=64)
 def _centre_and_planes(hull: Hull) -> tuple[Array, Array, float]:
-    """Return the planes (F, 4) of a convex solid, and centre (3,) and radius m of a ball in it.
+    """Return the planes (F, 4) of a convex solid, and centre (3,) m and radius (m) of a ball in it.
 
-    The largest there is: its centre stays the deepest point however far the planes go in.
+    It is the largest such ball: its centre stays the deepest point at any depth of shaving.
     """
     planes = np.unique(ConvexHull(hull.points).equations, axis=0)
     found = linprog(

@@ -1,4 +1,4 @@
-"""A sheet drawn as a surface, made a closed solid."""
+"""Turn a sheet that is drawn as a surface into a closed solid."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ __all__ = ["edges_of", "thicken"]
 def edges_of(triangles: Ints) -> tuple[Ints, Ints]:
     """Return the edges (E, 2) of triangles (F, 3), and how often (E,) each is left open.
 
-    An edge is left open as often as more triangles run through it one way, as it is given, than
-    the other; a closed surface leaves none.
+    That is how many more triangles use the edge in its given direction than in the opposite one;
+    a closed surface leaves no edge open.
     """
     edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     forward = edges[:, 0] < edges[:, 1]
@@ -26,16 +26,16 @@ def edges_of(triangles: Ints) -> tuple[Ints, Ints]:
 
 
 def thicken(vertices: ArrayLike, triangles: ArrayLike, thickness: float) -> tuple[Array, Ints]:
-    """Return the closed mesh of a sheet, its material behind the surface given.
+    """Return the closed mesh of a sheet, with the material behind the given surface.
 
     Parameters
     ----------
     vertices : (V, 3) m
     triangles : (F, 3) int
-        Counter-clockwise about the normals of the side that is drawn.
+        Counter-clockwise about the normals of the drawn side.
     thickness : float m
-        How far the other side lies behind, along the mean normal of the triangles of a vertex: at
-        sharp bends that is less than the thickness across them.
+        Distance of the other side, along the mean normal of the triangles of each vertex; at sharp
+        bends, the sheet is therefore thinner.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def thicken(vertices: ArrayLike, triangles: ArrayLike, thickness: float) -> tupl
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     used = np.unique(corners)
     if not (length[used] > 0).all():
-        raise InputError("sheet: its triangles face each other at a vertex; mend the surface")
+        raise InputError("sheet: its triangles face each other at a vertex; repair the surface")
     back = front - depth * normal / np.where(length > 0, length, 1.0)
     V = len(front)
     start, end = np.repeat(*edges_of(corners), axis=0).T

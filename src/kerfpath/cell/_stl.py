@@ -1,4 +1,4 @@
-"""Meshes of files and of other packages as solids. They do not say their unit: the caller must."""
+"""Meshes of files and of other packages as solids; the caller gives their unit."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 
 
 class TriangleMesh(Protocol):
-    """What trimesh and others call a mesh."""
+    """A mesh as trimesh and others have it."""
 
     @property
     def vertices(self) -> ArrayLike:
-        """(V, 3)."""
+        """Vertices (V, 3)."""
 
     @property
     def faces(self) -> ArrayLike:
-        """(F, 3), vertices of each triangle."""
+        """Indices (F, 3) of the vertices of each triangle."""
 
 
 def read_stl(path: str | Path, unit: str) -> Mesh:
@@ -43,34 +43,34 @@ def read_stl(path: str | Path, unit: str) -> Mesh:
     Raises
     ------
     InputError
-        An unknown unit, a file that cannot be read or is cut short, or what `Mesh` refuses.
+        An unknown unit, a file that cannot be read or is cut short, or a mesh that `Mesh` refuses.
     """
     path = Path(path)
     if unit not in UNITS:
         raise InputError(
-            f"{path.name}: an STL file does not say its unit; expected one of "
+            f"{path.name}: an STL file does not state its unit; expected one of "
             f"{', '.join(UNITS)}, got {unit!r}"
         )
     return close_surface(*_stl(_bytes(path), path.name), UNITS[unit], path.name)
 
 
 def mesh_of(mesh: TriangleMesh, unit: str, name: str = "mesh") -> Mesh:
-    """Return the solid in a mesh of another package, such as trimesh, that is in memory.
+    """Return the solid in a mesh in memory of another package, such as trimesh.
 
     Parameters
     ----------
-    mesh : with `vertices` (V, 3) and `faces` (F, 3)
-        Nothing else of it is looked at: neither a unit nor a pose that it may have.
+    mesh : object with `vertices` (V, 3) and `faces` (F, 3)
+        Other attributes, such as a unit or a pose, are ignored.
     unit : {"mm", "cm", "m", "in"}
-        Of its vertices.
+        Unit of the vertices.
     name : str
-        What messages call it.
+        Name in messages.
 
     Raises
     ------
     InputError
-        An unknown unit, no such mesh, faces of more than three corners, a number that is not
-        finite, or what `Mesh` refuses.
+        An unknown unit, no such mesh, faces with more than three corners, a number that is not
+        finite, or a mesh that `Mesh` refuses.
     """
     require_one_of(unit, f"{name}: unit", UNITS)
     try:
@@ -85,8 +85,8 @@ def mesh_of(mesh: TriangleMesh, unit: str, name: str = "mesh") -> Mesh:
 
 
 def close_surface(vertices: Array, triangles: Ints, scale: Array | float, name: str) -> Mesh:
-    """Return the solid inside a surface: scaled, and what the file tears apart welded."""
-    with np.errstate(over="ignore"):  # what becomes infinite is refused for its size
+    """Return the solid inside a surface, scaled and with coincident vertices welded."""
+    with np.errstate(over="ignore"):  # infinite values are refused for their size
         points = vertices * scale
     size = size_of(points, triangles, name)
     points, triangles = weld(points, triangles, SAME * size, name)
@@ -94,10 +94,10 @@ def close_surface(vertices: Array, triangles: Ints, scale: Array | float, name: 
 
 
 def read_surface(path: Path, name: str) -> tuple[Array, Ints]:
-    """Return vertices (V, 3), in the file's own unit, and triangles (F, 3) of an STL file.
+    """Return vertices (V, 3) and triangles (F, 3) of an STL, COLLADA (.dae) or Wavefront file.
 
-    Of a COLLADA (.dae) file the vertices are in m, its own unit; like the tools that read robot
-    descriptions, this one does not turn it by the axis that it calls up. Wavefront (.obj) too.
+    Vertices are in the file's own unit; those of a COLLADA file, which states its unit, are in m.
+    Like other readers of robot descriptions, this one ignores the up axis of a COLLADA file.
 
     Raises
     ------
@@ -121,14 +121,14 @@ def _bytes(path: Path) -> bytes:
 def _stl(data: bytes, name: str) -> tuple[Array, Ints]:
     corners = _corners(data, name)
     if not len(corners):
-        raise InputError(f"{name}: the mesh is empty, it holds no triangle")
+        raise InputError(f"{name}: the mesh is empty: it has no triangles")
     if not np.isfinite(corners).all():
         raise InputError(f"{name}: a vertex is not a finite number; export the mesh again")
     return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
 
 
 def _load_with_coal(path: Path, name: str) -> tuple[Array, Ints]:
-    """Return what the collision library's own reader finds; it ignores the unit of COLLADA."""
+    """Return what the collision library reads, scaled by the unit of COLLADA, which it ignores."""
     content = _bytes(path)
     unit = _UNIT.search(content) if path.suffix.lower() == ".dae" else None
     try:
@@ -138,7 +138,7 @@ def _load_with_coal(path: Path, name: str) -> tuple[Array, Ints]:
         raise InputError(f"{name}: {error}") from None
     except ValueError:
         raise InputError(
-            f"{name}: no mesh that can be read as {path.suffix}; export it again"
+            f"{name}: the mesh cannot be read as {path.suffix}; export it again"
         ) from None
     if not np.isfinite(vertices).all():
         raise InputError(f"{name}: a vertex is not a finite number; export the mesh again")
@@ -160,7 +160,7 @@ def _corners(data: bytes, name: str) -> Array:
         if len(data) == 84 + count * _RECORD.itemsize:
             return np.frombuffer(data, _RECORD, count, 84)["corners"].astype(np.float64)
     if not data.lstrip()[:5].lower() == b"solid":
-        raise InputError(f"{name}: neither a text STL nor a whole binary one; export it again")
+        raise InputError(f"{name}: neither a text STL nor a complete binary one; export it again")
     if b"endsolid" not in data.lower():
         raise InputError(f"{name}: the text STL is cut short, 'endsolid' is missing")
     try:

@@ -1,4 +1,4 @@
-"""The augmented line of section 2.1: points, tool axes, and what each stretch of it is."""
+"""The contour: points, tool axes and kinds of stretches (the augmented line of section 2.1)."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ FrameKind = Literal["tangent", "rotation-minimising"]
 FRAME_KINDS: tuple[FrameKind, ...] = ("tangent", "rotation-minimising")
 
 REPEATED_POINT = 1e-9
-"""Consecutive nodes closer than this (m) are one point: they leave no direction of travel."""
+"""Consecutive nodes closer than this (m) are one point: they define no direction of travel."""
 
 SAME_PLACE = 1e-6
-"""m; a path whose ends are nearer returns to its start."""
+"""A path whose ends are closer than this (m) returns to its start."""
 
 KINDS = ("cut", "pierce", "lead-in", "micro joint", "overlap", "lead-out", "loop", "corner")
-"""What a stretch of a contour is; `Contour.kind` holds places in this tuple."""
+"""Kinds of stretches of a contour; `Contour.kind` holds indices into this tuple."""
 CORNER_KIND = KINDS.index("corner")
 
 
@@ -34,32 +34,32 @@ CORNER_KIND = KINDS.index("corner")
 class Contour:
     """Points and tool axes along a cut: the augmented line of section 2.1.
 
-    Between nodes the contour is the polyline through its points, the axis turning evenly.
+    Between two nodes the path is straight and the axis turns evenly.
 
     Parameters
     ----------
     points : (K, 3) m
         Tool-tip positions; K >= 2, consecutive points distinct.
     axes : (K, 3)
-        Tool axes, pointing from the nozzle into the part; any length but zero, kept at length one.
+        Tool axes, from the nozzle into the part; any non-zero length, stored as unit vectors.
     closed : bool
         True when the path returns to its start. The first node is then repeated at the end
         (p_0 = p_n); it is added when the last point differs from the first.
     s : (K,) m, optional
         Arc length of each node along the path that was sampled; default: along the polyline.
     time : (K,) s, optional
-        Time of each node, where a speed has been laid on the contour.
+        Time of each node, if a speed has been assigned to the contour.
     kind : (K,) int, optional
-        What the stretch that begins at each node is, a place in `KINDS`; the last node has that of
-        the stretch before it. "pierce" is a point: the first node, where the beam goes through.
-        Default: "cut" throughout.
+        Kind of the stretch that begins at each node, an index into `KINDS`; the last node has the
+        kind of the stretch before it. "pierce" is a point: the first node, where the beam pierces.
+        Default: "cut" everywhere.
     speed_share : (K,), optional
-        Speed asked for at each node as a share of the contour's, above 0 and at most 1; default 1.
+        Requested share of the contour's speed at each node, above 0 and at most 1; default 1.
     x : (K, 3), optional
-        Direction at each node that gamma counts from, where that is not to follow from the path
-        alone (see `frames`), as for a part of a contour.
+        Direction at each node from which gamma is measured. Default: from the path (see `frames`);
+        a part of a contour keeps the directions of the contour that it comes from.
     name : str
-        What messages, reports and programs call it.
+        Name in messages, reports and programs.
 
     Raises
     ------
@@ -126,7 +126,7 @@ class Contour:
         if self.kind is not None:
             kind = integers(self.kind, "kind", (count,))
             if not ((kind >= 0) & (kind < len(KINDS))).all():
-                raise InputError(f"kind: expected places in KINDS, 0 to {len(KINDS) - 1}")
+                raise InputError(f"kind: expected indices into KINDS, 0 to {len(KINDS) - 1}")
             if (kind[1:] == KINDS.index("pierce")).any():
                 raise InputError("kind: only the first node of a contour can be its pierce")
         share = np.ones(count)
@@ -154,25 +154,24 @@ class Contour:
 
     @property
     def returns(self) -> bool:
-        """Whether it ends within 1 um of where it begins, closed or not."""
+        """Whether the path ends within 1 um of its start, closed or not."""
         return bool(np.linalg.norm(self.points[0] - self.points[-1]) < SAME_PLACE)
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What the stretch that begins at each node is, in words."""
+        """Kind of the stretch that begins at each node, as a word of `KINDS`."""
         return tuple(KINDS[code] for code in self.kind)
 
     @property
     def corners(self) -> Ints:
-        """Nodes at which the path turns by more than 20 deg; the first of a closed one may be."""
+        """Nodes at which the path turns by more than 20 deg; ends count only if it is closed."""
         return _sampling.corners(self.points, self.closed)
 
     @property
     def feature_ends(self) -> Ints:
-        """Nodes that sampling by `spacing` or `dt` keeps: ends, corners, and where a kind ends.
+        """Nodes that sampling by `spacing` or `dt` keeps: ends, corners and changes of kind.
 
-        Of a rounded corner its middle, which is nearest to the corner that was drawn, and not where
-        it begins and ends.
+        Of a rounded corner only the middle is kept, the point nearest to the drawn corner.
         """
         kind = self._stretch_kind()
         ends = np.flatnonzero(np.diff(kind)) + 1
@@ -197,8 +196,8 @@ class Contour:
         """Sample the contour again, uniformly in arc length or in time (Eq. 1).
 
         Give exactly one of `spacing`, `count`, `tolerance` (with or without `axis_tolerance`), or
-        `dt` together with `speed`. The ends are always nodes; with `spacing` or `dt` corners and
-        feature ends are, too, and steps may be shorter than the largest by up to a fifth.
+        `dt` together with `speed`. The ends are always nodes. With `spacing` or `dt`, feature ends
+        (see `feature_ends`) are nodes too, and steps may be up to a fifth shorter than the largest.
 
         Parameters
         ----------
@@ -207,22 +206,23 @@ class Contour:
         count : int
             Number of nodes, both ends included.
         tolerance : float m
-            The fewest evenly spaced nodes whose chords leave this contour by no more than this.
+            Largest deviation of the chords from this contour; the fewest evenly spaced nodes are
+            taken that keep it.
         axis_tolerance : float rad
-            With it (or alone): the axis, turned evenly along each chord, also stays this close.
+            The same for the axis, turned evenly along each chord; with `tolerance` or alone.
         dt : float s
-            Largest time between nodes; each stretch is divided evenly, and where that leaves its
-            steps shorter than the others, it is run through more slowly.
+            Largest time between nodes. Each stretch is divided evenly; a stretch with shorter
+            steps than the others is traversed more slowly.
         speed : float or (K,) m/s
-            Speed along the path, constant or at each node of this contour; times `speed_share`.
+            Speed along the path, constant or at each node; multiplied by `speed_share`.
         keep : (m,) int
-            Nodes of this contour that are nodes again, too, with `spacing` or `dt`.
+            Further nodes of this contour to keep, with `spacing` or `dt`.
 
         Raises
         ------
         InputError
-            No or several ways of sampling given, a value that is not positive, or a stretch too
-            short for the step.
+            None or several ways of sampling, a value that is not positive, or a stretch too short
+            for the step.
         """
         given = {
             "spacing": spacing,
@@ -294,11 +294,11 @@ class Contour:
 
     @property
     def along(self) -> Array:
-        """Directions of travel, (K, 3): unit, normal to the tool axes; errors as in `frames`."""
+        """Directions of travel (K, 3): unit vectors normal to the axes; raises as `frames` does."""
         return replace(self, x=None).frames("tangent")[:, :3, 0]
 
     def part(self, first: int, last: int, frames: FrameKind) -> Contour:
-        """Return the nodes first to last as an open contour, gamma counting from the same frames.
+        """Return nodes `first` to `last` as an open contour that measures gamma from equal frames.
 
         Raises
         ------
@@ -320,22 +320,22 @@ class Contour:
         )
 
     def between(self, s0: float, s1: float) -> Contour:
-        """Return the open contour between two arc lengths (m), its own nodes kept on the way."""
+        """Return the open contour between two arc lengths (m); it keeps the nodes between them."""
         inside = self.s[(self.s > s0 + REPEATED_POINT) & (self.s < s1 - REPEATED_POINT)]
         s = np.concatenate([[s0], inside, [s1]])
         return replace(self, closed=False, x=None).at_nodes(s)
 
     def _stretch_kind(self) -> Ints:
-        """Return the kind of each stretch, (K-1,); that of the first is not its pierce."""
+        """Return the kind of each stretch, (K-1,); the first is never "pierce"."""
         kind = self.kind[:-1].copy()
         if self.kind[0] == KINDS.index("pierce"):
             kind[0] = self.kind[1]
         return kind
 
     def at_nodes(self, s: Array, time: Array | None = None) -> Contour:
-        """Return the contour with nodes at arc lengths s (M,) m, increasing, end to end."""
+        """Return the contour sampled at increasing arc lengths `s` (M,) m, with `time` (M,) s."""
         points, axes = self.at(s)
-        # A node that rounding left just before a feature's end still begins what follows it.
+        # A node that rounding puts just before the end of a stretch still begins the next one.
         k = np.searchsorted(self.s, s + REPEATED_POINT, side="right") - 1
         kind = self._stretch_kind()[np.clip(k, 0, len(self) - 2)]
         if self.kind[0] == KINDS.index("pierce") and s[0] == self.s[0]:
@@ -363,5 +363,8 @@ class Contour:
 def _increasing(value: ArrayLike, name: str, count: int) -> Array:
     array = floats(value, name, (count,))
     if (bad := np.flatnonzero(np.diff(array) <= 0)).size:
-        raise InputError(f"{name}: must increase from node to node, but not after node {bad[0]}")
+        raise InputError(
+            f"{name}: expected increasing values, but that of node {bad[0] + 1} is not larger "
+            f"than that of node {bad[0]}"
+        )
     return array

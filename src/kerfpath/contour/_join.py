@@ -1,4 +1,4 @@
-"""Contours put end to end."""
+"""Join contours end to end."""
 
 from __future__ import annotations
 
@@ -22,29 +22,31 @@ def join(
     closed: bool = False,
     name: str | None = None,
 ) -> Contour:
-    """Return one contour that runs through `contours` in order, sampled alike if asked.
+    """Return one contour that runs through `contours` in order.
 
     Parameters
     ----------
     contours : sequence of open Contour
         Each begins where the one before it ends.
     gap_tolerance : float m
-        Largest distance bridged between an end and the next start; such ends become one node.
+        Largest gap between an end and the next start that is bridged; the two become one node.
     spacing : float m, optional
-        Sample the whole evenly at this spacing (the segments' own nodes are not kept).
+        Resample the joined contour evenly; the nodes of the segments are not kept.
     closed : bool
-        The last segment returns to the first.
+        Whether the last segment returns to the first.
+    name : str, optional
+        Default: the names of the contours, joined by "+".
 
     Raises
     ------
     InputError
-        Nothing to join, a closed contour among several, or a gap over the tolerance (says where).
+        No contour, a closed contour among several, or a gap above the tolerance.
     """
     if not contours:
         raise InputError("join: expected at least one contour, got none")
     for c in contours:
         if c.closed and len(contours) > 1:
-            raise InputError(f"join: contour {c.name!r} is closed, nothing can be joined to it")
+            raise InputError(f"join: expected open contours, but {c.name!r} is closed")
     for before, after in pairwise(contours):
         gap = float(np.linalg.norm(before.points[-1] - after.points[0]))
         if gap > gap_tolerance:

@@ -1,4 +1,4 @@
-"""Samplings of a path: evenly between features, evenly in time, or by the fewest nodes."""
+"""Sample a path evenly between features, evenly in time, or with the fewest nodes."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from kerfpath.errors import InputError
 __all__ = ["Polyline", "corners", "divide_evenly", "sample_fewest", "sample_in_time"]
 
 CORNER = np.radians(20)
-"""Turn of the path at one node from which on it is a corner, which sampling keeps."""
+"""rad: a node at which the path turns by more than this is a corner, which sampling keeps."""
 EVEN = 0.8
-"""Least share of the largest step that the steps between two features have."""
+"""Smallest step between features, as a share of the largest."""
 MOST_OFTEN = 8.0
-"""How much shorter than asked for steps may become for the sake of a short stretch."""
+"""Factor by which steps may become shorter than requested to fit a short stretch."""
 MOST_NODES = 200_000
-"""Nodes that a tolerance may ask for; a sharp corner asks for its length over the tolerance."""
+"""Most nodes for a tolerance; with a sharp corner, about length / tolerance are needed."""
 REPEATED_POINT = 1e-9
-"""m; keeps a chord of no length from dividing by zero."""
+"""m; prevents a division by zero for a chord without length."""
 
 
 class Polyline(NamedTuple):
-    """The path through the nodes, the axis turning evenly between them."""
+    """A path that is straight between its nodes, with an axis that turns evenly between them."""
 
     s: Array
     """(K,) m: arc lengths, increasing."""
@@ -45,9 +45,9 @@ class Polyline(NamedTuple):
 
 
 def corners(points: Array, closed: bool) -> Ints:
-    """Return the nodes of points (K, 3) m at which the path turns sharply, in their order.
+    """Return the nodes, in order, at which the path through points (K, 3) m turns sharply.
 
-    The first node counts where the path is closed, the ends of an open one do not.
+    The first node of a closed path can be one; the ends of an open path cannot.
     """
     along = unit(np.diff(points, axis=0), "points")
     turn = angle_between(along, np.roll(along, 1, axis=0))
@@ -65,7 +65,7 @@ def divide_evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str)
     ends : (e,) int
         Nodes that are kept.
     step : float m or s
-        A smaller one is taken where that makes the steps of all stretches alike within `EVEN`.
+        Reduced where that makes the steps of all stretches equal within `EVEN`.
     unit_name, name : str
         For messages: mm or ms, and the contour's name.
 
@@ -83,9 +83,9 @@ def divide_evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str)
     if share.max() < EVEN:
         k = int(np.argmin(lengths))
         raise InputError(
-            f"contour {name!r}: the stretch of {lengths[k] * 1e3:.4g} {unit_name} from "
-            f"{at[ends[k]] * 1e3:.6g} {unit_name} on is too short for steps of {step * 1e3:.4g} "
-            f"{unit_name}; take about {lengths[k] * 1e3:.4g} {unit_name}, or leave the feature out"
+            f"contour {name!r}: the stretch of {lengths[k] * 1e3:.4g} {unit_name} that begins at "
+            f"{at[ends[k]] * 1e3:.6g} {unit_name} is too short for steps of {step * 1e3:.4g} "
+            f"{unit_name}; use about {lengths[k] * 1e3:.4g} {unit_name}, or leave the feature out"
         )
     best = int(np.argmax(share >= EVEN))
     pieces = [
@@ -103,12 +103,12 @@ def sample_in_time(s: Array, speed: Array, dt: float, ends: Ints, name: str) -> 
     s : (K,) m
         Arc lengths of the nodes.
     speed : (K,) m/s
-        At each node, linear in arc length between them.
+        Speed at each node, linear in arc length between nodes.
     dt : float s
     ends : (e,) int
         Nodes that are kept.
     name : str
-        The contour's, for messages.
+        Name of the contour, for messages.
     """
     # With the speed linear in s over a segment, its mean slowness is ln(v1/v0)/(v1-v0).
     log_ratio, change = np.log(speed[1:] / speed[:-1]), np.diff(speed)
@@ -124,19 +124,19 @@ def sample_in_time(s: Array, speed: Array, dt: float, ends: Ints, name: str) -> 
     grown = np.where(still, tau, np.expm1(rate * tau) / np.where(still, 1.0, rate))
     made = s[k] + speed[k] * grown
     made[0], made[-1] = s[0], s[-1]
-    # A stretch whose steps are shorter than the longest is run through in as much time each.
+    # Every step takes as much time as the longest, so a stretch with shorter steps is slower.
     return made, np.diff(at).max(initial=0.0) * np.arange(len(at))
 
 
 def sample_fewest(line: Polyline, tolerance: float, axis_tolerance: float) -> Array:
     """Return the arc lengths of the fewest evenly spaced nodes that keep both tolerances."""
-    # Cells this short keep both: in one, path and axis move less than is allowed.
+    # Cells this short keep both tolerances: path and axis change by less within a cell.
     rate = float((angle_between(line.axes[:-1], line.axes[1:]) / np.diff(line.s)).max())
     enough = (line.s[-1] - line.s[0]) * max(1 / tolerance, rate / axis_tolerance) + 1
     witness = len(line.s) // 2
     for cells in range(1, int(min(enough, MOST_NODES)) + 1):
         s = np.linspace(line.s[0], line.s[-1], cells + 1)
-        # A node that spoilt the coarser sampling most likely spoils this one: try it first.
+        # A node that violated a tolerance before most likely does so again: try it first.
         if _spoilt(line, s, np.array([witness]), tolerance, axis_tolerance) < 0:
             bad = _spoilt(line, s, np.arange(len(line.s)), tolerance, axis_tolerance)
             if bad < 0:
@@ -149,7 +149,7 @@ def sample_fewest(line: Polyline, tolerance: float, axis_tolerance: float) -> Ar
 
 
 def _spoilt(line: Polyline, s: Array, nodes: Ints, tolerance: float, axis_tolerance: float) -> int:
-    """Return -1 if chords over `s` stay close at these nodes, or the worst of them."""
+    """Return -1 if the chords between `s` keep both tolerances at `nodes`, else the worst node."""
     cell = np.clip(np.searchsorted(s, line.s[nodes], side="right") - 1, 0, len(s) - 2)
     p0, n0 = line.at(s[cell])
     p1, n1 = line.at(s[cell + 1])
@@ -164,5 +164,5 @@ def _spoilt(line: Polyline, s: Array, nodes: Ints, tolerance: float, axis_tolera
 
 
 def _cells(length: Array, step: Array | float) -> Ints:
-    """Return into how many equal parts each length falls so that none is longer than `step`."""
+    """Return the number of equal parts of each length, none of them longer than `step`."""
     return np.maximum(1, np.ceil(length / step * (1 - 1e-12))).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Unit vectors in bulk: made from vectors of any length, and turned from one to another."""
+"""Arrays of unit vectors: normalisation, angles and interpolation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ZERO = 1e-9
 
 
 def unit(vectors: Array, name: str = "axes") -> Array:
-    """Return vectors (K, 3) at length one.
+    """Return vectors (K, 3) scaled to unit length.
 
     Raises
     ------
@@ -30,13 +30,13 @@ def unit(vectors: Array, name: str = "axes") -> Array:
 
 
 def angle_between(n0: Array, n1: Array) -> Array:
-    """Return the angle (...,) rad between unit vectors (..., 3), exact also where it is tiny."""
+    """Return the angle (...,) rad between unit vectors (..., 3), accurate for tiny ones too."""
     sine = np.linalg.norm(np.cross(n0, n1), axis=-1)
     return np.asarray(np.arctan2(sine, (n0 * n1).sum(-1)))
 
 
 def slerp(n0: Array, n1: Array, part: Array) -> Array:
-    """Turn unit vectors n0 (..., 3) by `part` (..., 1) of the angle towards n1, evenly."""
+    """Turn unit vectors n0 (..., 3) towards n1 by a share `part` (..., 1) of their angle."""
     angle = angle_between(n0, n1)[..., None]
     small = angle < 1e-7
     sine = np.where(small, 1.0, np.sin(angle))

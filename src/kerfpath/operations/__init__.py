@@ -1,8 +1,8 @@
-"""From a loop of the drawing to a cut: start, kerf, leads, joints, corners, tool axes.
+"""Turn a loop of a drawing into a cut: start, kerf, leads, micro joints, corners, tool axes.
 
-Each operation takes a contour and returns a new one. Sides are as seen from the nozzle, looking
-along the travel: loops of CAD files run with the material on their left and the scrap on their
-right, see `Side`.
+Each operation takes a contour and returns a new one. Sides are seen from the nozzle, looking along
+the direction of travel: loops of CAD files have the material on their left and the scrap on their
+right (see `Side`).
 """
 
 from kerfpath.operations._axes import bevel as bevel

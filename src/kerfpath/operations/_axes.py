@@ -15,28 +15,33 @@ from kerfpath.operations._surface import Side, lateral
 __all__ = ["bevel", "smooth_axes"]
 
 TAIL = 3.0
-"""Standard deviations at which the weight of a neighbour is dropped."""
+"""Neighbours farther away than this many standard deviations are ignored."""
 MOST_BEVEL = np.radians(60)
 
 
 def smooth_axes(contour: Contour, distance: float, *, limit: float) -> Contour:
     """Return the contour with its axes averaged along the path, none turned by more than `limit`.
 
-    Where faces meet at a bend, the axis then turns over about twice the distance instead of at
-    once; the noise of triangulated surfaces goes.
+    At a bend between two faces, the axis then turns over about twice the distance instead of at
+    once; the noise of triangulated surfaces disappears.
 
     Parameters
     ----------
     contour : Contour
     distance : float m
-        Standard deviation of the weight that neighbours have.
+        Standard deviation of the Gaussian weights along the path.
     limit : float rad
-        Largest angle between an axis and what it was.
+        Largest angle between the old and the new axis of a node.
+
+    Raises
+    ------
+    InputError
+        A distance or limit that is not positive, or axes whose average is zero.
     """
     sigma = scalar(distance, "smoothing distance", unit="m", above=0.0)
     limit = scalar(limit, "smoothing limit", unit="rad", above=0.0)
     s, axes, length = contour.s - contour.s[0], contour.axes, contour.length
-    # Weighted by the length of path that a node stands for.
+    # Each node is weighted by its length of path.
     stands_for = np.gradient(s)
     if contour.closed:
         turns = int(np.ceil(TAIL * sigma / length))
@@ -68,13 +73,13 @@ def bevel(contour: Contour, angle: ArrayLike, *, side: Side = "right") -> Contou
     ----------
     contour : Contour
     angle : float or (K,) rad
-        Tilt, constant or at each node; above 0 the head leans over to `side`.
+        Tilt, constant or at each node; if positive, the head leans towards `side`.
     side : {"left", "right"}
 
     Raises
     ------
     InputError
-        An angle of more than 60 deg.
+        An angle of more than 60 deg, or different angles at the ends of a closed contour.
     """
     tilt = floats(np.broadcast_to(np.asarray(angle, dtype=float), len(contour)), "angle", (None,))
     if (np.abs(tilt) > MOST_BEVEL).any():
@@ -82,7 +87,7 @@ def bevel(contour: Contour, angle: ArrayLike, *, side: Side = "right") -> Contou
             f"bevel: expected angles up to 60 deg, got {np.degrees(np.abs(tilt).max()):.3g} deg"
         )
     if contour.closed and tilt[0] != tilt[-1]:
-        raise InputError(f"bevel: contour {contour.name!r} is closed; give both ends one angle")
+        raise InputError(f"bevel: contour {contour.name!r} is closed; give both ends equal angles")
     away = lateral(contour.axes, contour.along, side)
     tilted: Array = np.cos(tilt)[:, None] * contour.axes - np.sin(tilt)[:, None] * away
     return replace(contour, axes=tilted, x=None)

@@ -1,4 +1,4 @@
-"""Corners: rounded within a tolerance, run around in a loop in the scrap, or slowed down at."""
+"""Corners: round them within a tolerance, loop around them in the scrap, or slow down."""
 
 from __future__ import annotations
 
@@ -19,33 +19,34 @@ STRAIGHT_BACK = np.radians(179)
 ARC_STEP = np.radians(5)
 """Turn between the nodes of an arc."""
 SHRUNK, ROUNDING = 8, 1e-9
-"""Times that an arc is made smaller until it keeps to its measure, and by what share it is taken
-smaller than that for rounding."""
+"""Most attempts at shrinking an arc until it keeps its tolerance, and the extra share that each
+attempt takes off against rounding."""
 
 Corner = Callable[[int, Array, Array, float], tuple[float, Array] | None]
-"""Node, directions before and behind it, room on both sides (m): what to put there, and how far
-before and behind it (m) the contour is left; None to leave the corner as it is."""
+"""A function of a node, the directions before and after it, and the room on each side (m). It
+returns how far before and after the node (m) the contour is replaced, and the points (m, 3) m to
+put there; or None to keep the corner."""
 
 
 def round_corners(contour: Contour, tolerance: float, *, surface: Surface | None = None) -> Contour:
-    """Return the contour with an arc in place of each corner that leaves it by `tolerance` (m).
+    """Return the contour with each corner replaced by an arc that passes it at `tolerance` (m).
 
-    The arc is smaller where corners are too near to each other for that, and nowhere farther from
-    the corner, on curved ways neither. Its middle is a node, which sampling keeps, as it keeps
-    corners. A closed contour that begins in a corner begins at its smoothest place afterwards.
+    Where corners are close together, the arc is smaller; it never passes farther from the corner,
+    on curved paths neither. Sampling keeps the node in the middle of the arc, as it keeps corners.
+    A closed contour that begins at a corner is changed to begin at its smoothest place.
 
     Parameters
     ----------
     contour : Contour
     tolerance : float m
     surface : Surface, optional
-        What the arcs are laid on; default: the plane of the two ways at each corner.
+        Surface that the arcs are laid on; default: the plane of the two directions at each corner.
 
     Raises
     ------
     InputError
-        A corner that turns straight back; a contour that is more than a cut already; an arc that
-        leaves the surface.
+        A corner that turns straight back; a contour that already has leads, micro joints or loops;
+        an arc that leaves the surface.
     """
     tolerance = scalar(tolerance, "corner tolerance", unit="m", above=0.0)
     contour = _begin_off_corners(contour)
@@ -62,24 +63,27 @@ def round_corners(contour: Contour, tolerance: float, *, surface: Surface | None
 def loop_corners(
     contour: Contour, radius: float, *, side: Side = "right", surface: Surface | None = None
 ) -> Contour:
-    """Return the contour with each outer corner run past and come back to in a loop.
+    """Return the contour with a loop in the scrap added at each outer corner.
+
+    The cut runs straight past the corner and returns to it in the loop. A closed contour that
+    begins at a corner is changed to begin at its smoothest place.
 
     Parameters
     ----------
     contour : Contour
     radius : float m
-        Of the loop.
+        Radius of the loop.
     side : {"left", "right"}
-        Where the scrap is; corners that turn towards it have no room for a loop and stay. A closed
-        contour that begins in a corner begins at its smoothest place afterwards.
+        Side of the scrap; corners that turn towards it have no room for a loop and stay as they
+        are.
     surface : Surface, optional
-        What the loops are laid on; default: the plane across the tool axis at each corner.
+        Surface that the loops are laid on; default: the plane across the tool axis at each corner.
 
     Raises
     ------
     InputError
         A loop that touches the part or leaves the surface; a corner that turns straight back; a
-        contour that is more than a cut already.
+        contour that already has leads, micro joints or loops.
     """
     radius = scalar(radius, "loop radius", unit="m", above=0.0)
     contour = _begin_off_corners(contour)
@@ -104,17 +108,22 @@ def loop_corners(
 def slow_corners(
     contour: Contour, share: float, *, distance: float = 1e-3, ramp: float = 2e-3
 ) -> Contour:
-    """Return the contour with only a share of the speed asked for around each corner.
+    """Return the contour with a lower speed around each corner.
 
     Parameters
     ----------
     contour : Contour
     share : float
-        Of the speed, above 0 and below 1.
+        Share of the speed at a corner, above 0 and below 1.
     distance : float m
-        Before and behind the corner at that share.
+        Length before and after the corner that is cut at that share.
     ramp : float m
-        Length over which the speed changes, before and behind that.
+        Length over which the speed changes, before and after that.
+
+    Raises
+    ------
+    InputError
+        A share, distance or ramp out of range.
     """
     share = scalar(share, "corner speed share", above=0.0)
     if share >= 1:
@@ -142,14 +151,14 @@ def _begin_off_corners(contour: Contour) -> Contour:
     """Return the contour begun at its smoothest place if it is closed and begins in a corner."""
     if contour.kind.any():
         raise InputError(
-            f"corners of {contour.name!r}: expected a cut without leads, joints or loops; see to "
-            "corners before"
+            f"corners of {contour.name!r}: expected a cut without leads, micro joints or loops; "
+            "treat its corners before adding those"
         )
     if 0 in contour.corners:
         begun = start_at(contour, smoothest_start(contour))
         if 0 not in begun.corners:
             return begun
-        side = int(np.argmax(np.diff(contour.s)))  # of a polygon, whose every node is a corner
+        side = int(np.argmax(np.diff(contour.s)))  # a polygon: every node is a corner
         return start_at(contour, float(contour.s[side : side + 2].mean()))
     return contour
 
@@ -157,9 +166,9 @@ def _begin_off_corners(contour: Contour) -> Contour:
 def _replace_corners(
     contour: Contour, corner: Corner, kind: int, surface: Surface | None, most: float = np.inf
 ) -> Contour:
-    """Return the contour with what `corner` makes of each corner, all of one kind, in its place.
+    """Return the contour with each corner replaced by what `corner` returns, of one kind.
 
-    Its middle is no farther than `most` (m) from the corner.
+    The middle of each replacement is at most `most` (m) from the corner.
     """
     nodes = contour.corners
     if not nodes.size:
@@ -202,10 +211,10 @@ def _replace_corners(
 def _laid(
     contour: Contour, k: int, reach: float, points: Array, surface: Surface | None
 ) -> tuple[float, Array, Array]:
-    """Return what is put at corner k, m before and behind it: its points and axes, on a surface."""
+    """Return reach (m), points and axes of what replaces corner k, laid on the surface."""
     ends, axes = contour.at(contour.s[k] + reach * np.array([-1.0, 1.0]))
     part = np.linspace(0, 1, len(points))[:, None]
-    # On a curved way an arc that is tangent at the corner begins and ends a little beside it.
+    # On a curved path, an arc tangent to the directions at the corner ends slightly beside it.
     points = _shift_between(ends, points, part)
     if surface is None:
         before, after = (np.tile(axis, (len(part), 1)) for axis in axes)
@@ -223,7 +232,7 @@ def _shift_between(ends: Array, points: Array, part: Array) -> Array:
 
 
 def _arc(corner: Array, t0: Array, t1: Array, reach: float) -> Array:
-    """Return the arc (m, 3) tangent to both ways at `reach` (m) from the corner."""
+    """Return the arc (m, 3) tangent to both directions at `reach` (m) from the corner."""
     turn = float(angle_between(t0, t1))
     radius = reach / np.tan(turn / 2)
     inwards = t1 - (t1 @ t0) * t0

@@ -14,21 +14,21 @@ __all__ = ["offset"]
 ARC_STEP = np.radians(10)
 """Turn between the nodes of an arc around an outer corner; a smaller turn needs no arc."""
 ENOUGH = 0.98
-"""Least share of the distance that is kept; the chords of an arc keep 0.996 of it."""
+"""Smallest share of the distance that the result keeps; the chords of an arc keep 0.996 of it."""
 FITS = 0.99
-"""Share of the distance that the image keeps with which a chain may begin: those of inner corners,
-which are cut off later, keep 0.985 of it at most, the cosine of `ARC_STEP`."""
+"""Share of the distance that the first point of an offset chain must keep. Offset points of inner
+corners, which are cut off later, keep at most 0.985 of it, the cosine of `ARC_STEP`."""
 LOOK = 20.0
-"""How many distances of path an inner corner may take."""
+"""Length of path that an inner corner may take up, in multiples of the distance."""
 SLOT = np.radians(165)
-"""Turn of an inner corner from which on it is a slot or a notch that the beam does not fit into,
-and of an outer one from which on its sides meet too far off."""
+"""An inner corner that turns by more than this is a slot or notch that the beam does not fit into;
+the sides of an outer corner that does would meet too far away."""
 PARALLEL = 1e-9
-"""Sine of the angle of two segments that have no one crossing."""
+"""Sine of the angle below which two segments count as parallel."""
 STRAIGHT = np.radians(0.01)
-"""Turn at a node below which the path goes straight on there."""
+"""Turn at a node below which the path counts as straight there."""
 SAME_PLACE = 1e-9
-"""m: two nodes nearer than this are one."""
+"""m: nodes closer than this are the same."""
 
 
 def offset(
@@ -37,31 +37,32 @@ def offset(
     """Return the contour moved sideways by `distance` (m) in the planes across its tool axes.
 
     Outer corners become arcs around the corner; at inner corners the sides are cut back to where
-    they meet. A closed contour begins where it did, or as near to there as is left of it.
+    they meet. A closed contour begins at the point nearest to its previous start.
 
     Parameters
     ----------
     contour : Contour
-        Nothing but a cut at one speed; closed or open.
+        A plain cut at one speed, closed or open.
     distance : float m
         Half the kerf.
     side : {"left", "right"}
         Seen from the nozzle along the travel; the scrap of loops from CAD is on the right.
     sharp : bool
-        Outer corners stay corners: the sides go on until they meet, so that the corner can be
-        rounded, run around or slowed down at afterwards.
+        Keep outer corners: extend their sides until they meet, so that `round_corners`,
+        `loop_corners` or `slow_corners` can treat them afterwards.
 
     Raises
     ------
     InputError
         A place where the beam does not fit: a radius on that side smaller than the distance, a slot
-        or neck narrower than twice the distance, or nothing left.
+        or neck narrower than twice the distance, or nothing left; a contour that already has leads,
+        micro joints, loops or slow corners.
     """
     distance = scalar(distance, "offset distance", unit="m", above=0.0)
     if contour.kind.any() or (contour.speed_share < 1).any():
         raise InputError(
-            f"offset: contour {contour.name!r} has leads, joints, loops or slow corners already; "
-            "offset it before"
+            f"offset: contour {contour.name!r} already has leads, micro joints, loops or slow "
+            "corners; offset it before adding those"
         )
     contour = _with_middles(contour)
     points, axes, source = _move_nodes(contour, distance, side, sharp)
@@ -87,7 +88,10 @@ def offset(
 
 
 def _with_middles(contour: Contour) -> Contour:
-    """Return the contour with a node amid each side between two corners, where the beam may fit."""
+    """Return the contour with a node added in the middle of each side between two corners.
+
+    The beam may fit there even if it does not fit at the corners.
+    """
     steps = np.diff(contour.points, axis=0)
     turn = angle_between(*_ways_at(contour))
     amid = np.flatnonzero((turn[:-1] > ARC_STEP) & (turn[1:] > ARC_STEP))
@@ -106,7 +110,7 @@ def _with_middles(contour: Contour) -> Contour:
 def _ways_at(contour: Contour) -> tuple[Array, Array]:
     """Return the unit directions (K, 3) of the path before and after each node.
 
-    At the ends of an open one they are the same.
+    At the ends of an open contour they are the same.
     """
     along = unit(np.diff(contour.points, axis=0))
     ends = (along[-1], along[0]) if contour.closed else (along[0], along[-1])
@@ -116,7 +120,7 @@ def _ways_at(contour: Contour) -> tuple[Array, Array]:
 def _move_nodes(
     contour: Contour, distance: float, side: Side, sharp: bool
 ) -> tuple[Array, Array, Ints]:
-    """Return the images of all nodes, their axes, and the node of each; corners make several."""
+    """Return the offset points, the axis and the source node of each; corners give several."""
     before, after = _ways_at(contour)
     across = [lateral(contour.axes, t, side) for t in (before, after)]
     turn = angle_between(*across)
@@ -130,7 +134,7 @@ def _move_nodes(
             part = np.linspace(0, 1, int(np.ceil(turn[k] / ARC_STEP - 1e-9)) + 1)[:, None]
             ways = slerp(np.tile(l0, (len(part), 1)), np.tile(l1, (len(part), 1)), part)
         else:
-            ways = np.array([l0, l1])  # the way between them is cut off, where the sides meet
+            ways = np.array([l0, l1])  # what lies between them is cut off where the sides meet
         points.append(contour.points[k] + distance * ways)
         axes.append(np.tile(contour.axes[k], (len(ways), 1)))
         source += [k] * len(ways)
@@ -138,7 +142,7 @@ def _move_nodes(
 
 
 def _amid_what_fits(contour: Contour, points: Array, distance: float) -> int:
-    """Return the middle of the longest run of images (M, 3) m that keep the distance."""
+    """Return the middle of the longest run of offset points (M, 3) m that keep the distance."""
     gap = np.linalg.norm(points - nearest(contour, points)[0], axis=1)
     tight = np.flatnonzero(gap < FITS * distance)
     if len(tight) == len(points):
@@ -153,9 +157,9 @@ def _amid_what_fits(contour: Contour, points: Array, distance: float) -> int:
 def _without_loops(
     contour: Contour, points: Array, axes: Array, source: Ints, distance: float, side: Side
 ) -> tuple[Array, Array]:
-    """Return the chain without the loops that it runs where it crosses itself."""
+    """Return the chain without the loops at its crossings with itself."""
     kept, kept_axes = [], []
-    first, place = 0, 0.0  # the next node to keep, and where on the chain, in nodes, that is
+    first, place = 0, 0.0  # the next node to keep, and its place along the chain, in nodes
     far = min(LOOK * distance, contour.length / 2)
     for i, f, j, g in _crossings(points, axes, far):
         if i + f < place:
@@ -169,9 +173,10 @@ def _without_loops(
 
 
 def _crossings(points: Array, axes: Array, far: float) -> list[tuple[int, float, int, float]]:
-    """Return where segments i < j of a chain cross seen along the axis, at shares f and g of them.
+    """Return the crossings (i, f, j, g) of a chain: segments i < j, at shares f and g of them.
 
-    Only those with less than `far` (m) of chain between them; in order along the chain.
+    Crossings are seen along the axis. Only those with less than `far` (m) of chain between them
+    count; they are in order along the chain.
     """
     step = np.diff(points, axis=0)
     size = np.linalg.norm(step, axis=1)
@@ -194,7 +199,7 @@ def _crossings(points: Array, axes: Array, far: float) -> list[tuple[int, float,
 
 
 def _require_corner(contour: Contour, nodes: Ints, distance: float, side: Side) -> None:
-    """Raise InputError where what is left out is no corner but a curve or a slot too tight."""
+    """Raise InputError if the loop that is cut off is a tight curve or slot, not a corner."""
     before, after = (ways[nodes] for ways in _ways_at(contour))
     turn = angle_between(before, after)
     if turn.max() < CORNER and (radius := _radius(contour, nodes)) < distance:
@@ -209,10 +214,10 @@ def _require_corner(contour: Contour, nodes: Ints, distance: float, side: Side) 
 
 
 def _radius(contour: Contour, nodes: Ints) -> float:
-    """Return the least radius, m, of a curve that the path may follow with its turns at some nodes.
+    """Return the smallest radius (m) of a curve that the path may approximate at some nodes.
 
-    That is the way to the nearer of the turns before and after over the turn: of a polygon the
-    radius of the circle that its sides touch.
+    At a node this is the distance to the nearer of the neighbouring turns, divided by the turn: for
+    a regular polygon, about the radius of its inscribed circle.
     """
     turn, count = angle_between(*_ways_at(contour)), len(contour) - 1
     bent = np.flatnonzero(turn[:count] > STRAIGHT)

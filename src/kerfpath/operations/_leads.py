@@ -29,7 +29,7 @@ __all__ = ["LeadShape", "lead_in", "lead_out"]
 LeadShape = Literal["line", "arc"]
 
 STEP = 2e-4
-"""m between the nodes of a lead."""
+"""Distance (m) between the nodes of a lead."""
 
 
 def lead_in(
@@ -44,16 +44,16 @@ def lead_in(
     speed_share: float = 1.0,
     clearance: float = 2e-4,
 ) -> Contour:
-    """Return the contour with a lead from its pierce in the scrap to its first node.
+    """Return the contour with a lead-in from a pierce in the scrap to its first node.
 
-    The tool stands normal to the surface at the pierce and fans to the axis of the cut. A closed
+    The tool axis is normal to the surface at the pierce and fans to the axis of the cut. A closed
     contour becomes an open one that ends where its cut began.
 
     Parameters
     ----------
     contour : Contour
     length : float m
-        Of the lead.
+        Length of the lead.
     shape : {"line", "arc"}
         A line at `angle` to the first step, or an arc that turns by `angle` and joins it
         tangentially.
@@ -62,21 +62,22 @@ def lead_in(
     side : {"left", "right"}
         Where the scrap is, seen from the nozzle along the travel.
     surface : Surface, optional
-        What the lead is laid on; default: the planes across the contour's own axes.
+        Surface that the lead is laid on; default: the planes across the contour's own axes.
     fan : float m, optional
-        Length over which the axis fans; default: the whole lead.
+        Length over which the axis fans; default: the length of the lead.
     speed_share : float
-        Share of the speed at the far end of the lead; it changes evenly along it.
+        Share of the speed at the outer end of the lead; it changes evenly along the lead.
     clearance : float m
-        How far the pierce must be from the contour.
+        Distance that the pierce must keep from the contour.
 
     Raises
     ------
     InputError
-        A lead that touches the part, leaves the surface or pierces too near; values out of range.
+        A lead that touches the part, leaves the surface or ends too close to the part; a contour
+        that already has a pierce; values out of range.
     """
     if contour.kind[0] == KINDS.index("pierce"):
-        raise InputError(f"lead_in: contour {contour.name!r} has a pierce already")
+        raise InputError(f"lead_in: contour {contour.name!r} already has a pierce")
     points, axes = _lay_lead(
         contour, length, shape, angle, side, surface or Ribbon(contour), fan, clearance, "lead-in"
     )
@@ -99,7 +100,10 @@ def lead_out(
     speed_share: float = 1.0,
     clearance: float = 0.0,
 ) -> Contour:
-    """Return the contour with a lead from its last node into the scrap; as `lead_in`."""
+    """Return the contour with a lead-out from its last node into the scrap.
+
+    Parameters and exceptions are those of `lead_in`, except that the contour may have a pierce.
+    """
     pierced = contour.kind == KINDS.index("pierce")
     kinds = np.where(pierced, KINDS.index("lead-in"), contour.kind)  # for `reverse`
     plain = replace(contour, closed=False, kind=kinds, x=None, time=None)
@@ -115,7 +119,7 @@ def lead_out(
 
 
 def _share(points: Array, far: float, near: float) -> Array:
-    """Return speed shares (m,) from the far end of a lead to its joint."""
+    """Return speed shares (m,) from the outer end of a lead to the contour."""
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     return np.asarray(far + (near - far) * s / s[-1])
 
@@ -149,7 +153,7 @@ def _lay_lead(
     points, normals = lay_on(surface, flat, contour, what)
     # The cut may lie beside the surface by rounding or kerf: close that gap along the lead.
     points = points + (1 - back / length)[:, None] * (start - points[-1])
-    # What tilts the cut's axis from the surface's normal tilts the lead's more and more.
+    # The tilt of the cut's axis from the surface normal increases along the lead.
     leaning = lean_axes(normals, normal[0], contour.axes[0])
     axes = slerp(-normals, leaning, 1 - np.minimum(back / fan, 1)[:, None])
     _require_clearance(contour, points, side, clearance, what)
@@ -159,7 +163,7 @@ def _lay_lead(
 def _require_clearance(
     contour: Contour, points: Array, side: Side, clearance: float, what: str
 ) -> None:
-    """Raise InputError where a lead lies on the part's side, or its pierce too near to the part."""
+    """Raise InputError if a lead is on the part's side, or its outer end too close to the part."""
     part = edge(contour)
     require_in_scrap(part, points[:-1], side, what)
     apart = float(np.linalg.norm(points[0] - nearest(part, points[:1])[0]))

@@ -21,22 +21,24 @@ __all__ = [
 ]
 
 SAME_PLACE = 1e-7
-"""m: two nodes nearer than this are one."""
+"""m: nodes closer than this are the same."""
 ALIKE = 1e-6
-"""rad: turns of two windows that differ by less are alike."""
+"""rad: windows whose turns differ by less are equally smooth."""
 MICRO_JOINT, OVERLAP = (KINDS.index(word) for word in ("micro joint", "overlap"))
 
 
 def reverse(contour: Contour) -> Contour:
-    """Return the contour run the other way; scrap then lies on its other side.
+    """Return the contour in the opposite direction, with the scrap on its other side.
 
     Raises
     ------
     InputError
-        A contour that has a pierce: give it its lead-in afterwards.
+        A contour that has a pierce; reverse it before adding the lead-in.
     """
     if contour.kind[0] == KINDS.index("pierce"):
-        raise InputError(f"reverse: contour {contour.name!r} has a pierce; reverse it before")
+        raise InputError(
+            f"reverse: contour {contour.name!r} has a pierce; reverse it before adding the lead-in"
+        )
     return replace(
         contour,
         points=contour.points[::-1],
@@ -55,7 +57,7 @@ def start_at(contour: Contour, s: float) -> Contour:
     Raises
     ------
     InputError
-        An open contour, or a place that it does not have.
+        An open contour, or an arc length outside it.
     """
     _require_closed(contour, "start_at")
     s = scalar(s, "s", unit="m")
@@ -88,7 +90,12 @@ def smoothest_start(contour: Contour, *, window: float = 5e-3) -> float:
     ----------
     contour : closed Contour
     window : float m
-        Length looked at around each place.
+        Length of path over which the turn around each node is summed.
+
+    Raises
+    ------
+    InputError
+        An open contour, or a window that is not positive.
     """
     _require_closed(contour, "smoothest_start")
     half = scalar(window, "window", unit="m", above=0.0) / 2
@@ -107,7 +114,7 @@ def smoothest_start(contour: Contour, *, window: float = 5e-3) -> float:
     smooth = total <= total.min() + ALIKE
     if smooth.all():
         return float(contour.s[0])
-    # Amid the longest stretch of places that are alike.
+    # Take the middle of the longest stretch of equally smooth places.
     rough = np.flatnonzero(~smooth)
     gap = np.diff(np.append(s[rough], s[rough[0]] + length))
     k = int(np.argmax(gap))
@@ -116,12 +123,13 @@ def smoothest_start(contour: Contour, *, window: float = 5e-3) -> float:
 
 
 def overlap(contour: Contour, length: float) -> Contour:
-    """Return a closed contour run on past its start by `length` (m): an open one.
+    """Return a closed contour as an open one that continues past its start by `length` (m).
 
     Raises
     ------
     InputError
-        An open contour, an overlap longer than it, or one that would cut a micro joint.
+        An open contour, an overlap as long as the contour or longer, or one that would cut a micro
+        joint.
     """
     _require_closed(contour, "overlap")
     length = scalar(length, "overlap", unit="m", above=0.0)
@@ -155,19 +163,19 @@ def micro_joints(
     ----------
     contour : Contour
     width : float m
-        Of each joint.
+        Width of each joint.
     count : int
-        How many, spread evenly from half a distance behind the start on; or
+        Number of joints, evenly spaced; the first is half a spacing after the start.
     at : sequence of float m
-        Arc lengths of their middles.
+        Arc lengths of the middles of the joints, instead of `count`.
 
     Raises
     ------
     InputError
-        Both or none of `count` and `at`; joints that overlap, pass the ends, or lie in a lead.
+        Both or neither of `count` and `at`; joints that overlap, pass the ends, or lie in a lead.
     """
     if (count is None) == (at is None):
-        raise InputError("micro_joints: give one of count= and at=")
+        raise InputError("micro_joints: give either count= or at=")
     width = scalar(width, "micro joint width", unit="m", above=0.0)
     if at is not None:
         middles = np.sort(floats(at, "at", (None,)))
@@ -181,22 +189,22 @@ def micro_joints(
     if (np.diff(ends) <= 0).any() or ends[0] <= contour.s[0] or ends[-1] >= contour.s[-1]:
         raise InputError(
             f"micro_joints: {len(middles)} joints of {width * 1e3:g} mm do not fit into "
-            f"{contour.length * 1e3:g} mm of {contour.name!r} one behind the other"
+            f"{contour.length * 1e3:g} mm of {contour.name!r} without overlap"
         )
     marked = with_nodes(contour, ends)
     place = np.searchsorted(ends, marked.s + SAME_PLACE, side="right")
     joint = place % 2 == 1
     if marked.kind[joint].any():
         raise InputError(
-            f"micro_joints: a joint of {contour.name!r} lies in a lead, loop or overlap; make "
-            "joints before those, or elsewhere"
+            f"micro_joints: a joint of {contour.name!r} lies in a lead, loop or overlap; add "
+            "micro joints before those, or elsewhere"
         )
     kind = np.where(joint, MICRO_JOINT, marked.kind)
     return replace(marked, kind=kind)
 
 
 def with_nodes(contour: Contour, s: Array) -> Contour:
-    """Return the contour with nodes at arc lengths s (m) too, where it has none."""
+    """Return the contour with nodes added at arc lengths s (m) where it has none."""
     known = np.abs(contour.s - s[:, None]).min(axis=1) <= SAME_PLACE
     every = np.sort(np.concatenate([contour.s, s[~known]]))
     return replace(contour, x=None, time=None).at_nodes(every)
@@ -204,4 +212,4 @@ def with_nodes(contour: Contour, s: Array) -> Contour:
 
 def _require_closed(contour: Contour, what: str) -> None:
     if not contour.closed:
-        raise InputError(f"{what}: contour {contour.name!r} is open; only closed ones will do")
+        raise InputError(f"{what}: expected a closed contour, but {contour.name!r} is open")

@@ -26,35 +26,35 @@ __all__ = [
 ]
 
 TOUCH = 1e-5
-"""m: what runs in the scrap may be on the part's side by no more; a lead that is tangent to a curve
-leaves its first chord by some micrometres."""
+"""m: how far a path in the scrap may lie on the part's side; a lead that is tangent to a curve
+deviates from the curve's first chord by some micrometres."""
 SURFACE_ENDS = 1e-3
-"""m: what is to be laid on the surface and is farther than this from it has left it."""
+"""m: a point farther than this from the surface has left it."""
 SAME_PLACE = 1e-9
-"""m: two places nearer than this are one."""
+"""m: points closer than this are the same."""
 
 IN_SCRAP = [KINDS.index(word) for word in ("pierce", "lead-in", "lead-out", "loop")]
 """Kinds of the stretches that run in the scrap."""
 
 Side = Literal["left", "right"]
-"""Seen from the nozzle along the travel."""
+"""Side of a contour, seen from the nozzle along the direction of travel."""
 
 
 class Surface(Protocol):
-    """A sheet's surface, healed: there also where the part has a hole or ends."""
+    """The healed surface of a sheet: it extends over holes and past the edges of the part."""
 
     def project(self, points: Array) -> tuple[Array, Array]:
         """Return the nearest points (B, 3) m of the surface, and its outward normals (B, 3)."""
 
 
 class Ribbon:
-    """The surface as a contour has it: the plane across the tool axis at the nearest node."""
+    """A surface made from a contour: the plane across the tool axis at the nearest node."""
 
     def __init__(self, contour: Contour) -> None:
         self._contour = contour
 
     def project(self, points: Array) -> tuple[Array, Array]:
-        """Return the feet (B, 3) m of points on those planes, and their normals (B, 3)."""
+        """Return points projected onto those planes (B, 3) m, and the outward normals (B, 3)."""
         where, k = nearest(self._contour, points)
         axis = self._contour.axes[k]
         return points - ((points - where) * axis).sum(1, keepdims=True) * axis, -axis
@@ -93,16 +93,16 @@ def lateral(axes: Array, along: Array, side: Side) -> Array:
     """
     if side not in get_args(Side):
         raise InputError(f"side: expected left or right, got {side!r}")
-    # Of steps as short as they come: only a travel along the tool axis has no side.
+    # Steps may be very short: only travel along the tool axis has no side.
     along = along / np.linalg.norm(along, axis=-1, keepdims=True)
     across = unit(np.cross(axes, along), "side")
     return across if side == "right" else -across
 
 
 def nearest(contour: Contour, points: Array) -> tuple[Array, Array]:
-    """Return for points (B, 3) the nearest points (B, 3) of a contour, and the node before each."""
+    """Return the points (B, 3) m of a contour nearest to `points`, and the node before each."""
     start, step = contour.points[:-1], np.diff(contour.points, axis=0)
-    # The segments whose middle is not farther than the nearest node by half the longest of them.
+    # Segments whose middle is farther than the nearest node by at most half the longest segment.
     bound, _ = cKDTree(contour.points).query(points)
     size = np.linalg.norm(step, axis=1)
     near = cKDTree(start + step / 2).query_ball_point(points, bound + 0.5001 * size.max())
@@ -116,7 +116,7 @@ def nearest(contour: Contour, points: Array) -> tuple[Array, Array]:
 
 
 def edge(contour: Contour) -> Contour:
-    """Return what of a contour is the part's edge: without the leads and loops in the scrap."""
+    """Return the part's edge: the contour without its leads and loops in the scrap."""
     on = ~np.isin(contour.kind[:-1], IN_SCRAP)
     keep = np.append(on, False) | np.append(False, on)
     points, axes = contour.points[keep], contour.axes[keep]
@@ -125,14 +125,14 @@ def edge(contour: Contour) -> Contour:
 
 
 def require_in_scrap(contour: Contour, points: Array, side: Side, what: str) -> None:
-    """Raise InputError where one of the points (B, 3) m lies on the part's side of the contour."""
+    """Raise InputError if one of the points (B, 3) m lies on the part's side of the contour."""
     where, k = nearest(contour, points)
     across = lateral(contour.axes[:-1], np.diff(contour.points, axis=0), side)
     last, nodes = len(across) - 1, contour.points
     ring = np.linalg.norm(nodes[0] - nodes[-1]) <= SAME_PLACE
     before = np.where(k > 0, k - 1, last if ring else 0)
     after = np.where(k < last, k + 1, 0 if ring else last)
-    # Beside a corner, either of its segments alone may give the wrong side.
+    # Close to a corner, one of its segments alone may give the wrong side.
     at_start, at_end = (np.linalg.norm(where - nodes[i], axis=1) <= SAME_PLACE for i in (k, k + 1))
     other = np.where(at_start, before, np.where(at_end, after, k))
     depth = ((points - where) * (across[k] + across[other]) / 2).sum(1)

@@ -1,4 +1,4 @@
-"""A path moved to poses that a person has taught, and eased back to where it was."""
+"""Move a path to poses taught by a person, with a gradual return to the original path."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kerfpath.errors import InputError
 __all__ = ["touched_up"]
 
 PARTS = 16
-"""Parts of a step between nodes at which the eased path has points of its own."""
+"""Number of parts into which the moved path divides each step between nodes."""
 
 
 def touched_up(
@@ -25,31 +25,32 @@ def touched_up(
     *,
     ease: float = 0.01,
 ) -> tuple[Contour, Ints]:
-    """Return the path through poses taught at some of its nodes, and which of its nodes they are.
+    """Return the path through poses taught at some nodes, and the indices (m,) of these in it.
 
-    From each taught pose the shift of the points and the turn of the axes fade out over `ease`, or
-    go over to those of the next pose where that is nearer than twice as far, with speed and
-    curvature continuous (the polynomial of degree five that is flat at both ends). To cut it,
-    sample it with the second answer as `keep`.
+    The shift of the points and the turn of the axes fade out over `ease` from each taught pose, or
+    blend into those of the next pose if it is closer than twice `ease`. Speed and curvature stay
+    continuous (a polynomial of degree five, flat at both ends). Before cutting, sample the path
+    with the returned indices as `keep`.
 
     Parameters
     ----------
     path : Contour
         The path, densely sampled.
     nodes : Contour
-        Sampled from it.
+        The contour sampled from `path`, in whose nodes the poses were taught.
     moved : (m,) int
         Nodes that were moved, increasing; never the first, nor the last of a path that returns.
     points : (m, 3) m
+        Taught positions of the tip.
     axes : (m, 3)
-        Taught there.
+        Taught tool axes.
     ease : float m
-        Distance along the path.
+        Distance along the path over which the changes fade out.
 
     Raises
     ------
     InputError
-        No or other nodes.
+        No nodes, or nodes that are out of range or out of order.
     """
     ease = scalar(ease, "ease", unit="m", above=0.0)
     moved = integers(moved, "moved", (None,))
@@ -60,8 +61,8 @@ def touched_up(
     most = last - nodes.returns
     if not (ordered and moved[0] > 0 and moved[-1] <= most):
         raise InputError(
-            f"contour {nodes.name!r}: expected nodes from 1 to {most} that were moved, increasing, "
-            f"got {moved.tolist()}"
+            f"contour {nodes.name!r}: expected increasing moved nodes from 1 to {most}, got "
+            f"{moved.tolist()}"
         )
     step = np.arange(last * PARTS + 1) / PARTS
     s = np.unique(np.concatenate([np.interp(step, np.arange(last + 1), nodes.s), nodes.s]))

@@ -1,9 +1,7 @@
-"""Robot descriptions (URDF): the chain of joints from base to tip, its limits, bodies and masses.
+"""Read and write robot descriptions (URDF): joints from base to tip, limits, bodies and masses.
 
-Read, and written from joints.
-
-Knows nothing of kinematic families: `kerfpath.Robot.from_urdf` recognises those, and therefore
-this package lies below `robots` and imports nothing of it.
+This package knows no kinematic families; `kerfpath.Robot.from_urdf` recognises those. It lies below
+`robots` and imports nothing from it.
 """
 
 from kerfpath.urdf._bodies import LinkBody as LinkBody

@@ -1,4 +1,4 @@
-"""The bodies of a description: what collides, in the frame of the joint that moves it."""
+"""Collision bodies of a description, each in the frame of the joint that moves it."""
 
 from __future__ import annotations
 
@@ -22,15 +22,16 @@ SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radiu
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinkBody:
-    """A collision body of a link, rigid on one joint of the arm, or on what carries arm or part.
+    """A collision body of a link, fixed to a joint of the arm or to what carries arm or part.
 
     Parameters
     ----------
     link : str
+        Name of the link.
     joint : int
-        Number of joints of the arm that move it: 0 for what the arm stands on.
+        Number of arm joints that move the body; 0 if none does.
     pose : (4, 4)
-        In the (turned) frame of that joint, m; for joint 0 in the base frame, with all external
+        Pose in the (turned) frame of that joint, m; for joint 0 in the base frame with all external
         axes at zero.
     kind : {"mesh", "box", "cylinder", "sphere"}
     size : (k,) m
@@ -38,8 +39,8 @@ class LinkBody:
     path : Path or None
         File of the mesh.
     on : str or None
-        The external joint that carries it, "" the ground; None: what the arm stands on, or a link
-        of the arm.
+        Name of the external joint that carries the body; "" for the ground; None for links of the
+        arm and for what the arm stands on.
     """
 
     link: str
@@ -85,7 +86,9 @@ def _size(shape: ElementTree.Element, where: str) -> Array:
     keys, count = SIZES[shape.tag]
     size = np.concatenate([numbers(shape, key, where, (0.0,) * count) for key in keys.split()])
     if not (size > 0).all():
-        raise InputError(f"{where}: expected a {shape.tag} of positive {keys}, got {size.tolist()}")
+        raise InputError(
+            f"{where}: expected a {shape.tag} with positive {keys}, got {size.tolist()}"
+        )
     return size
 
 
@@ -107,13 +110,13 @@ def _mesh_file(
         raise InputError(f"{where}: the mesh {name!r} is not a local file")
     if not name or not file.is_file():
         raise InputError(
-            f"{where}: the mesh {name!r} is not there; say where its package lies with packages="
-            '{"NAME": "FOLDER"}, or read the kinematics alone with meshes=False'
+            f"{where}: the mesh {name!r} was not found; give the folder of its package with "
+            'packages={"NAME": "FOLDER"}, or read only the kinematics with meshes=False'
         )
     return file
 
 
 def _places(here: Path, package: str) -> list[Path]:
-    """Return where a package may lie: a folder of its name, here or above, or beside one above."""
+    """Return where a package may be: `here` or a parent of its name, or a folder in these."""
     above = [here, *here.parents]
     return [folder for folder in above if folder.name == package] + [p / package for p in above]

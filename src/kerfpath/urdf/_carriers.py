@@ -1,4 +1,4 @@
-"""The joints of a description that carry the arm or the part, and where every link stands."""
+"""The joints of a description that carry the arm or the part, and the places of all links."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from kerfpath.urdf._xml import Joint, Tree
 __all__ = ["ExternalJoint", "Place", "carriers_before", "external_joints", "places", "under_part"]
 
 FEWEST = 6
-"""Joints of the smallest arm that is read from a description."""
+"""Number of joints of the smallest arm that is read from a description."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -26,9 +26,9 @@ class ExternalJoint:
     Parameters
     ----------
     joint : Joint
-        As it is written.
+        The joint as the file has it.
     pose : (4, 4)
-        Of its frame in the base with all such joints at zero, m.
+        Pose of the joint frame in the base with all such joints at zero, m.
     carries : {"robot", "part"}
     """
 
@@ -43,19 +43,20 @@ class Place(NamedTuple):
     """What moves a link, and where it is."""
 
     joint: int
-    """Number of joints of the arm that move it: 0 for what the arm stands on."""
+    """Number of arm joints that move it; 0 if none does."""
     on: str | None
-    """The external joint that carries it, "" the ground; None: what the arm stands on, or a link
-    of it."""
+    """Name of the external joint that carries it; "" for the ground; None for links of the arm and
+    for what the arm stands on."""
     pose: Array
-    """(4, 4) m: in the frame of the last joint of the arm that moves it, else in the base with all
+    """(4, 4) m: in the frame of the last arm joint that moves it, else in the base with all
     external joints at zero."""
 
 
 def carriers_before(tree: Tree, written: Sequence[Joint], mount: str | None) -> int:
-    """Return how many of the moving joints of a chain carry the arm.
+    """Return how many moving joints of a chain carry the arm.
 
-    Those above link `mount`; without it all up to the last one that slides, if an arm follows.
+    These are the joints above link `mount`; without it, all up to the last prismatic joint, if an
+    arm follows.
 
     Raises
     ------
@@ -81,7 +82,8 @@ def under_part(tree: Tree, base: str, part: str | None, chain: Sequence[Joint]) 
     Raises
     ------
     InputError
-        No such link; one that is part of the robot, stands still, or against which the base moves.
+        No such link; a link that the robot moves, that does not move, or that is not connected to
+        what the base is fixed to.
     """
     if part is None:
         return []
@@ -105,12 +107,12 @@ def under_part(tree: Tree, base: str, part: str | None, chain: Sequence[Joint]) 
             )
     if link not in ground:
         raise InputError(
-            f"{tree.path}: part: link {part!r} does not hang on what base {base!r} is fixed to; "
+            f"{tree.path}: part: link {part!r} is not connected to what base {base!r} is fixed to; "
             "choose base= above both of them"
         )
     if all(joint.kind == "fixed" for joint in joints):
         raise InputError(
-            f"{tree.path}: part: no joint moves {part!r}; leave it out where the part stands still"
+            f"{tree.path}: part: no joint moves {part!r}; leave it out if the part does not move"
         )
     return joints[::-1]
 
@@ -123,7 +125,7 @@ def external_joints(
     Raises
     ------
     InputError
-        One that floats, is planar, or mimics another.
+        A joint that floats, is planar, or mimics another.
     """
     found = []
     for joints, carries in ((before, "robot"), (under, "part")):
@@ -146,7 +148,7 @@ def external_joints(
 def places(
     tree: Tree, base: str, written: Sequence[Joint], externals: Sequence[ExternalJoint]
 ) -> dict[str, Place]:
-    """Return every link whose place is known: on the ground, on external joints, on the arm."""
+    """Return the place of every link on the ground, on external joints and on the arm."""
     carried = {external.joint.name: external.carries for external in externals}
     mounts = [name for name, carries in carried.items() if carries == "robot"]
     in_chain = {joint.name for joint in written}
@@ -177,7 +179,7 @@ def places(
 
 
 def _fixed_above(tree: Tree, base: str) -> dict[str, Array]:
-    """Return the base and the links above it that it is fixed to: their poses (4, 4) in it, m."""
+    """Return the poses (4, 4) m in the base of itself and of links above that it is fixed to."""
     found = {base: freeze(np.eye(4))}
     link = base
     while link in tree.parent and tree.parent[link].kind == "fixed":

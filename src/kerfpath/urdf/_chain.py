@@ -1,4 +1,4 @@
-"""A chain of revolute joints: the frames of its links in bulk, and how far points can get."""
+"""A chain of revolute joints: the frames of its links for many joint vectors, and its reach."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["KinematicChain", "turns"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class KinematicChain:
-    """Revolute joints one after the other; frame 0 is the base, frame i turns with joint i.
+    """A serial chain of revolute joints; frame 0 is the base, frame i turns with joint i.
 
     Parameters
     ----------
@@ -40,17 +40,17 @@ class KinematicChain:
 
     @property
     def joints(self) -> int:
-        """How many joints there are."""
+        """Number of joints."""
         return len(self.axes)
 
     @property
     def still(self) -> int:
-        """The frame that stands still: the base."""
+        """Index of the fixed frame: the base."""
         return 0
 
     @property
     def base(self) -> int:
-        """The frame of the robot's base."""
+        """Index of the frame of the robot's base."""
         return 0
 
     @property
@@ -60,28 +60,28 @@ class KinematicChain:
 
     @property
     def slides(self) -> Bools:
-        """Which joints of the chain are linear, (n,): none."""
+        """Whether each joint of the chain is linear, (n,): none is."""
         return np.zeros(len(self.axes), np.bool_)
 
     def say(self, place: int) -> str:
-        """Return what a joint of the chain is called in messages."""
+        """Return the name of a joint of the chain in messages."""
         return f"joint {place + 1}"
 
     def moves_with(self, frame: int) -> str:
-        """Return what a frame moves with, in words."""
+        """Return the name of what a frame moves with."""
         return f"joint {frame}" if frame else "base"
 
     def spread(self, share: Array) -> Array:
-        """Return joints (B, n) rad at shares (B, n), 0 to 1, of whole turns."""
+        """Map shares (B, n) from 0 to 1 to joints (B, n) rad over a whole turn each."""
         return np.asarray(2 * np.pi * share - np.pi, dtype=np.float64)
 
     def bounded(self, q: Array) -> Bools:
-        """Return at which of q (B, n) bounds on motions hold: at all."""
+        """Return at which of q (B, n) the bounds on motions hold, (B,): at all."""
         return np.ones(len(q), np.bool_)
 
     @property
     def length(self) -> float:
-        """The lengths (m) from joint to joint and to the end, together: how far the arm reaches."""
+        """Sum of the lengths (m) from joint to joint and to the end, the reach of the arm."""
         steps = np.linalg.norm(self.origins[1:, :3, 3], axis=1)
         return float(steps.sum() + np.linalg.norm(self.end[:3, 3]))
 
@@ -99,10 +99,10 @@ class KinematicChain:
         return np.asarray(self.frames(q)[:, -1] @ self.end)
 
     def reach(self, frame: int, points: Array) -> Array:
-        """Return bounds (n,) m on the distance of any of points (c, 3) from each joint's axis.
+        """Return bounds (n,) m on the distance of any of points (c, 3) m from each joint's axis.
 
-        They hold at every q: the links between stretched out, or zero for joints that do not move
-        the frame.
+        The points are in coordinates of `frame`. The bounds hold at every q, as they assume that
+        the links between are stretched out; they are zero for joints that do not move the frame.
         """
         arms = np.zeros(len(self.axes))
         length = float(np.linalg.norm(points, axis=1).max())

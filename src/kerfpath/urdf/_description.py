@@ -1,4 +1,4 @@
-"""The chain of a description: joints from base to tip, fixed joints merged, limits, bodies."""
+"""Read the chain of a description: joints from base to tip, with limits, bodies and masses."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from kerfpath.urdf._xml import Joint, Tree, read_tree
 __all__ = ["Description", "read_urdf"]
 
 SAME_LINE = 1e-9
-"""m, and sine: two neighbouring axes nearer than this turn about the same line."""
+"""m, and sine of an angle: neighbouring axes that differ by less turn about the same line."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Description:
-    """The arm between `base` and `tip` as a description has it, and what carries it and the part.
+    """The arm between `base` and `tip` of a description, and what carries it and the part.
 
     Parameters
     ----------
@@ -39,23 +39,22 @@ class Description:
     name : str
         Name of the robot.
     base, tip : str
-        Links.
+        Names of the links.
     joints : tuple of Joint
-        The joints of the arm that move, in order, as they are written.
+        The moving joints of the arm, in order, as the file has them.
     chain : KinematicChain
-        Their frames, fixed joints merged, all external joints at zero.
+        Frames of these joints, with fixed joints merged and all external joints at zero.
     externals : tuple of ExternalJoint
-        The joints that carry the arm, then those that carry the part, each carried by those of its
-        side before it.
+        The joints that carry the arm, then those that carry the part; within each group, each
+        joint is carried by those before it.
     bodies : tuple of LinkBody
         Collision bodies of every link on the ground, on external joints and on the arm.
     left_out : tuple of str
-        Links on other moving joints: where they are is not known, and no body of theirs is in
-        `bodies`.
+        Links on other moving joints, whose place is not known; `bodies` has none of their bodies.
     inertia : ChainInertia or None
-        What the joints carry; None where it is not known.
+        Masses that the joints carry; None if they are not known.
     inertia_missing : str
-        Why it is not known.
+        Why `inertia` is not known.
     """
 
     path: Path
@@ -86,34 +85,36 @@ def read_urdf(
 ) -> Description:
     """Read the chain from link `base` (default: the root) to `tip` (default: the only leaf).
 
-    Joints of it that come before the arm carry the arm: external axes, as those between what the
-    base is fixed to and the link `part`, which carry the part.
+    Moving joints of this chain before the arm are external axes that carry the arm. Moving joints
+    between what the base is fixed to and the link `part` are external axes that carry the part.
 
     Parameters
     ----------
     path : path
         A URDF file.
     base, tip : str, optional
+        Names of the links.
     mount : str, optional
-        The link that the arm stands on: joints between base and it are external. Default: below
-        the last joint that slides, if at least six joints follow it, else the base.
+        The link that the arm stands on; joints between the base and this link are external axes.
+        Default: the link below the last prismatic joint, if at least six joints follow it, else the
+        base.
     part : str, optional
-        The link that carries the part; default: the part stands still.
+        The link that carries the part; default: the part does not move.
     packages : mapping, optional
-        Folder of each package that mesh names begin with; one that is not named is looked for in
-        the folders above the file.
+        Folder of each package that mesh names begin with; other packages are searched for in the
+        folders above the file.
     meshes : bool
         Read the collision bodies too; a missing mesh file is then an error.
     snap : float rad
-        Angles this near to a multiple of 15 deg are taken as that: many descriptions print right
-        angles as 1.5708.
+        Angles within this of a multiple of 15 deg are rounded to it, because many descriptions
+        print right angles as 1.5708.
 
     Raises
     ------
     InputError
-        Not a description, no such link, no chain from base to tip; in the arm a joint that slides,
-        floats or mimics, or two neighbours about the same line; an external joint that floats or
-        mimics; a part that no external joint moves; a missing mesh.
+        Not a description; no such link; no chain from base to tip; an arm joint that slides, floats
+        or mimics another, or two neighbours about the same line; an external joint that floats or
+        mimics another; a part that no external joint moves; a missing mesh.
     """
     tree = read_tree(Path(path), snap)
     base, tip = _ends(tree, base, tip)
@@ -164,7 +165,7 @@ def read_urdf(
 def _inertia(
     tree: Tree, stand: dict[str, Place], joints: list[Joint]
 ) -> tuple[ChainInertia | None, str]:
-    """Return what the joints carry, or why that is not known: only torques need it."""
+    """Return what the joints carry, or why that is not known; only torques need it."""
     try:
         return inertia_of(tree, stand, joints), ""
     except InputError as fault:
@@ -211,18 +212,18 @@ def _between(tree: Tree, base: str, tip: str) -> list[Joint]:
 def _require_revolute(tree: Tree, joint: Joint) -> None:
     if joint.kind not in ("revolute", "continuous"):
         raise InputError(
-            f"{tree.path}: joint {joint.name!r} between base and tip is {joint.kind}; only chains "
-            "of revolute joints are planned, choose base= or tip= on this side of it"
+            f"{tree.path}: joint {joint.name!r} between base and tip is {joint.kind}; an arm must "
+            "have revolute joints only; choose base= or tip= on this side of it"
         )
     if joint.mimics:
         raise InputError(
-            f"{tree.path}: joint {joint.name!r} between base and tip mimics {joint.mimics!r}: it "
-            "does not move on its own, and such chains are not planned"
+            f"{tree.path}: joint {joint.name!r} between base and tip mimics {joint.mimics!r}; "
+            "every joint of an arm must move on its own"
         )
 
 
 def _require_lengths(tree: Tree, chain: KinematicChain, joints: list[Joint]) -> None:
-    """Raise InputError where a link between two joints has no length and no bend."""
+    """Raise InputError if a link between two joints has no length and no bend."""
     for i in range(1, len(joints)):
         T = chain.origins[i]
         first, second = chain.axes[i - 1], T[:3, :3] @ chain.axes[i]

@@ -1,4 +1,4 @@
-"""The masses of a description: what each joint of the chain carries, as one rigid body."""
+"""Masses of a description: the rigid body on each joint of the chain."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from kerfpath.urdf._xml import Joint, Tree, child, numbers, pose_of
 __all__ = ["ChainInertia", "inertia_of", "joined", "require_tensor"]
 
 SOLID = ("visual", "collision")
-"""Elements that a link with a shape has; one without any is a frame, which has no mass."""
+"""Elements of a link with a shape; a link without any of them is a frame, which has no mass."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,7 +34,7 @@ class ChainInertia:
     Raises
     ------
     InputError
-        A mass that is not positive, an inertia that is not positive definite, unlike numbers.
+        A mass that is not positive, an inertia that is not positive definite, different lengths.
     """
 
     mass: Array
@@ -53,7 +53,7 @@ class ChainInertia:
 
 
 def inertia_of(tree: Tree, stand: Mapping[str, Place], joints: list[Joint]) -> ChainInertia:
-    """Return the rigid bodies on the joints of the arm, links that are fixed together as one.
+    """Return the rigid body on each joint of the arm; links that are fixed together are merged.
 
     Parameters
     ----------
@@ -79,8 +79,8 @@ def inertia_of(tree: Tree, stand: Mapping[str, Place], joints: list[Joint]) -> C
             found[number - 1].append((mass, T[:3, 3] + R @ centre, R @ tensor @ R.T))
     for link in _hanging(tree, stand):
         raise InputError(
-            f"{tree.path}: link {link!r} hangs on the chain by a joint outside it, so that where "
-            f"its mass is is not known; make joint {tree.parent[link].name!r} fixed"
+            f"{tree.path}: link {link!r} is attached to the chain by a joint outside it, so the "
+            f"place of its mass is not known; make joint {tree.parent[link].name!r} fixed"
         )
     for joint, bodies in zip(joints, found, strict=True):
         if not bodies:
@@ -96,12 +96,12 @@ def inertia_of(tree: Tree, stand: Mapping[str, Place], joints: list[Joint]) -> C
 
 
 def joined(bodies: list[tuple[float, Array, Array]]) -> tuple[float, Array, Array]:
-    """Return mass (kg), centre (3,) m and tensor (3, 3) kg m^2 of bodies, given so, as one."""
+    """Merge bodies, each given as mass (kg), centre (3,) m and tensor (3, 3) kg m^2, into one."""
     mass = sum(mass for mass, _, _ in bodies)
     centre = sum((mass * centre for mass, centre, _ in bodies), np.zeros(3)) / mass
     tensor = np.zeros((3, 3))
     for m, c, own in bodies:
-        off = c - centre  # Huygens and Steiner: of the mass at its own centre
+        off = c - centre  # the theorem of Huygens and Steiner (parallel axes)
         tensor += own + m * (off @ off * np.eye(3) - np.outer(off, off))
     return mass, freeze(centre), freeze(tensor)
 
@@ -122,14 +122,14 @@ def _body(tree: Tree, link: str) -> tuple[float, Array, Array] | None:
     inertial = child(element, "inertial", where)
     if inertial is None:
         if any(element.find(tag) is not None for tag in SOLID):
-            raise InputError(f"{where} has a shape and no <inertial>")
+            raise InputError(f"{where} has a shape but no <inertial>")
         return None
     parts = [child(inertial, tag, where) for tag in ("mass", "inertia")]
     if parts[0] is None or parts[1] is None or parts[0].get("value") is None:
         raise InputError(f"{where}: its <inertial> lacks <mass value=...> or <inertia>")
     mass = float(numbers(parts[0], "value", where, (0.0,))[0])
     if not mass > 0:
-        raise InputError(f"{where}: its mass is not positive, {mass:g} kg")
+        raise InputError(f"{where}: expected a positive mass, got {mass:g} kg")
     xx, xy, xz, yy, yz, zz = (
         float(numbers(parts[1], f"i{key}", where, (0.0,))[0])
         for key in ("xx", "xy", "xz", "yy", "yz", "zz")
@@ -142,7 +142,7 @@ def _body(tree: Tree, link: str) -> tuple[float, Array, Array] | None:
 
 
 def _hanging(tree: Tree, stand: Mapping[str, Place]) -> Iterator[str]:
-    """Yield the links that moving joints outside the chain hang on links that it moves."""
+    """Yield the links that moving joints outside the chain attach to links that it moves."""
     for link, joint in tree.parent.items():
         if link not in stand and joint.parent in stand and stand[joint.parent].joint:
             yield link

@@ -1,4 +1,4 @@
-"""A description as text: joints with numbers in, XML out, which `read_tree` reads back."""
+"""Write joints as the XML of a description, which `read_tree` reads back."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def urdf_text(name: str, joints: Sequence[Joint], remark: str) -> str:
     Parameters
     ----------
     name : str
-        Of the robot.
+        Name of the robot.
     joints : sequence of Joint
-        Parents before children. An effort that is not known is written as 0: the format asks for
-        a number.
+        Joints, parents before children. An unknown effort is written as 0, because the format
+        requires a number.
     remark : str
-        What a comment at the head of the file says.
+        Comment at the head of the file.
     """
     robot = ElementTree.Element("robot", name=name)
     robot.append(ElementTree.Comment(f" {remark} "))

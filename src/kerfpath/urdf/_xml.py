@@ -1,4 +1,4 @@
-"""The text of a description: safe XML in, links and joints with numbers out."""
+"""Parse the XML of a description, safely, into links and joints."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ __all__ = ["Joint", "Tree", "child", "numbers", "pose_of", "read_root", "read_tr
 
 XACRO = ("{http://www.ros.org/wiki/xacro}", "{http://wiki.ros.org/xacro}")
 FINE = np.pi / 12
-"""rad: the angles that are meant where a description rounds them are whole multiples of 15 deg."""
+"""rad: angles that a description rounds are taken as multiples of this, 15 deg."""
 LARGEST = 1e6
-"""No number of a description is larger, m, rad or a scale."""
+"""Largest number allowed in a description (m, rad or a scale)."""
 NO_AXIS = 1e-9
-"""An axis whose numbers are all smaller is none."""
+"""An axis whose components are all smaller than this has no direction."""
 KINDS = ("revolute", "continuous", "fixed", "prismatic", "floating", "planar")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Joint:
-    """A joint as it is written; None where its limits are not.
+    """A joint as the file has it; limits that the file leaves out are None.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ class Joint:
     lower, upper : float rad or None
     velocity : float rad/s or None
     acceleration : float rad/s^2 or None
-        The smaller of those for speeding up and for slowing down, as far as they are written.
+        The smaller of the limits for acceleration and deceleration that the file has.
     jerk : float rad/s^3 or None
     effort : float N m or None
-        None also where what is written is no limit: 0, or no number.
+        None also if the value in the file is no limit: 0, or not a number.
     mimics : str
-        The joint that it follows, or nothing.
+        Name of the joint that it follows, or "".
     """
 
     name: str
@@ -80,43 +80,44 @@ class Tree:
 
 
 class _NoDoctype(ElementTree.TreeBuilder):
-    """A document type may define entities that grow without bound: no description needs one."""
+    """Refuse document types: they may define entities of unlimited size, and are not needed."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
         raise InputError("a document type (<!DOCTYPE ...>) is refused; remove that line")
 
 
 def read_tree(path: Path, snap: float) -> Tree:
-    """Return the links and joints of the file.
+    """Return the links and joints of the file; `snap` (rad) as in `pose_of`.
 
     Raises
     ------
     InputError
-        Not XML or not a description, names twice or missing, a link with two parents, a loop.
+        Not XML or not a description, duplicate or missing names, a link with two parents, a loop.
     """
     root = read_root(path, "robot description (URDF)")
     links: dict[str, ElementTree.Element] = {}
     for link in root.findall("link"):
         name = _attribute(link, "name", "a link", path)
         if name in links:
-            raise InputError(f"{path}: link {name!r} is there twice; rename one")
+            raise InputError(f"{path}: two links are called {name!r}; rename one")
         links[name] = link
     joints = tuple(_joint(element, snap, path) for element in root.findall("joint"))
     names = [joint.name for joint in joints]
     for i, joint in enumerate(joints):
         if joint.name in names[:i]:
-            raise InputError(f"{path}: joint {joint.name!r} is there twice; rename one")
+            raise InputError(f"{path}: two joints are called {joint.name!r}; rename one")
         for link_name in (joint.parent, joint.child):
             if link_name not in links:
                 raise InputError(
-                    f"{path}: joint {joint.name!r} names the link {link_name!r}, which is not there"
+                    f"{path}: joint {joint.name!r} names the link {link_name!r}, which is missing"
                 )
     parent: dict[str, Joint] = {}
     for joint in joints:
         if joint.child in parent:
             raise InputError(
-                f"{path}: link {joint.child!r} hangs on two joints, {parent[joint.child].name!r} "
-                f"and {joint.name!r}: a closed loop; only trees are read, remove one joint"
+                f"{path}: link {joint.child!r} is the child of two joints, "
+                f"{parent[joint.child].name!r} and {joint.name!r}: a closed loop; only trees are "
+                "read, so remove one joint"
             )
         parent[joint.child] = joint
     _require_no_loop(path, parent)
@@ -126,16 +127,16 @@ def read_tree(path: Path, snap: float) -> Tree:
 
 
 def read_root(path: Path, what: str) -> ElementTree.Element:
-    """Return the element <robot> of a file; `what` it should be is said where it is not.
+    """Return the <robot> element of a file; `what` is the expected kind of file, for messages.
 
     Raises
     ------
     InputError
-        No file, no XML, a document type, macros, another first element.
+        No file, no XML, a document type, xacro macros, another root element.
     """
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):
-            raise InputError(f"is no file; expected a {what}")
+            raise InputError(f"is not a regular file; expected a {what}")
         root = ElementTree.fromstring(
             path.read_bytes(), parser=ElementTree.XMLParser(target=_NoDoctype())
         )
@@ -147,7 +148,7 @@ def read_root(path: Path, what: str) -> ElementTree.Element:
         raise InputError(f"{path}: expected an XML {what}, {error}") from None
     if any(element.tag.startswith(XACRO) for element in root.iter()):
         raise InputError(
-            f"{path}: holds xacro macros; expand them first, with 'xacro {path.name} > robot.urdf'"
+            f"{path}: has xacro macros; expand them first with 'xacro {path.name} > robot.urdf'"
         )
     if root.tag != "robot":
         raise InputError(
@@ -163,7 +164,9 @@ def _require_no_loop(path: Path, parent: Mapping[str, Joint]) -> None:
             above = parent[above].parent
             if above in seen:
                 ring = " - ".join([*seen[seen.index(above) :], above])
-                raise InputError(f"{path}: the links {ring} hang on each other: a closed loop")
+                raise InputError(
+                    f"{path}: the links {ring} form a closed loop; only trees are read"
+                )
             seen.append(above)
 
 
@@ -172,7 +175,7 @@ def _joint(element: ElementTree.Element, snap: float, path: Path) -> Joint:
     where = f"{path}: joint {name!r}"
     kind = _attribute(element, "type", f"joint {name!r}", path)
     if kind not in KINDS:
-        raise InputError(f"{where}: type {kind!r} is none of {', '.join(KINDS)}")
+        raise InputError(f"{where}: expected a type of {', '.join(KINDS)}, got {kind!r}")
     ends = {}
     for end in ("parent", "child"):
         if (found := child(element, end, where)) is None:
@@ -182,7 +185,7 @@ def _joint(element: ElementTree.Element, snap: float, path: Path) -> Joint:
     if kind not in ("fixed", "floating") and (found := child(element, "axis", where)) is not None:
         axis = numbers(found, "xyz", where, (1.0, 0.0, 0.0))
         if not np.abs(axis).max() > NO_AXIS:
-            raise InputError(f"{where}: its axis is nearly 0 0 0, which is no direction")
+            raise InputError(f"{where}: its axis is nearly 0 0 0 and has no direction")
     limit, mimic = child(element, "limit", where), child(element, "mimic", where)
     names = ("lower", "upper", "velocity", "acceleration", "deceleration", "jerk")
     written: dict[str, float | None] = dict.fromkeys(names)
@@ -191,7 +194,7 @@ def _joint(element: ElementTree.Element, snap: float, path: Path) -> Joint:
             if limit.get(key) is not None:
                 written[key] = float(numbers(limit, key, f"{where} <limit>", (0.0,))[0])
         if written["lower"] is not None or written["upper"] is not None:
-            # The format's own default of the one that is left out.
+            # A limit that is left out has the default of the format, 0.
             written = {
                 **written,
                 "lower": written["lower"] or 0.0,
@@ -213,7 +216,7 @@ def _joint(element: ElementTree.Element, snap: float, path: Path) -> Joint:
 
 
 def _effort(text: str | None) -> float | None:
-    """Return an effort limit, N m; None where it is none: many descriptions write 0 there."""
+    """Return an effort limit (N m), or None if there is none; many descriptions then write 0."""
     try:
         effort = float(text or 0.0)
     except ValueError:
@@ -224,8 +227,8 @@ def _effort(text: str | None) -> float | None:
 def pose_of(element: ElementTree.Element, where: str, snap: float = 0.0) -> Array:
     """Return the <origin> of an element as a pose (4, 4).
 
-    Its angles are roll, pitch and yaw about the fixed x, y and z. Those within `snap` (rad) of a
-    multiple of 15 deg are taken as that.
+    Its angles are roll, pitch and yaw about the fixed x, y and z axes. Angles within `snap` (rad)
+    of a multiple of 15 deg are rounded to it.
     """
     pose, origin = np.eye(4), child(element, "origin", where)
     if origin is not None:
@@ -250,14 +253,12 @@ def numbers(
         values = np.array([])
     if len(values) != len(default) or not (np.abs(values) <= LARGEST).all():
         want = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers"
-        raise InputError(
-            f"{where}: expected {key}= as {want}, got {text!r} (allowed are {LARGEST:g})"
-        )
+        raise InputError(f"{where}: expected {key}= as {want}, got {text!r} (at most {LARGEST:g})")
     return values
 
 
 def child(element: ElementTree.Element, tag: str, where: str) -> ElementTree.Element | None:
-    """Return the only child of that tag, or None."""
+    """Return the only child with this tag, or None."""
     found = element.findall(tag)
     if len(found) > 1:
         raise InputError(f"{where}: has <{tag}> {len(found)} times, expected it once")

@@ -105,7 +105,7 @@ def test_what_stretches_are_is_kept():
 def test_nodes_that_cannot_be_moved_are_refused(moved):
     path, nodes = ring()
     k = np.clip(moved, 0, 60).astype(int)
-    with pytest.raises(InputError, match="expected nodes from 1 to 59 that were moved"):
+    with pytest.raises(InputError, match="expected increasing moved nodes from 1 to 59"):
         touched_up(path, nodes, moved, nodes.points[k], nodes.axes[k])
 
 

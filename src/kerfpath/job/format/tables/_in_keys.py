@@ -15,7 +15,7 @@ IN_KEYS = {
     "snap=0.0005": "snap_deg = 0.03",
     "snap=0.005": "snap_deg = 0.3",
     "snap=0": "snap_deg = 0",
-    'packages={"NAME": "FOLDER"}, or read the kinematics alone with meshes=False': (
+    'packages={"NAME": "FOLDER"}, or read only the kinematics with meshes=False': (
         'packages = { NAME = "FOLDER" }'
     ),
     "choose base= or tip=": "choose base or tip",
