@@ -283,11 +283,11 @@ def test_what_does_not_hold_them_refuses(circle, arm, tool, placement):
                 plan(circle, robot, speed=0.2, method=method, **here)
         with pytest.raises(InputError, match=f'{what}: a limit needs feed "constant", got "dip"'):
             plan(circle, robot, speed=0.2, feed="dip", **here)
-        with pytest.raises(InputError, match=f"the fastest speed: .* has some on {what}"):
+        with pytest.raises(InputError, match=f"the fastest speed: .* has limits on {what}"):
             fastest_speed(circle, robot, **here)
-        with pytest.raises(InputError, match=f"the Pareto set: .* has some on {what}"):
+        with pytest.raises(InputError, match=f"the Pareto set: .* has limits on {what}"):
             pareto(circle, robot, speed=0.2, **here)
-    with pytest.raises(InputError, match="jerk: a limit is kept by the refinement alone"):
+    with pytest.raises(InputError, match="jerk: only the refinement keeps a limit"):
         plan(circle, smooth, speed=0.2, method="exact", **here)
 
 
