@@ -64,7 +64,7 @@ class RateLimit:
 
     @property
     def usable(self) -> Array:
-        """The bound times the share of it that may be used, (n,) rad/s^order."""
+        """The usable part of the bound, share * bound, (n,) rad/s^order."""
         return freeze(self.share * self.bound)
 
     def per_interval(self, dt: float) -> Array:

@@ -42,7 +42,7 @@ class Loss(IntEnum):
 
 
 class Reason(str):
-    """A loss and the joint, margin or place of it, as plan.json and messages write it.
+    """A loss with its joint, margin or place, as plan.json and messages write it.
 
     The string is that text, such as "joint 3 low"; code compares its `loss`.
     """

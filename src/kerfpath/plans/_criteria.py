@@ -104,8 +104,8 @@ class Feed:
         if self.limit is None:
             return "full speed throughout"
         return (
-            f"full speed on {self.full:.1%} of the length; slowest, {self.slowest:.1%} of it, from "
-            f"node {self.node} on, where the {self.limit} of joint {self.joint + 1} binds"
+            f"full speed on {self.full:.1%} of the length; lowest speed {self.slowest:.1%} of it "
+            f"from node {self.node} on, where the {self.limit} of joint {self.joint + 1} binds"
         )
 
 
