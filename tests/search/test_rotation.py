@@ -216,7 +216,7 @@ def test_limits_that_close_the_way_only_together_are_both_named():
         shortest_path(q, [0, 1, 3], rotation=[0.5, 0.5], **two)
     with pytest.raises(NoFeasiblePath, match=r"joint 1 .* and of joint 2 .* without rotation"):
         shortest_path([[0.0, 0.0], [0.8, 0.8]], [0, 1, 2], rotation=[0.5, 0.5], **two)
-    with pytest.raises(NoFeasiblePath, match=r"of joint 2 \(0.5 rad\) closes"):
+    with pytest.raises(NoFeasiblePath, match=r"of joint 2 \(0.5 rad\) leaves"):
         shortest_path([[0.0, 0.0], [0.4, 0.8]], [0, 1, 2], rotation=[0.5, 0.5], **two)
 
 
