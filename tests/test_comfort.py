@@ -377,7 +377,7 @@ def test_the_fastest_speed_keeps_margins_and_knows_no_costs(fine):
     away = {"comfort": Comfort(limits=Band(margin=0.3))} | options
     on, off = (fastest_speed(nodes, arm, refine=refine, **away) for refine in (False, True))
     assert off.speed >= on.speed
-    with pytest.raises(InputError, match="knows no costs"):
+    with pytest.raises(InputError, match="takes no costs"):
         fastest_speed(nodes, arm, comfort=EVERY, **options)
 
 

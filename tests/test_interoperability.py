@@ -182,7 +182,7 @@ def test_pinocchio_moves_as_the_plan_does(arm, names):
 def test_a_model_of_other_joints_is_refused(plain, arm):
     railed = carried(arm, "rail")
     model = pin.buildModelFromXML(plain.robot.to_urdf())
-    with pytest.raises(InputError, match=r"model: expected .* got one with no rail, table; pinocc"):
+    with pytest.raises(InputError, match=r"model: expected .* got one with no rail, table; use p"):
         railed.to_pinocchio(model)
     with pytest.raises(InputError, match=r"expected a pinocchio.Model, got str"):
         plain.to_pinocchio("arm.urdf")

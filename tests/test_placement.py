@@ -80,7 +80,7 @@ def test_noisy_points_give_the_least_squares():
         (POINTS[:2], 0, "at least 3 points, got 2"),
         (np.outer([0, 0.1, 0.5, 0.9], [1, 2, 3]), 0, "lie on one line"),
         (np.zeros((4, 3)), 0, "lie on one line"),
-        (POINTS, [[0, 0, 0], [0, 0, 0], [0, 0, 0.003], [0, 0, 0]], r"point \d of 4 is left .* mm"),
+        (POINTS, [[0, 0, 0], [0, 0, 0], [0, 0, 0.003], [0, 0, 0]], r"point \d of 4 is off .* mm"),
     ],
 )
 def test_points_that_tell_no_frame_are_refused(nominal, change, message):

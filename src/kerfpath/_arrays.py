@@ -1,4 +1,4 @@
-"""The border: cast what users hand in to the one dtype and shape that the kernels assume.
+"""Input checks: cast the arrays of users to the dtype and shape that the kernels assume.
 
 Every array inside kerfpath is float64 (or an integer type), C-contiguous, finite and read-only.
 """
@@ -34,7 +34,7 @@ Bools = NDArray[np.bool_]
 _A = TypeVar("_A", bound=NDArray[Any])
 
 WHOLE = 2.0**53
-"""Whole numbers from here on are not distinct as float64."""
+"""From here on float64 does not represent every whole number."""
 _ROTATION_TOLERANCE = 1e-6
 """How far R^T R may be from the identity: seven printed decimals pass, a typo fails."""
 
@@ -55,8 +55,8 @@ def floats(
 ) -> Array:
     """Return `value` as a read-only float64 array of `shape` (None: any length), all finite.
 
-    Without `copy` the numbers of a fitting array are looked at where they are: for arrays that are
-    not kept. Where `infinite`, infinity is let pass.
+    Without `copy` the result may be a view of `value`: for arrays that are not kept. With
+    `infinite`, infinity is accepted.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def floats(
 
 
 def integers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Ints:
-    """Return `value` as a read-only int64 array of `shape`; floats are refused unless whole."""
+    """Return `value` as a read-only int64 array of `shape`; floats must be whole numbers."""
     if isinstance(value, np.ndarray) and value.dtype.kind == "i":
         _require_shape(value, name, shape)
         return freeze(np.array(value, dtype=np.int64, order="C"))
@@ -89,7 +89,7 @@ def integers(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Ints
 
 
 def bools(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Bools:
-    """Return `value` as a read-only bool array of `shape`; only True and False (0 and 1) pass."""
+    """Return `value` as a read-only bool array of `shape`; it may be True, False, 0 or 1."""
     array = np.asarray(value)
     _require_shape(array, name, shape)
     if array.dtype != np.bool_ and not np.isin(array, (0, 1)).all():
@@ -150,7 +150,7 @@ def as_pose(value: ArrayLike, name: str) -> Array:
     if error > _ROTATION_TOLERANCE or np.linalg.det(rotation) < 0:
         raise InputError(
             f"{name}: the upper left 3x3 must be a right-handed rotation, "
-            f"it is off by {error:.1e} (allowed {_ROTATION_TOLERANCE:g})"
+            f"but it is off by {error:.1e} (allowed {_ROTATION_TOLERANCE:g})"
         )
     return pose
 

@@ -26,9 +26,9 @@ NEEDS = {
 
 
 def require_extra(extra: str, what: str) -> None:
-    """Raise InputError where what an extra installs is not there; `what` needs it.
+    """Raise InputError if the modules of an extra, which `what` needs, are not installed.
 
-    Nothing is imported for it.
+    Nothing is imported for this check.
     """
     missing = [name for name in NEEDS[extra] if find_spec(name) is None]
     if missing:
@@ -39,7 +39,7 @@ def require_extra(extra: str, what: str) -> None:
 
 
 def imported(name: str, extra: str, what: str) -> ModuleType:
-    """Return a module of an extra, or one in its place that raises InputError where it is used."""
+    """Return a module of an extra, or a stand-in that raises InputError when it is used."""
     return import_module(name) if find_spec(name) else _Absent(name, extra, what)
 
 

@@ -1,4 +1,4 @@
-"""Identifiers made of what people call their contours."""
+"""Identifiers made from the names of contours."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from collections.abc import Iterable
 __all__ = ["LONGEST_NAME", "identifier", "identifiers"]
 
 LONGEST_NAME = 32
-"""Characters that a name keeps when it is made from a contour's name; ABB's bound."""
+"""Most characters of an identifier made from a contour's name; ABB's limit."""
 
 
 def identifiers(
     texts: Iterable[str], taken: Iterable[str], longest: int = LONGEST_NAME
 ) -> list[str]:
-    """Return an identifier for each text, unique also where a language ignores capitals."""
+    """Return an identifier for each text, unique also in languages that ignore case."""
     used = {name.lower() for name in taken}
     names = []
     for text in texts:

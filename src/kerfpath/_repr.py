@@ -1,4 +1,4 @@
-"""What a data object is, in a line: a notebook prints one without being asked."""
+"""One line that describes a data object, as a notebook prints it."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ import numpy as np
 __all__ = ["counted", "html_table", "in_degrees", "short_repr"]
 
 LONGEST = 240
-"""Characters of a line; what does not fit is left out."""
+"""Most characters of a line; fields that do not fit are left out."""
 FEW = 6
-"""Numbers and things up to which all are shown."""
+"""Most numbers of an array, or items of a collection, that are all shown."""
 SHORT = 40
-"""Characters of a text or of several things that are shown."""
+"""Most characters of a text, or of a collection whose items are shown."""
 
 
 def counted(number: int, noun: str) -> str:
-    """Return how many there are, with the noun in singular or plural: "1 face", "2 faces"."""
+    """Return a number with its noun in singular or plural: "1 face", "2 faces"."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def short_repr(thing: Any) -> str:
-    """Return the class of a dataclass and its fields in few words; arrays by their shapes."""
+    """Return the class of a dataclass and its fields in short; arrays by their shapes."""
     said, left = [f"{type(thing).__name__}("], LONGEST
     for field in fields(thing):
         value = getattr(thing, field.name)
@@ -52,7 +52,7 @@ def html_table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]]
 
 
 def in_degrees(value: float, unit: str) -> str:
-    """Return a value in rad or m, or per s or s^2, as people read it: "12.50 deg/s", "40.00 mm"."""
+    """Return a value in rad or m, or per s or s^2, in deg or mm: "12.50 deg/s", "40.00 mm"."""
     of, slash, per = unit.partition("/")
     factor, word = (180 / np.pi, "deg") if of == "rad" else (1e3, "mm")
     return f"{factor * value:.2f} {word}{slash}{per}"

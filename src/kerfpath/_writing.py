@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, also when the process is stopped in the middle."""
+"""Write files atomically: complete or not at all, even if the process is stopped."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _WRITING = Lock()
 
 
 def write_whole(files: Mapping[Path, bytes]) -> None:
-    """Write all files or none: each beside its place first, then all into their places in order.
+    """Write all files or none: first to temporary files beside them, then renamed in order.
 
     Raises
     ------
     OSError
-        One cannot be written, `filename` says which; nothing is left beside the others.
+        A file cannot be written; `filename` is its path. No temporary file is left.
     """
     beside = {path: path.with_name(f".{path.name}.{os.getpid()}.tmp") for path in files}
     with _WRITING:
@@ -38,7 +38,7 @@ def write_whole(files: Mapping[Path, bytes]) -> None:
 
 @contextmanager
 def _about(path: Path) -> Iterator[None]:
-    """Let errors name the file that was to be written."""
+    """Let errors name the file instead of its temporary file."""
     try:
         yield
     except OSError as error:
@@ -46,8 +46,8 @@ def _about(path: Path) -> Iterator[None]:
 
 
 def no_more_writing(timeout: float) -> None:
-    """Let a file that is being written be finished, for `timeout` s at most, and begin no other.
+    """Wait, for `timeout` s at most, until a file in progress is written; begin no other.
 
-    For who is about to end the process: what comes after waits for ever.
+    Call it just before the process ends: every later `write_whole` waits forever.
     """
     _WRITING.acquire(timeout=timeout)

@@ -1,7 +1,7 @@
-"""Calls that may take their process with them, as C++ libraries do on damaged files: made apart.
+"""Calls in a process of their own, for libraries that may crash (C++ readers of damaged files).
 
-One process is kept for them while they come; it is replaced when it dies, and leaves by itself
-when nothing is asked of it for a while.
+One process serves all calls. It is replaced when it dies, and it ends by itself when no call comes
+for a while.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from kerfpath.errors import InputError
 __all__ = ["call_apart", "stand_by"]
 
 SECONDS = 20.0
-"""Processor time that a small file may take."""
+"""Processor time allowed for any file, s."""
 SECONDS_PER_MB = 20.0
-"""And so much more for each megabyte of it."""
+"""Processor time allowed in addition for each megabyte of the file, s."""
 MEMORY = 2 * 1024**3
-"""Bytes that a small file may take, beside what the libraries themselves do."""
+"""Bytes allowed for any file, beside those of the libraries themselves."""
 MEMORY_PER_BYTE = 100
-"""And so many more for each byte of it."""
+"""Bytes allowed in addition for each byte of the file."""
 PATIENCE = 20.0
-"""Times the processor time: what it may take by the clock, on a machine that is busy."""
+"""Wall-clock time allowed, as a multiple of the processor time, for a busy machine."""
 IDLE = 10.0
-"""s after which a process leaves that nothing is asked of."""
+"""Time without a call after which the process ends, s."""
 
 _T = TypeVar("_T")
 _LEAVES = "leaves"
@@ -54,18 +54,19 @@ def call_apart(function: Callable[..., _T], *arguments: object, size: int) -> _T
     Parameters
     ----------
     function : callable
-        From the top level of a module; it, its arguments and what it returns are pickled.
+        From the top level of a module; it, its arguments and its result are pickled.
     *arguments
-        For it. Files by absolute paths.
+        Arguments of the function; files by absolute paths.
     size : int
-        Bytes of the file that it reads: what it may take of time and memory grows with them.
+        Bytes of the file that it reads; the time and memory allowed grow with it.
 
     Raises
     ------
     InputError
-        The process crashed, or took more than it may: what of it, without the name of the file.
+        The process crashed, or took more time or memory than allowed. The message does not name
+        the file.
     Exception
-        What the function raised.
+        Whatever the function raised.
     """
     seconds = math.ceil(SECONDS + SECONDS_PER_MB * size / 1e6)
     memory = MEMORY + MEMORY_PER_BYTE * size
@@ -76,24 +77,24 @@ def call_apart(function: Callable[..., _T], *arguments: object, size: int) -> _T
         return value  # type: ignore[no-any-return]  # what the function returned, pickled
     if isinstance(value, MemoryError):
         raise InputError(
-            f"it takes more than {memory / 1024**3:.0f} GB of memory to read; it is damaged, or "
-            "holds far more than what is to be cut: export it again"
+            f"reading it takes more than {memory / 1024**3:.0f} GB of memory; it is damaged, or "
+            "contains much more than the part to cut: export it again"
         )
     assert isinstance(value, BaseException)
     raise value
 
 
 def stand_by(module: str | None = None) -> None:
-    """Have the process started, which takes a second, while this one does something else.
+    """Start the process, which takes a second, while this process does something else.
 
-    A new one imports `module`, that of a function that it will be asked for, without being asked.
+    A new process imports `module`, so that its functions are ready for the first call.
     """
     with _lock:
         _ready(module)
 
 
 def _answer(request: bytes, seconds: int) -> tuple[str, Any]:
-    """Return what the process sends back: what is done, and its value."""
+    """Return the answer of the process: "value" or "error", and the value or exception."""
     global _worker
     done: tuple[str, Any] = (_LEAVES, None)
     while done[0] == _LEAVES:
@@ -110,7 +111,7 @@ def _answer(request: bytes, seconds: int) -> tuple[str, Any]:
                 raise _too_slow(seconds) from None
             name = signal.Signals(number).name if number > 0 else f"exit code {-number}"
             raise InputError(
-                f"it crashes the library that reads it ({name}), so it is damaged; copy or export "
+                f"the library that reads it crashed ({name}), so it is damaged; copy or export "
                 "it again"
             ) from None
         finally:
@@ -122,13 +123,13 @@ def _answer(request: bytes, seconds: int) -> tuple[str, Any]:
 
 def _too_slow(seconds: int) -> InputError:
     return InputError(
-        f"it takes more than {seconds} s to read; it is damaged, or holds far more than what is to "
-        "be cut: export it again"
+        f"reading it takes more than {seconds} s; it is damaged, or contains much more than the "
+        "part to cut: export it again"
     )
 
 
 class _Worker:
-    """The process, and this end of the line to it."""
+    """The process, and this end of the pipe to it."""
 
     def __init__(self, module: str | None) -> None:
         self.ours, theirs = Pipe()
@@ -154,7 +155,7 @@ _lock = threading.Lock()
 
 
 def _ready(module: str | None = None) -> _Worker:
-    """Return the process, a new one where there is none, which imports a module first."""
+    """Return the process; start one if there is none, which imports a module first."""
     global _worker
     if _worker is not None and _worker.process.poll() is not None:
         _worker.end()
@@ -171,7 +172,7 @@ def _end() -> None:
 
 
 def _forget() -> None:
-    """Leave the process to the parent of this one, after a fork."""
+    """After a fork, leave the process to the parent and forget it here."""
     global _worker, _lock
     if _worker is not None:
         _worker.ours.close()
@@ -183,10 +184,10 @@ os.register_at_fork(after_in_child=_forget)
 
 
 def _serve(fd: int, idle: float, module: str | None) -> None:
-    """Do what is asked over a line, until it is closed or nothing comes for `idle` seconds."""
+    """Answer requests from a pipe until it is closed or no request comes for `idle` seconds."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if module is not None:
-        with suppress(ImportError):  # whoever asks for what is in it is told
+        with suppress(ImportError):  # a call of a function in it reports the error
             import_module(module)
     line = Connection(fd)
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
@@ -197,14 +198,14 @@ def _serve(fd: int, idle: float, module: str | None) -> None:
 
 def _attempt(request: bytes) -> bytes:
     try:
-        # What is imported to unpickle the function is no part of what its file takes.
+        # Imports needed to unpickle the function do not count towards the limits of its file.
         function, arguments, seconds, memory = pickle.loads(request)
         used = resource.getrusage(resource.RUSAGE_SELF)
         _bound(resource.RLIMIT_CPU, math.ceil(used.ru_utime + used.ru_stime) + seconds)
         if (here := _address_space()) is not None:
             _bound(resource.RLIMIT_AS, here + memory)
         return pickle.dumps(("value", function(*arguments)))
-    except (Exception, SystemExit) as error:  # sent to who asked, not hidden
+    except (Exception, SystemExit) as error:  # sent back to the caller, not hidden
         return pickle.dumps(("error", error))
 
 
@@ -214,7 +215,7 @@ def _bound(which: int, most: int) -> None:
 
 
 def _address_space() -> int | None:
-    """Return the bytes that this process has mapped, None where the system does not say."""
+    """Return the bytes that this process has mapped; None if the system does not report them."""
     with suppress(OSError):
         return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     return None

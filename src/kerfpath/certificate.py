@@ -1,23 +1,23 @@
-"""The certificate of a plan: what proves that no motion along its contour costs less than a bound.
+"""The certificate of a plan: a proof that no motion along its contour costs less than a bound.
 
-Every motion passes, at each node, through one of the cells of a stage: an interval of gamma in one
-posture and on one turn of each joint. A stage lays a function over its cells, the potential
+At each node every motion passes through one of the cells of a stage: an interval of gamma in one
+posture and on one turn of each joint. A stage defines a function on its cells, the potential
 
     V(q) = max over m of  level_m - dual_m . (q - q_0),        m = 0, 1,
 
-q_0 the joints at the middle of the cell. With any potential, a motion q_0, q_1, .. costs at least
-V(q_0) plus, for each of its steps, the least of rho(q_{k+1} - q_k) + V(q_{k+1}) - V(q_k) over the
-two cells of the step (the sum telescopes): so does the shortest path through the cells with these
-reduced costs. Whoever checks it computes the enclosures of the joints, hence the reduced costs, on
-his own; a potential that is wrong makes the bound weaker, not untrue.
+where q_0 are the joints at the middle of the cell. With any potential, a motion q_0, q_1, .. costs
+at least V(q_0) plus, for each of its steps, the least of rho(q_{k+1} - q_k) + V(q_{k+1}) - V(q_k)
+over the two cells of the step (the sum telescopes). So the shortest path through the cells with
+these reduced costs is a lower bound. A checker computes the enclosures of the joints, and from them
+the reduced costs, by itself; a wrong potential makes the bound weaker, not untrue.
 
-The layers of a stage are the nodes that its cells are of; it need not have them all. A step from
+The layers of a stage are the nodes of its cells; it need not have all nodes. A step from
 node k to node k' > k + 1 spans k' - k intervals: its velocity bound is that many times the one of
-(5), and rho of the whole is no more than the sum over its parts. An endless joint may turn further
-in it than the short way: where another representative of the difference is within reach, either
-counts.
+(5), and rho of the step is no more than the sum over its intervals. In such a step an endless joint
+may turn further than the short way: if another representative of the difference is within reach,
+either counts.
 
-A stage may carry multipliers nu of (6): they tilt the cost of a step (see `Stage`). Cells through
+A stage may have multipliers nu of (6), which tilt the cost of a step (see `Stage`). Cells through
 which every motion costs more than the plan drop out, and the next stage covers those that remain.
 """
 
@@ -46,16 +46,16 @@ __all__ = [
 ]
 
 BASE = 72
-"""Cells that the circle of gamma is divided into at level 0; each level divides them in two."""
+"""Number of cells of the circle of gamma at level 0; each level halves them."""
 LIFTS = 8
-"""Parts of half a turn in which the place of a joint is written, to distinguish its turns."""
+"""Parts of pi in which the position of a joint is stored, to distinguish its turns."""
 ALLOWANCE = 2e-4
-"""Share of the plan's cost by which the bound that is stated stays below the one computed: another
+"""Share of the plan's cost by which the stated bound is below the computed one, because a checker's
 enclosure of the same joints may be a little wider."""
 
 
 class CertifyData(TypedDict):
-    """A `Certify` as JSON holds it."""
+    """A `Certify` as JSON data."""
 
     gap: float
     seconds: float | None
@@ -64,18 +64,18 @@ class CertifyData(TypedDict):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certify:
-    """How far a plan is certified: the gap to reach, and the time that may go into it.
+    """How plans are certified: the gap to reach, and the time for it.
 
     Parameters
     ----------
     gap : float
-        Share of the plan's cost that may be left between the bound and the cost, from above 0 to
-        1; nothing more is tried once it is reached.
+        Gap at which the certifier stops: the share of the plan's cost between bound and cost,
+        above 0 and at most 1.
     seconds : float s, optional
-        Time to spend on each plan; None: no limit but the certifier's own limit on its work, so
-        that the same task has the same bound on every machine.
+        Time to spend on each plan; None: only the certifier's own limit on its work, so that the
+        same task has the same bound on every machine.
     keep : bool
-        Whether plan.json carries the certificate, for others to check; the bound is there anyhow.
+        Whether plan.json contains the certificate, for others to check; it always has the bound.
 
     Raises
     ------
@@ -99,17 +99,17 @@ class Certify:
             raise InputError(f"certify keep: expected True or False, got {self.keep!r}")
 
     def to_data(self) -> CertifyData:
-        """Return it as JSON holds it; `Certify(**data)` is the same again."""
+        """Return it as JSON data; `Certify(**data)` is equal to it."""
         return cast(CertifyData, asdict(self))
 
 
 USUAL = Certify()
-"""How plans are certified where nothing else is asked for."""
+"""How plans are certified by default."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stage:
-    """Cells and a potential over them.
+    """Cells and a potential on them.
 
     Parameters
     ----------
@@ -117,23 +117,22 @@ class Stage:
         Node of each cell; ascending. The nodes that occur are the layers.
     posture : (C,) int8
     level : (C,) int8
-        Times that a cell of the coarsest grid (`BASE`) was divided in two.
+        How often a cell of the coarsest grid (`BASE`) was halved.
     index : (C,) int32
-        Place on the circle: gamma from -pi + width index to -pi + width (index + 1), with width
+        Position on the circle: gamma from -pi + width index to -pi + width (index + 1), with width
         2 pi / (`BASE` 2^level).
     lift : (C, n) int8
-        About where the joints are, in parts of half a turn (pi / `LIFTS`): it tells which turn of
-        a joint the cell is on. The enclosure of a joint is moved by whole turns until its middle
-        is the one nearest to it.
+        Approximate joints in units of pi / `LIFTS`, which identify the turn of each joint: its
+        enclosure is moved by whole turns until the middle is nearest to this value.
     value : (C, 2) float64
         The levels of the potential, in units of cost.
     dual : (C, 2, n) float32
         Its slopes, 1/rad times cost.
     multipliers : (K, n) float64, optional
-        nu at each node, zero at the first and the last: to the cost of a motion they add
+        nu at each node, zero at the first and the last. They add to the cost of a motion
         nu_k . (u_k - u_{k-1}) - |nu_k| . A, which is never above zero where (6) holds; u_k is the
-        increment from node k to k + 1, A the bound of (6) on its change. Only where the cells are
-        of all nodes.
+        increment from node k to k + 1, A the bound of (6) on its change. Only if there are cells
+        at all nodes.
     """
 
     node: NDArray[np.int32]
@@ -150,14 +149,14 @@ class Stage:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Certificate:
-    """What proves a lower bound on the cost of every motion along a contour.
+    """Proof of a lower bound on the cost of every motion along a contour.
 
     Parameters
     ----------
     bound : float
-        What is proved, `ALLOWANCE` less than computed.
+        The bound as stated: `ALLOWANCE` times the plan's cost below the computed one.
     stages : tuple of Stage
-        The first covers all motions, each further one what the one before it leaves.
+        The first covers all motions, each further one those that the stage before leaves.
     """
 
     bound: float
@@ -167,9 +166,14 @@ class Certificate:
 
 
 def cell_bounds(level: NDArray[np.int8], index: NDArray[np.int32]) -> tuple[Array, Array]:
-    """Return the middle of the cells and half their width, (C,) rad each.
+    """Return the middle and half the width of cells, (C,) rad each.
 
-    The half is a few roundings too wide, so that neighbours overlap.
+    The half width is a few roundings too large, so that neighbouring cells overlap.
+
+    Parameters
+    ----------
+    level, index : (C,)
+        As in `Stage`.
     """
     width = 2 * np.pi / (BASE * np.exp2(level.astype(float)))
     return -np.pi + width * (index + 0.5), width / 2 + 1e-15 * np.pi

@@ -1,16 +1,16 @@
-"""Distances of joint vectors from singularities and limits, and the cost of coming near.
+"""Distances of joint vectors from singularities and limits, and the cost of small distances.
 
-The measures, of an arm whose model angles are sign * q - offset:
+The measures, for an arm whose model angles are sign * q - offset:
 
 ==============  ====  ======================================================================
-wrist           rad   angle between axes 4 and 6 (of seven axes 5 and 7), away from being in line
-elbow           rad   angle between the upper arm (axis 2 to 3) and what lies behind it (axis 3
-                      to the wrist centre or, of a UR arm, to axis 4), away from stretched or
-                      folded: the offset a2 of the forearm is part of it
-shoulder        m     distance of the wrist centre (of a UR arm: of where axes 5 and 6 meet) from
-                      the plane through axis 1 that is parallel to axis 2: sqrt(r^2 - b^2) at the
-                      distance r from axis 1, which a1 and the offset b of the arm are part of
-limits          rad   to the nearest limit of a joint that is not endless, or of a coupling
+wrist           rad   angle by which axes 4 and 6 (with seven axes: 5 and 7) are out of line
+elbow           rad   angle by which the upper arm (axis 2 to 3) and the forearm (axis 3 to the
+                      wrist centre, or of a UR arm to axis 4) are out of line, stretched or
+                      folded; the offset a2 of the forearm is included
+shoulder        m     distance of the wrist centre (of a UR arm: of the point where axes 5 and 6
+                      meet) from the plane through axis 1 parallel to axis 2: sqrt(r^2 - b^2) at
+                      the distance r from axis 1, with a1 and the offset b of the arm included
+limits          rad   distance to the nearest limit of a joint that is not endless, or of a coupling
 manipulability  m^3   Yoshikawa's, sqrt(det J J^T), see `jacobian`
 ==============  ====  ======================================================================
 
@@ -18,8 +18,8 @@ The determinant of an ortho-parallel arm with a spherical wrist is, up to its si
 c3^2) sin(elbow) shoulder sin(wrist), that of a UR arm a2 a3 sin(elbow) shoulder sin(wrist): at
 these three zeros, and only there, such arms lose a direction of motion. Sources: B. Siciliano et
 al., "Robotics: Modelling, Planning and Control" (2009), section 3.3; T. Yoshikawa, "Manipulability
-of robotic mechanisms", IJRR 4(2), 1985. Which singularities a five-axis wrist has depends on the
-tool; its manipulability knows the tool. A seven-axis arm has those of its others with joint 3 held.
+of robotic mechanisms", IJRR 4(2), 1985. The singularities of a five-axis wrist depend on the tool,
+which its manipulability includes. A seven-axis arm has those of its other joints with joint 3 held.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ from kerfpath.robots import Robot
 __all__ = ["MEASURES", "Band", "BandData", "Comfort", "Measure", "jacobian", "measure", "measures"]
 
 AT_ONCE = 100_000
-"""Jacobians worked out at a time: large against the overhead, small against the memory."""
+"""Jacobians computed at a time: many enough to hide the overhead, few enough for the memory."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measure:
-    """A measure of joint vectors: its words, its unit, and the most that it can be.
+    """A measure of joint vectors: its name in messages, its unit, and its largest value.
 
-    `of` returns its values (B,) of an arm without an external axis, of joint vectors (B, n) rad and
-    T_flange_tip or None. Without `families`, every arm has it.
+    `of` takes an arm without external axes, joint vectors (B, n) rad and T_flange_tip or None, and
+    returns the values (B,). If `families` is None, every arm has the measure.
     """
 
     words: str
@@ -62,12 +62,12 @@ class Measure:
     __repr__ = short_repr
 
     def has(self, robot: Robot) -> bool:
-        """Return whether the arm has it."""
+        """Return whether the measure is defined for the arm."""
         return self.families is None or robot.kinematics in self.families
 
 
 class BandData(TypedDict):
-    """A `Band` as JSON holds it, in rad, m and m^3."""
+    """A `Band` as JSON data, in rad, m and m^3."""
 
     margin: float
     width: float
@@ -81,12 +81,12 @@ class Band:
     Parameters
     ----------
     margin : float, unit of the measure
-        What is nearer is not used.
+        Joint vectors below this value are not used.
     width : float, unit of the measure
-        The band reaches from the margin so far.
+        Width of the band beyond the margin.
     cost : float
-        Of a node at the margin, falling linearly to 0 at the end of the band; in the unit of the
-        objective: with the default weights, a joint at full speed from node to node costs 1.
+        Cost of a node at the margin, falling linearly to 0 at the end of the band; in the unit of
+        the objective: with the default weights, a joint at full speed from node to node costs 1.
 
     Raises
     ------
@@ -102,10 +102,10 @@ class Band:
         for name in ("margin", "width", "cost"):
             object.__setattr__(self, name, not_negative(getattr(self, name), f"comfort {name}"))
         if self.cost and not self.width:
-            raise InputError("comfort cost: needs a width over which it falls to zero, got none")
+            raise InputError("comfort cost: needs a width over which it falls to zero, got width 0")
 
     def price(self, value: Array) -> Array:
-        """Return what values (B,) of the measure cost, (B,)."""
+        """Return the cost (B,) of values (B,) of the measure."""
         if not self.cost:
             return np.zeros(len(value))
         return np.asarray(self.cost * np.clip(1 - (value - self.margin) / self.width, 0.0, 1.0))
@@ -113,7 +113,7 @@ class Band:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comfort:
-    """Bands that a plan is to keep away from, by measure; None: it does not matter.
+    """Margins and bands of a plan, one for each measure; None: the measure does not matter.
 
     Parameters
     ----------
@@ -121,12 +121,12 @@ class Comfort:
     shoulder : Band m, optional
     manipulability : Band m^3, optional
     clearance : Band m, optional
-        Of the near-miss distances of a cell, which are the hard margin: it has none of its own.
+        Band beyond the near-miss distances of a cell, which are the hard margin; without a margin.
 
     Raises
     ------
     InputError
-        A margin that no joint vector keeps, a margin of clearance, something else than a Band.
+        A margin that no joint vector keeps, a margin of clearance, or a value that is no Band.
     """
 
     wrist: Band | None = None
@@ -147,12 +147,12 @@ class Comfort:
             if band.margin >= MEASURES[name].most:
                 raise InputError(
                     f"comfort {name}: the margin must be below {MEASURES[name].most:.4g} "
-                    f"{MEASURES[name].unit}, the most there is, got {band.margin:g}"
+                    f"{MEASURES[name].unit}, the largest possible value, got {band.margin:g}"
                 )
         if self.clearance is not None and self.clearance.margin:
             raise InputError(
-                "comfort clearance: its margin is the near-miss distance of the cell; give that "
-                "there, and width and cost here"
+                "comfort clearance: its margin is the near-miss distance of the cell; set the "
+                "margin there, and only width and cost here"
             )
 
     @property
@@ -162,12 +162,12 @@ class Comfort:
 
     @property
     def costs(self) -> bool:
-        """Whether anything of it costs."""
+        """Whether any band has a cost."""
         return any(b.cost for b in (*self.bands.values(), *filter(None, [self.clearance])))
 
     @property
     def prices_clearance(self) -> bool:
-        """Whether coming near a body costs: how much is known at the vertices of a graph only."""
+        """Whether small clearance costs; the cost is known only at the vertices of a graph."""
         return self.clearance is not None and self.clearance.cost > 0
 
     @property
@@ -176,7 +176,7 @@ class Comfort:
         return Comfort(**{name: Band(margin=band.margin) for name, band in self.bands.items()})
 
     def too_near(self, robot: Robot, q: Array, tool: Array) -> dict[Reason, Bools]:
-        """Return which of joint vectors q (B, n) rad break which hard margin, (B,) by the reason.
+        """Return which of joint vectors q (B, n) rad break each hard margin, (B,) by reason.
 
         Raises
         ------
@@ -195,10 +195,10 @@ class Comfort:
         return tuple(why for why, near in self.too_near(robot, q, tool).items() if near.any())
 
     def narrowed(self, robot: Robot, q: Array) -> JointLimits:
-        """Return the joint limits inside which the margins of limits, wrist and elbow are kept.
+        """Return joint limits narrowed so that the margins of limits, wrist and elbow are kept.
 
-        On the sides of the singularities that joint vectors q (B, n) rad are on; where they are on
-        both, and where a joint is endless, nothing is narrowed.
+        They keep to the side of each singularity that joint vectors q (B, n) rad are on. If these
+        are on both sides, or the joint is endless, nothing is narrowed.
         """
         limits = robot.joint_limits()
         lower, upper, room = limits.lower.copy(), limits.upper.copy(), 0.0
@@ -223,7 +223,7 @@ class Comfort:
         )
 
     def price(self, robot: Robot, q: Array, tool: Array) -> Array:
-        """Return what joint vectors q (B, n) rad cost, (B,), clearance left out.
+        """Return the cost (B,) of joint vectors q (B, n) rad, without that of clearance.
 
         Raises
         ------
@@ -238,15 +238,15 @@ class Comfort:
 
 
 def measures(robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> dict[str, Array]:
-    """Return every measure that the arm has, (B,) by its name, of joint vectors q (B, n) rad.
+    """Return the values (B,) of every measure that the arm has, at joints q (B, n) rad, by name.
 
-    Units are those of `MEASURES`; arguments and errors as in `measure`.
+    The units are those of `MEASURES`; arguments and errors as in `measure`.
     """
     return {name: measure(name, robot, q, tool=tool) for name in _measures_of(robot)}
 
 
 def measure(name: str, robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> Array:
-    """Return one measure (B,) of joint vectors q (B, n) rad, of the arm without an external axis.
+    """Return one measure (B,) of joint vectors, for the arm without its external axes.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def measure(name: str, robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = N
     Raises
     ------
     InputError
-        An unknown measure, or one that such an arm does not have; limits that are not known.
+        An unknown measure, one that this kind of arm does not have, or limits that are not known.
     """
     q = floats(q, "q", (None, robot.joints), copy=False)[:, : robot.family.joints]
     robot = robot.alone()
@@ -275,16 +275,16 @@ def measure(name: str, robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = N
 
 
 def jacobian(robot: Robot, q: ArrayLike, *, tool: ArrayLike | None = None) -> Array:
-    """Return the geometric Jacobians (B, 6, n) of the tool tip at joint vectors q (B, n) rad.
+    """Return the geometric Jacobians (B, 6, n) of the tool tip, in the robot base.
 
-    Linear (m/rad) over angular velocity, in the robot base, of a robot without an external axis.
-    Every entry of a pose is a sinusoid of each joint's angle, so that half the difference between a
-    quarter turn ahead and one behind is its derivative, exactly and for every family.
+    Of joint vectors q (B, n) rad of a robot without external axes; linear (m/rad) over angular
+    velocity. Every entry of a pose is a sinusoid of each joint's angle, so its derivative is half
+    the difference between its values 90 deg ahead and 90 deg behind, exactly, for every family.
     """
     q = floats(q, "q", (None, robot.joints), copy=False)
     if robot.externals:
         name = robot.externals[0].name
-        raise InputError(f"jacobian: with {name} ask for that of robot.held(x)")
+        raise InputError(f"jacobian: expected no external axis, got {name}; use robot.held(x)")
     T_flange_tip = np.eye(4) if tool is None else as_pose(tool, "tool")
     turned = robot.forward(q)[:, :3, :3] @ T_flange_tip[:3, :3]
     J = np.empty((len(q), 6, robot.joints))
@@ -306,7 +306,7 @@ def _measures_of(robot: Robot) -> list[str]:
 def _manipulability(robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
     """Return Yoshikawa's measure (B,) m^3.
 
-    Of an arm without free rotation, that of the tool tip and the direction of the tool axis.
+    For an arm without free rotation, it is that of the tool tip and the direction of the tool axis.
     """
     found = np.empty(len(q))
     T_flange_tip = np.eye(4) if tool is None else as_pose(tool, "tool")
@@ -324,7 +324,7 @@ def _manipulability(robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
 
 
 def _to_limits(robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
-    """Return how far the nearest limit is, (B,) rad, negative beyond it; infinite without any."""
+    """Return the distance (B,) rad to the nearest limit, negative beyond it; infinite if none."""
     limits = robot.joint_limits()
     bound = ~limits.endless
     combined = q @ limits.rows.T
@@ -338,7 +338,7 @@ def _to_limits(robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
 
 
 def _from_line(name: str, robot: Robot, q: Array, tool: ArrayLike | None) -> Array:
-    """Return how far a bend (B,) is from the nearest multiple of pi, from 0 to pi / 2."""
+    """Return the distance (B,) of a bend from the nearest multiple of pi, from 0 to pi / 2."""
     bend = _bend(name, robot, q)
     return np.asarray(np.abs(bend - np.pi * np.round(bend / np.pi)))
 
@@ -378,7 +378,7 @@ _BENDS: Mapping[str, Mapping[str, tuple[int, Callable[[Mapping[str, float]], flo
     "five": {"elbow": (2, _forearm)},
     "srs": {"wrist": (5, _straight), "elbow": (3, _straight)},
 }
-"""By family and measure: the joint that bends, and what its angle is off by, from the lengths."""
+"""By family and measure: the joint that bends, and the offset of its angle from the lengths."""
 
 MEASURES: Mapping[str, Measure] = {
     **{
@@ -397,4 +397,4 @@ MEASURES: Mapping[str, Measure] = {
     "limits": Measure(words="joint limit", unit="rad", of=_to_limits),
     "manipulability": Measure(words="manipulability", unit="m^3", of=_manipulability),
 }
-"""What can be measured of a joint vector, by name."""
+"""All measures, by name."""

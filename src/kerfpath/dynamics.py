@@ -1,7 +1,8 @@
-"""What torques a motion asks of the joints of an arm.
+"""Joint torques of a motion.
 
-Rigid links on rigid joints: inertias as a robot description states them, a load on the flange, and
-gravity. Friction and the inertia of rotors and gears are in no description and are left out.
+The model has rigid links on rigid joints, with the inertias of a robot description, a load on the
+flange, and gravity. Friction and the inertia of rotors and gears are in no description and are left
+out.
 """
 
 from __future__ import annotations
@@ -20,22 +21,22 @@ from kerfpath.urdf import ChainInertia, KinematicChain, joined, require_tensor
 __all__ = ["STANDARD_GRAVITY", "ArmDynamics", "Load"]
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
-"""m/s^2, in the base of a robot that stands on the floor."""
+"""m/s^2, in the base of a floor-mounted robot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Load:
-    """What the flange carries: the tool and all that is fixed to it.
+    """Load on the flange: the tool and everything fixed to it.
 
     Parameters
     ----------
     mass : float kg
-        0 where there is nothing.
+        0 for no load.
     centre : (3,) m, optional
-        Centre of mass in the flange frame; needed of any mass but 0.
+        Centre of mass in the flange frame; required if the mass is not 0.
     tensor : (3, 3) kg m^2, optional
-        Inertia about the centre of mass, along the axes of the flange frame; default: none, the
-        mass is in one point.
+        Inertia about the centre of mass, along the axes of the flange frame; default: zero, a point
+        mass.
 
     Raises
     ------
@@ -65,7 +66,15 @@ class Load:
             _set(self, "tensor", tensor)
 
     def on(self, inertia: ChainInertia, T_joint_flange: Array) -> ChainInertia:
-        """Return what the joints of an arm carry with this load; the pose is of the flange, m."""
+        """Return the bodies of an arm with this load added to the last one.
+
+        Parameters
+        ----------
+        inertia : ChainInertia
+            The bodies without the load.
+        T_joint_flange : (4, 4) m
+            Pose of the flange in the frame of the last joint.
+        """
         if self.mass == 0:
             return inertia
         assert self.centre is not None
@@ -88,11 +97,16 @@ class ArmDynamics:
     Parameters
     ----------
     chain : KinematicChain
-        Its joints; the end is the flange.
+        The joints, up to the flange.
     inertia : ChainInertia
-        What each of them carries, the load included.
+        The body that each joint moves, load included.
     gravity : (3,) m/s^2
         In the robot base.
+
+    Raises
+    ------
+    InputError
+        Another number of bodies than of joints, or a gravity that is not three numbers.
     """
 
     chain: KinematicChain
@@ -105,13 +119,13 @@ class ArmDynamics:
         object.__setattr__(self, "gravity", floats(self.gravity, "gravity", (3,)))
         if len(self.inertia.mass) != len(self.chain.axes):
             raise InputError(
-                f"inertia: expected {len(self.chain.axes)} bodies, one for each joint, got "
+                f"inertia: expected {len(self.chain.axes)} bodies, one per joint, got "
                 f"{len(self.inertia.mass)}"
             )
 
     @property
     def bodies(self) -> ArmBodies:
-        """The arm as the kernels take it."""
+        """The arm as arrays for the kernels."""
         return ArmBodies(
             rotation=freeze(np.ascontiguousarray(self.chain.origins[:, :3, :3])),
             position=freeze(np.ascontiguousarray(self.chain.origins[:, :3, 3])),
@@ -123,7 +137,7 @@ class ArmDynamics:
         )
 
     def torque(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
-        """Return the torques (B, n) N m that a motion asks of the joints.
+        """Return the joint torques (B, n) N m of a motion.
 
         Parameters
         ----------

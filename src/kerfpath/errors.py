@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 LONGEST, BEGINNING = 600, 420
-"""Characters of a message about bad input; of a longer one its beginning and its end are kept."""
+"""Most characters of a message about bad input; a longer one keeps its beginning and its end."""
 
 
 class KerfpathError(Exception):
@@ -37,13 +37,14 @@ class KerfpathError(Exception):
 class InputError(KerfpathError, ValueError):
     """Bad input: one line that says what was expected, what came, where, and what to do.
 
-    It stays one line, and one that can be read, whatever of a file is quoted in it.
+    Control characters are escaped and long messages are cut, so that it stays one readable line
+    whatever it quotes from a file.
 
     Parameters
     ----------
     message : str
     others : sequence of str
-        Lines about further faults that were found with it.
+        Messages about further faults found at the same time.
     """
 
     def __init__(self, message: str, others: Sequence[str] = ()) -> None:
@@ -60,11 +61,12 @@ class OptionConflict(InputError):
     Parameters
     ----------
     option : str
-        The one that another forbids.
+        The option whose value does not go with the others.
     expected, got : object
-        Its only value beside the other (a tuple: any of them), None for none; and its value.
+        The value it must have with the others (a tuple: any of these; None: it must not be given),
+        and the value it has.
     beside : mapping of str to object
-        The options that forbid it, with their values.
+        The other options, with their values.
     """
 
     def __init__(
@@ -79,7 +81,7 @@ class OptionConflict(InputError):
 
 
 def _value(value: object) -> str:
-    """Return a value in a message: text in quotes, numbers; nothing for an object."""
+    """Return a value as a message shows it: quoted text or a number; "" for any other object."""
     if isinstance(value, str):
         return f'"{value}"'
     if isinstance(value, tuple):
@@ -93,7 +95,7 @@ class CertificateRefused(InputError):
     Parameters
     ----------
     why : str
-        Part of the message.
+        The reason, which the message contains.
     """
 
     def __init__(self, why: str) -> None:
@@ -103,7 +105,7 @@ class CertificateRefused(InputError):
 
 @contextmanager
 def about(path: Path) -> Iterator[None]:
-    """Have errors about bad input name the file that they are about, where they do not."""
+    """Put the path of a file before messages about bad input that do not name it yet."""
     try:
         yield
     except InputError as error:
@@ -113,16 +115,16 @@ def about(path: Path) -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Closed:
-    """Where it is proved that no motion passes, whatever its gamma, postures and turns.
+    """Place that no motion passes; proved for every gamma, posture and turn.
 
     Parameters
     ----------
     node : int
-        No motion that keeps the limits up to this node goes on from it and reaches the end.
+        No motion that keeps the limits up to this node continues from it to the end.
     joint : int or None
-        The joint that stops most of what is left there, 0-based; None with "pose".
+        The joint that rules out most of the steps left there, 0-based; None with "pose".
     limit : {"velocity", "acceleration", "pose"}
-        Which of its limits does; "pose" where the next node has no pose within the ranges.
+        The limit that rules them out; "pose" if the next node has no pose within the joint ranges.
     """
 
     node: int
@@ -130,26 +132,26 @@ class Closed:
     limit: Literal["velocity", "acceleration", "pose"]
 
     def __str__(self) -> str:
-        """Say it in words."""
+        """Return the place in words."""
         if self.joint is None:
             return f"node {self.node + 1} has no pose within the ranges of the joints"
         return (
-            f"no motion goes on from node {self.node}, where the {self.limit} of joint "
-            f"{self.joint + 1} stops most"
+            f"no motion continues from node {self.node}, where the {self.limit} limit of joint "
+            f"{self.joint + 1} rules out most steps"
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Relaxation:
-    """What a motion that was found asks for beyond what was asked: less speed, or more limits.
+    """Lower speed, or higher limits, with which a motion was found.
 
     Parameters
     ----------
     speed : float
-        Share of the speed asked for at which it keeps every limit, below 1.
+        Share of the speed asked for at which the motion keeps every limit, below 1.
     velocity, acceleration : float
-        At the speed asked for: the multiples of the velocities and of the accelerations that may be
-        used with both of which it keeps them; 1 where they are enough as they are.
+        Factors on the usable velocities and accelerations: with both of them the motion keeps these
+        limits at the speed asked for. A factor is 1 if its limit is kept as it is.
     """
 
     speed: float
@@ -165,24 +167,24 @@ class NoFeasiblePath(KerfpathError):
     message : str
         One line: where the path breaks and what each test removed there.
     proved : bool
-        True when no admissible path exists on this graph; False when the method cannot tell
+        True when no admissible path exists on this graph; False when the method cannot decide
         (the paper's acceleration test is greedy).
     node : int
         The last node that any admissible path reaches, 0-based; -1 when layer 0 is empty.
     back : int or None
-        The first node from which an admissible path reaches the end, where that is known: with
-        `node` it brackets the cut. The number of nodes when the last layer is empty.
+        The first node from which an admissible path reaches the end, if known: the path breaks
+        between `node` and `back`. It is the number of nodes when the last layer is empty.
     reached, leaving : (m,) int, optional
-        Vertices, 0-based inside their layers, in which the paths from the front end at `node`, and
-        from which those to the end begin at `back`.
+        Vertices, 0-based inside their layers: at `node` those where paths from the start end, and
+        at `back` those where paths to the end begin.
     counts : mapping of str to int
-        What each test removed where the path breaks: candidates of the empty layer or edges into
-        the unreached one, by `kerfpath.losses.Reason`, which is its words; of a Pareto set without
-        plans the runs by what became of them.
+        Number removed by each test where the path breaks: candidates of the empty layer, or edges
+        into the unreached one. The keys are `kerfpath.losses.Reason`, a str. For a Pareto set
+        without plans: the number of runs by outcome.
     closed : Closed, optional
         Where no motion passes at any gamma, if that is proved.
     relaxation : Relaxation, optional
-        With what a motion was found, where one was looked for.
+        The lower speed, or the higher limits, with which a motion was found, if one was looked for.
     """
 
     def __init__(
@@ -210,16 +212,16 @@ class NoFeasiblePath(KerfpathError):
 
     @property
     def scope(self) -> Literal["every gamma", "grid", "undecided"]:
-        """Of what it is proved that there is no path: of every gamma, or of this grid of it alone.
+        """Where it is proved that there is no path: at every gamma, or only on this grid of gamma.
 
-        "undecided" where a path may even be on the grid.
+        "undecided" if there may even be a path on the grid.
         """
         if self.closed is not None:
             return "every gamma"
         return "grid" if self.proved else "undecided"
 
     def lost_by(self, loss: Loss) -> list[Reason]:
-        """Return the reasons of one kind among the counts."""
+        """Return the reasons in `counts` that are losses of one kind."""
         return [why for why in self.counts if isinstance(why, Reason) and why.loss is loss]
 
     def with_message(
@@ -229,7 +231,7 @@ class NoFeasiblePath(KerfpathError):
         closed: Closed | None = None,
         relaxation: Relaxation | None = None,
     ) -> NoFeasiblePath:
-        """Return the same answer in other words, with what else is given."""
+        """Return the same answer with another message and with the fields that are given."""
         return NoFeasiblePath(
             message,
             proved=self.proved,
@@ -244,4 +246,4 @@ class NoFeasiblePath(KerfpathError):
 
 
 class AuditFailed(KerfpathError):
-    """A plan or program that its audit refuses; nothing is written from it."""
+    """A plan or program that failed its audit; nothing is written from it."""

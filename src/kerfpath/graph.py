@@ -1,4 +1,4 @@
-"""The layered graph: every admissible pose of every node, with a count of every loss."""
+"""Layered graph: all admissible joint vectors of every node, and a count of every loss."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from kerfpath.robots import Robot, base_in_part, samples_of
 __all__ = ["LayeredGraph", "build", "external_grid", "gamma_grid"]
 
 _WHOLE_STEPS = 1e-9
-"""How far 2 pi / step may be from a whole number, relative, and still count as one."""
+"""Relative distance of 2 pi / step from a whole number up to which it counts as one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LayeredGraph:
-    """The vertices of all layers (Eq. 11); the edges (12) are implied by neighbouring layers.
+    """Vertices of all layers (Eq. 11); the edges (12) are implied by neighbouring layers.
 
     Parameters
     ----------
@@ -36,21 +36,20 @@ class LayeredGraph:
     gamma : (m,) rad
         The samples of gamma, ascending.
     tilt : (V, 2) rad
-        Lead and lean of each variant of a layer; without a tolerance all nominal.
+        Lead and lean of each variant of a layer; zero without a tolerance of the tool axis.
     sample, posture, variant : (N,) int
         Index into `gamma`, posture mu, and variant of each vertex.
     turn : (N, n) int
         Turns of 2 pi of each joint of each vertex.
     reason : (K, V m, P) uint8
-        What became of each candidate: an index into `reasons`; all gamma of a variant in a row.
+        Result for each candidate: an index into `reasons`; all gamma of a variant are consecutive.
     reasons : tuple of Reason
-        What the codes mean; code 0 is admitted.
+        Meaning of the codes; code 0 is admitted.
     external : (K, X, E) rad or m, or None
-        Values of what a pose leaves free at every node, each tilt in X variants; None: the
-        robot has none.
+        Values of the joints that a pose leaves free, at every node; each tilt has X variants.
+        None: a pose leaves no joint free.
     kept : object
-        The margins that all its vertices are known to keep, by whoever thinned it for them; None:
-        nothing is known.
+        What its vertices have been checked for (margins, floor, windows of gamma); None: nothing.
     """
 
     q: Array
@@ -74,37 +73,41 @@ class LayeredGraph:
 
     @property
     def candidate(self) -> NDArray[np.int32]:
-        """Variant and gamma of each vertex, (N,): its place along the second axis of `reason`."""
+        """Index of each vertex along the second axis of `reason`, (N,): its variant and gamma."""
         return self.variant * np.int32(len(self.gamma)) + self.sample
 
     @property
     def reason_by_gamma(self) -> NDArray[np.uint8]:
-        """What became of gamma and posture, (K, m, P): admitted if any variant of them is."""
+        """Result for each gamma and posture, (K, m, P): admitted if any of their variants is."""
         K, _, P = self.reason.shape
         return np.asarray(self.reason.reshape(K, -1, len(self.gamma), P).min(axis=1))
 
     def gamma_at(self, place: Ints) -> Array:
-        """Return gamma (...) rad at places among its samples, beyond the last one turned on."""
+        """Return gamma (...) rad of sample numbers, which go on beyond a full turn."""
         m = len(self.gamma)
         return np.asarray(self.gamma[place % m] + 2 * np.pi * (place // m))
 
     def counts(self, node: int | None = None) -> dict[str, int]:
-        """Count the candidates by `Reason`, over all nodes or at one."""
+        """Count the candidates by `Reason`, at all nodes or at one."""
         codes = self.reason if node is None else self.reason[node]
         number = np.bincount(codes.ravel(), minlength=len(self.reasons))
         return {why: int(c) for why, c in zip(self.reasons, number, strict=True) if c}
 
     def main_loss(self, node: int) -> str:
-        """Return what most candidates of a node are lost by, "" if none is by robot or part."""
+        """Return the reason why most candidates of a node are lost; "" if none applies.
+
+        Admitted candidates and postures that are not wanted do not count.
+        """
         counts = self.counts(node)
         for loss in (Loss.ADMITTED, Loss.UNWANTED):
             counts.pop(Reason(loss), None)
         return max(counts, key=counts.__getitem__, default="")
 
     def without(self, unwanted: Mapping[Reason, Bools]) -> LayeredGraph:
-        """Return the graph without the vertices unwanted, (N,) bool by the reason.
+        """Return the graph without some vertices, given as (N,) bool for each reason.
 
-        A candidate counts as dropped where none of its turns is left, by the first reason for any.
+        A candidate counts as dropped if none of its turns is left; its reason is the first one that
+        applies to any of them.
         """
         gone = np.any([*unwanted.values()], axis=0)
         if not gone.any():
@@ -124,20 +127,20 @@ class LayeredGraph:
         return replace(self._of(keep, start, slice(None)), reason=freeze(reason), reasons=reasons)
 
     def part(self, first: int, last: int) -> LayeredGraph:
-        """Return the layers of nodes first to last."""
+        """Return the graph of nodes `first` to `last`, both included."""
         vertices = slice(self.start[first], self.start[last + 1])
         start = self.start[first : last + 2] - self.start[first]
         return self._of(vertices, start, slice(first, last + 1))
 
     def at_nodes(self, nodes: Ints) -> LayeredGraph:
-        """Return the layers of some nodes (M,), ascending."""
+        """Return the graph of some nodes (M,), in ascending order."""
         sizes, kept = np.diff(self.start), np.zeros(len(self.start) - 1, np.bool_)
         kept[nodes] = True
         start = np.concatenate([[0], np.cumsum(sizes[nodes])])
         return self._of(np.repeat(kept, sizes), start, nodes)
 
     def _of(self, vertices: Bools | slice, start: Ints, nodes: Ints | slice) -> LayeredGraph:
-        """Return the graph of some of the vertices, those of some nodes."""
+        """Return the graph of some vertices, which are those of some nodes."""
         return replace(
             self,
             q=freeze(self.q[vertices]),
@@ -178,7 +181,7 @@ def build(
     external: Array | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
-    """Return the vertices of every node: all variants, gamma, postures and turns (Eq. 10).
+    """Return the layered graph: all variants, gamma, postures and turns of every node (Eq. 10).
 
     Parameters
     ----------
@@ -186,17 +189,17 @@ def build(
         Task frames H_k in the robot base, m; or those of each tilt.
     robot : Robot
         Kinematics and joint limits.
-    T_flange_tip : (4, 4)
+    T_flange_tip : (4, 4) m
         Tool: tip frame in the flange.
     gamma : (m,) rad
-        Samples of gamma, see `gamma_grid`; of a robot that leaves no rotation free, one, at zero.
+        Samples of gamma, see `gamma_grid`; a single 0 instead if the robot leaves no rotation free.
     tilt : (T, 2) rad, optional
-        Lead and lean of the tilts, see `kerfpath.tilt`; default: one, the nominal axis.
+        Lead and lean of each tilt, see `kerfpath.tilt`; default: only the nominal axis.
     postures : sequence of int, optional
         The postures that may be used; default all. See `kerfpath.robots.postures_named`.
     external : (K, X, E) rad or m, optional
-        Values of what a pose leaves free, joint 3 of a seven-axis arm and then the external axes,
-        each a variant of each tilt; default: all of a grid in their steps.
+        Values of the joints that a pose leaves free (joint 3 of a seven-axis arm, then the external
+        axes), in X variants of each tilt; default: a grid in the steps of these joints.
     progress : callable, optional
         Called with the number of nodes done since the last call.
 
@@ -222,7 +225,7 @@ def build(
     reason = np.empty((len(frames), samples, robot.postures), np.uint8)
 
     def layers_of(first: int, last: int) -> _NodeRun:
-        """Solve nodes first..last-1 and keep what the limits admit."""
+        """Solve nodes first..last-1 and keep the solutions within the limits."""
         H, x = frames[first:last, :, None], external[first:last]
         if robot.externals:
             H = np.linalg.inv(base_in_part(robot.externals, x[..., inner:]))[:, None] @ H
@@ -266,14 +269,14 @@ def build(
 
 
 def external_grid(robot: Robot) -> Array:
-    """Return every combination (X, E) of the samples of what a pose leaves free, rad or m.
+    """Return all combinations (X, E) of samples of the joints that a pose leaves free, rad or m.
 
-    Of joint 3 of a seven-axis arm, and of the external axes.
+    These are joint 3 of a seven-axis arm and the external axes.
 
     Raises
     ------
     InputError
-        One of them has no step.
+        One of these joints has no step.
     """
     limits, free = robot.joint_limits(), robot.free.tolist()
     if not free:
@@ -295,7 +298,7 @@ def external_grid(robot: Robot) -> Array:
 
 
 def _end_to_end(parts: list[NDArray[Any]]) -> NDArray[Any]:
-    """Return the arrays in one, letting go of each: there are never two copies of them all."""
+    """Return the arrays joined; each is freed when copied, so they are never all held twice."""
     whole = np.empty((sum(map(len, parts)), *parts[0].shape[1:]), parts[0].dtype)
     end = len(whole)
     while parts:
@@ -306,7 +309,7 @@ def _end_to_end(parts: list[NDArray[Any]]) -> NDArray[Any]:
 
 
 class _NodeRun(NamedTuple):
-    """The vertices of a run of nodes, and how many each node has."""
+    """Vertices of successive nodes, and their number at each node."""
 
     sizes: Ints
     q: Array
@@ -318,7 +321,7 @@ class _NodeRun(NamedTuple):
 def _admitted(
     q: Array, reach: Bools, wanted: Bools, limits: JointLimits, out_reason: NDArray[np.uint8]
 ) -> _NodeRun:
-    """Return the turns that the limits admit of q (K, V m, P, n); fills the reasons (K, V m, P)."""
+    """Return the turns of q (K, V m, P, n) within the limits; fill the reasons (K, V m, P)."""
     sizes = np.empty(len(q), np.int64)
     count_admissible(q, reach, wanted, limits, sizes, out_reason)
     N, n = int(sizes.sum()), q.shape[3]

@@ -1,8 +1,8 @@
-"""How the joints may move: limits as objects that say what they bound.
+"""Limits on the motion of the joints: velocity, acceleration, jerk and torque.
 
 A rate limit bounds a time derivative of every joint. Between nodes at equal intervals the
-derivative is a difference of as many orders, so that such a limit is a bound on a difference. The
-share of it that may be used, eta, is applied here and nowhere else.
+derivative is a difference of the same order, so that such a limit bounds a difference. The share of
+a limit that may be used, eta, is applied here and nowhere else.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class RateLimit:
     Parameters
     ----------
     bound : (n,) rad/s^order
-        Largest size of the derivative (for a rail, m); infinity where there is none.
+        Largest absolute value of the derivative (a rail: m/s^order); infinity for no limit.
     share : float
         Share of the bound that may be used, eta.
 
@@ -64,7 +64,7 @@ class RateLimit:
 
     @property
     def usable(self) -> Array:
-        """What of the bound may be used, (n,) rad/s^order."""
+        """The usable part of the bound, share * bound, (n,) rad/s^order."""
         return freeze(self.share * self.bound)
 
     def per_interval(self, dt: float) -> Array:
@@ -73,7 +73,7 @@ class RateLimit:
 
 
 class VelocityLimit(RateLimit):
-    """Bound on the velocity of each joint: on its increment from node to node (5)."""
+    """Bound on the velocity of each joint, thus on its increment from node to node (5)."""
 
     __slots__ = ()
     quantity = "velocity"
@@ -82,7 +82,7 @@ class VelocityLimit(RateLimit):
 
 
 class AccelerationLimit(RateLimit):
-    """Bound on the acceleration of each joint: on the change of its increment at a node (6)."""
+    """Bound on the acceleration of each joint, thus on the change of its increment (6)."""
 
     __slots__ = ()
     quantity = "acceleration"
@@ -91,7 +91,7 @@ class AccelerationLimit(RateLimit):
 
 
 class JerkLimit(RateLimit):
-    """Bound on the jerk of each joint: on the change of the change of its increment."""
+    """Bound on the jerk of each joint, thus on the third difference over four nodes."""
 
     __slots__ = ()
     quantity = "jerk"
@@ -101,22 +101,23 @@ class JerkLimit(RateLimit):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TorqueLimit:
-    """Bound on the torque of each joint, and the arm that says what it is.
+    """Bound on the torque of each joint, and the dynamics of the arm that give the torque.
 
-    Held at the nodes, where (6) holds the acceleration: at node k between intervals of length
-    t_k and t_{k+1}, where the joints are q_k, the velocity is the mean of those of both intervals
-    and the acceleration their difference over (t_k + t_{k+1}) / 2. Of equal intervals these are the
-    central differences. At the two ends of an open path nothing is held, as by (6).
+    It holds at the nodes where (6) bounds the acceleration. At node k, between intervals of
+    t_k and t_{k+1}, the joints are q_k, the velocity is the mean of those of both intervals, and
+    the acceleration is their difference over (t_k + t_{k+1}) / 2. If the intervals are equal, these
+    are the central differences. As with (6), nothing is bounded at the two ends of an open path.
 
     Parameters
     ----------
     bound : (n,) N m
+        Largest torque of each joint.
     dynamics : ArmDynamics
 
     Raises
     ------
     InputError
-        A bound that is not positive, or of another number of joints.
+        A bound that is not positive, or not for the number of joints of the arm.
     """
 
     bound: Array
@@ -130,7 +131,7 @@ class TorqueLimit:
         object.__setattr__(self, "bound", positive(self.bound, "torque", (n,)))
 
     def shares(self, q: Array, tau: Array, *, periodic: bool = False) -> Array:
-        """Return the signed shares (M, n) of the bound that a motion asks for at its nodes.
+        """Return the torques of a motion as signed shares of the bound.
 
         Parameters
         ----------
@@ -140,6 +141,11 @@ class TorqueLimit:
             Time of each interval.
         periodic : bool
             Whether the last interval is followed by the first.
+
+        Returns
+        -------
+        shares : (M, n)
+            At each node where two intervals meet, see `meetings`.
         """
         dq = np.diff(q, axis=0)
         v, a = rates_of(dq, tau, periodic=periodic)
@@ -150,16 +156,16 @@ class TorqueLimit:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Limits:
-    """What bounds a motion in time, joint by joint.
+    """Limits on the velocity, acceleration, torque and jerk of each joint.
 
     Parameters
     ----------
     velocity : VelocityLimit
     acceleration : AccelerationLimit
     torque : TorqueLimit, optional
-        Held by the exact search and the refinement, as the acceleration at the nodes.
+        The exact search and the refinement keep it at the nodes, as they do the acceleration.
     jerk : JerkLimit, optional
-        Held by the refinement: a search would have to know three steps back.
+        Only the refinement keeps it: a search would have to remember the last three steps.
     """
 
     velocity: VelocityLimit
@@ -180,7 +186,21 @@ class Limits:
         torque: TorqueLimit | None = None,
         jerk: JerkLimit | None = None,
     ) -> Limits:
-        """Return the limits of a robot, all finite, and the shares of them that may be used."""
+        """Return the limits of a robot, with the shares of them that may be used.
+
+        Parameters
+        ----------
+        velocity, acceleration : (n,) rad/s, rad/s^2
+        eta_v, eta_a : float
+            Share of the velocity and acceleration limits that may be used.
+        torque : TorqueLimit, optional
+        jerk : JerkLimit, optional
+
+        Raises
+        ------
+        InputError
+            A velocity, an acceleration or a share that is not positive or not finite.
+        """
         return cls(
             velocity=VelocityLimit(bound=positive(velocity, "velocity", (None,)), share=eta_v),
             acceleration=AccelerationLimit(
@@ -191,28 +211,28 @@ class Limits:
         )
 
     def require_joints(self, n: int) -> None:
-        """Raise InputError unless each limit is one of n joints."""
+        """Raise InputError unless each limit is for n joints."""
         for limit in (self.velocity, self.acceleration, self.torque, self.jerk):
             if limit is not None and len(limit.bound) != n:
                 raise InputError(f"{limit.quantity}: expected shape ({n}), got {limit.bound.shape}")
 
     def without_acceleration(self) -> Limits:
-        """Return the limits on the velocity alone."""
+        """Return the velocity limit alone."""
         free = np.full(len(self.acceleration.bound), np.inf)
         return Limits(velocity=self.velocity, acceleration=AccelerationLimit(bound=free))
 
 
 def meetings(intervals: int, *, periodic: bool = False) -> tuple[Ints, Ints]:
-    """Return the intervals before and after each node where two meet, (M,) each.
+    """Return the intervals before and after each node where two intervals meet, (M,) each.
 
-    With `periodic` the last one is followed by the first.
+    If `periodic`, the last interval is followed by the first.
     """
     before = np.arange(intervals if periodic and intervals > 1 else intervals - 1)
     return before, (before + 1) % intervals
 
 
 def rates_of(dq: Array, tau: Array, *, periodic: bool = False) -> tuple[Array, Array]:
-    """Return the velocities (K-1, n) and accelerations (M, n) of a motion in rad and s.
+    """Return the velocities (K-1, n) rad/s and accelerations (M, n) rad/s^2 of a motion.
 
     Parameters
     ----------
@@ -229,10 +249,10 @@ def rates_of(dq: Array, tau: Array, *, periodic: bool = False) -> tuple[Array, A
 
 
 def jerks_of(a: Array, tau: Array, *, periodic: bool = False) -> Array:
-    """Return the jerks (J, n) between nodes of accelerations (M, n) at them, rad and s.
+    """Return the jerks (J, n) rad/s^3 between nodes from the accelerations (M, n) rad/s^2 at them.
 
-    Over each interval that both ends of have an acceleration: third differences over dt^3 where
-    all intervals are alike. The arguments are as of `rates_of`.
+    There is one for each interval with an acceleration at both ends. If all intervals are equal,
+    the jerks are third differences over dt^3. `tau` and `periodic` are as in `rates_of`.
     """
     _, after = meetings(len(tau), periodic=periodic)
     if periodic:

@@ -8,7 +8,7 @@ __all__ = ["Loss", "Reason"]
 
 
 class Loss(IntEnum):
-    """The tests that take a candidate pose out of its layer, or an edge out of the graph.
+    """The tests that remove a candidate pose from its layer, or an edge from the graph.
 
     Kernels code the bounds of joint (or coupling) i as LOW + 2 i and HIGH + 2 i.
     """
@@ -16,7 +16,7 @@ class Loss(IntEnum):
     words: str
 
     def __new__(cls, code: int, words: str) -> Loss:
-        """Return the member of a code; {} in its words stands for which joint, margin, place."""
+        """Return the member with a code; {} in its words is the joint, margin or place."""
         made = int.__new__(cls, code)
         made._value_, made.words = code, words
         return made
@@ -42,20 +42,20 @@ class Loss(IntEnum):
 
 
 class Reason(str):
-    """A loss and what it concerns, in the words of plan.json and messages: "joint 3 low".
+    """A loss with its joint, margin or place, as plan.json and messages write it.
 
-    It is these words; code asks for its `loss`.
+    The string is that text, such as "joint 3 low"; code compares its `loss`.
     """
 
     loss: Loss
     which: object
 
     def __new__(cls, loss: Loss, which: object = "") -> Reason:
-        """Return the reason; which: the joint, margin or place that the words of the loss name."""
+        """Return the reason; `which` is the joint, margin or place that fills {} in the words."""
         made = str.__new__(cls, loss.words.format(which).rstrip())
         made.loss, made.which = loss, which
         return made
 
     def __getnewargs__(self) -> tuple[Loss, object]:  # type: ignore[override]  # not a str's own
-        """Return what a copy is made of."""
+        """Return the arguments that pickle and copy pass to `__new__`."""
         return self.loss, self.which

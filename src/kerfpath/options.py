@@ -1,4 +1,4 @@
-"""How a plan is asked for: one object with every option, and the rules of what goes with what."""
+"""Planning options: one object with every option, and the rules for combining them."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class PlanKeywords(GraphKeywords, total=False):
 
 
 class OptionData(TypedDict):
-    """The options as JSON holds them: SI, the unit in the name, null for infinity."""
+    """Options as JSON data: SI units, unit in the key, null for infinity."""
 
     method: PlanMethod
     objective: ObjectiveKind
@@ -98,7 +98,7 @@ class OptionData(TypedDict):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlanOptions:
-    """How a plan is asked for: the search space, what is best, and what is kept.
+    """Options of a plan: the search space, the objective, and the limits to keep.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class PlanOptions:
     frames : {"rotation-minimising", "tangent"}
         Task frames that gamma is measured in.
     tilt : Tilt, optional
-        Tolerance of the tool axis, searched too; None: the nominal axis alone.
+        Tolerance of the tool axis, which is then searched too; None: only the nominal axis.
     postures : tuple of int, optional
         The postures that may be used; None: all. See `kerfpath.robots.postures_named`.
     method : {"continuous", "exact", "paper", "known"}
@@ -120,43 +120,42 @@ class PlanOptions:
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
     rotation : (n,) rad, optional
-        Largest angle that an endless joint may turn away, either way, from where it begins;
-        infinite where that is not limited.
+        Largest angle that an endless joint may turn away from where it begins, in either
+        direction; infinite for no limit.
     feed : {"constant", "dip"}
-        Where the limits do not let the speed be held: "constant" refuses, "dip" reduces the feed
-        there and holds the speed elsewhere, in the least time.
+        If the limits do not allow the speed everywhere: "constant" refuses, "dip" reduces the feed
+        there and keeps the speed elsewhere, in the least time.
     refine : bool
         Whether gamma moves off its grid after a search of the grid, see `kerfpath.refine`; with
         the method "continuous" it always does.
     refine_parts : int
-        Parts into which the refinement divides every interval between nodes. A job does so; `plan`
+        Parts into which the refinement divides every interval between nodes. Jobs do so; `plan`
         keeps the nodes of its contour.
     between_nodes : {"reported", "kept", "guaranteed"}
-        The limits hold at the nodes, and what the program needs between them is "reported"; where
-        that is more, the nodes are held to less if the limits can be "kept" so at every instant;
-        or the audit fails unless that is proved, "guaranteed". A job does so; `plan` holds the
+        The limits hold at the nodes, and the audit reports what the program needs between them.
+        "kept": if that is more, the nodes keep lower limits if this keeps the limits at every
+        instant. "guaranteed": the audit fails unless that is proved. Jobs do so; `plan` holds the
         limits at the nodes, and `kerfpath.keep_limits` those between them.
     interruptions : {"none", "fewest"}
         Whether a contour that cannot be cut in one go is cut in pieces, see `plan_in_pieces`.
     least_piece : float m, optional
-        Length that every such piece has at least.
+        Least length of such a piece.
     comfort : Comfort, optional
-        Margins that the nodes keep from singularities and limits, and penalties beside them.
+        Margins that the nodes keep from singularities and limits, and penalties beyond them.
     retract : float m, optional
-        The tool can back off by so much along its axis at both ends, within the joint limits and
-        their margin, where a sample of gamma leaves room for it; the audit says where none does.
+        Distance by which the tool can back off along its axis at both ends, within the joint limits
+        and their margin, if some sample of gamma allows it; else the audit reports it.
     floor : float m, optional
-        Height in the robot base below which no node has the elbow, the wrist or the flange; None:
-        there is no floor.
+        Least height of elbow, wrist and flange in the robot base, at every node; None: no floor.
     gamma_windows : tuple of GammaWindow
         Stretches of the contour on which gamma is kept inside an interval.
     certify : Certify, optional
-        How far it is proved how near the plan is to the best motion; None: not at all.
+        The gap to the best motion to prove, and the time for it; None: no bound is proved.
 
     Raises
     ------
     InputError
-        A value out of its range or not of its kind; `OptionConflict` where two do not go together.
+        A value out of range or of the wrong type; `OptionConflict` if two do not go together.
     """
 
     gamma_step: float = np.pi / 90
@@ -224,7 +223,7 @@ class PlanOptions:
     __hash__ = None  # type: ignore[assignment]  # arrays have none
 
     def resolve(self, robot: Robot, dt: float) -> PlanOptions:
-        """Return the options with the default weights of a robot at `dt` s from node to node.
+        """Return the options with weights and rotation limits filled in, for nodes `dt` s apart.
 
         Raises
         ------
@@ -241,13 +240,13 @@ class PlanOptions:
         )
 
     def limits(self, robot: Robot) -> Limits:
-        """Return the limits of a robot in time, and the shares of them that may be used."""
+        """Return the limits on a robot's motion, with the shares of them that may be used."""
         rates = Limits.of(*robot.speed_limits(), eta_v=self.eta_v, eta_a=self.eta_a)
         return replace(rates, torque=robot.torque_limit(), jerk=robot.jerk_limit())
 
     @property
     def without_penalties(self) -> PlanOptions:
-        """The options with the margins of comfort and the cone of tilt, at no cost."""
+        """The options without penalties: margins of comfort and the cone of tilt stay."""
         return replace(
             self,
             tilt=None if self.tilt is None else replace(self.tilt, cost=0.0),
@@ -255,18 +254,18 @@ class PlanOptions:
         )
 
     def to_data(self) -> OptionData:
-        """Return the options as JSON holds them; `from_data` reads the same options back."""
+        """Return the options as JSON data, which `from_data` reads."""
         names = {key: _NAMES.get(key, key) for key in OptionData.__annotations__}
         return cast(OptionData, {key: _to_json(getattr(self, name)) for key, name in names.items()})
 
     @classmethod
     def from_data(cls, data: OptionData) -> PlanOptions:
-        """Return the options that `to_data` wrote; other keys of `data` are left alone.
+        """Return the options that `to_data` wrote; other keys of `data` are ignored.
 
         Raises
         ------
         InputError
-            As the class itself.
+            As `PlanOptions`.
         KeyError
             A key is missing.
         """
@@ -293,11 +292,11 @@ _NAMES = {
     "retract_m": "retract",
     "floor_m": "floor",
 }
-"""Options whose key in JSON has another name, by that key."""
+"""Names of options whose JSON key differs, by that key."""
 
 
 def _to_json(value: object) -> object:
-    """Return the value of an option as JSON holds it, null for infinity."""
+    """Return the value of an option as JSON data, null for infinity."""
     if isinstance(value, Tilt | Certify | GammaWindow):
         return value.to_data()
     if isinstance(value, Comfort):
@@ -310,21 +309,22 @@ def _to_json(value: object) -> object:
 def with_keywords(
     options: PlanOptions | None, keywords: Mapping[str, Any], allowed: type, **more: Any
 ) -> PlanOptions:
-    """Return `options`, or the defaults, with the keywords that a caller gave in their place.
+    """Return `options`, or the defaults, with some of them replaced by keywords.
 
     Parameters
     ----------
     options : PlanOptions or None
     keywords : mapping of str to value
+        Options that a user gave to a function as keywords.
     allowed : type of TypedDict
-        The keywords that the caller takes.
+        The keywords that the function accepts.
     more : value
-        Options that the caller sets itself.
+        Options that the function sets itself.
 
     Raises
     ------
     TypeError
-        A keyword that the caller does not take.
+        A keyword that the function does not accept.
     InputError
         As `PlanOptions`.
     """
@@ -350,11 +350,11 @@ _KNOWN: dict[str, tuple[str, ...]] = {
 
 KEEPS = "kerfpath.keep_limits(plan) makes a plan keep its limits between the nodes, too"
 EXACT_OR_BETTER = ("continuous", "exact")
-"""Methods that hold (5) and (6) throughout."""
+"""Methods whose paths keep (5) and (6)."""
 GIVEN = object()
-"""Any value but None."""
+"""In a rule: any value except None."""
 CLEARANCE, PENALTIES = "comfort clearance", "comfort costs"
-"""What the rules ask of comfort, beside the options themselves."""
+"""Names under which the rules test two facts of comfort, beside the options themselves."""
 _ONE_WAY: dict[str, object] = {"method": EXACT_OR_BETTER, "closure": "free", "rotation": None}
 _RULES: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
     (
@@ -374,7 +374,7 @@ _RULES: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
     ({CLEARANCE: GIVEN}, {"feed": "constant", "interruptions": "none"}),
     ({"feed": "dip", PENALTIES: True}, {"refine": False}),
 )
-"""Where all options of the first are so, those of the second must be so."""
+"""Pairs of options and values: if all of the first hold, those of the second must hold."""
 
 
 def _require_no_conflict(options: PlanOptions) -> None:

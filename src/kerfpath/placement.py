@@ -1,4 +1,4 @@
-"""The part where it really stands: the frame of measured points, and plans moved to it."""
+"""Placement of the real part: its frame from measured points, and plans moved to it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 ON_A_LINE = 0.05
-"""Points that spread across their best line by a smaller share of its length fix no frame."""
+"""Points define no frame if their spread across the best line is a smaller share of its length."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,7 +40,7 @@ class MeasuredFrame:
     ----------
     T_base_part : (4, 4) m
     residuals : (K,) m
-        How far each measured point is from where the placement puts it.
+        Distance of each measured point from its nominal point at this placement.
     """
 
     T_base_part: Array
@@ -50,16 +50,16 @@ class MeasuredFrame:
 
     @property
     def xyz_mm(self) -> list[float]:
-        """The part's position as a job says it, to 0.1 um."""
+        """Position of the part as in a job file, mm, rounded to 0.1 um."""
         return xyz_rpy(self.T_base_part)[0]
 
     @property
     def rpy_deg(self) -> list[float]:
-        """Its roll, pitch and yaw as a job says them, to 1e-6 deg."""
+        """Roll, pitch and yaw of the part as in a job file, deg, rounded to 1e-6 deg."""
         return xyz_rpy(self.T_base_part)[1]
 
     def moved_from(self, T_base_part: ArrayLike) -> tuple[float, float]:
-        """Return how far the part's origin is (m) from another placement, and how turned (rad)."""
+        """Return distance (m) and rotation (rad) of the part from another placement (4, 4)."""
         other = as_pose(T_base_part, "T_base_part")
         turned = Rotation.from_matrix(other[:3, :3].T @ self.T_base_part[:3, :3]).magnitude()
         return float(np.linalg.norm(self.T_base_part[:3, 3] - other[:3, 3])), float(turned)
@@ -75,7 +75,7 @@ def xyz_rpy(T: Array) -> tuple[list[float], list[float]]:
 def placement_from_points(
     nominal: ArrayLike, measured: ArrayLike, *, most_residual: float = 5e-4
 ) -> MeasuredFrame:
-    """Return the rigid placement that brings points of the part nearest to where they are measured.
+    """Return the rigid placement that fits points of the part to their measured positions best.
 
     Least squares by singular value decomposition (Kabsch, Acta Cryst. A32, 1976).
 
@@ -86,7 +86,7 @@ def placement_from_points(
     measured : (K, 3) m
         The same points in the robot base.
     most_residual : float m
-        Largest distance that may be left at a point.
+        Largest residual allowed at a point.
 
     Raises
     ------
@@ -104,8 +104,8 @@ def placement_from_points(
     ):
         if spread[1] <= ON_A_LINE * spread[0]:
             raise InputError(
-                "measured frame: the points lie on one line, or nearly, and leave the part free to "
-                "turn about it; measure one that stands away from it"
+                "measured frame: the points lie on one line, or nearly, so the part's rotation "
+                "about it is unknown; measure a point away from the line"
             )
     turned, _ = Rotation.align_vectors(measured - middle, nominal - centre)
     T = np.eye(4)
@@ -116,8 +116,8 @@ def placement_from_points(
     worst = int(residuals.argmax())
     if residuals[worst] > most_residual:
         raise InputError(
-            f"measured frame: point {worst + 1} of {len(nominal)} is left "
-            f"{residuals[worst] * 1e3:.3f} mm off, allowed are {most_residual * 1e3:g} mm; check "
+            f"measured frame: point {worst + 1} of {len(nominal)} is off by "
+            f"{residuals[worst] * 1e3:.3f} mm, allowed are {most_residual * 1e3:g} mm; check "
             "its coordinates and the order of the points, or measure it again (fitted: xyz_mm = "
             f"{fitted.xyz_mm}, rpy_deg = {fitted.rpy_deg})"
         )
@@ -127,22 +127,21 @@ def placement_from_points(
 def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
     """Return the plan with the part at another placement: same tool path on it, other joints.
 
-    At every node the tool keeps its pose in the part, so gamma too, the joints their branch, and
-    external axes their values. Times stay; whether the limits are kept there is for the audit to
-    say.
+    At every node the tool keeps its pose in the part and thus gamma, the joints keep their posture,
+    and external axes their values. Times stay. Audit the result: the limits may not be kept there.
 
     Parameters
     ----------
     plan : Plan
     T_base_part : (4, 4) m
-        With external axes at zero.
+        Placement with external axes at zero.
 
     Raises
     ------
     NoFeasiblePath
         A node out of reach in its posture.
     InputError
-        No pose.
+        `T_base_part` is no pose.
     """
     T_base_part = as_pose(T_base_part, "T_base_part")
     T_base_flange = T_base_part @ plan.T_part_tip @ np.linalg.inv(plan.T_flange_tip)
@@ -156,11 +155,11 @@ def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
         k = int(lost[0])
         raise NoFeasiblePath(
             f"contour {plan.name!r}, node {k}: out of the robot's reach at this placement in "
-            f"posture {posture_name(int(plan.posture[k]))}; plan the job again with it",
+            f"posture {posture_name(int(plan.posture[k]))}; plan the job again with this placement",
             proved=False,
             node=k,
         )
-    # Nearest turn at the first node, and no jump of a turn from the old joints after it.
+    # At the first node the turn nearest to the old joints; after it no jump by whole turns.
     q = plan.q + np.unwrap(q - plan.q, axis=0)
     turn = turns_of(q).astype(np.int64)
     turn[:, arm:] = 0
@@ -178,11 +177,11 @@ def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
 
 
 def planned_again(plan: Plan, T_base_part: ArrayLike) -> Plan:
-    """Return the plan at another placement, where the limits ask for another motion than `placed`.
+    """Return a plan at another placement if the plan that `placed` returns breaks limits there.
 
-    Gamma is moved from where the plan has it so that the limits are kept there. Where that cannot
-    be, the contour is planned anew with the settings of the plan, in its postures, refined; what
-    clearance costs is left out, as the cell is not known there.
+    Gamma is moved so that the limits are kept there. If that fails, the contour is planned again
+    with the settings of the plan and in its postures, and refined; costs of clearance are left out,
+    as the cell is not known there.
 
     Parameters
     ----------
@@ -199,7 +198,7 @@ def planned_again(plan: Plan, T_base_part: ArrayLike) -> Plan:
     """
     try:
         found = refine(placed(plan, T_base_part))
-    except NoFeasiblePath:  # out of reach as it was, with another gamma perhaps not
+    except NoFeasiblePath:  # out of reach with the old gamma, perhaps not with another
         found = None
     if found is not None and found.done:
         return found.plan
@@ -232,7 +231,7 @@ def place_moves(
 ) -> tuple[TransferMove, ...]:
     """Return the straight moves between plans that were moved to another placement, not `clear`.
 
-    Where a move begins or ends at a home position it stays there.
+    A move that begins or ends at a home position still does.
 
     Parameters
     ----------
@@ -246,7 +245,7 @@ def place_moves(
     Raises
     ------
     InputError
-        A move that goes around obstacles, or an end beyond the limits.
+        A move that goes around obstacles, or a move whose end is beyond the limits.
     """
     first = 0 if len(moves) < len(plans) else -1
     moved = []
@@ -254,7 +253,8 @@ def place_moves(
         if len(move.q) > 2:
             raise InputError(
                 f"move {before - first + 1} of {len(moves)} between contours goes around obstacles,"
-                " and nobody knows its way at another placement; plan the job again with it"
+                " and its way at another placement is unknown; plan the job again with that "
+                "placement"
             )
         after = before + 1
         q0 = move.q[0] if before < 0 else back_off(plans[before], "end", retract)

@@ -1,4 +1,4 @@
-"""Progress: how a long call says how far it is, and where it may be stopped."""
+"""Progress of long calls, and the places where they may be stopped."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["Progress", "may_stop", "no_progress", "stopped_by"]
 
 
 class Progress(Protocol):
-    """A callable that takes what is being done, how much of it is done, and of how much."""
+    """Callable that receives the progress of a long call."""
 
     def __call__(self, what: str, done: int, total: int, /) -> None:
         """Take the state of one piece of work.
@@ -19,10 +19,10 @@ class Progress(Protocol):
         Parameters
         ----------
         what : str
-            The piece of work in words; another text is another piece.
+            Name of the piece of work; another name means another piece.
         done, total : int
-            Its parts that are done, and all of them. A total of 0: it has no measure, and is over
-            when the next call comes.
+            Number of parts done, and number of all parts. With a total of 0 the work cannot be
+            measured, and it ends when the next call comes.
         """
 
 
@@ -38,19 +38,19 @@ _CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=_go_on)
 
 
 def may_stop() -> None:
-    """Let the work be stopped here: called where a long call can be left, nothing half done.
+    """Let the work be stopped here; long calls call it where nothing is left half done.
 
     Raises
     ------
     BaseException
-        What the check of `stopped_by` raises; nothing without one.
+        Whatever the check of `stopped_by` raises; nothing without one.
     """
     _CHECK.get()()
 
 
 @contextmanager
 def stopped_by(check: Callable[[], None]) -> Iterator[None]:
-    """Have calls inside, in this thread, call `check` now and then, which stops them by raising."""
+    """Make long calls in this thread call `check` now and then; it stops them by raising."""
     token = _CHECK.set(check)
     try:
         yield

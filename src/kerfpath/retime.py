@@ -1,13 +1,13 @@
-"""The dip: keep the commanded speed wherever the limits allow, and slow down elsewhere.
+"""Feed reduction: keep the commanded speed where the limits allow it, and slow down elsewhere.
 
-The path is fixed, and each interval of it may take longer than commanded. In the interval times tau
-the limits as the audit measures them are velocity bounds, |dq_k| / tau_k <= v, and, where two
+The path is fixed, and each interval may take longer than commanded. In terms of the interval times
+tau, the limits as the audit measures them are velocity bounds, |dq_k| / tau_k <= v, and, where two
 intervals meet,
 
     dq_{k+1} / tau_{k+1} - dq_k / tau_k <= a (tau_k + tau_{k+1}) / 2
 
-for either sign. A positive term is convex in 1 / tau; a negative one is not, and its tangent takes
-its place: an inner approximation, so that every solution keeps the limits and the next one is never
+for either sign. Positive terms are convex in tau; negative ones are not and are replaced by their
+tangents. This is an inner approximation: every solution keeps the limits, and the next one is never
 slower (the convex-concave procedure).
 """
 
@@ -28,15 +28,15 @@ from kerfpath.plans import Feed
 __all__ = ["feed", "retime"]
 
 SLACK = 1e-9
-"""Relative slack on the limits that the result keeps: rounding."""
+"""Relative slack of the limits in the result, for rounding."""
 MARGIN = 1e-7
-"""Share of the acceleration that the solver does not get, so that its tolerance breaks no limit."""
+"""Share of the acceleration kept from the solver, so that its tolerance breaks no limit."""
 SNAP = 1e-6
-"""Relative excess over the least time that counts as none, where the limits agree."""
+"""Relative excess over the least time below which an interval is set to it, if the limits allow."""
 GAIN = 1e-5
-"""Relative gain in total time below which the procedure has arrived."""
+"""Relative gain in total time below which the procedure has converged."""
 ITERATIONS = 50
-"""At most: each about halves how much too slow the start is, and the last ones are few."""
+"""Most iterations; each about halves the excess over the optimal time."""
 
 
 class _LimitRows(NamedTuple):
@@ -48,7 +48,7 @@ class _LimitRows(NamedTuple):
     b: Array
 
     def excess(self, tau: Array) -> Array:
-        """Return, row by row, the left side over the right one."""
+        """Return, row by row, the left side divided by the right one."""
         left = self.b / tau[self.after] - self.a / tau[self.before]
         return 2 * left / (tau[self.before] + tau[self.after])
 
@@ -60,10 +60,10 @@ def retime(
     *,
     periodic: bool = False,
 ) -> Array:
-    """Return the interval times of least sum, none below `dt`, that keep the limits.
+    """Return the interval times with the least sum, none below `dt`, that keep the limits.
 
     The result keeps them to 1e-9 relative; it is a local optimum, to about 1e-4 of the total time.
-    Where the limits leave an interval free, its time is `dt` exactly.
+    An interval that no limit slows has exactly the time `dt`.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def retime(
         Commanded time of each interval.
     limits : Limits
     periodic : bool
-        The last interval is followed by the first; else the ends are reached and left at speed.
+        Whether the last interval is followed by the first; else the path begins and ends at speed.
 
     Returns
     -------
@@ -82,11 +82,14 @@ def retime(
     Raises
     ------
     InputError
-        Arrays that do not fit each other, NaN, times that are not positive; limits on torque or
+        Arrays whose shapes do not fit, NaN, times that are not positive, or limits on torque or
         jerk.
     """
     if limits.torque is not None or limits.jerk is not None:
-        raise InputError("retime: limits on velocity and acceleration alone are known to it")
+        raise InputError(
+            "retime: supports limits on velocity and acceleration only; remove those on torque "
+            "and jerk"
+        )
     dq, dt, velocity, acceleration = _inputs(dq, dt, limits)
     least = np.maximum(dt, (np.abs(dq) / velocity).max(axis=1, initial=0.0))
     rows = _rows(dq / acceleration, least, periodic)
@@ -113,14 +116,14 @@ def feed(
     *,
     periodic: bool = False,
 ) -> Feed:
-    """Return where the times `tau` keep the commanded speed and what slows them where not.
+    """Return where the times `tau` keep the commanded speed, and what limits the slowest interval.
 
     Parameters
     ----------
     tau : (K-1,) s
-        As `retime` returns it.
+        The result of `retime`.
     dt, dq, limits, periodic
-        As given to `retime`.
+        As in `retime`.
     length : (K-1,) m
         Length of the path in each interval.
 
@@ -183,13 +186,13 @@ def _rows(step: Array, least: Array, periodic: bool) -> _LimitRows:
 
 
 def _stretch_times(rows: _LimitRows, tau: Array) -> Array:
-    """Return times that keep the rows: `tau`, as much slower throughout as the worst row asks."""
+    """Return times that keep the rows: all of `tau` stretched by the factor of the worst row."""
     worst = rows.excess(tau).max(initial=0.0)
     return tau if worst <= 1 + SLACK / 2 else tau * np.sqrt(worst)
 
 
 def _snap_times(rows: _LimitRows, least: Array, tau: Array) -> Array:
-    """Set times that are the least but for rounding to the least, wherever the rows agree."""
+    """Set times that are nearly the least to the least, where the rows allow it."""
     near = tau <= least * (1 + SNAP)
     while True:
         snapped = np.where(near, least, tau)
@@ -204,7 +207,8 @@ def _snap_times(rows: _LimitRows, least: Array, tau: Array) -> Array:
 def _improve_times(rows: _LimitRows, least: Array, tau: Array) -> Array:
     """Return the quickest times under the rows made convex at `tau` (K-1,).
 
-    Variables: y = tau / unit, and x >= 1 / y where a row has it with a positive sign.
+    Variables: y = tau / unit, and x >= 1 / y for each interval whose 1 / y has a positive sign in
+    some row.
     """
     unit = float(np.mean(least))
     y, a, b = tau / unit, rows.a / unit**2, rows.b / unit**2
@@ -237,7 +241,7 @@ def _improve_times(rows: _LimitRows, least: Array, tau: Array) -> Array:
 def _tangents(
     interval: Ints, y: Array, plus: Array, minus: Array
 ) -> tuple[sparse.csc_array, sparse.csc_array, Array]:
-    """Return plus / y - minus / y - y / 2 of one interval a row, as (to_y) y + (to_x) x - most.
+    """Return plus / y - minus / y - y / 2, one interval a row, as (to_y) y + (to_x) x - most.
 
     The tangent of -1 / y at y0 is y / y0^2 - 2 / y0.
     """

@@ -1,4 +1,4 @@
-"""The tolerance of the tool axis: a cone about it, sampled as lead and lean."""
+"""Tolerance of the tool axis: a cone about the nominal axis, sampled as lead and lean."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Tilt", "TiltData", "tilt_frames"]
 
 
 class TiltData(TypedDict):
-    """A `Tilt` as JSON holds it."""
+    """A `Tilt` as JSON data."""
 
     cone_rad: float
     steps: int
@@ -24,22 +24,21 @@ class TiltData(TypedDict):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tilt:
-    """The tilt allowed away from the nominal tool axis: how far, in which steps, at what cost.
+    """Tilt allowed away from the nominal tool axis: largest angle, steps and cost.
 
     Lead and lean are in the frame of travel: x along the path, z along the nominal tool axis
-    into the part, y = z x x across the path. They are the parts of one turn about an axis between
-    the two: by hypot(lead, lean), about lean x + lead y. Lead alone turns about y, and where it is
-    positive the beam points ahead; lean alone turns about x, and where it is positive the beam
-    points away from y.
+    into the part, y = z x x across the path. Together they are one rotation: by hypot(lead, lean)
+    about the axis lean x + lead y. A positive lead, which turns about y, points the beam ahead;
+    a positive lean, which turns about x, points it away from y.
 
     Parameters
     ----------
     cone : float rad
-        Largest angle between tool axis and nominal axis, from 0 to less than a quarter turn.
+        Largest angle between tool axis and nominal axis, from 0 to less than pi/2.
     steps : int
         Steps of lead and of lean from the nominal axis to the rim of the cone; 0: no tilt.
     cost : float 1/rad
-        What each node costs per angle of tilt, on top of the distances of (14) or (15).
+        Cost of each node per angle of tilt, on top of the distances of (14) or (15).
 
     Raises
     ------
@@ -62,7 +61,7 @@ class Tilt:
         object.__setattr__(self, "steps", int(self.steps))
 
     def to_data(self) -> TiltData:
-        """Return it as JSON holds it; `from_data` reads the same back."""
+        """Return the tilt as JSON data, which `from_data` reads."""
         return {"cone_rad": self.cone, "steps": self.steps, "cost_per_rad": self.cost}
 
     @classmethod
@@ -81,14 +80,20 @@ class Tilt:
         return freeze(np.asarray(grid[inside] * (self.cone / self.steps), dtype=float))
 
     def price(self, samples: Array) -> Array:
-        """Return what nodes cost (T,) with lead and lean (T, 2) rad."""
+        """Return the cost (T,) of nodes with lead and lean (T, 2) rad."""
         return self.cost * np.hypot(samples[:, 0], samples[:, 1])
 
 
 def tilt_frames(frames: Array, along: Array, tilt: Array) -> Array:
-    """Return task frames (..., 4, 4) turned by lead and lean (..., 2) rad; z is the tool axis.
+    """Return task frames tilted by lead and lean; their z is the tilted tool axis.
 
-    along (..., 3) are the directions of travel, see `Contour.along`.
+    Parameters
+    ----------
+    frames : (..., 4, 4)
+    along : (..., 3)
+        Directions of travel, see `Contour.along`.
+    tilt : (..., 2) rad
+        Lead and lean.
     """
     across = np.cross(frames[..., :3, 2], along)
     turn = tilt[..., 1:] * along + tilt[..., :1] * across

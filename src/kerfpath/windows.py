@@ -1,4 +1,4 @@
-"""Windows of gamma: where along a contour the free rotation is kept inside an interval."""
+"""Windows of gamma: stretches of a contour on which gamma is kept inside an interval."""
 
 from __future__ import annotations
 
@@ -23,13 +23,14 @@ __all__ = [
 ]
 
 SAME_ANGLE, SAME_PLACE = 1e-9, 1e-9
-"""rad, m: ends that rounding left so near to a sample of gamma, or to a node, are there."""
+"""rad, m: an end of a window this close to a sample of gamma, or to a node, is taken to be there
+(rounding)."""
 LEAST_OUT = 1e-6
-"""rad: a window leaves out at least so much of the circle."""
+"""rad: least part of the circle that a window leaves out."""
 
 
 class WindowData(TypedDict):
-    """A `GammaWindow` as JSON holds it."""
+    """A `GammaWindow` as JSON data."""
 
     start_m: float
     end_m: float
@@ -39,22 +40,23 @@ class WindowData(TypedDict):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GammaWindow:
-    """A stretch of a contour, and the interval of the circle that gamma is kept in there.
+    """A stretch of a contour, and the interval of angles that gamma is kept in there.
 
-    It holds at every node on the stretch, its ends included; between nodes gamma goes from one to
-    the next. Of several windows at a node all hold.
+    The window holds at every node on the stretch, ends included; between nodes gamma goes from the
+    value at one to that at the next. If several windows cover a node, all of them hold.
 
     Parameters
     ----------
     start, end : float m
         Arc length `Contour.s` at which the stretch begins and ends.
     low, high : float rad
-        Gamma lies on the way from low up to high; where high is below low, that way crosses pi.
+        Gamma lies between low and high, counted upwards from low; if high is below low, the
+        interval crosses pi.
 
     Raises
     ------
     InputError
-        An end before the start, an angle beyond a turn, an interval that leaves nothing out.
+        An end before the start, an angle beyond a full turn, or an interval of all angles.
     """
 
     start: float
@@ -71,7 +73,8 @@ class GammaWindow:
         if self.end < self.start:
             raise InputError(
                 f"gamma_windows end: expected at least the start, {self.start:g} m, got "
-                f"{self.end:g} m; a stretch across the start of a closed contour is two windows"
+                f"{self.end:g} m; for a stretch across the start of a closed contour give two "
+                "windows"
             )
         for name in ("low", "high"):
             if abs(getattr(self, name)) > 2 * np.pi:
@@ -88,11 +91,11 @@ class GammaWindow:
 
     @property
     def width(self) -> float:
-        """Width of the interval, rad; 0: gamma is given."""
+        """Width of the interval, rad; 0: gamma is fixed."""
         return (self.high - self.low) % (2 * np.pi)
 
     def to_data(self) -> WindowData:
-        """Return it as JSON holds it; `from_data` reads the same back."""
+        """Return the window as JSON data, which `from_data` reads."""
         return {
             "start_m": self.start,
             "end_m": self.end,
@@ -112,16 +115,16 @@ class GammaWindow:
 
 
 def nodes_of(windows: Sequence[GammaWindow], s: Array) -> Bools:
-    """Return which windows hold at nodes at arc lengths s (K,) m, as (W, K)."""
+    """Return which windows hold at the nodes, (W, K), from the arc lengths s (K,) m."""
     start, end = (np.array([getattr(w, name) for w in windows]) for name in ("start", "end"))
     return np.asarray((s >= start[:, None] - SAME_PLACE) & (s <= end[:, None] + SAME_PLACE))
 
 
 def with_window_ends(gamma: Array, windows: Sequence[GammaWindow]) -> Array:
-    """Return samples of gamma (m,) rad, ascending, with those that windows need.
+    """Return samples of gamma (m,) rad, ascending, with those added that windows need.
 
-    These are both ends of each, so that a window is a whole number of steps between samples, and
-    the middle of what it leaves out, so that no step leads across that.
+    These are both ends of each window, so that it is a whole number of steps between samples, and
+    the middle of the angles that it leaves out, so that no step crosses them.
     """
     asked = [
         angle for w in windows for angle in (w.low, w.high, w.high + (2 * np.pi - w.width) / 2)
@@ -133,7 +136,7 @@ def with_window_ends(gamma: Array, windows: Sequence[GammaWindow]) -> Array:
 
 
 def samples_inside(windows: Sequence[GammaWindow], s: Array, gamma: Array) -> Bools:
-    """Return which samples of gamma (m,) rad all windows admit at nodes s (K,) m, as (K, m)."""
+    """Return which samples of gamma (m,) rad every window admits at nodes s (K,) m, (K, m)."""
     inside = np.ones((len(s), len(gamma)), np.bool_)
     for window, here in zip(windows, nodes_of(windows, s), strict=True):
         inside[here] &= _inside(window, gamma)
@@ -141,9 +144,9 @@ def samples_inside(windows: Sequence[GammaWindow], s: Array, gamma: Array) -> Bo
 
 
 def nearest_inside(windows: Sequence[GammaWindow], s: Array, gamma: Array) -> Array | None:
-    """Return gamma (K,) rad at the nodes s (K,) m, moved as little as windows ask for.
+    """Return gamma (K,) rad at the nodes s (K,) m, moved into the windows by the least angle.
 
-    None where two windows leave a node no gamma.
+    Return None if two windows leave no gamma at a node.
     """
     held = nodes_of(windows, s)
     ends = [end for w in windows for end in (w.low, w.high)]
@@ -159,9 +162,9 @@ def nearest_inside(windows: Sequence[GammaWindow], s: Array, gamma: Array) -> Ar
 
 
 def room_beside(windows: Sequence[GammaWindow], s: Array, gamma: Array) -> tuple[Array, Array]:
-    """Return the least and the largest gamma (K,) rad that windows admit about gamma (K,) in them.
+    """Return the least and the largest gamma (K,) rad that the windows admit at nodes s (K,) m.
 
-    Infinite where none holds.
+    `gamma` (K,) rad, which lies inside them, says on which turn. Infinite where no window holds.
     """
     low, high = np.full(len(s), -np.inf), np.full(len(s), np.inf)
     for w, here in zip(windows, nodes_of(windows, s), strict=True):
@@ -173,7 +176,7 @@ def room_beside(windows: Sequence[GammaWindow], s: Array, gamma: Array) -> tuple
 
 
 def _off(gamma: Array, angle: float) -> Array:
-    """Return by how much gamma is ahead of an angle, in [-pi, pi)."""
+    """Return gamma minus an angle, in [-pi, pi)."""
     return np.asarray(np.mod(gamma - angle + np.pi, 2 * np.pi) - np.pi)
 
 

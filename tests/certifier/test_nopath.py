@@ -66,7 +66,7 @@ def test_a_refusal_says_that_it_holds_at_every_gamma(circle, arm, tool, placemen
     assert none.scope == "every gamma"
     assert none.proved
     assert f"from node {none.closed.node}" in str(none)
-    assert f"the {none.closed.limit} of joint {none.closed.joint + 1}" in str(none)
+    assert f"the {none.closed.limit} limit of joint {none.closed.joint + 1}" in str(none)
     with pytest.raises(NoFeasiblePath) as caught:
         plan(nodes, arm, speed=5.0, method="exact", **options)
     assert caught.value.scope == "grid"

@@ -308,7 +308,7 @@ def test_a_refusal_says_that_no_rotation_would_do(folder, fastest):
     assert entry["proved_for"] == "every gamma"
     assert set(entry["closed"]) == {"node", "joint", "limit"}
     assert 0 < entry["relaxation"]["speed"] < 1
-    assert "proved for every rotation: no motion goes on from node" in entry["reason"]
+    assert "proved for every rotation: no motion continues from node" in entry["reason"]
     said = re.search(r"impossible at any rotation from ([\d.]+) m/min on", entry["reason"])
     assert float(said[1]) == pytest.approx(fastest["impossible_from_m_min"], rel=0.05)
 

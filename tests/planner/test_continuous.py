@@ -268,7 +268,7 @@ def test_what_clearance_costs_is_planned_on_the_grid_and_said(task, arm, tool, p
     there = posts(arm, tool, placement, 6)
     comfort = Comfort(clearance=Band(width=0.1, cost=1))
     made = plan(*task[0], cell=there, comfort=comfort, **task[1])
-    assert made.proof.statement.startswith("planned on the grid: what clearance costs is known")
+    assert made.proof.statement.startswith("planned on the grid: the cost of clearance is known")
     exact = plan(*task[0], cell=there, comfort=comfort, method="exact", **task[1])
     assert made.cost <= exact.cost
 

@@ -173,7 +173,7 @@ def test_other_courses_may_be_faster_than_the_gentlest(arm, tool):
     # There is a plan at the speed that is named.
     made = plan(contour, robot, speed=found.speed * 0.999, **options)
     assert not errors(made)
-    too_fast = r"no admissible .*nothing of others(; joint \d is chuck)?$"
+    too_fast = r"no admissible .*nothing about others(; joint \d is chuck)?$"
     with pytest.raises(NoFeasiblePath, match=too_fast):
         plan(contour, robot, speed=found.speed * 3, **options)
 

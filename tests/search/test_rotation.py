@@ -158,7 +158,7 @@ def test_a_limit_of_zero_holds_the_joint_still():
     assert shortest_path(q, [0, 2, 4, 6], vertex_cost=dear, **ONE).cost == pytest.approx(0.1)
     path = shortest_path(q, [0, 2, 4, 6], vertex_cost=dear, rotation=[0.0], **ONE)
     np.testing.assert_array_equal(path.index, [1, 1, 1])
-    with pytest.raises(NoFeasiblePath, match=r"joint 1 \(0 rad\) closes the way from node 1 on"):
+    with pytest.raises(NoFeasiblePath, match=r"joint 1 \(0 rad\) leaves no path from node 1 on"):
         shortest_path(q[:5], [0, 2, 4, 5], rotation=[0.0], **ONE)
 
 
@@ -204,7 +204,7 @@ def test_a_lap_that_turns_once_needs_a_limit_of_a_turn():
     q, start = TURNING[:8], np.arange(9)
     path = shortest_path(q, start, closure="periodic", rotation=[2 * np.pi], **ONE)
     assert path.cost == pytest.approx(2 * np.pi)
-    with pytest.raises(NoFeasiblePath, match=r"joint 1 \(6 rad\) closes the way; without it"):
+    with pytest.raises(NoFeasiblePath, match=r"joint 1 \(6 rad\) leaves no path; without it"):
         shortest_path(q, start, closure="periodic", rotation=[6.0], **ONE)
 
 
@@ -216,7 +216,7 @@ def test_limits_that_close_the_way_only_together_are_both_named():
         shortest_path(q, [0, 1, 3], rotation=[0.5, 0.5], **two)
     with pytest.raises(NoFeasiblePath, match=r"joint 1 .* and of joint 2 .* without rotation"):
         shortest_path([[0.0, 0.0], [0.8, 0.8]], [0, 1, 2], rotation=[0.5, 0.5], **two)
-    with pytest.raises(NoFeasiblePath, match=r"of joint 2 \(0.5 rad\) closes"):
+    with pytest.raises(NoFeasiblePath, match=r"of joint 2 \(0.5 rad\) leaves"):
         shortest_path([[0.0, 0.0], [0.4, 0.8]], [0, 1, 2], rotation=[0.5, 0.5], **two)
 
 
@@ -227,7 +227,7 @@ def test_where_the_limit_ends_all_paths_before_they_break_it_is_named():
         shortest_path(q, start, **ONE)
     assert (caught.value.node, caught.value.back) == (11, 12)
     said = (
-        r"joint 1 \(3 rad\) closes the way from node 3 on; without it there is a path to node 11, "
+        r"joint 1 \(3 rad\) leaves no path from node 3 on; without it there is a path to node 11, "
         "and there no admissible edge from node 11 to node 12"
     )
     with pytest.raises(NoFeasiblePath, match=said) as caught:
@@ -245,7 +245,7 @@ def test_one_layer_turns_nowhere():
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        ({"rotation": [1.0], "endless": [False]}, "joint 1 is not endless, its range limits it"),
+        ({"rotation": [1.0], "endless": [False]}, "joint 1 is not endless and already limited"),
         ({"rotation": [-1.0]}, "must not be negative"),
         ({"rotation": [np.nan]}, "must be a number, but rotation"),
         ({"rotation": [1.0, 1.0]}, "expected shape"),

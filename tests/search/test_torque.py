@@ -156,7 +156,7 @@ def test_searches_that_do_not_know_torques_refuse_them():
     limits = Limits.of(o["velocity"], o["acceleration"], torque=torque)
     problem = SearchProblem(q=q, start=start, dt=o["dt"], limits=limits)
     for search in (find_least_interval, find_slowed):
-        with pytest.raises(InputError, match="limits on the torque are not known to it"):
+        with pytest.raises(InputError, match="limits on the torque are not supported"):
             search(problem)
     other, _ = random_arm(np.random.default_rng(1), q.shape[1] + 1)
     limit = TorqueLimit(bound=np.ones(q.shape[1] + 1), dynamics=other)

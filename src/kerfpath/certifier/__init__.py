@@ -1,4 +1,4 @@
-"""The certificate: a proved lower bound on the cost of any motion along a contour."""
+"""Certificates: a proved lower bound on the cost of any motion along a contour."""
 
 from kerfpath.certifier._certify import Certified as Certified
 from kerfpath.certifier._certify import certify as certify

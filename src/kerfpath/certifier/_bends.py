@@ -1,4 +1,4 @@
-"""What motions cost at least through each cell where pairs of steps that break (6) are left out."""
+"""Least cost of motions through each cell, without pairs of steps that break (6)."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ def cross_bends(
     packed: Cells, steps: Steps, begin: Ints, to: Ints, cost: Array,
     behind: Array, ahead: Array, most: float,
 ) -> tuple[Array, int]:  # fmt: skip
-    """Return the least cost through each cell (C,), infinite beyond `most`, and the tests of (6).
+    """Return the least cost through each cell (C,), infinite beyond `most`; and the tests of (6).
 
     Parameters
     ----------
     packed : Cells
-        Of neighbouring nodes.
+        Cells at neighbouring nodes.
     steps : Steps
     begin, to, cost : (C + 1,), (E,), (E,)
         The steps of cell a are begin[a]..begin[a+1]-1, each to a cell and at a reduced cost.
     behind, ahead : (C,)
-        The least of the reduced costs up to each cell and from it on, (6) left out.
+        Least reduced cost up to each cell and from it on, without (6).
     most : float
-        What motions of interest cost at most.
+        Largest cost of the motions of interest.
     """
     start, step = packed.start, steps.over(1)
     bound = steps.acceleration + 2 * LIMIT_TOLERANCE

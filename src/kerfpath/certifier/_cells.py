@@ -1,4 +1,4 @@
-"""Cells of gamma: where the joints may be on them, and how they are divided."""
+"""Cells of gamma: enclosures of the joints on them, and their division."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["CellMaker", "CellSet"]
 
 TURN = 2 * np.pi
 AT_ONCE = 50_000
-"""Cells enclosed in one piece: what all their postures take stays below 100 MB."""
+"""Cells enclosed at a time: all their postures take less than 100 MB."""
 FREE = 1.0
-"""rad: a joint known no better than this may be on more than one turn."""
+"""rad: a joint whose position is less certain than this may be on more than one turn."""
 ROUNDED = 1e-14
-"""What a joint may be off by rounding, in rad per rad and in rad."""
+"""Rounding error of a joint, in rad per rad and in rad."""
 SLIGHT = 1e-9
-"""rad: half the width of a cell that stands for its middle."""
+"""rad: half the width of a cell that represents a single gamma."""
 EDGE = 1e-8
 """rad: joints this far out of their range still count as inside, as in the graph and the audit."""
 
@@ -42,7 +42,7 @@ class CellSet:
     center, slope, bend, spread : (C, n)
         The joints are center + slope t + bend t^2 / 2 +- spread on the cell, in rad.
     floor : (C,)
-        What motions through each cell are already known to cost at least; minus infinity: nothing.
+        Known lower bound on the cost of motions through each cell; minus infinity: none.
     """
 
     node: NDArray[np.int32]
@@ -63,21 +63,21 @@ class CellSet:
 
     @property
     def box(self) -> Array:
-        """How far a joint may be from its centre anywhere on the cell, (C, n) rad."""
+        """Largest distance of a joint from its centre on the cell, (C, n) rad."""
         return np.asarray(np.abs(self.slope) * self.half[:, None] + self.unsure)
 
     @property
     def unsure(self) -> Array:
-        """How far a joint may be from a straight line over the cell, (C, n) rad."""
+        """Largest distance of a joint from a straight line over the cell, (C, n) rad."""
         return np.asarray(np.abs(self.bend) * self.half[:, None] ** 2 / 2 + self.spread)
 
     @property
     def lift(self) -> NDArray[np.int8]:
-        """About where the joints are, (C, n), in parts of half a turn."""
+        """Approximate joints, (C, n), in units of pi / `LIFTS`."""
         return np.rint(self.center * (LIFTS / np.pi)).astype(np.int8)
 
     def flipped(self, joint: int, middle: float) -> CellSet:
-        """Return the cells with the wrist turned over (`Robot.flip`), except for constant turns."""
+        """Return the cells with the wrist flipped (`Robot.flip`), up to constant turns."""
         center, slope, bend = self.center.copy(), self.slope.copy(), self.bend.copy()
         center[:, joint] = 2 * middle - center[:, joint]
         slope[:, joint] *= -1
@@ -102,14 +102,14 @@ class CellMaker:
     Parameters
     ----------
     robot : Robot
-        One that `encloses`.
+        A robot that `encloses`.
     frames : (K, 4, 4) m
         Task frames in the robot base.
     T_flange_tip : (4, 4) m
     postures : sequence of int, optional
         The postures that may be used; default all.
     width : float
-        How much wider the curvature is taken than it is proved to be.
+        Factor on the uncertainty of the curvature, 1 as proved.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class CellMaker:
     ) -> None:
         self._robot, self._frames, self._tool = robot, frames, T_flange_tip
         limits = robot.joint_limits()
-        # A coupling of an endless joint holds on one of its turns, which cells do not know.
+        # A coupling of an endless joint holds on one of its turns, which cells do not distinguish.
         plain = ~(limits.rows[:, limits.endless] != 0).any(axis=1)
         self._limits = limits._replace(
             rows=limits.rows[plain],
@@ -140,7 +140,7 @@ class CellMaker:
         self.endless, self.flip = robot.endless, robot.flip
 
     def coarsest(self, nodes: Ints) -> CellSet:
-        """Return the cells of level 0 at some nodes: postures and turns that ranges admit."""
+        """Return the cells of level 0 at some nodes, in postures and turns within the ranges."""
         node = np.repeat(nodes.astype(np.int32), BASE)
         index = np.tile(np.arange(BASE, dtype=np.int32), len(nodes))
         level = np.zeros(len(node), np.int8)
@@ -151,9 +151,9 @@ class CellMaker:
         return CellSet.join(sets)
 
     def motion(self, gamma: Array, posture: int) -> tuple[Array, Array] | None:
-        """Return the joints of the motion with gamma (K,) in a posture, and their slopes; about.
+        """Return the approximate joints of the motion with gamma (K,) in a posture, and slopes.
 
-        Both (K, n), rad and rad/rad; None where the posture does not reach some node.
+        Both are (K, n), rad and rad/rad; None if the posture does not reach some node.
         """
         node, half = np.arange(len(gamma)), np.full(len(gamma), SLIGHT)
         found = self._robot.enclose(self._frames, node, gamma, half, self._tool)
@@ -166,7 +166,7 @@ class CellMaker:
         return CellSet.join([cells.take(~which), self.halves(cells.take(which))])
 
     def halves(self, cells: CellSet) -> CellSet:
-        """Return both halves of the cells, on the turns of their own."""
+        """Return both halves of the cells, on the same turns."""
         sets = [
             self._halves(cells.take(slice(first, first + AT_ONCE // 2)))
             for first in range(0, len(cells), AT_ONCE // 2)
@@ -203,7 +203,7 @@ class CellMaker:
     def _enclosed(
         self, node: NDArray[np.int32], level: NDArray[np.int8], index: NDArray[np.int32]
     ) -> CellSet:
-        """Return the cells with a solution, of every posture that may be used."""
+        """Return the cells with a solution, in every posture that may be used."""
         return self._enclosed_all(node, level, index)[0]
 
     def _enclosed_all(
@@ -241,7 +241,7 @@ class CellMaker:
         return made, place
 
     def _lifted(self, cells: CellSet) -> CellSet:
-        """Return the cells on all turns that the ranges admit."""
+        """Return the cells on all turns within the ranges."""
         limits, box = self._limits, cells.box
         shifts = []
         for i in range(cells.center.shape[1]):

@@ -29,53 +29,52 @@ from kerfpath.search import METRIC_CODES
 __all__ = ["Certified", "certify"]
 
 LONGEST, TURNED = 3.0, 3e-4
-"""How far a joint may turn in one step of the first stage, rad: less than half a turn; and the
-share of its cost that the plan may lose if it went straight from step to step."""
+"""Largest rotation of a joint in one step of the first stage, rad: less than half a turn; and the
+share of its cost that the plan may lose with straight steps between the nodes."""
 DROPPED = 0.25
 """Share of its cells that a stage must rule out to be kept in the certificate."""
 STALLED = 0.5
-"""Share of the gap that a stage must close; less, and nodes come in between instead."""
+"""Share of the gap that a stage must close; if it closes less, nodes are added in between."""
 CARE = 0.05
 """Share of the cost beyond the cheapest step up to which steps are bounded with care."""
 FINE = 3
-"""Level below which cells are too coarse to show whether they lack further nodes, or (6)."""
+"""Level below which cells are too coarse to show whether more nodes, or (6), are needed."""
 NEAR = 0.9
-"""Share of what is wanted from which (6) may be what is left."""
+"""Share of the target from which (6) may be what is missing."""
 DEEPEST = 12
-"""Levels at most: cells of 0.001 deg."""
+"""Largest level: cells of 0.001 deg."""
 MOST_PAIRS, MOST_PER_NODE = 10_000_000, 60_000
-"""Steps from cell to cell that are looked at, and for each node, unless a time is given."""
+"""Most steps from cell to cell, in all and in addition for each node, unless a time is given."""
 MOST_CELLS = 2_000_000
-"""Cells of a stage after which it is left at that: some 2 GB."""
+"""Most cells of a stage, some 2 GB; the certifier stops before it exceeds them."""
 CLEARLY, USUAL_LEVEL, WIDER = 0.02, 3, 2.0
-"""Share of its cost by which the motions through a cell of that level cost more than the plan
-where it drops out, four times as much a level coarser: whoever checks the certificate has
-enclosures of his own, and may find less. The curvature is taken so much wider, too. Where nobody
-does: `SAME`, rounding."""
+"""For checkable certificates: a cell of this level drops out if motions through it cost more than
+the plan by this share, four times the share per coarser level, because a checker's own enclosures
+may give less; and the factor on the curvature. Otherwise only `SAME`, for rounding."""
 SAME = 1e-9
 NOT_KEPT = 'a bound of the objective "max" has no certificate to keep'
 AT_LIMIT = 0.98
-"""Share of what (6) allows from which it may be what keeps the plan from costing less."""
+"""Share of the acceleration limit from which (6) may keep the plan from costing less."""
 EARLY, COARSE = 0.3, 1
-"""Share of the work after which motions are bounded in parts in any case where (6) binds the plan;
-and the level of the cells that this begins with at further nodes."""
+"""Share of the work after which motions are always bounded in parts if (6) binds the plan; and the
+largest level of the new cells at further nodes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Certified:
-    """What came of certifying a plan.
+    """Result of certifying a plan.
 
     Parameters
     ----------
     plan : Plan
-        With `proof.bound`, `gap` and `certificate` where something is proved.
+        The plan, with `proof.bound`, `gap` and `certificate` if a bound is proved.
     done : bool
-        The gap asked for is reached.
+        Whether the gap asked for is reached.
     statement : str
-        What is proved, or why nothing can be.
+        The proved bound, or the reason why there is none.
     stages, pairs : int
-        Stages, and steps from cell to cell looked at in all of them; of the objective "max" the
-        costs that were tried.
+        Number of stages, and of steps from cell to cell bounded in all of them. With the objective
+        "max", `stages` is the number of costs that were tried.
     """
 
     plan: Plan
@@ -97,23 +96,25 @@ def certify(
 ) -> Certified:
     """Return the plan with a proved lower bound on the cost of any motion along its contour.
 
-    Any motion that keeps (5) and (6) at the nodes, the ranges of the joints and their couplings, at
-    any gamma, in the postures that the plan may use, on any turn. What else the plan keeps (a cell,
-    comfort, a periodic closure, a limit on the rotation) only makes the best motion dearer.
+    The bound holds for any motion that keeps (5) and (6) at the nodes, the ranges of the joints and
+    their couplings, at any gamma, in the postures that the plan may use, on any turn. Other
+    constraints of the plan (cell, comfort, periodic closure, rotation limits) can only raise the
+    cost of the best motion.
 
     Parameters
     ----------
     plan : Plan
     gap : float
-        (cost - bound) / cost at which to stop.
+        Value of (cost - bound) / cost at which it stops.
     seconds : float s, optional
         Time after which no further stage is begun; default: a limit on the work, which does not
         depend on the machine.
     checkable : bool
-        Whether the plan is to have a certificate for others to check, with enclosures that may be
-        wider: cells drop out where motions are clearly too dear only, which is more work, and (6)
+        Whether the plan gets a certificate that others can check with enclosures that may be wider.
+        Then cells drop out only if their motions clearly cost too much, which is more work, and (6)
         is left out, as the multipliers of parts do not fit into a certificate.
     progress : Progress
+        Called with the progress of the proof.
 
     Raises
     ------
@@ -141,7 +142,7 @@ def certify(
 def _certified(
     plan: Plan, best: float, gap: float, kept: tuple[Stage, ...] | None, stages: int, pairs: int
 ) -> Certified:
-    """Return the plan with what is proved of its cost, and the stages to keep where there are."""
+    """Return the plan with its proved bound, and with the stages to keep if there are any."""
     bound = max(best - ALLOWANCE * plan.cost, 0.0)
     reached = (plan.cost - bound) / plan.cost
     certificate = None if kept is None else Certificate(bound=bound, stages=kept)
@@ -156,7 +157,7 @@ def _certified(
 
 
 def _why_not(plan: Plan) -> str:
-    """Say why nothing can be proved of a plan; "" where it can."""
+    """Return the reason why no bound of a plan can be proved; "" if one can."""
     robot, asked = plan.robot, plan.settings
     if robot.externals:
         return "the joints of an external axis are not enclosed"
@@ -172,7 +173,7 @@ def _why_not(plan: Plan) -> str:
 
 
 def _steps_of(plan: Plan) -> Steps:
-    """Return what the steps of motions along the contour of a plan cost and may be."""
+    """Return the costs and limits of the steps of motions along the contour of a plan."""
     asked, dt = plan.settings, float(np.diff(plan.time).max())
     limits = asked.limits(plan.robot)
     return Steps(
@@ -185,7 +186,7 @@ def _steps_of(plan: Plan) -> Steps:
 
 
 class _Course:
-    """The stages of one certificate, from coarse cells at a few nodes to fine ones at more."""
+    """The stages of one certificate, from coarse cells at a few nodes to fine cells at more."""
 
     def __init__(
         self,
@@ -210,13 +211,13 @@ class _Course:
         self.stages: list[Stage] = []
         self.plan, self.checkable = plan, checkable
         self.proved = 0.0  # by the stages that are kept
-        self.loose: tuple[int, StageResult] | None = None  # the best that is not, and its place
+        self.loose: tuple[int, StageResult] | None = None  # the best one left out, and its place
 
     def run(self) -> None:
-        """Go from stage to stage until the gap is reached or it is enough."""
+        """Run stages until the gap is reached or the work is spent."""
         cells = self.maker.coarsest(self.nodes)
         self.at_node = len(cells) / len(self.nodes)
-        fresh = True  # cells that the certificate has to show
+        fresh = True  # new cells, which the certificate must contain
         while True:
             result = solve_stage(cells, self.steps, care=CARE * self.cost)
             gained, cells = self._take(result), result.cells
@@ -255,11 +256,11 @@ class _Course:
 
     @cached_property
     def _priced(self) -> bool:
-        """Whether (6) is worth more to the plan than the gap that may be left."""
+        """Whether (6) adds more to the cost of the plan than the gap that may be left."""
         if self.checkable:
             return False
         share = np.abs(self.plan.acceleration_share)
-        if self.steps.metric == CHEBYCHEV:  # its potentials are too loose for prices to tell
+        if self.steps.metric == CHEBYCHEV:  # its potentials are too loose for prices to help
             return False
         if not (share > AT_LIMIT * self.plan.settings.eta_a).any():
             return False
@@ -268,7 +269,7 @@ class _Course:
         return max(map(self.steps.price, prices)) > self.cost - self.target
 
     def _prices(self, gamma: Array, posture: int, reach: float, most: float) -> Array | None:
-        """Return multipliers of (6) about the motion with gamma (K,) in a posture."""
+        """Return multipliers of (6) for the motion with gamma (K,) in a posture; None if none."""
         if self._spent(self.pairs):
             return None
         motion = self.maker.motion(gamma, posture)
@@ -280,7 +281,7 @@ class _Course:
         return limit_prices(u, slope, self.steps, reach, most)
 
     def _divide(self, cells: CellSet) -> None:
-        """Go on at all nodes, with multipliers of (6), part by part."""
+        """Continue at all nodes, with multipliers of (6), part by part."""
         self.nodes = np.arange(self.last + 1)
         cells = self._with_nodes(cells, COARSE)
         before = self.pairs
@@ -303,15 +304,15 @@ class _Course:
         self.pairs, self.count = before + parts.pairs, self.count + parts.count
 
     def _keep(self, result: StageResult) -> None:
-        """Take a stage into the certificate."""
+        """Add a stage to the certificate."""
         self.stages.append(result.stage())
         self.proved = max(self.proved, result.bound)
 
     def _finish(self, result: StageResult) -> None:
-        """Take the last stage, and where none that is kept proves the bound the one that does.
+        """Add the last stage, and the stage that proves the bound if no kept one does.
 
-        Further nodes and other potentials may prove less. What a stage that was left out covers,
-        those after it cover, too: it ruled nothing out.
+        Stages with more nodes and other potentials may prove less. A stage that was left out ruled
+        no cells out, so the stages after it cover the same motions.
         """
         self._keep(result)
         if self.loose is not None and self.proved < self.best:
@@ -319,7 +320,7 @@ class _Course:
             self.stages.insert(place, best.stage())
 
     def _take(self, result: StageResult) -> float:
-        """Take what a stage proves; return the share of the gap that it closes."""
+        """Update the bound with a stage; return the share of the gap that it closes."""
         before, self.best = self.best, max(self.best, min(result.bound, self.cost))
         self.pairs, self.count = self.pairs + result.pairs, self.count + 1
         short = max(self.target - self.best, 0.0)
@@ -327,28 +328,28 @@ class _Course:
         return (self.best - before) / max(self.target - before, 1e-300)
 
     def _late(self, slow: bool) -> bool:
-        """Return whether (6) is to be told by multipliers from here on."""
+        """Return whether to use multipliers of (6) from here on."""
         close = slow and self.best > NEAR * self.target
         return close or self.pairs > EARLY * (MOST_PAIRS + MOST_PER_NODE * self.last)
 
     def _enough(self, result: StageResult, left: float) -> bool:
-        """Return whether the next stage, of a share `left` of the cells, would be too much."""
+        """Return whether the next stage, with a share `left` of the cells, is too much work."""
         if len(result.cells) * left > MOST_CELLS:
             return True
         return self._spent(self.pairs + result.pairs * left**2)
 
     def _fits(self, nodes: int) -> bool:
-        """Return whether coarse cells at so many nodes are few enough."""
+        """Return whether coarse cells at this number of nodes are few enough."""
         return nodes * self.at_node <= MOST_CELLS
 
     def _spent(self, pairs: float) -> bool:
-        """Return whether so many steps, or the time, are all that may go into it."""
+        """Return whether the time is over, or this number of steps exceeds the limit on work."""
         if self.until < np.inf:
             return monotonic() > self.until
         return pairs > MOST_PAIRS + MOST_PER_NODE * self.last
 
     def _with_nodes(self, cells: CellSet, most: int = DEEPEST) -> CellSet:
-        """Return the cells with those of further nodes, about as fine where motions may pass."""
+        """Return the cells plus those of further nodes, similarly fine where motions may pass."""
         level = min(most, int(np.median(cells.level))) if len(cells) else 0
         missing = np.setdiff1d(self.nodes, cells.node)
         if not len(missing):

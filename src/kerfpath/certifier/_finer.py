@@ -1,4 +1,4 @@
-"""Which cells to divide: those about which too little is known, as long as these decide."""
+"""Choice of the cells to divide: first those whose joints are too uncertain, if these decide."""
 
 from __future__ import annotations
 
@@ -10,32 +10,34 @@ from kerfpath.certifier._cells import CellSet
 __all__ = ["cells_to_divide"]
 
 DECIDES = 0.5
-"""Share of what the cheapest motions lack that what is not known of their joints must be worth."""
+"""Uncertain cells decide if the joint uncertainty along the cheapest motion is worth more than this
+share of what that motion lacks."""
 HALF = 0.5
-"""Share of what is not known that goes into the cells to divide."""
+"""Share of the total worth that the cells to divide have together."""
 AIM, MOST = 0.5, 0.25
-"""Share of what is lacking that the cells to divide are to gain; and the most that one is worth."""
+"""Share of the lack that the division is to gain; and the largest worth of a cell, as a share of
+its lack."""
 WIDE = 0.02
-"""What the box of a cell is worth beside what is not known of the joints on it."""
+"""Weight of the box of a cell, compared with the uncertainty of the joints on it."""
 
 
 def cells_to_divide(
     cells: CellSet, through: Array, target: float, weight: Array
 ) -> tuple[Bools, bool]:
-    """Return which cells (C,) to divide, and whether others, as coarse, may wait.
+    """Return which cells (C,) to divide, and whether only uncertain ones are divided.
 
-    Near a singularity the joints turn fast with gamma: a few cells there, on which they may be
-    almost anywhere, let motions look cheap that there are not. As long as they decide, only they
-    are divided (those that are worth half of what is not known, as finite elements are refined:
-    Doerfler, SIAM J. Numer. Anal. 33 (1996) 1106); else all that lack something.
+    Near a singularity the joints turn fast with gamma: a few cells there, on which the joints may
+    be almost anywhere, make motions look cheap that do not exist. As long as such cells decide,
+    only the most uncertain ones are divided, with half of the total worth (as finite elements are
+    refined: Doerfler, SIAM J. Numer. Anal. 33 (1996) 1106); else all cells below the target.
 
     Parameters
     ----------
     cells : CellSet
     through : (C,)
-        What motions through each cell cost at least.
+        Lower bound on the cost of motions through each cell.
     target : float
-        What is wanted of them.
+        Lower bound to reach.
     weight : (n,) 1/rad
     """
     low = through < target

@@ -1,4 +1,4 @@
-"""Groups of cells that no step joins, and which of them only repeat another."""
+"""Groups of cells that no step joins, without groups that only repeat another one."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ __all__ = ["distinct_groups"]
 
 
 def distinct_groups(result: StageResult, kept: Bools, maker: CellMaker) -> list[Bools]:
-    """Return the cells (C,) that are kept in groups that no step joins, one (C,) of each.
+    """Return the groups of kept cells that no step joins, (C,) bool each.
 
-    A group is left out that lies in another one but for whole turns of the joints, or for the
-    wrist turned over (`Robot.flip`): to each motion through it there is one through the other that
-    costs the same, as (5), (6) and the cost know no more of increments than their sizes.
+    A group is left out if another one contains it up to whole turns of the joints or a flipped
+    wrist (`Robot.flip`): each motion through it then has a counterpart through the other one at the
+    same cost, as (5), (6) and the cost depend only on the sizes of increments.
     """
     labels, count = _joined(result, kept)
     if count < 2:
@@ -35,7 +35,7 @@ def distinct_groups(result: StageResult, kept: Bools, maker: CellMaker) -> list[
 
 
 def _joined(result: StageResult, kept: Bools) -> tuple[Ints, int]:
-    """Return the group (C,) of each cell, -1 of those that are not kept, and how many there are."""
+    """Return the group (C,) of each cell, -1 if it is not kept, and the number of groups."""
     cell = np.repeat(np.arange(len(kept)), np.diff(result.begin))
     both = kept[cell] & kept[result.to]
     size = (len(kept),) * 2
@@ -47,10 +47,10 @@ def _joined(result: StageResult, kept: Bools) -> tuple[Ints, int]:
 
 
 def _codes(cells: CellSet, maker: CellMaker) -> tuple[Ints, Ints]:
-    """Return a number for each cell but for the turns of its joints, and one for these, (C,) each.
+    """Return a number for each cell up to turns of its joints, and one for the turns, (C,) each.
 
-    A shift of the turns of all cells shifts the second numbers of all by the same. Where the wrist
-    can be turned over, those of the cells with the wrist turned over follow, (2 C,) each.
+    Shifting the turns of all cells shifts the second numbers of all by the same amount. If the
+    wrist can be flipped, the numbers of the cells with the wrist flipped follow, (2 C,) each.
     """
     sets = [cells] if maker.flip is None else [cells, cells.flipped(*maker.flip)]
     name = np.concatenate([np.stack([c.node, c.posture, c.level, c.index], axis=1) for c in sets])
@@ -58,13 +58,13 @@ def _codes(cells: CellSet, maker: CellMaker) -> tuple[Ints, Ints]:
     _, first, which = np.unique(name, axis=0, return_index=True, return_inverse=True)
     which = which.ravel()
     halves = np.rint((center - center[first[which]]) / np.pi).astype(np.int64)
-    halves[:, maker.endless] = 0  # any turn is as good
-    digits = 4 * np.abs(halves).max() + 1  # turns, shifts between two, and their sums stay apart
+    halves[:, maker.endless] = 0  # all turns are equivalent
+    digits = 4 * np.abs(halves).max() + 1  # keeps turns, shifts and their sums distinct
     return which, halves @ digits ** np.arange(halves.shape[1])
 
 
 def _contains(which: Ints, turn: Ints, cells: Ints, others: Ints) -> bool:
-    """Return whether some cells (A,), their turns shifted, are all among others (B,)."""
+    """Return whether cells (A,), with their turns shifted, are all among others (B,)."""
     if len(cells) > len(others):
         return False
     shifts = turn[others[which[others] == which[cells[0]]]] - turn[cells[0]]

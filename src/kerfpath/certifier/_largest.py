@@ -1,8 +1,8 @@
-"""The bound of the objective "max" (15): what the costliest step of any motion costs at least.
+"""The bound of the objective "max" (15): the least cost of the costliest step of any motion.
 
-A motion that costs at most c has no step that costs more. That no motion has such steps only is
-proved as for any other limit (`_nopath`), about the costliest step of the plan; the largest c for
-which it is proved bounds the cost from below.
+A motion that costs at most c has no step that costs more. `_nopath` proves, as for any other limit,
+that no motion has only such steps, near the costliest step of the plan. The largest c for which
+this is proved is a lower bound on the cost.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from kerfpath.progress import Progress
 __all__ = ["largest_step_bound"]
 
 ABOUT = 12
-"""Nodes on either side of the costliest step that are looked at: of more, cells stay too coarse."""
+"""Nodes on either side of the costliest step that are tested: with more, cells stay too coarse."""
 CLOSE = 0.5
-"""Share of the gap asked for to which the largest cost that is proved is found."""
+"""Precision of the largest proved cost, as a share of the gap asked for."""
 SHARES = (0.5, 0.75, 0.9, 0.95)
-"""Shares of the cost that are tried upwards where that of the gap stays undecided: what is far too
-little is quickly proved to be."""
+"""Shares of the cost that are tried in this order if that of the gap stays undecided: costs that
+are far too low are quickly proved to be impossible."""
 FAILED, MOST_PAIRS = 3, 3_000_000
-"""Costs that may stay undecided before it is left at what is proved; and pairs of steps after which
-one does."""
+"""Costs that may stay undecided before the search stops; and pairs of steps after which a cost
+counts as undecided."""
 ROUNDED = 1e-15
-"""Share of a quotient that rounding may cost."""
+"""Relative rounding error of a quotient."""
 
 
 def largest_step_bound(
     plan: Plan, steps: Steps, gap: float, spent: Callable[[], bool], progress: Progress
 ) -> tuple[float, int]:
-    """Return a lower bound on the costliest step of any motion along a contour, and the tests.
+    """Return a lower bound on the costliest step of any motion, and the number of tests.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ def largest_step_bound(
     steps : Steps
         Bounds (5) and (6), weights and metric.
     gap : float
-        (cost - bound) / cost that is enough.
+        Value of (cost - bound) / cost at which it stops.
     spent : callable
-        Whether no further test is to be begun.
+        Returns whether the time is over, so that no further test begins.
     progress : Progress
     """
     middle = int(np.argmax([rho(u, steps.weight, steps.metric) for u in plan.increments]))
@@ -73,7 +73,7 @@ def largest_step_bound(
 
 
 def _capped(steps: Steps, cost: float) -> Steps:
-    """Return the steps that cost at most so much: no joint goes farther than that alone lets it."""
+    """Return the steps with a largest cost, which also bounds the increment of each joint."""
     alone: Array = np.divide(
         cost, steps.weight, out=np.full_like(steps.weight, np.inf), where=steps.weight > 0
     )

@@ -1,4 +1,4 @@
-"""Which nodes a stage needs: those where the plan turns."""
+"""Nodes of a stage: those where the plan changes direction."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ __all__ = ["between", "turning_nodes"]
 
 
 def turning_nodes(plan: Plan, share: float, longest: int) -> Ints:
-    """Return nodes (M,) such that straight steps between them cost about what the plan does.
+    """Return nodes (M,) such that straight steps between them cost about as much as the plan.
 
     Parameters
     ----------
     plan : Plan
     share : float
-        Share of the plan's cost that the way between them may cost more.
+        Largest share of the plan's cost that the straight steps may lose.
     longest : int
-        Intervals that a step spans at most.
+        Most intervals that a step spans.
     """
     asked, dq = plan.settings, plan.increments
     metric, last = METRIC_CODES[asked.metric], len(dq)
@@ -33,7 +33,7 @@ def turning_nodes(plan: Plan, share: float, longest: int) -> Ints:
     upto = np.concatenate([[0.0], np.cumsum(each)])
 
     def lost(a: int, b: int) -> float:
-        """Return what a straight step from node a to b leaves out."""
+        """Return the cost that a straight step from node a to b loses."""
         return float(upto[b] - upto[a] - rho(q[b] - q[a], asked.weights, metric))
 
     ends = np.unique(np.append(np.arange(0, last, longest), last)).tolist()
@@ -52,5 +52,5 @@ def turning_nodes(plan: Plan, share: float, longest: int) -> Ints:
 
 
 def between(nodes: Ints) -> Ints:
-    """Return the nodes with one more in the middle of each step that spans several intervals."""
+    """Return the nodes plus one in the middle of each step that spans several intervals."""
     return np.unique(np.append(nodes, (nodes[:-1] + nodes[1:]) // 2))

@@ -1,4 +1,4 @@
-"""Whether any motion exists: cells of gamma that no motion can pass, until a node has none left."""
+"""Proof that no motion exists: cells of gamma are ruled out until a node has none left."""
 
 from __future__ import annotations
 
@@ -29,15 +29,16 @@ from kerfpath.robots import Robot
 __all__ = ["MotionTest", "closed_node"]
 
 DEEPEST = 12
-"""Levels at most: cells of 0.001 deg."""
+"""Largest level: cells of 0.001 deg."""
 MOST_STEPS, MOST_PAIRS = 2_000_000, 30_000_000
-"""Steps between cells in one round, and pairs of steps in all, after which it is left at that."""
+"""Most steps between cells in one round, and most pairs of steps in all, before the test ends
+undecided."""
 ABOUT = 12
-"""Nodes on either side of one about which a part is looked at."""
+"""Nodes on either side of a node in a part of the contour that is tested."""
 MOST_CELLS = 2_000
-"""Cells of one node that may have a pose, after which it is left at that."""
+"""Most cells of one node that may have a pose, before the test ends undecided."""
 EACH_PAIRS = 1_000_000
-"""Pairs of steps over one node up to which (6) is tested in a round."""
+"""Most pairs of steps at one node for which (6) is tested in a round."""
 
 
 def closed_node(
@@ -47,10 +48,10 @@ def closed_node(
     nodes: Ints,
     postures: tuple[int, ...] | None = None,
 ) -> Closed | None:
-    """Return the first of some nodes proved to have no pose within the ranges, at any gamma.
+    """Return the first of some nodes that is proved to have no pose within the ranges at any gamma.
 
-    Arguments as for `MotionTest`; None where that is proved of none of them. Cells of gamma without
-    a solution within ranges and couplings drop out, the others are halved.
+    None if this is proved for none of them. Cells of gamma without a solution within ranges and
+    couplings drop out, and the others are halved. Arguments are as in `MotionTest`.
     """
     maker = CellMaker(robot, frames, T_flange_tip, postures)
     for node in nodes:
@@ -76,12 +77,12 @@ class _Layer:
 
 
 class MotionTest:
-    """Tests for limits whether any motion along a contour keeps them, by an outer approximation.
+    """Tests whether any motion along a contour keeps given limits, by an outer approximation.
 
     Parameters
     ----------
     robot : Robot
-        One that `encloses`.
+        A robot that `encloses`.
     frames : (K, 4, 4) m
         Task frames in the robot base.
     T_flange_tip : (4, 4) m
@@ -102,13 +103,13 @@ class MotionTest:
         self._coarsest = self._maker.coarsest(np.arange(self._count))
 
     def closed(self, limits: Limits, dt: float, around: int | None = None) -> Closed | None:
-        """Return where no motion passes, nodes dt s apart; None where that is not proved.
+        """Return the place that no motion passes, with nodes `dt` s apart; None if not proved.
 
-        With `around` only the part of the contour about that node is looked at, with finer cells:
-        what cannot pass a part cannot pass the whole. Of any motion that keeps (5) and (6) at the
-        nodes, ranges and couplings, none passes a cell from which no step, or pair of steps, leads
-        on, or to which none leads. Cells that may be passed are halved until a node has none, or
-        until it is enough work.
+        Motions that keep (5) and (6) at the nodes, ranges and couplings cannot pass a cell from
+        which, or to which, no step or pair of steps leads. The other cells are halved until a node
+        has none left, or until the limit of work. With `around`, only the part of the contour
+        around that node is tested, with finer cells: a motion that cannot pass a part cannot pass
+        the whole contour.
         """
         steps = Steps(
             weight=freeze(np.ones(len(self._endless))),
@@ -122,9 +123,9 @@ class MotionTest:
     def closed_to(
         self, steps: Steps, around: int | None = None, most_pairs: int = MOST_PAIRS
     ) -> Closed | None:
-        """Return the same of motions of such steps: bounds (5) and (6), and the most they cost.
+        """Return the same for motions with given bounds (5) and (6) and largest cost of steps.
 
-        It is left at that after so many pairs of steps.
+        It ends undecided after `most_pairs` pairs of steps.
         """
         first, last = 0, self._count - 1
         if around is not None:
@@ -147,7 +148,7 @@ class MotionTest:
 
 
 class _Round:
-    """One sweep on and one back over cells of all nodes."""
+    """One forward and one backward sweep over cells of all nodes."""
 
     def __init__(self, cells: CellSet, steps: Steps) -> None:
         self.cells, self._packed, _, _ = arranged(cells, steps)
@@ -159,7 +160,7 @@ class _Round:
         self.pairs, self.left, self._steps = 0, False, 0
 
     def forward(self) -> Closed | None:
-        """Keep the steps that motions from the first node may make; return where they end."""
+        """Keep the steps that motions from the first node may make; return where all end."""
         start = self._packed.start
         live = np.ones(len(self.cells), np.bool_)
         for k in range(len(start) - 2):
@@ -184,7 +185,7 @@ class _Round:
         return None
 
     def backward(self) -> Bools:
-        """Keep the steps from which motions may reach the end; return the cells (C,) they pass."""
+        """Keep the steps from which motions may reach the end; return the cells (C,) passed."""
         start = self._packed.start
         live = np.zeros(len(self.cells), np.bool_)
         last = self._layers[-1]
@@ -198,7 +199,7 @@ class _Round:
                     self._packed, self._step, self._bound, self._lead_a, k,
                     layer.begin, layer.to, ahead.begin, ahead.to, ahead.kept, layer.kept,
                 )  # fmt: skip
-            # Cells of the next layer stay only where a kept step leads to them, too.
+            # Cells of the next layer stay only if a kept step leads to them, too.
             reached = np.zeros(start[k + 2] - start[k + 1], np.bool_)
             reached[layer.to[layer.kept] - start[k + 1]] = True
             live[start[k + 1] : start[k + 2]] &= reached
@@ -207,7 +208,7 @@ class _Round:
         return live
 
     def _steps_from(self, k: int, live: Bools) -> _Layer | None:
-        """Return the steps from the live cells of layer k; None where they are too many."""
+        """Return the steps from the live cells of layer k; None if there are too many."""
         start = self._packed.start
         count = np.zeros(start[k + 1] - start[k], np.int64)
         count_steps(self._packed, self._step, self._lead_v, k, live, count)
@@ -221,12 +222,12 @@ class _Round:
         return _Layer(begin, to, np.ones(len(to), np.bool_))
 
     def _few(self, layer: _Layer, ahead: _Layer, k: int) -> bool:
-        """Return whether the pairs of steps over layer k are few enough to be tested."""
+        """Return whether the pairs of steps at layer k are few enough to be tested."""
         onward = np.diff(ahead.begin)[layer.to[layer.kept] - self._packed.start[k]]
         return bool(onward.sum() <= EACH_PAIRS)
 
     def _closed(self, k: int, limit: Literal["velocity", "acceleration"], live: Bools) -> Closed:
-        """Return where it is closed: from node k no step leads on."""
+        """Return the closed place at node k, from which no step continues."""
         blame = np.zeros(len(self._bound), np.int64)
         if limit == "velocity":
             blame_steps(self._packed, self._step, k, live, blame)

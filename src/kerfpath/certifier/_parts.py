@@ -1,12 +1,12 @@
-"""Parts of the motions, each with a bound of its own, divided until all reach what is wanted.
+"""Parts of the motions, each with its own bound, divided until all bounds reach the target.
 
-Where (6) decides, two things stand in the way of a close bound. The multipliers that bound the
-motions about the plan closely make those elsewhere look cheap, in another posture above all; and
-however fine the cells, a bound with multipliers stays below the best motion as long as its cells
-are far apart. So the motions are divided: into those that no step joins, and by where they pass a
-node. Each part is bounded without multipliers, with those about the plan or about a motion that
-looked cheap before, and with those about the one that then looks cheapest: a motion that breaks (6)
-shows where in the part prices are missing. What is known of its cells holds on.
+If (6) decides, two things prevent a close bound. Multipliers that give a close bound for motions
+near the plan make other motions look cheap, above all in another posture. And however fine the
+cells, a bound with multipliers stays below the best motion as long as its cells are far apart. So
+the motions are divided: into groups that no step joins, and by where they pass a node. Each part is
+bounded without multipliers, with those of the plan or of a motion that looked cheap before, and
+with those of the motion that then looks cheapest: if that motion breaks (6), it shows where prices
+are missing in the part. Bounds that are known for cells stay valid.
 """
 
 from __future__ import annotations
@@ -30,26 +30,27 @@ from kerfpath.certifier._steps import Steps
 __all__ = ["DEAREST", "NARROW", "Parts"]
 
 SAME = 1e-9
-"""Share of the cost by which motions cost more than the plan where they drop out: rounding."""
+"""Share of the cost by which motions must cost more than the plan to drop out, for rounding."""
 CARE = 0.05
 """Share of the cost beyond the cheapest step up to which steps are bounded with care."""
 STALLED, AGAIN = 0.1, 1
-"""Share of what a part lacks that finer cells must gain, and how often they may not."""
+"""Share of the lack of a part that finer cells must gain, and how often they may gain less."""
 NARROW, WIDE = 0.017, 0.2
-"""How far gamma may go where multipliers are found, rad: about the plan, which keeps (6), and about
-a motion that does not."""
+"""rad: largest change of gamma when multipliers are computed, around the plan, which keeps (6), and
+around a motion that does not."""
 DEAREST = 5.0, 20.0
-"""The largest multipliers, in weights: far from the motion that they are about small ones prove
-more."""
+"""The largest multipliers, in weights; small ones prove more far from the motion that they are
+computed for."""
 DEEPEST = 16
-"""Levels at most: cells of 1e-4 deg."""
+"""Largest level: cells of 1e-4 deg."""
 
 
 @dataclass(slots=True, eq=False)
 class _Part:
-    """Cells, what they prove of themselves, and how often in a row finer ones gained little.
+    """Cells, their own bound, and the number of successive divisions that gained little.
 
-    `prices` (K, n) are the multipliers that proved most; None where none did better than none.
+    `prices` (K, n) are the multipliers with the best bound; None if the bound without multipliers
+    is the best.
     """
 
     cells: CellSet
@@ -61,22 +62,22 @@ class _Part:
 
 
 class Parts:
-    """Divides motions, those first that may be the cheapest, and bounds each part.
+    """Divides motions, those that may be the cheapest first, and bounds each part.
 
     Parameters
     ----------
     maker : CellMaker
     steps : Steps
     prices : callable
-        Gives multipliers (K, n) of (6) about the motion with gamma (K,) in a posture, which may
-        change by so many rad, up to a largest one in weights; None where there are none. Any are
-        valid.
+        Takes gamma (K,), a posture, the largest change of gamma, rad, and the largest multiplier,
+        in weights; returns multipliers (K, n) of (6) for that motion, or None. Any multipliers give
+        a valid bound.
     gamma : (K,) rad
-        Of the plan.
+        Gamma of the plan.
     cost, target : float
-        Of the plan; and what is wanted of the bound.
+        Cost of the plan, and the bound to reach.
     enough : callable
-        Says of the steps looked at and of the cells held whether they are enough.
+        Takes the number of steps bounded and of cells held; returns whether to stop.
     """
 
     def __init__(
@@ -98,9 +99,9 @@ class Parts:
         self.pairs, self.count = 0, 0
 
     def bound(self, cells: CellSet, known: float) -> float:
-        """Return what motions through the cells cost at least, or the plan's cost if that is less.
+        """Return a lower bound on the cost of motions through the cells, at most the plan's cost.
 
-        The cells are of all nodes; `known` is what the motions are known to cost at least.
+        There must be cells at all nodes; `known` is a known lower bound.
         """
         self._wait(known, _Part(cells))
         while self._open and self._open[0][0] < min(self._target, self._closed):
@@ -116,7 +117,7 @@ class Parts:
         self._held += len(part.cells)
 
     def _divide(self, part: _Part, known: float) -> None:
-        """Bound a part, and wait with what may be cheaper than is wanted in smaller parts."""
+        """Bound a part, and queue smaller parts of it that may cost less than the target."""
         self.count += 1
         through, result, prices = self._solved(part)
         kept = through <= self._cost * (1 + SAME)
@@ -127,7 +128,7 @@ class Parts:
         for one in distinct_groups(result, kept, self._maker):
             rest = cells.take(one)
             if len(np.unique(rest.node)) < layers:
-                continue  # no motion all the way along
+                continue  # no motion along the whole contour
             own = float(rest.floor.min())
             least = max(known, own)
             slow = part.own > -np.inf and own - part.own < STALLED * (self._target - part.own)
@@ -139,10 +140,10 @@ class Parts:
                 self._wait(least, each)
 
     def _solved(self, part: _Part) -> tuple[Array, StageResult, Array | None]:
-        """Return the most that is proved through each cell, a result, and what proved most.
+        """Return the best bound through each cell, a result, and the prices of the best bound.
 
-        The result has the order of the cells. Prices about another motion are asked for where
-        those at hand prove nothing more, or no longer do.
+        The result has the order of the cells. Prices for another motion are tried if the known ones
+        prove nothing more, or no longer do.
         """
         result = best = self._stage(part.cells, None)
         through = np.maximum(result.through, result.cells.floor)
@@ -181,10 +182,10 @@ class Parts:
         return result
 
     def _smaller(self, part: _Part) -> list[_Part]:
-        """Return the parts that a part divides into; none where it cannot be divided.
+        """Return the smaller parts of a part; none if it cannot be divided.
 
-        Finer cells; where these gain little, both sides of the middle of the node at which the
-        joints are farthest apart.
+        The part gets finer cells; if these gain little, it is split in the middle of the joint
+        range at the node where the joints are farthest apart.
         """
         cells = part.cells
         low = cells.floor < self._target

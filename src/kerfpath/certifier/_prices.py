@@ -1,7 +1,7 @@
-"""Multipliers of (6): what a plan would pay for a little more acceleration.
+"""Multipliers of (6): the gain in cost for a little more acceleration.
 
-They are the dual of a convex program about the plan, its joints linear in the change of gamma.
-Whatever they are, a bound with them is true: they decide how close it is.
+They are the dual of a convex program around a motion, with joints linear in the change of gamma.
+A bound is valid with any multipliers; they only decide how close it is.
 """
 
 from __future__ import annotations
@@ -22,28 +22,28 @@ __all__ = ["limit_prices"]
 FAST = 10.0
 """Price of an increment beyond (5), in largest prices of (6)."""
 NOTHING = 1e-4
-"""Share of a weight below which a price counts as none."""
+"""Share of a weight below which a price counts as zero."""
 SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
 _Rows = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
 
 
 def limit_prices(u: Array, slope: Array, steps: Steps, reach: float, most: float) -> Array | None:
-    """Return prices (K, n) of (6) about a motion, zero at the first node and the last.
+    """Return prices (K, n) of (6) for a motion, zero at the first and the last node.
 
-    None where they are none, or where the program has no solution.
+    None if (6) cannot bind, or if the program has no solution.
 
     Parameters
     ----------
     u : (K-1, n) rad
-        Its increments.
+        Increments of the motion.
     slope : (K, n) rad/rad
-        How its joints move with gamma.
+        Derivatives of its joints by gamma.
     steps : Steps
     reach : float rad
-        How far gamma may change at each node.
+        Largest change of gamma at each node.
     most : float
-        The largest price, in weights: who breaks (6) pays so much for it. Prices that are large
-        are worth more close to the motion, and less the farther away from it.
+        The largest price, in weights, which is the penalty for breaking (6) in the program. Large
+        prices give better bounds close to the motion, and worse ones farther away from it.
     """
     edges, n = u.shape
     weight, own = np.tile(steps.weight, edges), u.ravel()
@@ -51,7 +51,7 @@ def limit_prices(u: Array, slope: Array, steps: Steps, reach: float, most: float
     bent, bend = moved[n:] - moved[:-n], (u[1:] - u[:-1]).ravel()
     bound, velocity = np.tile(steps.acceleration, edges - 1), np.tile(steps.velocity, edges)
     span = abs(moved).sum(axis=1)
-    # What can bind: joints that turn round, increments near (5), changes near (6).
+    # Constraints that can bind: joints that reverse, increments near (5), changes near (6).
     turns = np.flatnonzero(np.abs(own) <= span)
     if steps.metric != MANHATTAN:
         turns = turns[:0]
@@ -84,7 +84,7 @@ def limit_prices(u: Array, slope: Array, steps: Steps, reach: float, most: float
 
 
 def _moved(slope: Array, n: int) -> _Rows:
-    """Return how the increments change with the nodes, ((K-1) n, K), from slopes (K, n)."""
+    """Return the derivatives of the increments by the nodes' gamma, ((K-1) n, K)."""
     nodes = len(slope)
     row = np.arange((nodes - 1) * n)
     values = np.concatenate([slope[1:].ravel(), -slope[:-1].ravel()])
@@ -95,7 +95,7 @@ def _moved(slope: Array, n: int) -> _Rows:
 def _metric(u: Array, moved: _Rows, steps: Steps) -> tuple[Array, _Rows]:
     """Return the slope of rho at increments u (K-1, n), ((K-1) n,), and its curvature (K, K).
 
-    The Manhattan metric has none between its kinks; that of the others is guessed.
+    The Manhattan metric has no curvature between its kinks; for the others it is estimated.
     """
     step, slope = steps.over(1), np.empty_like(u)
     tangents(u, step, slope)
@@ -108,10 +108,10 @@ def _metric(u: Array, moved: _Rows, steps: Steps) -> tuple[Array, _Rows]:
 
 
 def _dual(groups: list[tuple[_Rows, Array, Array | float]], cost: Array, curved: _Rows) -> Any:
-    """Return the dual of |value + slope x| <= bound + s, s >= 0, of the last group; None for none.
+    """Return the dual of |value + slope x| <= bound + s, s >= 0, of the last group, or None.
 
-    Minimised is cost (x, s) + x curved x / 2 over x from -1 to 1; of each group (slope, value,
-    bound) every row has its own s.
+    The program minimises cost (x, s) + x curved x / 2 over x from -1 to 1; every row of each group
+    (slope, value, bound) has its own s.
     """
     boxed = curved.shape[0]
     sizes = [len(value) for _, value, _ in groups]

@@ -1,4 +1,4 @@
-"""One stage: a potential over cells, and what every motion through each of them costs at least."""
+"""One stage: a potential on cells, and a lower bound on the cost of motions through each cell."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ from kerfpath.kernels.reduced import Cells, Potential
 __all__ = ["StageResult", "arranged", "linked", "solve_stage"]
 
 TESTS = 50
-"""Pairs of steps whose test by (6) takes as long as to bound one step."""
+"""Number of pairs of steps whose test by (6) takes as long as bounding one step."""
 IN_ONE = 64
-"""Cells of a layer below which a second thread costs more than it brings."""
+"""Cells of a layer below which a second thread takes more time than it saves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StageResult:
-    """What a stage proves.
+    """The bounds that a stage proves.
 
     Parameters
     ----------
     cells : CellSet
-        Sorted.
+        The cells, sorted.
     through : (C,)
-        Least cost of a motion through each cell; infinite where no motion passes.
+        Lower bound on the cost of a motion through each cell; infinite if no motion passes.
     level, dual : (C, 2), (C, 2, n)
         The potential.
     multipliers : (K, n), optional
     begin, to : (C + 1,), (E,)
         The steps of cell a are begin[a]..begin[a+1]-1, each to a cell.
     tests : int
-        Of pairs of steps.
+        Number of pairs of steps tested.
     """
 
     cells: CellSet
@@ -59,16 +59,16 @@ class StageResult:
 
     @property
     def pairs(self) -> int:
-        """Steps from cell to cell that were looked at, the tests of pairs of them included."""
+        """Work of the stage in steps from cell to cell, with the tests of pairs converted."""
         return len(self.to) + self.tests // TESTS
 
     @property
     def bound(self) -> float:
-        """The least that any motion costs."""
+        """Lower bound on the cost of any motion."""
         return float(self.through.min(initial=np.inf))
 
     def cheapest(self) -> Ints:
-        """Return the cells of a motion that may be the cheapest, one of each layer."""
+        """Return the cells of a motion that may be the cheapest, one per layer."""
         cell = int(self.through[: int((self.cells.node == self.cells.node[0]).sum())].argmin())
         motion = [cell]
         while self.begin[cell] < self.begin[cell + 1]:
@@ -78,7 +78,7 @@ class StageResult:
         return np.array(motion)
 
     def stage(self) -> Stage:
-        """Return the stage as a certificate holds it."""
+        """Return the stage for a certificate."""
         cells = self.cells
         return Stage(
             node=cells.node,
@@ -99,24 +99,29 @@ def solve_stage(
     care: float = np.inf,
     most: float | None = None,
 ) -> StageResult:
-    """Return what the cells prove of every motion through them.
+    """Return the bounds that the cells prove for every motion through them.
 
     Parameters
     ----------
     cells : CellSet
-        The nodes that they are of make the layers; of those between, the motion is any.
+        Their nodes are the layers; at the nodes in between, the motion is arbitrary.
     steps : Steps
     multipliers : (K, n), optional
-        Of (6), zero at the first node and the last; the cells are of all nodes then.
+        Multipliers of (6), zero at the first and the last node; they need cells at all nodes.
     care : float
         Cost beyond the cheapest step of a cell up to which steps are bounded with care.
     most : float, optional
-        Pairs of steps that break (6) are left out as well, of motions that cost no more than that;
-        the cells are of all nodes then.
+        If given, pairs of steps that break (6) are excluded for motions that cost at most this; it
+        needs cells at all nodes.
+
+    Raises
+    ------
+    ValueError
+        Multipliers without cells at every node.
     """
     cells, packed, nodes, _ = arranged(cells, steps)
     if multipliers is not None and len(nodes) < len(multipliers):
-        raise ValueError("multipliers of (6) ask for cells at every node")
+        raise ValueError("multipliers of (6) need cells at every node")
     start = packed.start
     C, n = cells.center.shape
     potential = Potential(
@@ -153,10 +158,10 @@ def solve_stage(
 
 
 class Arranged(NamedTuple):
-    """Cells in the order of the kernels, and as those take them.
+    """Cells in the order that the kernels need, and packed for them.
 
-    ``cells`` sorted by node and then by the joint whose windows of (5) leave the least; ``nodes``
-    (M,) are their layers; ``order`` (C,) is where each cell was before.
+    ``cells`` are sorted by node and then by the joint whose windows of (5) leave the fewest;
+    ``nodes`` (M,) are their layers; ``order`` (C,) is the previous index of each cell.
     """
 
     cells: CellSet
@@ -179,7 +184,7 @@ def arranged(cells: CellSet, steps: Steps) -> Arranged:
 
 
 def linked(cells: CellSet, steps: Steps) -> Bools:
-    """Return which cells (C,) steps within (5) lead to, and lead on from."""
+    """Return which cells (C,) steps within (5) lead to and from."""
     _, packed, nodes, order = arranged(cells, steps)
     after, before = np.zeros((2, len(cells)), np.bool_)
     after[packed.start[-2] :] = before[: packed.start[1]] = True
@@ -191,7 +196,7 @@ def linked(cells: CellSet, steps: Steps) -> Bools:
 
 
 def _widest_apart(cells: CellSet, box: Array, steps: Steps) -> int:
-    """Return the joint by which the windows of (5) leave the least of a layer."""
+    """Return the joint whose windows of (5) leave the smallest share of a layer."""
     if not len(cells):
         return 0
     spread = np.where(steps.endless, np.pi / np.sqrt(3), cells.center.std(axis=0))
@@ -206,7 +211,7 @@ def _lay(
     multipliers: Array | None,
     care: float,
 ) -> tuple[Ints, Ints, Array]:
-    """Lay the potential from the last layer to the first; return the steps and reduced costs.
+    """Compute the potential from the last layer to the first; return steps and reduced costs.
 
     The steps of cell a are begin[a]..begin[a+1]-1, each to a cell and at a cost.
     """
@@ -249,7 +254,7 @@ def _lay(
 
 
 def _least_at_first(cells: CellSet, potential: Potential, first: slice) -> Array:
-    """Return the least of the potential over each cell of the first layer, by either cut."""
+    """Return a lower bound of the potential on each cell of the first layer, from both cuts."""
     h, best = cells.half, np.full(len(cells), -np.inf)
     for m in range(2):
         y = potential.dual[first, m]

@@ -1,4 +1,4 @@
-"""What the steps of a motion cost and may be, and the prices of (6)."""
+"""Costs and limits of the steps of a motion, and the prices of (6)."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from kerfpath.kernels.reduced import Step
 __all__ = ["ROUNDED", "Steps"]
 
 ROUNDED = 1e-14
-"""Share of the largest term that a sum of one more may cost."""
+"""Relative rounding error of adding one term to a sum, as a share of the largest term."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Steps:
-    """What the steps of a motion cost and may be.
+    """Costs and limits of the steps of a motion.
 
     Parameters
     ----------
@@ -26,9 +26,10 @@ class Steps:
     velocity, acceleration : (n,) rad
         Bounds (5) and (6) on an increment and on its change, tolerance included.
     metric : int
+        Code of the metric.
     endless : (n,) bool
     most : float
-        What a step may cost at most; infinite where it may cost anything.
+        Largest cost of a step; infinite for no limit.
     """
 
     weight: Array
@@ -41,7 +42,7 @@ class Steps:
     __repr__ = short_repr
 
     def over(self, intervals: int) -> Step:
-        """Return the step over several intervals: no shorter than all of them together (14)."""
+        """Return the step over several intervals, which costs at most their sum (14)."""
         velocity = intervals * self.velocity
         tilt, most = np.zeros_like(velocity), intervals * self.most
         return Step(self.weight, tilt, velocity, self.metric, self.endless, most)
@@ -54,7 +55,7 @@ class Steps:
         return step._replace(tilt=multipliers[k] - multipliers[k + 1])
 
     def price(self, multipliers: Array | None) -> float:
-        """Return what the multipliers (K, n) take off: the most that they add where (6) holds."""
+        """Return the price of the multipliers (K, n): the most that they add where (6) holds."""
         if multipliers is None:
             return 0.0
         return float((np.abs(multipliers) @ self.acceleration).sum()) * (1 + ROUNDED)

@@ -1,4 +1,4 @@
-"""plan(): layers, search and refinement in one; the fastest speed; what opens a closed way."""
+"""plan(): graph, search and refinement; the fastest speed; relaxations where there is no path."""
 
 from kerfpath.planner._best import best_motion as best_motion
 from kerfpath.planner._certified import with_bound as with_bound

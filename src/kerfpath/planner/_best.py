@@ -1,4 +1,4 @@
-"""The best motion over continuous gamma and nothing else: no grid instead, and no proofs."""
+"""The best motion over continuous gamma, without falling back to the grid and without proofs."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ def best_motion(
     cell: Cell | None = None,
     phase: Callable[[str], None] | None = None,
 ) -> Plan:
-    """Return the plan of the best motion that is found over continuous gamma.
+    """Return the plan of the best motion found over continuous gamma.
 
-    It is that of `kerfpath.plan`, not certified; where that would go to the grid, this has none,
-    and takes no time to prove anything.
+    It is that of `kerfpath.plan`, but not certified. Where `kerfpath.plan` would go to the grid,
+    this raises NoFeasiblePath and spends no time on a proof.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def best_motion(
     Raises
     ------
     NoFeasiblePath
-        No motion is found, or a node has no pose; nothing is proved but the latter.
+        No motion is found, or a node has no pose; only the latter is proved.
     InputError
         As `kerfpath.plan`.
     """

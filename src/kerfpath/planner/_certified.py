@@ -1,4 +1,4 @@
-"""The bound of a plan: how far it is at most from the best motion that there is."""
+"""Bound of a plan: its largest possible distance from the best motion."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ def with_bound(
     phase: Callable[[str], None] | None = None,
     progress: Progress = no_progress,
 ) -> Plan:
-    """Return the plan with the bound that is proved for it, or with why there is none.
+    """Return the plan with a proved bound, or with the reason why there is none.
 
-    What proves it is large: the plan keeps it only where that is asked for.
+    The plan keeps the certificate, which is large, only if `asked.keep`.
 
     Parameters
     ----------
     made : Plan
     asked : Certify or None
-        How far it is to be certified, which its settings then say; None: it stays without a bound.
+        How to certify it; becomes part of its settings. None: the plan stays without a bound.
     phase : callable, optional
-        Called with "certificate" where that begins.
+        Called with "certificate" when this begins.
     progress : callable
         As `kerfpath.certifier.certify` calls it.
     """

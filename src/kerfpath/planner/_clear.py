@@ -1,4 +1,4 @@
-"""The searches of a task, in a cell for what is clear in it."""
+"""Searches of a task; in a cell they find only clear paths."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ __all__ = ["ClearSearch"]
 _P = TypeVar("_P", bound=FoundPath)
 
 POSES_MEASURED, PAIRS_NAMED = 100, 3
-"""Poses of a node that are measured, and pairs of bodies that are named, where it is closed."""
+"""For the message about a node without clear poses: poses measured, and pairs of bodies named."""
 SAMPLES_LOOKED_AT = 8
 """Samples of gamma on either side of a path that the refinement may use if they are clear."""
 POSES_SETTLED = 20_000
-"""Poses asked about to find the nodes at which none is clear."""
+"""Most poses checked to find the nodes without a clear pose."""
 RANGES_LISTED = 6
-"""Ranges of nodes that a message lists."""
+"""Most ranges of nodes listed in a message."""
 SAME_PLACE = 1e-9
-"""m: two poses of the same tool or part differ by rounding at most."""
+"""m: largest difference (rounding) of two poses of the same tool or part."""
 
 
 class ClearSearch:
-    """How the searches of a task run: as they are or, in a cell, for what is clear in it."""
+    """Runs the searches of a task: as they are or, in a cell, for clear paths."""
 
     def __init__(self, task: PlanningTask, cell: Cell | None) -> None:
         self._task, self._cell = task, cell
@@ -47,7 +47,7 @@ class ClearSearch:
 
     @property
     def _graph(self) -> LayeredGraph:
-        return self._task.graph  # along a course of external axes it is built when it is known
+        return self._task.graph  # built late: a course of external axes must be known first
 
     @cached_property
     def _checker(self) -> CollisionChecker:
@@ -71,19 +71,19 @@ class ClearSearch:
 
     @property
     def is_free(self) -> bool:
-        """Whether there is no cell, so that other samples of gamma need no test for collisions."""
+        """Whether there is no cell, so that no sample of gamma needs a test for collisions."""
         return self._cell is None
 
     def clear(self, q: Array) -> Bools:
-        """Return which of joint vectors q (B, n) rad are clear, whatever graph they are of."""
+        """Return which joint vectors q (B, n) rad are clear, (B,), in the graph or not."""
         return np.ones(len(q), np.bool_) if self._cell is None else self._cell.clear(q)
 
     def of(self, task: PlanningTask) -> ClearSearch:
-        """Return how the searches of another task run in the same cell."""
+        """Return a `ClearSearch` of another task in the same cell."""
         return ClearSearch(task, self._cell)
 
     def find(self, search: Callable[[SearchProblem], _P], problem: SearchProblem) -> _P:
-        """Return what a search finds for a problem on the graph of the task."""
+        """Return the path that a search finds for a problem on the graph of the task."""
         if self._cell is None:
             return search(problem)
         try:
@@ -94,23 +94,23 @@ class ClearSearch:
     def open_problem(self, problem: SearchProblem) -> SearchProblem:
         """Return a problem on the graph of the task without the vertices that are known to collide.
 
-        Those that nothing is known of are open.
+        Vertices that have not been checked stay open.
         """
         if self._cell is None:
             return problem
         return replace(problem, vertex_cost=problem.vertex_cost + self._known.cost)
 
     def learn(self, vertices: list[Ints]) -> bool:
-        """Look at vertices (rows of q) of which nothing is known; True where one of them collides.
+        """Check vertices (rows of q) that have not been checked; return True if one collides.
 
-        Around those that do, neighbours are looked at, too.
+        The neighbours of colliding vertices are checked, too.
         """
         if self._cell is None or not vertices:
             return False
         return self._known.learn_vertices(np.concatenate(vertices))
 
     def corridor(self, one: Ints, other: Ints) -> tuple[Ints, Ints] | None:
-        """Return how many samples before vertices `one`, and after `other`, are clear in a row.
+        """Return the number of successive clear samples before vertices `one` and after `other`.
 
         (K,) each, up to `SAMPLES_LOOKED_AT`; None without a cell.
         """
@@ -123,10 +123,10 @@ class ClearSearch:
         return back, ahead
 
     def _named(self, broken: NoFeasiblePath) -> NoFeasiblePath:
-        """Say of a break by collision where no pose is clear at all, and which bodies collide.
+        """Return a break by collision with the nodes without a clear pose and the colliding bodies.
 
-        A search learns what it needs in any order, and may break at a node of many that are closed:
-        the message is about the first of them.
+        A search checks vertices in any order and may break at any of several closed nodes; the
+        message is about the first of them.
         """
         if self._cell is None or not broken.lost_by(Loss.COLLISION):
             return broken
@@ -135,7 +135,7 @@ class ClearSearch:
             return self._at_break(broken)
         first, nodes = closed[0], len(self._known.start) - 1
         others = f" ({len(closed)} such nodes: {_ranges(closed)})" if len(closed) > 1 else ""
-        rest = "" if settled == nodes else f"; nodes from {settled} on have not been looked at"
+        rest = "" if settled == nodes else f"; nodes from {settled} on have not been checked"
         counts = self._graph.counts(first)
         counts.pop(Reason(Loss.ADMITTED), None)
         counts[Reason(Loss.COLLISION, "at the node")] = int(
@@ -151,11 +151,11 @@ class ClearSearch:
         )
 
     def _at_break(self, broken: NoFeasiblePath) -> NoFeasiblePath:
-        """Say of a break that is not for want of clear poses which bodies collide at its node."""
+        """Return a break at a node that has clear poses, with the bodies that collide there."""
         return broken.with_message(f"{broken}{self._depths(broken.node + 1)}")
 
     def _depths(self, node: int) -> str:
-        """Say which bodies come too near to each other at a node, at how many poses, how deep."""
+        """Return text on the bodies that are too near each other at a node: how often, how deep."""
         assert self._cell is not None
         if node >= len(self._known.start) - 1:
             return ""
@@ -178,28 +178,29 @@ class ClearSearch:
         least = ""
         if hits.any(axis=1).all():
             one, two = self._cell.pair_names[int(np.argmin(over[best]))]
-            least = f"; the best of them lacks {-over[best].min() * 1e3:.3g} mm ({one} and {two})"
+            lack = -over[best].min() * 1e3
+            least = f"; the best pose is {lack:.3g} mm too near ({one} and {two})"
         return f" (most often {'; '.join(nearest)}{least})"
 
     def claimed(self, claim: str) -> str:
-        """Return a claim and, in a cell, that it holds for what is clear, after how many checks."""
+        """Return a claim; in a cell with "clear in the cell" and the number of checks."""
         if self._cell is None:
             return claim
         seen, clear = self._checker, f"{claim}, clear in the cell{self._but}"
-        if not seen.asked:  # what some of the nodes led to is looked at as it is
+        if not seen.asked:  # a motion found along some of the nodes is checked as a whole
             return clear
         return (
             f"{clear}: {seen.asked} of {len(self._known.cost)} poses and "
-            f"{seen.motions_asked} motions looked at in {self._known.searches} searches, "
-            f"distances found at {seen.measured} poses and on {seen.motions_measured} motions"
+            f"{seen.motions_asked} motions checked in {self._known.searches} searches, "
+            f"distances computed at {seen.measured} poses and on {seen.motions_measured} motions"
         )
 
     def is_clear(self, made: Plan) -> bool:
-        """Return whether a plan is clear in the cell, if there is one, at and between its nodes."""
+        """Return whether a plan is clear at and between its nodes; True without a cell."""
         return not self.unclear(made).any()
 
     def unclear(self, made: Plan) -> Bools:
-        """Return the nodes (K,) of a plan that are not clear, and both ends of what is not."""
+        """Return the nodes (K,) of a plan that are not clear, or that end an unclear interval."""
         q = made.q
         if self._cell is None:
             return np.zeros(len(q), np.bool_)
@@ -212,16 +213,20 @@ class ClearSearch:
 
 
 def _require_same_cell(task: PlanningTask, cell: Cell) -> None:
-    """Raise InputError where the cell was built for another tool, place of the part or robot."""
+    """Raise InputError if the cell was built for another tool, placement or robot."""
     require_axes(cell.chain, task.robot)
     for name, here, there in (
         ("tool", task.T_flange_tip, cell.T_flange_tip),
         ("placement", task.T_base_part, cell.T_base_part),
     ):
         if there is not None and not _same(here, there):
-            raise InputError(f"cell: it was built with another {name} than is planned with")
+            raise InputError(
+                f"cell: it was built with another {name} than the plan has; build it again"
+            )
     if not np.array_equal(cell.endless, task.robot.endless):
-        raise InputError("cell: it was built with other endless joints than is planned with")
+        raise InputError(
+            "cell: it was built with other endless joints than the robot has; build it again"
+        )
 
 
 def _same(a: Array, b: Array) -> bool:
@@ -229,9 +234,9 @@ def _same(a: Array, b: Array) -> bool:
 
 
 def _gamma_neighbours(graph: LayeredGraph) -> Ints:
-    """Return the vertices (N, 2) one step of gamma before and after each, -1 where there is none.
+    """Return the vertices (N, 2) one step of gamma before and after each, -1 for none.
 
-    Of the same node, variant, posture and turns; where one collides, its neighbours are likely to.
+    They have the same node, variant, posture and turns; neighbours often collide together.
     """
     m, layer = len(graph.gamma), np.repeat(np.arange(len(graph.start) - 1), np.diff(graph.start))
     _, turn = np.unique(graph.turn, axis=0, return_inverse=True)
@@ -249,7 +254,7 @@ def _gamma_neighbours(graph: LayeredGraph) -> Ints:
 
 
 def _ranges(numbers: list[int]) -> str:
-    """Write ascending numbers as ranges, such as "3 to 7, 9", the first of them."""
+    """Write ascending numbers as ranges, such as "3 to 7, 9"; only the first `RANGES_LISTED`."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][1] + 1:

@@ -1,4 +1,4 @@
-"""Whether a task has a motion at all, at any gamma, posture and turn."""
+"""Proofs that a task has no motion at any gamma, posture and turn."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ __all__ = [
 ]
 
 MOST_NODES = 5_000
-"""Nodes up to which cells of all of them are held at once: some 200 MB."""
+"""Most nodes whose cells are all held in memory at once: some 200 MB."""
 BINDS, APART, MOST_BINDING = 0.9, 3, 12
-"""Share of the limits, in speed, from which they bind at a node; how many nodes apart others are;
-and how many are looked at."""
+"""Share of the limits, in speed, from which they bind at a node; distance in nodes that further
+binding nodes keep; and most binding nodes."""
 SLACK = 1e-6
-"""Share of a limit that is left free against rounding."""
+"""Share of a limit that is left free, for rounding."""
 FAR, CLOSE = 300.0, 1.02
-"""Multiples of a speed: up to which one that is impossible is looked for, and how close to the
-fastest that may be possible."""
+"""Largest factor on the speed that is tried to find an impossible speed; and the factor to which
+the impossible speed is then narrowed down."""
 
 
 def motion_test(task: PlanningTask) -> MotionTest | None:
-    """Return the test of a task for motions at any gamma; None where nothing can be proved.
+    """Return the test of a task for motions at any gamma; None if nothing can be proved.
 
-    What else a plan keeps (a cell, comfort, a closure, a limit on the rotation) only leaves fewer.
+    Other constraints of a plan (cell, comfort, closure, rotation limits) only leave fewer motions.
     """
     asked = task.settings
     if not task.robot.encloses or asked.tilt is not None or len(task.contour) > MOST_NODES:
@@ -47,7 +47,7 @@ def motion_test(task: PlanningTask) -> MotionTest | None:
 
 
 def at_any_gamma(broken: NoFeasiblePath, task: PlanningTask) -> NoFeasiblePath:
-    """Return what a search found to be broken, and whether it is so at every gamma."""
+    """Return the answer of a search without a path, with whether it is proved at every gamma."""
     test = motion_test(task)
     if test is None or task.settings.feed == "dip":
         return broken
@@ -61,9 +61,10 @@ def at_any_gamma(broken: NoFeasiblePath, task: PlanningTask) -> NoFeasiblePath:
 def with_relaxation(
     broken: NoFeasiblePath, task: PlanningTask, quick: QuickMotion
 ) -> NoFeasiblePath:
-    """Return what is broken, and how much less speed or how much more of the limits would do.
+    """Return an answer without a path, with the lower speed or higher limits that would suffice.
 
-    Of the quickest motion found, slower than asked for: figures that keep what they say.
+    They are those of the quickest motion found, which is slower than asked for; the figures are
+    rounded so that they hold as printed.
     """
     limits = task.problem.limits
     v, a = rates_of(quick.plan.increments, np.full(len(task.contour) - 1, task.dt))
@@ -83,10 +84,10 @@ def with_relaxation(
 
 
 def impossible_share(task: PlanningTask, reached: float, nodes: Sequence[int]) -> float | None:
-    """Return an interval, as a share of `reached` s, too short for any motion at any gamma.
+    """Return an interval, as a share of `reached` s, that is too short for any motion at any gamma.
 
-    Proved for it and so for every shorter one; `nodes` are where limits bind a motion that takes
-    `reached`, most of all at the first. None where nothing is proved.
+    This is proved, and holds for every shorter interval, too; None if nothing is proved. `nodes`
+    are those where limits bind a motion with the interval `reached`, the most binding one first.
     """
     test = motion_test(task)
     if test is None:
@@ -94,7 +95,7 @@ def impossible_share(task: PlanningTask, reached: float, nodes: Sequence[int]) -
     limits = task.problem.limits
 
     def impossible(times: float, around: int | None) -> bool:
-        """Return whether no motion is so many times as fast, by what is about a node or by all."""
+        """Return whether no motion is this many times as fast, tested around a node or at all."""
         return test.closed(limits, reached / times, around) is not None
 
     low, high = 1.0, 2.0
@@ -103,7 +104,7 @@ def impossible_share(task: PlanningTask, reached: float, nodes: Sequence[int]) -
         if high > FAR:
             return None
     for node in nodes:
-        # What is about another node may be closed at a lower speed, too.
+        # The part around another node may be closed at a lower speed, too.
         least = low if node == nodes[0] else 1.0
         if not impossible(high / CLOSE, node):
             continue
@@ -118,10 +119,10 @@ def impossible_share(task: PlanningTask, reached: float, nodes: Sequence[int]) -
 
 
 def binding_nodes(motions: Sequence[QuickMotion]) -> list[int]:
-    """Return the nodes where limits bind ever quicker motions, that of the quickest first.
+    """Return nodes where limits bind successively quicker motions, that of the quickest first.
 
-    Where a limit binds each, and where limits nearly bind the quickest: some of them, not close to
-    each other.
+    They are the binding node of each motion, and nodes where limits nearly bind the quickest one,
+    at most `MOST_BINDING`, not close to each other.
     """
     plan = motions[-1].plan
     velocity = np.abs(plan.velocity_share).max(axis=1) / plan.settings.eta_v

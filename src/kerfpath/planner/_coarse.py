@@ -1,7 +1,8 @@
-"""Coarse samples of all that poses leave free, and the best ways through them.
+"""Coarse samples of the joints that poses leave free, and the best ways through them.
 
-At a few nodes every place of a coarse grid of external axes and elbow, of gamma and of postures;
-the best way through these within the velocity limits is found by dynamic programming.
+A few nodes are sampled at every place of a coarse grid of these joints (external axes, elbow), at
+coarse gamma and in all postures. Dynamic programming finds the best way through these samples
+within the velocity limits.
 """
 
 from __future__ import annotations
@@ -34,31 +35,32 @@ __all__ = [
 ]
 
 FEW_NODES, NODES = 9, 41
-"""Nodes at which the axes are sampled: as many as leave them time for a step, within these."""
+"""Least and most sampled nodes; in between, the axes have time for one step from node to node."""
 STEP = {"m": 0.15, "rad": np.radians(12)}
-"""m and rad: steps of the axes, where there are not too many places."""
+"""m and rad: steps of the axes, unless these give more than `MOST_PLACES`."""
 MOST_PLACES = 1500
+"""Most places of the grid."""
 GAMMA_STEP = {1: np.radians(12), 2: np.radians(20), 3: np.radians(24)}
-"""rad, by the number of axes."""
+"""rad: step of gamma by the number of axes."""
 FARTHEST = 2
-"""Steps of the grid that an axis moves at most from one of these nodes to the next."""
+"""Most steps of the grid that an axis moves from one sampled node to the next."""
 TURN = np.radians(40)
-"""rad that gamma turns by at most."""
+"""rad: most change of gamma from one sampled node to the next."""
 
 ELSEWHERE = np.radians(60)
-"""rad of gamma from which two ends are apart; or more than `FARTHEST` steps of an axis."""
+"""rad: two ends are apart if gamma differs by this, or an axis by more than `FARTHEST` steps."""
 DEARER = 0.1
-"""What another end may cost beyond the best, relative."""
+"""Most relative cost of another end above that of the best."""
 ROUNDS = 16
-"""Ways looked at for one whose samples are all clear in the cell."""
+"""Most ways tried to find one whose samples are all clear in the cell."""
 ABOUT = 2
-"""Steps of the grid around a place that collides, of which all samples are looked at."""
+"""Steps of the grid around a colliding place within which all samples are checked."""
 
 
 class Style(NamedTuple):
-    """What a course is to be good for: prices of speed squared, and of the axes' own moves.
+    """Objective of a course: prices of squared speed and of the moves of the axes.
 
-    To so many ends, where there are external axes.
+    With external axes, courses to `ends` different ends are looked for.
     """
 
     square: float
@@ -67,11 +69,11 @@ class Style(NamedTuple):
 
 
 End = int | tuple[int, int, int] | None
-"""Where a way is to end: at a place, at a place, gamma and posture, or where it is best."""
+"""End of a way: a place; a place, gamma and posture; or None for the best end."""
 
 
 class Reached(NamedTuple):
-    """What reaching each sample (X, m, P) of the last node costs, and from where: (M, X, m, P)."""
+    """Cost of reaching each sample (X, m, P) of the last node; predecessors (M, X, m, P)."""
 
     value: Array
     back: Ints
@@ -88,11 +90,11 @@ class Coarse:
     places : (X, E) rad or m
         The grid of the axes.
     counts : tuple of int
-        Values of each axis in it.
+        Number of values of each axis in the grid.
     graph : LayeredGraph
         All samples within limits and margins; its variants are the places.
     closed : (N,) bool
-        Its vertices that are known not to be clear; more become known.
+        Vertices of the graph that are known not to be clear; updated during the search.
     """
 
     nodes: Ints
@@ -105,12 +107,12 @@ class Coarse:
 
     @property
     def cells(self) -> Ints:
-        """Which value of each axis the places have, (X, E)."""
+        """Index of the value of each axis at the places, (X, E)."""
         places = np.arange(len(self.places))
         return np.stack(np.unravel_index(places, self.counts), axis=-1).astype(np.int64)
 
     def steps_from(self, place: int, robot: Robot) -> Ints:
-        """Return how many steps of each axis all places are from one, (X, E)."""
+        """Return the distance of all places from one of them, in steps of each axis, (X, E)."""
         cells = self.cells
         far = np.abs(cells - cells[place])
         around = np.minimum(far, np.array(self.counts) - far)
@@ -118,7 +120,7 @@ class Coarse:
 
 
 def coarse_places(robot: Robot) -> Array:
-    """Return a coarse grid (X, E) of the values of what a pose leaves free, rad or m."""
+    """Return a coarse grid (X, E) of values of the joints that a pose leaves free, rad or m."""
     return _grid(robot)[0]
 
 
@@ -126,7 +128,7 @@ def sampled(task: PlanningTask) -> Coarse:
     robot, options, K = task.robot, task.settings, len(task.contour)
     places, counts = _grid(robot)
     takes = steps_of(robot, counts) / robot.speed_limits()[0][robot.free]
-    slowest = takes.max() or np.inf  # none moves: as few nodes as there may be
+    slowest = takes.max() or np.inf  # no axis moves: the fewest nodes allowed
     many = int(np.clip(task.dt * (K - 1) / slowest, min(K, FEW_NODES), min(K, NODES)))
     nodes = np.unique(np.round(np.linspace(0, K - 1, many)).astype(np.int64))
     hard = options.comfort.hard if options.comfort is not None else None
@@ -151,7 +153,7 @@ def sampled(task: PlanningTask) -> Coarse:
 
 
 def _grid(robot: Robot) -> tuple[Array, tuple[int, ...]]:
-    """Return a grid (X, E) of what is free, rad or m, and how many values each has in it."""
+    """Return a grid (X, E) of the free joints, rad or m, and the number of values of each."""
     free, limits = robot.free, robot.joint_limits()
     bounds = list(zip(limits.lower[free], limits.upper[free], strict=True))
     endless = robot.endless[free]
@@ -182,9 +184,9 @@ def clear_way(
     known: Reached,
     end: End,
 ) -> Ints:
-    """Return the places (M,) of the best way whose samples are clear, or of the last one tried.
+    """Return the places (M,) of the best way whose samples are clear, or of the last way tried.
 
-    `known` is what is reached as far as it is known what is clear.
+    `known` is the result of `reached` with the vertices known to be closed so far.
     """
     graph = coarse.graph
     way = _way_to(known, end)
@@ -221,7 +223,7 @@ def _vertices(coarse: Coarse, way: Ints) -> Ints:
 def _way_to(known: Reached, end: End) -> Ints:
     """Return the place, gamma and posture (M, 3) of each sampled node on the best way.
 
-    To that end, if it is reached.
+    The way leads to `end` if that is reached, else to the best end.
     """
     value, back = known
     if end is not None and np.isfinite(value[end]).any():
@@ -237,12 +239,12 @@ def _way_to(known: Reached, end: End) -> Ints:
 
 
 def reached(coarse: Coarse, task: PlanningTask, style: Style) -> Reached:
-    """Return what reaching each sample (X, m, P) of the last node costs, and from where: (M, ...).
+    """Return the cost of reaching each sample (X, m, P) of the last node, and the predecessors.
 
     Raises
     ------
     NoFeasiblePath
-        None is reached.
+        No sample is reached.
     """
     robot, graph, count = task.robot, coarse.graph, len(coarse.nodes)
     before = _layer(coarse, robot, 0)
@@ -268,9 +270,9 @@ def reached(coarse: Coarse, task: PlanningTask, style: Style) -> Reached:
 
 
 def apart(coarse: Coarse, robot: Robot, value: Array, count: int) -> list[End]:
-    """Return samples of the last node that are far from each other, the best first.
+    """Return up to `count` samples of the last node that are far from each other, the best first.
 
-    Up to `count` of those (X, m, P) that cost little more than the best.
+    They cost little more than the best, by `value` (X, m, P).
     """
     samples = value.shape[1]
     left, most = value.copy(), (1 + DEARER) * value.min()
@@ -286,7 +288,7 @@ def apart(coarse: Coarse, robot: Robot, value: Array, count: int) -> list[End]:
 
 
 def _layer(coarse: Coarse, robot: Robot, k: int) -> CoarseLayer:
-    """Return the joints that follow at every sample of a node, one turn of each."""
+    """Return the solved joints at every sample of a node, on one turn each."""
     graph = coarse.graph
     own = slice(graph.start[k], graph.start[k + 1])
     shape = len(coarse.places), len(graph.gamma), robot.postures
@@ -297,7 +299,7 @@ def _layer(coarse: Coarse, robot: Robot, k: int) -> CoarseLayer:
 
 
 def _nearby(coarse: Coarse, task: PlanningTask, parts: int, style: Style) -> Nearby:
-    """Return where steps to each place may come from in the time of some intervals."""
+    """Return the places from which steps to each place may come within `parts` intervals."""
     robot, options = task.robot, task.settings
     free, solved, counts = robot.free, robot.solved, coarse.counts
     velocity = options.eta_v * robot.speed_limits()[0]
@@ -313,7 +315,7 @@ def _nearby(coarse: Coarse, task: PlanningTask, parts: int, style: Style) -> Nea
     steps = steps_of(robot, coarse.counts) / span[free]
     share, square = np.abs(moves) * steps, style.square * parts
     cost = style.axes * (weight[free] * share).sum(axis=1) + square * (share**2).sum(axis=1)
-    # Between the middles of two cells it is a step more than between their edges.
+    # The middles of two cells are one step farther apart than their nearest edges.
     cost = np.where((share - steps <= 1).all(axis=1), cost, np.inf)
     limits = robot.joint_limits()
     wide = limits.upper - limits.lower > 2 * np.pi
@@ -339,14 +341,14 @@ def steps_of(robot: Robot, counted: tuple[int, ...]) -> Array:
 
 
 def _stuck(coarse: Coarse, robot: Robot, k: int) -> str:
-    """Say where the way through the samples ends, and why that may be."""
+    """Return text on where the way through the samples ends, and the likely reason."""
     names, graph = robot.free_names, coarse.graph
     if graph.start[k + 1] == graph.start[k]:
         where = f"node {coarse.nodes[k]} is out of reach at every sampled value of {names}"
         loss = graph.main_loss(k)
-        return f"{where}; most are lost by {loss}" if loss else where
+        return f"{where}; most candidates are lost by {loss}" if loss else where
     return (
         f"no motion of the arm and {names} was found from node {coarse.nodes[k - 1]} to node "
-        f"{coarse.nodes[k]} within the velocity limits; the values of {names} were sampled, which "
-        "proves nothing of those between"
+        f"{coarse.nodes[k]} within the velocity limits; only samples of {names} were tried, which "
+        "proves nothing about the values between them"
     )

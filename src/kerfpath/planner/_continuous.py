@@ -1,4 +1,4 @@
-"""A plan over continuous gamma: paths by the value function, refined; the grid where that fails."""
+"""Plan over continuous gamma: paths by the value function, refined; else from the grid."""
 
 from __future__ import annotations
 
@@ -23,35 +23,35 @@ from kerfpath.search import ContinuousPath, Effort, find_shortest
 __all__ = ["claimed", "clear_motion", "grid_reason", "plan_continuous"]
 
 FIRST_STEP = 5e-3
-"""rad: first change of gamma of a refinement that begins from a path between the samples."""
+"""rad: first change of gamma when a path between the samples is refined."""
 FINE, COARSE = (0.1, 0.25), (1.1, 1.0)
-"""When the states of a beam are alike: for paths that hardly accelerate, and that must."""
+"""`Effort.alike` of beams for paths that hardly accelerate, and for paths that must."""
 QUICK = (Effort(60, FINE, 2), Effort(200, COARSE, 2))
-"""Paths that are refined at first; wide ones where the values promise better."""
+"""Efforts of the first paths; a wide search follows if the value function promises more."""
 OTHERWISE = (0.5, 0.5)
-"""When the states of a wide search are alike that is to end in other valleys than the first."""
+"""`Effort.alike` of a wide search that is to reach other local optima than the first."""
 ENOUGH, POOR = 5e-3, 1e-2
-"""Relative gap to what the values promise with which a motion is good; and beyond which (6) binds
-so much that what a path promises says little, and all of them are refined."""
+"""Relative gap to the value function: below the first a motion is good; beyond the second (6) binds
+so much that the promised costs say little, and all paths are refined."""
 COARSE_STEP = np.radians(1.5)
-"""rad: step of gamma from which a search that finds nothing is repeated on half of it."""
+"""rad: step of gamma from which a search that finds nothing is repeated with half the step."""
 NEARLY = 0.95
 """Share of the speed at which a motion must have been found for that."""
 GAIN = 5e-3
-"""What a refinement may take off the cost that a path promises, relative."""
+"""Relative gain that a refinement may reach beyond the promised cost of a path."""
 NARROWED = 6
-"""Times that a refinement is kept nearer to its path where it is not clear."""
+"""Most repetitions of a refinement closer to its path while the result is not clear."""
 FREE = 1.0
-"""rad or m: how far external axes may go from their course in a cell at first."""
+"""rad or m: how far external axes may at first leave their course in a cell."""
 
 
 def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]) -> Plan:
-    """Return the best motion found over continuous gamma; on the grid where that is not the way.
+    """Return the best motion found over continuous gamma, or on the grid if that is not possible.
 
     Raises
     ------
     NoFeasiblePath
-        None was found, on the grid neither.
+        No motion was found, not even on the grid.
     """
     if reason := grid_reason(task):
         return _from_grid(task, finder, begin, f"planned on the grid: {reason}")
@@ -71,7 +71,7 @@ def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[st
 
 
 def claimed(found: Refinement, finder: ClearSearch) -> Plan:
-    """Return the plan of a motion, and what is claimed of it."""
+    """Return the plan of a motion with the claim about it."""
     claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
 
@@ -79,7 +79,7 @@ def claimed(found: Refinement, finder: ClearSearch) -> Plan:
 def _from_grid(
     task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None], why: str
 ) -> Plan:
-    """Return the best plan of the grid, refined where that may be; and why it is one of the grid.
+    """Return the best plan of the grid, refined if possible; its proof begins with `why`.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def _from_grid(
         There is none.
     """
     comfort = task.settings.comfort
-    # What the nodes of a slower motion cost is known on the grid only.
+    # The node costs of a slowed-down motion are known only on the grid.
     priced = task.settings.feed == "dip" and comfort is not None and comfort.costs
     refine = task.robot.family.free_rotation and not priced
     made = plan_on_grid(task, finder, begin, refine=refine)
@@ -97,9 +97,9 @@ def _from_grid(
 def _from_more_samples(
     task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None], none: NoFeasiblePath
 ) -> Plan | None:
-    """Return a plan found with twice as many samples of gamma, where they may lead to one.
+    """Return a plan found with twice as many samples of gamma; None if there is none.
 
-    They may where they are not close as they are, and where a motion nearly as fast was found.
+    This is tried if the samples are not close already and a motion nearly as fast was found.
     """
     needed, fine = none.relaxation, _finer(task)
     if fine is None or needed is None or needed.speed < NEARLY or none.closed is not None:
@@ -115,9 +115,9 @@ def _from_more_samples(
 
 
 def _finer(task: PlanningTask) -> PlanningTask | None:
-    """Return the task with twice as many samples of gamma; None where they are close as they are.
+    """Return the task with twice as many samples of gamma; None if they are close already.
 
-    Its graph is built when it is asked for.
+    Its graph is built when it is needed.
     """
     step = task.settings.gamma_step
     return task.sampled(step / 2) if step >= COARSE_STEP else None
@@ -130,11 +130,11 @@ def clear_motion(
     *,
     thorough: bool = True,
 ) -> Refinement | None:
-    """Return the best motion found that is clear; None where none is.
+    """Return the best clear motion found; None if there is none.
 
-    Unless `thorough`, what the first paths are refined to is enough. The values tell whether a
-    wider search may find a better one; of very many nodes, the motion along some of them does, and
-    the graph of all is built only where that is not enough.
+    The value function shows whether a wider search may find a better motion; without `thorough`,
+    the refined first paths are enough. With very many nodes, a motion is first planned along some
+    of them, and the graph of all nodes is built only if that is not enough.
 
     Raises
     ------
@@ -174,10 +174,11 @@ def clear_motion(
 
 
 def _from_fewer_nodes(task: PlanningTask, finder: ClearSearch) -> tuple[Plan | None, float]:
-    """Return what the motion along some of very many nodes is along all, and a cost to judge it by.
+    """Return the motion along some of very many nodes, extended to all, and a cost to compare with.
 
-    None if there is none. No motion along all nodes costs less than the best along some: its steps
-    together are no shorter, and asked for no more (5), (6). 0 where that cannot be said.
+    None if there is none. No motion along all nodes costs less than the best one along some: its
+    steps together are no shorter, and the thinned nodes impose no more (5), (6). The cost is 0 if
+    this does not apply.
     """
     thin = thinned(task)
     found = None if thin is None else clear_motion(thin.task, finder.of(thin.task))
@@ -189,7 +190,7 @@ def _from_fewer_nodes(task: PlanningTask, finder: ClearSearch) -> tuple[Plan | N
 
 
 class _Starts:
-    """Paths to begin a refinement from, and the best motion that they are refined to."""
+    """Starts of refinements, and the best motion that was reached from them."""
 
     def __init__(self, task: PlanningTask, finder: ClearSearch) -> None:
         self._task, self._finder = task, finder
@@ -197,21 +198,21 @@ class _Starts:
         self.best: Refinement | None = None
 
     def above(self, value: float, share: float) -> bool:
-        """Return whether the best motion costs more than a value by more than a share of it."""
+        """Return whether the best motion costs more than (1 + share) times a value."""
         return self.best is None or self.best.cost_after > (1 + share) * value
 
     def start_from(self, made: Plan | None, least: float) -> None:
-        """Refine a motion, if there is one, that is close to the best, which costs at least so."""
+        """Refine a motion that is close to the best one, whose cost is at least `least`."""
         if made is not None:
             self._tried.append(made)
             found = refiner.refine(made, first=FIRST_STEP, least=least)
             self.best = found if found.done and self._finder.is_clear(found.plan) else None
 
     def refine(self, paths: list[ContinuousPath], *, unpromising: bool = False) -> None:
-        """Refine paths, the most promising first, of those alike one.
+        """Refine paths, the most promising first, and of similar paths only one.
 
-        Those that do not promise to be better only where that is asked for: what bringing a path
-        inside the limits costs is a guess.
+        Paths that promise no better motion are refined only if `unpromising`: the cost of bringing
+        a path inside the limits is a guess.
         """
         claim = Proof(optimal=False, statement="found over continuous rotation")
         plans = [self._task.plan_between(path, claim) for path in paths]
@@ -227,9 +228,9 @@ class _Starts:
                 self.best = _better(best, found)
 
     def refine_from_grid(self, task: PlanningTask) -> None:
-        """Refine the best path on the grid of a task, where there is a motion that it may better.
+        """Refine the best path on the grid of a task, if there is already a motion to improve on.
 
-        It leads into other valleys than paths between the samples do.
+        It leads to other local optima than paths between the samples do.
         """
         if self.best is None:
             return
@@ -249,10 +250,10 @@ class _Starts:
 def _refine_path(
     task: PlanningTask, finder: ClearSearch, path: ContinuousPath, made: Plan
 ) -> Refinement | None:
-    """Return what a path is refined to, clear; None where the limits, or clearance, are not kept.
+    """Return the refinement of a path; None if it does not keep the limits or is not clear.
 
-    In a cell gamma stays between samples that are clear, and gamma and external axes nearer to the
-    path where the motion that they are refined to is not.
+    In a cell, gamma stays between clear samples. Where the refined motion is not clear, gamma and
+    external axes are kept closer to the path, and the refinement is repeated.
     """
     clear = finder.corridor(path.one, path.other)
     if clear is None:
@@ -288,10 +289,10 @@ def _better(one: Refinement | None, other: Refinement | None) -> Refinement | No
 
 
 def grid_reason(task: PlanningTask) -> str:
-    """Return why a task is planned on the grid; "" where it need not be."""
+    """Return why a task must be planned on the grid; "" if it need not be."""
     comfort = task.settings.comfort
     if not task.robot.family.free_rotation:
         return "the robot leaves no rotation free"
     if comfort is not None and comfort.prices_clearance:
-        return "what clearance costs is known there only"
+        return "the cost of clearance is known only there"
     return ""

@@ -1,9 +1,9 @@
-"""Courses of external axes and elbows: smooth, from a search over coarse samples of what is free.
+"""Smooth courses of external axes and elbows, from a search over coarse samples of these joints.
 
-Rails and tables are slow beside the arm, and a grid of their values would quantise what they may
-accelerate, as it would that of joint 3 of a seven-axis arm, which is treated as one of them. So the
-best ways through coarse samples are found; a course is the smoothest curve that stays near one.
-Gamma is planned again along it, and both together are refined by the true kinematics.
+Rails and tables are slow compared with the arm, and a grid of their values would quantise their
+acceleration. The same holds for joint 3 of a seven-axis arm, which is treated as one of them. So
+the best ways through coarse samples are found, and a course is the smoothest curve that stays near
+one. Gamma is planned again along the course, and both are refined together by the true kinematics.
 """
 
 from __future__ import annotations
@@ -39,12 +39,13 @@ from kerfpath.robots import Robot
 __all__ = ["STYLES", "along_a_course", "courses", "external_course"]
 
 SLOW, SLOWLY = 1e-6, 1e6
-"""m/s and s from node to node: so slow that no limit binds."""
+"""Speed (m/s) and interval between nodes (s) so slow that no limit binds."""
 GENTLE = Style(1e6, 1.0)
-"""Where no speed is asked for: the least speeds alone."""
+"""Style without a speed asked for: only the least speeds of the axes count."""
 STYLES = (Style(1.0, 1.0), Style(8.0, 1.0), Style(1.0, 8.0))
+"""Styles of the courses that are tried."""
 VALLEYS = 5
-"""Places of joint 3, each better than those beside it, that courses are to end in."""
+"""Most local optima of joint 3 at the last node in which courses end."""
 
 
 def external_course(
@@ -57,14 +58,14 @@ def external_course(
     options: PlanOptions | None = None,
     cell: Cell | None = None,
 ) -> Array:
-    """Return the course (K, E) rad or m of what a pose leaves free that promises most.
+    """Return the most promising course (K, E) rad or m of the joints that a pose leaves free.
 
-    Arguments as in `kerfpath.plan`; without a speed the gentlest one.
+    Arguments are as in `kerfpath.plan`; without a speed it is the gentlest course.
 
     Raises
     ------
     NoFeasiblePath
-        There is no way through the samples of the axes; says from which node on.
+        There is no way through the samples of the axes; the message names the node where it ends.
     """
     free = speed is None and contour.time is None
     asked = options or PlanOptions()
@@ -77,11 +78,10 @@ def external_course(
 def along_a_course(
     task: PlanningTask, clear: Callable[[Array], Bools], *, at_any_speed: bool = False
 ) -> PlanningTask:
-    """Return the task along the course that promises most, where its robot has one to choose.
+    """Return the task along the most promising course, if its robot has one to choose.
 
-    `clear` as of `courses`.
-
-    A task that has a course or a graph is returned as it is, as is one that takes a grid of them.
+    A task that already has a course or a graph is returned unchanged, and so is one that searches a
+    grid of the axes. `clear` is as in `courses`.
 
     Raises
     ------
@@ -100,15 +100,15 @@ def courses(
     styles: tuple[Style, ...] = STYLES,
     clear: Callable[[Array], Bools] = lambda q: np.ones(len(q), np.bool_),
 ) -> Iterator[Array]:
-    """Yield courses (K, E) rad or m of what poses leave free, that which promises most first.
+    """Yield courses (K, E) rad or m of the joints that poses leave free, the most promising first.
 
-    With `clear`, which says of joint vectors (B, n) whether they are clear (B,), ways lead through
-    clear samples, as far as some rounds of looking at those on them and about them bring it.
+    `clear` takes joint vectors (B, n) and returns which are clear, (B,). Ways lead through clear
+    samples as far as a few rounds of checking the samples on and around them can achieve it.
 
     Raises
     ------
     NoFeasiblePath
-        There is no way through the samples; says from which of the nodes on.
+        There is no way through the samples; the message names the node where it ends.
     """
     coarse, robot = sampled(task), task.robot
     known: list[Array] = []
@@ -128,9 +128,10 @@ def courses(
 
 
 def _ends(coarse: Coarse, robot: Robot, value: Array, style: Style, *, valleys: bool) -> list[End]:
-    """Return where courses are to end, the best first; None: where it is best.
+    """Return the ends of courses, the best first; None: the best end of all.
 
-    An arm's own joint that is free has many `valleys`, whose depths the samples hardly tell apart.
+    With `valleys`, a free joint of the arm itself gets several local optima as ends, because the
+    coarse samples hardly distinguish their costs.
     """
     if robot.externals:
         return [None, *apart(coarse, robot, value, style.ends)[1:]]
@@ -144,7 +145,7 @@ def _ends(coarse: Coarse, robot: Robot, value: Array, style: Style, *, valleys: 
 
 
 def _smooth(coarse: Coarse, robot: Robot, path: Ints, K: int) -> Array:
-    """Return the smoothest course (K, E) that stays within half a step of the places of a way."""
+    """Return the smoothest course (K, E) within half a step of the places of a way."""
     free, limits = robot.free, robot.joint_limits()
     lower, upper = limits.lower[free], limits.upper[free]
     endless, steps = robot.endless[free], steps_of(robot, coarse.counts)
@@ -163,7 +164,7 @@ def _smooth(coarse: Coarse, robot: Robot, path: Ints, K: int) -> Array:
 
 
 def _eased(low: Array, high: Array, nodes: Ints) -> Array:
-    """Return the values (M,) between low and high whose speed changes least, over uneven nodes."""
+    """Return the values (M,) between low and high with the least changes of speed, uneven nodes."""
     if len(nodes) < 3 or (high - low).max() <= 0:
         return (low + high) / 2
     h = np.diff(nodes).astype(float)

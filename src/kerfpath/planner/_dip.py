@@ -1,4 +1,4 @@
-"""feed="dip": the paths to slow down, the least time one takes, and where the speed is reduced."""
+"""feed="dip": paths to slow down, their least times, and where the speed is reduced."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from kerfpath.search import ContinuousSearch, Effort, SearchProblem, find_slowed
 __all__ = ["plan_slowed"]
 
 EFFORT = Effort(60, (1.1, 1.0))
-"""What a path over continuous gamma is looked for with."""
+"""Effort of the search for a path over continuous gamma."""
 SLOWER = (1.0, 1.15, 1.4, 2.0)
-"""Node intervals, as multiples of the one asked for, at which (6) is to hold throughout."""
+"""Node intervals at which (6) must hold everywhere, as multiples of the one asked for."""
 MOST_LOOKS = 20
-"""Searches for a path whose samples are clear in the cell."""
+"""Most searches for a path whose samples are clear in the cell."""
 
 
 def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Plan:
-    """Return a plan at the speed asked for wherever its path lets it, and slower elsewhere.
+    """Return a plan at the speed asked for where its path allows it, and slower elsewhere.
 
-    On the grid two paths are worth their least times under all limits: the one that loses the least
-    time, priced above all distances, if each step had to be slow on its own, and the best one
-    without acceleration limits, where there is one. With `refine` gamma also moves off the grid
-    from each to ask for little beyond the limits, and each is refined; with the method "continuous"
-    so are paths over continuous gamma: the best one without acceleration limits, and the one that
-    keeps all of them at the least constant interval that has one. The plan is the quickest that is
-    clear, and of equally quick ones the cheapest.
+    Two paths of the grid get the least times under all limits: the one that loses the least time
+    step by step, with lost time priced above all distances, and the best one without acceleration
+    limits, if there is one. With `refine`, gamma also moves off the grid from each of them so that
+    the limits are exceeded little, and each is refined. With the method "continuous", so are paths
+    over continuous gamma: the best one without acceleration limits, and the one that keeps all
+    limits at the least constant interval that has one. The plan is the quickest clear one, and of
+    equally quick ones the cheapest.
     """
     slowed, first = _least_lost(task, finder), plan_first_order(task, finder)
     starts = [slowed]
@@ -57,15 +57,15 @@ def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Pla
 
 
 def _off_grid(task: PlanningTask, start: Plan) -> Plan:
-    """Return the quicker of a path eased and that refined, with its least times."""
+    """Return the quicker of an eased path and its refinement, with the least times."""
     eased = _ease(task, start)
     return min(eased, _with_least_times(task, refiner.refine(eased).plan), key=_time_and_cost)
 
 
 def _between_the_samples(task: PlanningTask, finder: ClearSearch) -> list[Plan]:
-    """Return the paths over continuous gamma that are worth slowing down; none where none is found.
+    """Return the paths over continuous gamma that are worth slowing down; there may be none.
 
-    Each at a constant interval: the one asked for without (6), and the least of `SLOWER` with it.
+    Each has a constant interval: the one asked for, without (6), and the least of `SLOWER` with it.
     """
     free = replace(task.problem, limits=task.problem.limits.without_acceleration())
     found = [_between(task, finder, free)]
@@ -78,7 +78,7 @@ def _between_the_samples(task: PlanningTask, finder: ClearSearch) -> list[Plan]:
 
 
 def _between(task: PlanningTask, finder: ClearSearch, problem: SearchProblem) -> Plan | None:
-    """Return the best path over continuous gamma of a problem; None where none is found."""
+    """Return the best path over continuous gamma of a problem; None if none is found."""
     claim = "no motion was found at constant speed; slowed down from a path over continuous gamma"
     for _ in range(MOST_LOOKS):
         search = ContinuousSearch(finder.open_problem(problem), task.samples)
@@ -90,19 +90,19 @@ def _between(task: PlanningTask, finder: ClearSearch, problem: SearchProblem) ->
 
 
 def _ease(task: PlanningTask, start: Plan) -> Plan:
-    """Return the plan off the grid that asks for little beyond the limits, with its least times."""
+    """Return the plan moved off the grid so that it exceeds the limits little, with least times."""
     claim = f"{start.proof.statement}; gamma moved off the grid to lose little time"
     eased = replace(refiner.ease(start), proof=Proof(optimal=False, statement=claim))
     return _with_least_times(task, eased)
 
 
 def _time_and_cost(made: Plan) -> tuple[float, float]:
-    """Return the time of a plan, s, without its rounding, and its cost."""
+    """Return the time of a plan, s, rounded to 1 ns, and its cost."""
     return round(float(made.time[-1]), 9), made.cost
 
 
 def _broken(task: PlanningTask, finder: ClearSearch, made: Plan) -> str:
-    """Return what a plan off the grid would break; empty where nothing."""
+    """Return what a plan off the grid would break, as text; "" if nothing."""
     comfort = task.settings.comfort
     if comfort is not None and comfort.broken(task.robot, made.q, task.T_flange_tip):
         return "break a margin of comfort"
@@ -119,7 +119,7 @@ def _least_lost(task: PlanningTask, finder: ClearSearch) -> Plan:
 
 
 def _with_least_times(task: PlanningTask, made: Plan) -> Plan:
-    """Return the plan with the least times, and where they dip."""
+    """Return the plan with the least times and its feed reduction."""
     limits = task.problem.limits
     tau = retime(made.increments, task.dt, limits)
     dips = feed(tau, task.dt, made.increments, limits, np.diff(made.contour.s))

@@ -1,4 +1,4 @@
-"""A motion moved towards what else is asked of it: soon, and not yet the best."""
+"""Drafts: a motion moved quickly towards new options, not yet the best one."""
 
 from __future__ import annotations
 
@@ -14,41 +14,41 @@ from kerfpath.refiner import refine
 __all__ = ["draft"]
 
 FIRST = np.radians(2.0)
-"""rad: what gamma changes by at first; larger steps fail more often than they gain."""
+"""rad: first change of gamma; larger steps fail more often than they gain."""
 PROGRAMS = 2
-"""Convex programs that a draft may take: a tenth of what the way to the best takes, for most of the
-gain of a change of weights."""
+"""Most convex programs of a draft: a tenth of those to the best motion, for most of the gain after
+a change of weights."""
 
 
 def draft(made: Plan, options: PlanOptions, *, dt: float) -> Plan | None:
-    """Return a motion near another one that keeps the limits of other options and costs less.
+    """Return a motion near an existing one that keeps the limits of new options and costs less.
 
-    It stays in the posture and near the gamma of the other one, where `plan` looks everywhere.
+    It stays in the posture and near the gamma of the existing motion; `plan` searches everywhere.
 
     Parameters
     ----------
     made : Plan
-        At constant speed, over continuous gamma.
+        The existing motion, at constant speed, over continuous gamma.
     options : PlanOptions
-        Of another speed, other weights, eta, metric or objective; the rest as of the plan.
+        New options: other weights, eta, metric or objective; the rest as in `made`.
     dt : float s
-        From node to node.
+        New time from node to node.
 
     Returns
     -------
     Plan or None
-        None where none is found so, or where it takes more than this to find one.
+        None if no such motion is found, or if these options need a full plan.
     """
     constant = made.feed is None and options.feed == "constant" and made.contour.time is None
     free = made.robot.family.free_rotation and options.method == "continuous"
     if not (constant and free and options.closure == made.settings.closure):
         return None
-    # What it costs by the other weights is known by the refinement.
+    # The refinement computes the cost under the new options.
     start = replace(
         made,
         settings=replace(options.resolve(made.robot, dt), certify=None),
         time=dt * np.arange(len(made.q), dtype=float),
-        proof=Proof(optimal=False, statement="a draft: the motion before, moved"),
+        proof=Proof(optimal=False, statement="a draft: the previous motion, moved"),
     )
     try:
         found = refine(start, first=FIRST, most=PROGRAMS)

@@ -1,4 +1,4 @@
-"""The fastest constant speed along a contour, and what opens the way where there is no plan."""
+"""The fastest constant speed along a contour, and the relaxations that give a path."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class SpeedKeywords(GraphKeywords, total=False):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FastestSpeed:
-    """The largest constant cutting speed at which a path exists, and what binds.
+    """Largest constant cutting speed at which a path exists, and the limit that binds.
 
     Parameters
     ----------
@@ -56,12 +56,12 @@ class FastestSpeed:
     node : int
         The node where it binds.
     limit : {"velocity", "acceleration"}
-        Which of its limits binds there.
+        The limit of the joint that binds.
     on_grid : float m/s, optional
-        Where gamma was moved off its grid: the largest speed on it.
+        Largest speed on the grid, if a higher one was found off it.
     ceiling : float m/s, optional
-        Where that is proved: at this constant speed, and at any higher one, no motion keeps the
-        limits at the nodes, at any gamma, posture and turn.
+        Speed from which on it is proved that no motion keeps the limits at the nodes, at any gamma,
+        posture and turn.
     """
 
     speed: float
@@ -73,7 +73,7 @@ class FastestSpeed:
 
     @classmethod
     def of(cls, contour: Contour, least: LeastInterval) -> FastestSpeed:
-        """Return what a least node interval is as a speed along a contour."""
+        """Return the speed along a contour that has a least node interval."""
         speed = longest_step(contour) / least.dt
         return cls(speed=speed, joint=least.joint, node=least.node, limit=least.limit)
 
@@ -93,27 +93,35 @@ def fastest_speed(
     enough: float | None = None,
     **keywords: Unpack[SpeedKeywords],
 ) -> FastestSpeed:
-    """Return the largest constant speed at which a path exists: exactly on the graph, or off it.
+    """Return the largest constant speed at which a path exists: exact on the graph, or off it.
 
-    The speed is the one that `plan` takes: that of the longest step between two nodes. A
-    second-order minimax problem on the layered graph; arguments as in `plan`, of whose options
-    gamma_step, frames, tilt, postures, comfort, eta_v, eta_a and refine matter. The grid quantises
-    the acceleration: `refine` moves gamma off it, from the fastest path and from others, to what is
-    faster still (the best found, which is not proved to be the best there is), where that is clear
-    and keeps the margins of `comfort`, which may have no costs here. `plan` finds a motion at the
-    speed returned, too. External axes, and the elbow of seven, follow the gentlest course, or
-    `external`; `refine` moves them, too, and looks for courses that are faster. With `ceiling` it
-    is also proved, as far as a limited amount of work does, above which speed there is no motion at
-    all, on the grid or off it, see `FastestSpeed.ceiling`. Off the grid a speed that is `enough`,
-    m/s, may be returned although there are faster ones.
+    On the layered graph this is a second-order minimax problem. The speed is that of `plan`, which
+    counts for the longest step between two nodes, and `plan` finds a motion at it, too.
+
+    Parameters
+    ----------
+    contour, robot, tool, placement, cell, graph, external, progress
+        As in `plan`. Without `external`, external axes and the elbow of a seven-axis arm follow the
+        gentlest course.
+    options : PlanOptions, optional
+        Only gamma_step, frames, tilt, postures, comfort, eta_v, eta_a and refine matter, which are
+        also keywords. The grid quantises the acceleration, so `refine` moves gamma and external
+        axes off it, from the fastest path and from others, to faster motions that are clear and
+        keep the margins of `comfort`, which may have no costs here. The result is the best motion
+        found, not proved to be the best.
+    ceiling : bool
+        Whether to prove, with a limited amount of work, from which speed on there is no motion at
+        all, on the grid or off it; see `FastestSpeed.ceiling`.
+    enough : float m/s, optional
+        Off the grid the search may stop once it has reached this speed.
 
     Raises
     ------
     NoFeasiblePath
-        Some node has no admissible pose at all, or no path is clear in the cell.
+        A node has no admissible pose, or no path is clear in the cell.
     InputError
-        Limits that are not known, or on torque or jerk; nodes unevenly spaced, values out of range,
-        costs of comfort.
+        Limits that are not known, limits on torque or jerk, nodes unevenly spaced, values out of
+        range, or costs of comfort.
     """
     require_rates_alone(robot, "the fastest speed")
     require_even(contour, np.diff(contour.s), "m")
@@ -122,7 +130,7 @@ def fastest_speed(
         enough = scalar(enough, "enough", unit="m/s", above=0.0)
     comfort = asked.comfort
     if comfort is not None and comfort.costs:
-        raise InputError("comfort: what is fastest knows no costs; give margins alone")
+        raise InputError("comfort: the fastest speed takes no costs; give margins only")
     task = task_of(
         contour if contour.time is None else replace(contour, time=None),
         robot,
@@ -145,22 +153,22 @@ def fastest_speed(
 
 
 def require_rates_alone(robot: Robot, what: str) -> None:
-    """Raise InputError where the torque or the jerk of a robot is limited, too."""
+    """Raise InputError if the torque or the jerk of a robot is limited; `what` needs them free."""
     for name, limit in (("torque", robot.torque_limit()), ("jerk", robot.jerk_limit())):
         if limit is not None:
             raise InputError(
-                f"{what}: limits on velocity and acceleration alone are known to it, and the robot "
-                f"has some on {name}; ask it of the robot without them"
+                f"{what}: takes limits on velocity and acceleration only, but the robot has limits "
+                f"on {name}; use the robot without them"
             )
 
 
 def _fastest(
     task: PlanningTask, along: PlanningTask, finder: ClearSearch, enough: float | None
 ) -> tuple[FastestSpeed, list[int]]:
-    """Return the largest speed reached, on the grid or, where that is asked for, off it.
+    """Return the largest speed, on the grid or with `refine` off it, and the nodes where it binds.
 
-    And the nodes where a limit binds, the first that of the speed. `along` is the task along the
-    first course of its external axes.
+    The first node is that of the speed. `along` is the task along the first course of its external
+    axes.
     """
     there = finder.of(along)
     if not (task.settings.refine and task.robot.family.free_rotation):
@@ -204,9 +212,16 @@ def relaxations(
 ) -> Relaxations:
     """Return the least eta_v, eta_a and node interval, each on its own, with which a path exists.
 
-    Arguments as in `plan`; what to ask after a `NoFeasiblePath` whose node has poses.
+    Arguments are as in `plan`. Call it after a `NoFeasiblePath` whose node has poses.
+
+    Raises
+    ------
+    NoFeasiblePath
+        A layer of the graph is empty.
+    InputError
+        Limits that are not known, limits on torque or jerk, or values out of range.
     """
-    require_rates_alone(robot, "what would open the way")
+    require_rates_alone(robot, "relaxations")
     problem = SearchProblem(
         q=graph.q,
         start=graph.start,

@@ -1,4 +1,4 @@
-"""What every planning task begins with: the layered graph, and the time from node to node."""
+"""The first steps of every planning task: the layered graph, and the time between nodes."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ __all__ = [
 ]
 
 UNEVEN = 0.21
-"""Largest relative difference of node distances that still counts as evenly spaced: a fifth, which
-sampling may leave so that corners and feature ends are nodes, and rounding."""
+"""Largest relative difference of node distances that counts as evenly spaced: a fifth, which
+sampling needs to place nodes at corners and feature ends, plus rounding."""
 
 
 def layered_graph(
@@ -51,11 +51,21 @@ def layered_graph(
     progress: Callable[[int], None] | None = None,
     **keywords: Unpack[GraphKeywords],
 ) -> LayeredGraph:
-    """Return the layered graph that `plan` searches; arguments as there.
+    """Return the layered graph that `plan` searches.
 
-    With `nodes` (M,) int it has their layers alone, the very ones of the whole graph; `external`
-    (K, E) or (K, X, E) rad or m has the values of the external axes at every node, one or more of
-    each, else it has a grid of them.
+    Parameters
+    ----------
+    contour, robot, tool, placement, options, progress
+        As in `plan`.
+    nodes : (M,) int, optional
+        Only the layers of these nodes, which equal those of the whole graph; default: all.
+    external : (K, E) or (K, X, E) rad or m, optional
+        Values of the joints that a pose leaves free at every node, in X variants; default: a grid.
+
+    Raises
+    ------
+    InputError
+        Joint limits that are not known, or values out of range.
     """
     asked = with_keywords(options, keywords, GraphKeywords)
     require_windows_fit(contour, robot, asked)
@@ -85,12 +95,12 @@ def layered_graph(
 
 
 def course_of(external: ArrayLike, contour: Contour, robot: Robot) -> Array:
-    """Return values of what is free at every node, (K, E) or (K, X, E), as (K, X, E), checked.
+    """Return checked values of the free joints at every node, (K, E) or (K, X, E), as (K, X, E).
 
     Raises
     ------
     InputError
-        Another number of nodes or axes; a value out of the range of its axis.
+        Another number of nodes or axes, or a value outside the range of its axis.
     """
     free, limits = robot.free, robot.joint_limits()
     x = np.asarray(external, dtype=float)
@@ -117,13 +127,12 @@ def within_margins(
     *,
     periodic: bool = False,
 ) -> LayeredGraph:
-    """Return the graph without the vertices that break a hard margin or the floor, counted.
+    """Return the graph without vertices that break a hard margin, the floor or a window of gamma.
 
-    And without those outside the windows of gamma; s (K,) m are the arc lengths of its nodes.
-
-    So are those of both ends that the tool cannot back off from, where it can from others. With a
-    `periodic` closure the first layer and the last are the same but for rounding, and are thinned
-    alike. A graph that has been thinned for the same is returned as it is.
+    At both ends it also drops vertices from which the tool cannot back off, if it can from others.
+    With a `periodic` closure, the first and the last layer are equal up to rounding and lose the
+    same vertices. A graph that was thinned with the same arguments is returned unchanged. The
+    losses are counted in the graph; s (K,) m are the arc lengths of its nodes.
     """
     comfort, retract = options.comfort, options.retract
     hard, limits = None if comfort is None else comfort.hard, robot.joint_limits()
@@ -147,7 +156,7 @@ def within_margins(
         for end in (first, last):
             at = graph.q[end], graph.posture[end].astype(np.int64)
             room = has_room(options, robot, *at, tool)
-            # Where no sample has any, a gamma between two may: the motion found is audited.
+            # If no sample has room, a gamma between two may: the motion found is audited.
             here[end] = ~room & (room & ~broken[end]).any()
     for here in near.values():
         if periodic and len(here[first]) == len(here[last]):
@@ -157,7 +166,7 @@ def within_margins(
 
 
 def require_windows_fit(contour: Contour, robot: Robot, options: PlanOptions) -> None:
-    """Raise InputError where a window of gamma holds at no node, or nothing is free to be kept."""
+    """Raise InputError if a window of gamma holds at no node, or gamma is not free."""
     windows = options.gamma_windows
     if windows and not robot.family.free_rotation:
         raise InputError("gamma_windows: the robot leaves no rotation free; remove them")
@@ -172,7 +181,7 @@ def require_windows_fit(contour: Contour, robot: Robot, options: PlanOptions) ->
 
 
 def samples_of(graph: LayeredGraph) -> GammaSamples:
-    """Return how the vertices of a graph lie on circles of gamma."""
+    """Return the positions of the vertices of a graph on circles of gamma."""
     return GammaSamples(
         sample=graph.sample.astype(np.int64),
         variant=graph.variant.astype(np.int64),
@@ -184,12 +193,13 @@ def samples_of(graph: LayeredGraph) -> GammaSamples:
 def node_interval(contour: Contour, speed: float | None) -> float:
     """Return the time between neighbouring nodes, s, from the speed (m/s) or the contour's times.
 
-    Where nodes are not quite evenly spaced, the speed is that of the longest step.
+    If nodes are not quite evenly spaced, the speed is that of the longest step.
 
     Raises
     ------
     InputError
-        No speed at all, or two; a speed that is not positive; nodes unevenly spaced.
+        No speed, or a speed besides the contour's own times; a speed that is not positive; nodes
+        unevenly spaced.
     """
     if contour.time is not None:
         if speed is not None:
@@ -200,24 +210,24 @@ def node_interval(contour: Contour, speed: float | None) -> float:
         require_even(contour, np.diff(contour.time), "s")
         return float(contour.time[-1] - contour.time[0]) / (len(contour) - 1)
     if speed is None:
-        raise InputError(f"speed: contour {contour.name!r} carries no times, give a speed in m/s")
+        raise InputError(f"speed: contour {contour.name!r} carries no times; give a speed in m/s")
     speed = scalar(speed, "speed", unit="m/s", above=0.0)
     if (contour.speed_share < 1).any():
         raise InputError(
-            f"speed: contour {contour.name!r} asks for a share of the speed at some nodes; lay it "
-            f"on with contour.resample(dt=..., speed={speed:g}) and give no speed"
+            f"speed: contour {contour.name!r} has nodes with a share of the speed; apply it "
+            f"with contour.resample(dt=..., speed={speed:g}) and give no speed"
         )
     require_even(contour, np.diff(contour.s), "m")
     return longest_step(contour) / speed
 
 
 def longest_step(contour: Contour) -> float:
-    """Return the longest step between neighbouring nodes, m: what a speed takes an interval for."""
+    """Return the longest step between neighbouring nodes, m; at the speed it takes one interval."""
     return float(np.diff(contour.s).max())
 
 
 def require_even(contour: Contour, steps: Array, unit: str) -> None:
-    """Raise InputError unless the steps (K-1,) between the nodes of a contour are all alike."""
+    """Raise InputError unless the steps (K-1,) between the nodes of a contour are nearly equal."""
     low, high = float(steps.min()), float(steps.max())
     if high - low > UNEVEN * high:
         raise InputError(
@@ -228,7 +238,7 @@ def require_even(contour: Contour, steps: Array, unit: str) -> None:
 
 
 def require_no_empty_layer(contour: Contour, graph: LayeredGraph) -> None:
-    """Raise NoFeasiblePath where a node has no admissible pose, with what removed them there."""
+    """Raise NoFeasiblePath if a node has no admissible pose, with the reasons and their counts."""
     empty = np.flatnonzero(np.diff(graph.start) == 0)
     if empty.size:
         k = int(empty[0])
@@ -245,7 +255,7 @@ def require_no_empty_layer(contour: Contour, graph: LayeredGraph) -> None:
 
 
 def require_held(robot: Robot, options: PlanOptions) -> None:
-    """Raise InputError where the way that is asked for does not hold a limit on torque or jerk."""
+    """Raise InputError if the planning method does not keep a torque or jerk limit of the robot."""
     limits, comfort = options.limits(robot), options.comfort
     refined = options.method == "continuous" or (options.method == "exact" and options.refine)
     priced = comfort is not None and comfort.prices_clearance
@@ -260,6 +270,6 @@ def require_held(robot: Robot, options: PlanOptions) -> None:
             raise InputError(f'{what}: a limit needs feed "constant", got "{options.feed}"')
     if limits.jerk is not None and not (refined and robot.family.free_rotation and not priced):
         raise InputError(
-            "jerk: a limit is kept by the refinement alone: it must be on, the robot must leave a "
-            "rotation free, and clearance must cost nothing"
+            "jerk: only the refinement keeps a limit: it must be on, the robot must leave a "
+            "rotation free, and clearance must have no cost"
         )

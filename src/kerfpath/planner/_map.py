@@ -1,4 +1,4 @@
-"""The collision map: which vertices of a layered graph are clear in a cell, and by how much."""
+"""Collision map: the clearance of each vertex of a layered graph in a cell."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ __all__ = ["ClearanceMap", "clearance_map"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ClearanceMap:
-    """How clear each vertex of a layered graph is in a cell.
+    """Clearance of each vertex of a layered graph in a cell.
 
-    Clearance is the least distance of any judged pair of bodies beyond what the pair must keep.
-    Pairs with a near-miss distance of their own, as nozzle and part, work near each other by
+    Clearance is the least distance of any judged pair of bodies beyond its near-miss distance.
+    Pairs with a near-miss distance of their own, such as nozzle and part, work close together by
     design: they close vertices but do not count as clearance.
 
     Parameters
@@ -31,17 +31,17 @@ class ClearanceMap:
     lower, upper : (N,) m
         Bounds on the clearance, at most `resolution` apart where `lower` is below `band`. Above,
         `upper` may be infinite; where a vertex is not clear, `lower` is minus infinity and `upper`
-        0 or less.
+        is 0 or less.
     pair : (N,) int
-        The pair, of `pairs`, that comes too near, or else the nearest known; -1 for none.
+        Index into `pairs` of the pair that is too near, or else the nearest known; -1 for none.
     pairs : tuple of (name, name)
         The judged pairs.
     band, resolution : float m
-        As asked for.
+        The arguments of `clearance_map`.
     poses : int
-        Different poses among the vertices: those of one posture, on whichever turns, are the same.
+        Number of different poses among the vertices; vertices that differ only in turns share one.
     queries : int
-        Distances between two bodies that were computed.
+        Number of distances between two bodies that were computed.
     """
 
     clear: Bools
@@ -65,27 +65,27 @@ def clearance_map(
     resolution: float = 2e-3,
     progress: Callable[[int], None] | None = None,
 ) -> ClearanceMap:
-    """Return the collision map of all vertices, at far fewer distances than there are vertices.
+    """Return the collision map of all vertices, from far fewer distances than vertices.
 
-    `ClearanceMap.clear` is what `Cell.clear` says of each, unless a pair keeps its near-miss
-    distance to the micrometre that distances are computed to.
+    `ClearanceMap.clear` equals `Cell.clear` for each vertex, unless a pair is within a micrometre
+    of its near-miss distance, the precision of distances.
 
     Parameters
     ----------
     graph : LayeredGraph
-        Of a task with the tool and placement that the cell was built with.
+        Graph of a task with the tool and placement that the cell was built with.
     cell : Cell
     band : float m
-        Where there is more clearance than this, it need not be known how much.
+        Clearance above this need not be known more closely.
     resolution : float m
-        How closely clearance within the band is to be known.
+        Precision of clearance within the band.
     progress : callable, optional
         Called with the number of poses done since the last call.
 
     Raises
     ------
     InputError
-        A cell of another robot, a negative band, a resolution that is not positive.
+        A cell of another robot, a negative band, or a resolution that is not positive.
     """
     band = not_negative(band, "band", unit="m")
     resolution = scalar(resolution, "resolution", unit="m", above=0.0)
@@ -111,7 +111,7 @@ def clearance_map(
 
 
 def _poses(graph: LayeredGraph) -> tuple[Ints, Ints]:
-    """Return a vertex of each pose, node after node, and which pose each vertex has."""
+    """Return one vertex of each pose, node after node, and the index of each vertex's pose."""
     layer = np.repeat(np.arange(len(graph.start) - 1), np.diff(graph.start))
     _, samples, postures = graph.reason.shape
     key = (layer * samples + graph.candidate) * postures + graph.posture

@@ -1,4 +1,4 @@
-"""A plan on the grid of gamma: the exact search, slower or off the grid where it has no path."""
+"""Plan on the grid of gamma by the exact search; if it has no path, slower or off the grid."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from kerfpath.search import SearchProblem, find_shortest, velocity_allows
 __all__ = ["plan_on_grid"]
 
 HOPELESS = 4.0
-"""Multiple of the node interval in which no path on the grid keeps the velocities: no motion is as
-quick as asked for, and how quick one can be is not worth minutes."""
+"""If no path on the grid keeps the velocities in this multiple of the node interval, no motion is
+as quick as asked for, and the exact fastest path is not worth minutes."""
 TOO_SLOW, NEARLY = 2.0, 1.15
-"""Multiples of the node interval from which a proof that there is no motion is tried before the
-next one: of the fastest path on the grid, and of quicker motions."""
+"""Multiples of the node interval above which a proof that there is no motion is tried before the
+next search: for the fastest path on the grid, and for quicker motions."""
 
 
 def plan_on_grid(
     task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None], *, refine: bool
 ) -> Plan:
-    """Return the best path on the graph of a task, refined if that is asked for.
+    """Return the plan of the best path on the graph of a task, refined if `refine`.
 
     Raises
     ------
     NoFeasiblePath
-        There is none, slower or off the grid neither where that is asked for; or a node has no
-        pose.
+        A node has no pose, or there is no path, nor one that is slower or off the grid if that is
+        allowed.
     """
     task = task.whole()
     begin("search")
@@ -59,12 +59,12 @@ def _otherwise(
     *,
     refine: bool,
 ) -> Plan:
-    """Return a plan where the graph has none at the speed asked for: slower, or off the grid.
+    """Return a slower plan, or one off the grid, if the graph has none at the speed asked for.
 
     Raises
     ------
     NoFeasiblePath
-        There is none, or it was not asked for.
+        There is none, or neither is allowed.
     """
     asked, found = task.settings, None
     if asked.feed == "dip":
@@ -90,20 +90,20 @@ def _otherwise(
 def _from_quickest(
     task: PlanningTask, finder: ClearSearch, broken: NoFeasiblePath, begin: Callable[[str], None]
 ) -> Plan:
-    """Return the plan that a motion as quick as asked for is refined to.
+    """Return the refinement of a motion that is at least as quick as asked for.
 
-    Unless motions close by are nearly as quick, it is first proved, if it can be, that there is
-    none at all.
+    Unless some motions are nearly as quick, a proof that there is none at all is tried first.
 
     Raises
     ------
     NoFeasiblePath
-        None was found; says of what that is proved, and what the quickest one found would take.
+        No motion was found; the message says what is proved, and with which lower speed or higher
+        limits a motion was found.
     """
     asked = task.settings
-    # The quickest motions know no closure, torque or jerk, and not what clearance costs. On a grid
-    # of external axes they may take minutes to begin: the long steps between its samples leave the
-    # arm nearly every edge, and the exact search for the fastest path keeps each as a state.
+    # The search for quickest motions supports no closure, torque, jerk or cost of clearance. On a
+    # grid of external axes its first motion may take minutes: the long steps between samples leave
+    # the arm nearly every edge, and the exact search for the fastest path keeps each as a state.
     priced = asked.comfort is not None and asked.comfort.prices_clearance
     held = task.problem.limits
     unknown = held.torque is not None or held.jerk is not None
@@ -136,13 +136,13 @@ def _from_quickest(
 def _judged(
     broken: NoFeasiblePath, task: PlanningTask, begin: Callable[[str], None]
 ) -> NoFeasiblePath:
-    """Return what is broken, and whether it is so at every gamma."""
-    begin("search for a proof that there is none")
+    """Return the answer without a path, with whether it is proved at every gamma."""
+    begin("search for a proof that no motion exists")
     return at_any_gamma(broken, task)
 
 
 def _bracket(broken: NoFeasiblePath, task: PlanningTask) -> str:
-    """Say from where on paths reach the end, and which change of posture would join the two."""
+    """Return text on the node from which paths reach the end, and the posture change needed."""
     if broken.back is None:
         return ""
     said = f"; from the back, paths reach the end from node {broken.back} on"

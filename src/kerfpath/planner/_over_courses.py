@@ -1,4 +1,4 @@
-"""Plans with a course to choose: along those that promise most, and the best of them."""
+"""Plans with free courses: planned along the most promising courses; the best is taken."""
 
 from __future__ import annotations
 
@@ -28,29 +28,30 @@ from kerfpath.robots import Robot
 __all__ = ["faster_motions", "graph_over_courses", "plan_over_courses"]
 
 GAMMA_STEP = np.radians(3)
-"""rad: the refinement moves gamma and axes together, so that few samples lead to it."""
+"""rad: step of gamma; few samples are enough, as the refinement moves gamma and axes together."""
 SAME = 1e-3
 """Relative difference of costs up to which two motions count as the same optimum."""
 ALIKE = 1e-3
-"""rad or m: courses that are nowhere farther apart are one."""
+"""rad or m: largest distance of two courses that count as one."""
 ENDS, MOST_NODES = 4, 1600
-"""Ends to which the cheapest courses are looked for, fewer over very many nodes."""
+"""Most ends of the cheapest courses; and the ends times the nodes, which bounds them further."""
 RUNGS = (1.25, 1.06)
-"""Multiples of the speed reached at which courses are looked for that are quicker still."""
+"""Multiples of the speed reached at which quicker courses are looked for."""
 
 
 def plan_over_courses(
     task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]
 ) -> Plan:
-    """Return the best motion found of all joints together, where poses leave some free.
+    """Return the best motion found of all joints together, if poses leave some joints free.
 
-    A tolerance of the tool axis is searched along the course of the best motion at the nominal
-    axis; along all courses where there is none.
+    A tolerance of the tool axis is searched along the course of the best motion with the nominal
+    axis, or along all courses if there is no such motion.
 
     Raises
     ------
     NoFeasiblePath
-        None was found; says where the best of the tries ended. It proves nothing of other courses.
+        No motion was found; the message says where the best try ended. Nothing is proved about
+        other courses.
     """
     return min(_plans(task, finder, begin), key=lambda plan: plan.cost)
 
@@ -68,8 +69,8 @@ def graph_over_courses(
 ) -> LayeredGraph:
     """Return the layered graph along the courses of the plans found.
 
-    Each is the course of a refined plan, that of the best one first; a path may change from one to
-    another where the limits of the axes let it. Arguments as in `kerfpath.plan`.
+    Each is the course of a refined plan, that of the best plan first; a path may change between
+    courses where the limits of the axes allow it. Arguments are as in `kerfpath.plan`.
 
     Raises
     ------
@@ -94,7 +95,7 @@ def graph_over_courses(
 
 
 def _plans(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]) -> list[Plan]:
-    """Return the motions that the courses lead to, one at least.
+    """Return the plans found along the courses, at least one.
 
     Raises
     ------
@@ -109,7 +110,7 @@ def _plans(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]
     nominal = _nominal(task, finder, begin)
     known = None if nominal is None else nominal.course
     cheapest = Style(0.0, 1.0, int(np.clip(MOST_NODES // len(task.contour), 1, ENDS)))
-    # What is cheapest to a rail is not what an elbow swings over best.
+    # The cheapest style is for external axes; it does not suit the elbow of a seven-axis arm.
     styles = (*STYLES[:1], cheapest, *STYLES[1:]) if task.robot.externals else STYLES
     ways = courses(task, styles, finder.clear) if known is None else iter([known])
     tried = _along(ways, task, finder, begin, nominal, least=1 + cheapest.ends)
@@ -128,7 +129,7 @@ def _plans(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]
 def faster_motions(
     task: PlanningTask, finder: ClearSearch, best: QuickMotion
 ) -> Iterator[QuickMotion]:
-    """Yield ever quicker motions than one, along courses that promise most at higher speeds."""
+    """Yield successively quicker motions along the most promising courses at higher speeds."""
     rung = 0
     while rung < len(RUNGS):
         at = replace(task, dt=best.dt / RUNGS[rung])
@@ -144,7 +145,7 @@ def faster_motions(
 
 
 class _Tried(NamedTuple):
-    """What came of some courses: their motions, why some have none, those with neither."""
+    """Results of some courses: plans, failures with their reason, and courses with neither."""
 
     plans: list[Plan]
     failed: list[NoFeasiblePath]
@@ -152,7 +153,7 @@ class _Tried(NamedTuple):
 
     @property
     def best(self) -> Plan | None:
-        """The best of the motions; None where there is none."""
+        """The best of the plans; None if there is none."""
         return min(self.plans, key=lambda plan: plan.cost, default=None)
 
 
@@ -164,9 +165,9 @@ def _along(
     known: Plan | None = None,
     least: int = 1,
 ) -> _Tried:
-    """Return what the arm's motions along some courses come to, with axes and gamma refined.
+    """Return the motions along some courses, with axes and gamma refined.
 
-    At `least` so many motions are made before two that are one optimum are enough.
+    After `least` motions, it stops when a motion has the same optimum as the best one before.
     """
     tried = _Tried([] if known is None else [known], [], [])
     for course in ways:
@@ -184,12 +185,12 @@ def _along(
         tried.plans.append(made)
         same = best is not None and abs(made.cost - best.cost) <= SAME * best.cost
         if same and len(tried.plans) >= least and task.robot.family.given is None:
-            break  # two courses have led to one optimum; those of an elbow have twins, mirrored
+            break  # two courses led to one optimum; not for elbows, whose courses have mirror twins
     return tried
 
 
 def _nominal(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]) -> Plan | None:
-    """Return the best motion at the nominal tool axis; None without a tolerance or a motion."""
+    """Return the best motion with the nominal tool axis; None without a tilt or a motion."""
     if task.settings.tilt is None:
         return None
     rigid = task.with_settings(replace(task.settings, tilt=None))
@@ -204,7 +205,8 @@ def _nominal(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], Non
 def _unproved(task: PlanningTask, broken: NoFeasiblePath) -> NoFeasiblePath:
     names = task.robot.free_names
     said = (
-        f"{broken}; along the courses of {names} that promised most, which proves nothing of others"
+        f"{broken}; only the most promising courses of {names} were tried, which proves nothing "
+        "about others"
     )
     numbers = {getattr(reason, "which", None) for reason in broken.counts}
     for number, axis in enumerate(task.robot.externals, task.robot.family.joints + 1):

@@ -1,4 +1,4 @@
-"""A cut that cannot be made in one go: the fewest interruptions, and a plan for every piece."""
+"""Contours that cannot be cut in one go: the fewest interruptions, and a plan for each piece."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ def plan_in_pieces(
     phase: Callable[[str], None] | None = None,
     **keywords: Unpack[PieceKeywords],
 ) -> tuple[Plan, ...]:
-    """Return the plans of the pieces that the contour is cut in, with the fewest interruptions.
+    """Return the plans of the pieces in which a contour is cut, with the fewest interruptions.
 
-    At an interruption the laser goes off, the robot takes another pose at the same node, and the
-    cut goes on from there. No plan has fewer, and on this graph none with as many costs less, both
-    exactly: where it is interrupted is decided on the grid. Each piece is then planned on its own
-    over continuous gamma, or refined where the method is "exact" and that is asked for, and
-    certified on its own: its bound is on motions along that piece. The moves between the pieces are
-    not planned here and cost nothing.
+    At an interruption the beam goes off, the robot takes another pose at the same node, and the cut
+    goes on from there. On the graph it is proved that no plan has fewer interruptions, and that
+    none with as many costs less; the grid thus decides where the cut is interrupted. Each piece is
+    then planned on its own over continuous gamma (or refined, with the method "exact" and
+    `refine`), and certified on its own: its bound holds for motions along that piece. The moves
+    between pieces are not planned here and cost nothing.
 
     Parameters
     ----------
@@ -65,23 +65,23 @@ def plan_in_pieces(
         not return to its first pose), no rotation limit and no tilt. Comfort: a node in two pieces
         costs in both.
     least_piece : float m, optional
-        Every piece is at least as long, measured along the nodes; the number of interruptions is
-        then the least with which that can be. A cut in one go may be shorter.
+        Least length of every piece, measured along the nodes; the number of interruptions is then
+        the least possible with this length. A cut in one go may be shorter.
 
     Returns
     -------
     plans : tuple of Plan
-        One for each piece, in order; a single one where nothing interrupts the cut. The contour of
-        each is the part of nodes that it cuts, its arc length `s` that of the whole.
+        One for each piece, in order; a single one if the cut needs no interruption. The contour of
+        each has the nodes that it cuts, with the arc length `s` of the whole contour.
 
     Raises
     ------
     NoFeasiblePath
-        No number of interruptions helps: a node without a pose, or an interval between two nodes
-        that no poses can pass; or no pieces of the least length. Or of a piece no motion was found
-        that keeps the jerk limits.
+        No number of interruptions helps: a node has no pose, no poses can pass an interval between
+        two nodes, or no pieces have the least length. Or no motion along a piece was found that
+        keeps the jerk limits.
     InputError
-        As `plan`; another method or closure, a rotation limit, a tilt.
+        As `plan`; another method or closure, a rotation limit, or a tilt.
     """
     asked = with_keywords(options, keywords, PieceKeywords, interruptions="fewest")
     require_nodes_alone(asked, "plan_in_pieces")
@@ -117,7 +117,7 @@ def plan_in_pieces(
 
 
 def _off_grid(part: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
-    """Return the plan of a piece off its grid: the best motion found over continuous gamma."""
+    """Return the plan of a piece moved off its grid: the best motion found there."""
     refined = refine_plan(part, finder, made)
     found = None
     if part.settings.method == "continuous" and not grid_reason(part):

@@ -1,4 +1,4 @@
-"""plan(): from a contour and a robot to a plan, through the layered graph and the search."""
+"""plan(): the best joint motion of a robot along a contour."""
 
 from __future__ import annotations
 
@@ -53,66 +53,68 @@ def plan(
     placement : (4, 4)
         T_base_part, m: part frame in the robot base.
     speed : float m/s
-        Speed along the path; left out where the contour carries its own times.
+        Speed along the path; omitted if the contour carries its own times.
     options : PlanOptions, optional
-        How the plan is asked for; default: `PlanOptions()`. Every option may also be given as a
-        keyword of its own, which goes before:
+        Planning options; default: `PlanOptions()`. Each option may also be given as a keyword,
+        which takes precedence:
 
         gamma_step : float rad
             Step of the free rotation about the beam.
         frames : {"rotation-minimising", "tangent"}
             Task frames that gamma is measured in.
         tilt : Tilt, optional
-            Tolerance of the tool axis, searched too; default: the nominal axis alone.
+            Tolerance of the tool axis, which is then searched too; default: the nominal axis only.
         postures : sequence of int, optional
             The postures that may be used; default all. See `kerfpath.robots.postures_named`.
         method : {"continuous", "exact", "paper", "known"}
             "continuous" (the default): the best motion found over continuous gamma, by a value
-            function between its samples, beams that keep the acceleration limits, and refinement.
-            Where that is not the way, and where it finds nothing, as "exact" with `refine`; the
-            proof says so. The others search the grid, as in `shortest_path`.
+            function between its samples, beam searches that keep the acceleration limits, and
+            refinement. If this is not possible or finds nothing, it plans as "exact" with `refine`,
+            and the proof says so. The others search the grid, as in `shortest_path`.
         objective, metric, weights, eta_v, eta_a, closure, rotation
             As in `shortest_path`; "periodic" closure needs a closed contour.
         feed : {"constant", "dip"}
-            Where the limits do not let the speed be held: "constant" refuses, "dip" holds it
-            wherever they do and slows down elsewhere, in the least time; `Plan.feed` says where.
-            Needs objective "sum", closure "free" and no rotation limit.
+            If the limits do not allow the speed everywhere: "constant" refuses, "dip" keeps it
+            where they do and slows down elsewhere, in the least time; `Plan.feed` says where.
+            "dip" needs objective "sum", closure "free" and no rotation limit.
         refine : bool
-            After a search of the grid, move gamma off it, see `kerfpath.refine`. Where the grid has
+            After a search of the grid, move gamma off it, see `kerfpath.refine`. If the grid has
             no path (it quantises acceleration), one is looked for off it.
         comfort : Comfort, optional
-            Margins that the nodes keep from singularities and limits, and what coming near costs;
-            see `kerfpath.comfort`. Costs are added at every node visited (objective "max":
+            Margins that the nodes keep from singularities and limits, and the costs near them; see
+            `kerfpath.comfort`. Costs are added at every node visited (objective "max":
             maximised); with closure "periodic" the first node is visited twice.
         gamma_windows : sequence of GammaWindow
             Stretches of the contour on which gamma is kept inside an interval; default none. Their
             ends are samples of gamma, too.
         certify : Certify, optional
-            The gap to reach between the plan's cost and what is proved of every other motion, and
+            The gap to reach between the plan's cost and a lower bound on every motion's cost, and
             the time for it; None: nothing is proved beyond the grid. See `Proof.bound`.
     cell : Cell, optional
-        The plan is clear in it, at the nodes and on straight joint motions between them; only what
-        the search wants to use is checked. Methods "continuous" and "exact" only; the latter finds
-        the best of all clear paths.
+        Cell in which the plan is clear, at the nodes and on straight joint motions between them.
+        Only poses and motions that the search would use are checked. Methods "continuous" and
+        "exact" only; the latter finds the best of all clear paths.
     graph : LayeredGraph, optional
-        The layered graph of this very task, kept from `layered_graph`.
+        The layered graph of this task, from `layered_graph`.
     external : (K, E) rad or m, optional
-        Values of the robot's external axes at every node, from which they are refined; of a
-        seven-axis arm those of joint 3 before them. Default: method "continuous" looks for a smooth
-        course, the others take all of a grid in their steps.
+        Values of the robot's external axes at every node, from which they are refined; for a
+        seven-axis arm, those of joint 3 come first. Default: the method "continuous" looks for a
+        smooth course, the others search a grid in the steps of these joints.
     progress : callable, optional
-        Called with the number of nodes whose poses have been solved since the last call. Of very
-        many nodes every few are solved first, and all only where these do not lead to a plan.
+        Called with the number of nodes whose poses have been solved since the last call. With very
+        many nodes some are solved first, and all only if these do not lead to a plan.
     phase : callable, optional
-        Called with what begins once the poses are solved: "search", "refinement", "certificate".
+        Called with each phase that begins once the poses are solved: "search", "refinement",
+        "certificate".
 
     Raises
     ------
     NoFeasiblePath
-        Says the first node where the path breaks, and what each test removed there.
+        There is no path; the message names the first node where it breaks, and counts what each
+        test removed there.
     InputError
-        Limits that are not known, nodes unevenly spaced, values out of range; what is to be
-        guaranteed between the nodes.
+        Limits that are not known, nodes unevenly spaced, values out of range, or `between_nodes`
+        "guaranteed".
     """
     asked = with_keywords(options, keywords, PlanKeywords)
     require_nodes_alone(asked, "plan")
@@ -144,12 +146,12 @@ def plan(
 
 
 def require_nodes_alone(options: PlanOptions, what: str) -> None:
-    """Raise InputError where a guarantee is asked for that no plan by itself can give.
+    """Raise InputError if `between_nodes` is "guaranteed", which a plan by itself cannot be.
 
-    It is one of a program and its controller: `kerfpath.keep_limits` and jobs look at them.
+    The guarantee depends on the program and its controller, see `kerfpath.keep_limits` and jobs.
     """
     if options.between_nodes == "guaranteed":
         raise InputError(
             f'between_nodes: expected "reported" or "kept", got "guaranteed"; {what} holds the '
-            f"limits at the nodes: leave it out, and {KEEPS}; or run a job"
+            f"limits at the nodes only: leave the option out, and {KEEPS}; or run a job"
         )

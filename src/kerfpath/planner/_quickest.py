@@ -1,4 +1,4 @@
-"""The quickest motion: off the grid from its fastest path, and from beams at higher speeds."""
+"""Quickest motion: the fastest path moved off the grid, then beam searches at higher speeds."""
 
 from __future__ import annotations
 
@@ -34,35 +34,35 @@ __all__ = [
 ]
 
 RUNGS = (1.06, 1.0, 1.1)
-"""Multiples of the speed reached at which beams look for a motion that is quicker still. Where no
-motion is as quick, they keep (6) as far as they can, and end in another valley."""
+"""Multiples of the speed reached at which beam searches look for a quicker motion. If no motion is
+as quick, they keep (6) as far as they can, and end in another local optimum."""
 GAIN = 2e-3
-"""Relative gain of speed below which a rung has brought nothing."""
+"""Relative gain of speed below which a rung counts as without gain."""
 WIDE, MOST_STATES = 1600, 5_000_000
-"""States of each layer that are kept in a wide search, and of all layers."""
+"""Most states kept in a wide search, in each layer and in all layers."""
 ALIKE = (1.1, 0.5)
-"""When two of them are alike."""
+"""`Effort.alike` of a wide search."""
 MOST_EDGES = 2e7
-"""Edges up to which the exact search for the fastest path takes no more than some ten seconds."""
+"""Most edges with which the exact search for the fastest path takes at most some ten seconds."""
 SLACK = 1e-6
 """Share of the interval that is left free, so that the motion keeps the limits after rounding."""
 SAME_VALLEY = 0.05
-"""rad of gamma up to which a path leads to the motion that another was refined to."""
+"""rad: paths whose gamma differs by less are refined to the same motion."""
 MOST_SEARCHES = 40
-"""Searches for paths that are clear."""
+"""Most searches for paths that are clear."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class QuickMotion:
-    """A motion with the least interval between its nodes, and what binds it.
+    """A motion with the least interval between its nodes, and the limit that binds it.
 
     Parameters
     ----------
     plan : Plan
-        Its times are those of that interval; as it is, not refined for its cost.
+        The motion with the times of that interval; not refined for its cost.
     at : Binding
     on_grid : float s
-        The least interval of the paths on the grid.
+        The least interval of a path on the grid.
     """
 
     plan: Plan
@@ -77,18 +77,18 @@ class QuickMotion:
         return self.plan.dt
 
     def is_enough(self, dt: float) -> bool:
-        """Return whether it keeps every limit with dt s between its nodes, whatever is rounded."""
+        """Return whether it keeps every limit, rounding included, with `dt` s between its nodes."""
         return self.dt * (1 - SLACK / 2) <= dt
 
 
 def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotion]:
-    """Yield ever quicker motions along the contour of a task, clear and within its margins.
+    """Yield successively quicker motions along the contour of a task, clear and within its margins.
 
-    First the fastest path on the grid; second, if the robot leaves a rotation free, what gamma off
-    the grid makes of it, or the same again; then what beams over continuous gamma at the speed
-    reached and above lead to, whatever they cost, as long as that gains. The speed, closure and
-    costs that the task asks for play no part: two tasks that differ in them alone have the same
-    motions, in the same order.
+    The first is the fastest path on the grid. The second, if the robot leaves a rotation free, is
+    that path with gamma moved off the grid, or the same again. Beam searches over continuous gamma
+    at the speed reached and above give the others, whatever they cost, until the speed no longer
+    grows. The speed, closure and costs of the task do not matter: tasks that differ only in them
+    have the same motions, in the same order.
 
     Raises
     ------
@@ -119,10 +119,11 @@ def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMoti
 
 
 def slow_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotion]:
-    """Yield motions of a task that is asked for much too fast: the quickest if they are soon found.
+    """Yield motions of a task whose speed is much too high: the quickest if these take little time.
 
-    Where the velocities leave very many edges in the time that a path takes: the shortest path by
-    the velocities alone, and what gamma off the grid makes of it. Raises as `quick_motions`.
+    If the velocities leave very many edges in the time that a path takes, they are the shortest
+    path by the velocities alone, and that path with gamma moved off the grid. Raises as
+    `quick_motions`.
     """
     slow = _without_aim(task)
     path = finder.find(find_slow_path, slow.problem)
@@ -143,7 +144,7 @@ def _along(task: PlanningTask, least: LeastInterval) -> QuickMotion:
 
 
 def _without_aim(task: PlanningTask) -> PlanningTask:
-    """Return the task as that of the fastest speed: no costs, no closure, the usual distances."""
+    """Return the task of the fastest speed: no costs, no closure, default distances."""
     velocity, _ = task.robot.speed_limits()
     settings = replace(
         task.settings.without_penalties,
@@ -168,7 +169,7 @@ def _claim() -> Proof:
 
 
 def quicker(task: PlanningTask, finder: ClearSearch, start: Plan, best: QuickMotion) -> QuickMotion:
-    """Return the better of the best motion so far and the one that a start is quickened to."""
+    """Return the better of the best motion so far and a start with its interval minimised."""
     quickened = quicken(start)
     if quickened is None:
         return best
@@ -192,8 +193,8 @@ def clear_paths(
 ) -> tuple[ContinuousSearch, list[ContinuousPath]] | None:
     """Return a search over continuous gamma and its paths, clear at the samples that they use.
 
-    What paths want to use is looked at, and avoided where it collides, until they are clear; None
-    where they do not become so.
+    Samples that paths would use are checked, and avoided if they collide, until all paths are
+    clear; None if this takes too many searches.
     """
     for _ in range(MOST_SEARCHES):
         search = ContinuousSearch(finder.open_problem(task.problem), task.samples)
@@ -204,6 +205,6 @@ def clear_paths(
 
 
 def alike(made: Plan, other: Plan) -> bool:
-    """Return whether two motions are so alike that they are refined to the same one."""
+    """Return whether two motions are so similar that they are refined to the same one."""
     apart = np.abs(wrap(made.gamma - other.gamma)).max()
     return bool(apart < SAME_VALLEY and np.array_equal(made.posture, other.posture))

@@ -1,4 +1,4 @@
-"""Off the grid: the best of what the refinement makes of the paths worth beginning from."""
+"""Plans off the grid: the best refinement of the paths worth starting from."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ __all__ = ["plan_first_order", "plan_off_grid", "plan_slowly", "refine_plan"]
 
 
 def refine_plan(task: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
-    """Return the plan off its grid, at least as good and clear; where that cannot be, as it is.
+    """Return the plan moved off its grid, clear and at least as good; unchanged if that fails.
 
-    A refinement ends in the nearest optimum. The grid quantises the acceleration, so that its best
-    path under (6) may lie far from the best motion, and its best path without (6) close by: both
-    are begun from. A limit on the jerk, which the grid does not know, may make it dearer.
+    A refinement ends in the nearest optimum. The grid quantises the acceleration, so its best
+    path under (6) may be far from the best motion, and its best path without (6) close to it: both
+    are refined. With a jerk limit, which the grid ignores, the result may cost more.
 
     Raises
     ------
     NoFeasiblePath
-        The jerk is limited, and no motion was found that keeps it.
+        The jerk is limited, and no motion was found within the limit.
     """
     first = plan_first_order(task, finder)
     starts = [made]
@@ -44,7 +44,7 @@ def refine_plan(task: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
         if jerk is not None:
             raise NoFeasiblePath(
                 f"contour {task.contour.name!r}: no motion was found within the jerk limits, "
-                f"which the grid does not know; {why}",
+                f"which the search of the grid ignores; {why}",
                 proved=False,
                 node=len(made.q) - 1,
             )
@@ -62,24 +62,24 @@ def refine_plan(task: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
 
 
 def plan_off_grid(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
-    """Look for a motion where the graph has no path: close by the best path without (6).
+    """Look for a motion close to the best path without (6), for graphs without a path.
 
-    Of a path that breaks (6) because gamma can only step, the motion close by may not. What is
-    found is clear in the cell; None where (5) alone closes the way.
+    If a path breaks (6) only because gamma changes in steps, a motion close to it may keep (6). The
+    motion found is clear in the cell; None if (5) alone leaves no path.
     """
     first = plan_first_order(task, finder)
     return None if first is None else _keep_if_clear(refiner.refine(first), finder)
 
 
 def plan_slowly(task: PlanningTask, quick: QuickMotion, finder: ClearSearch) -> Plan | None:
-    """Return the plan at the speed asked for that a motion at least as quick is refined to.
+    """Return the plan at the speed asked for, refined from a motion that is at least as quick.
 
-    A slower motion asks for less of every limit, so that it keeps them, too. None where a limit on
-    the rotation is not kept.
+    Slowed down, that motion uses less of every limit, so it keeps them, too. None if a limit on the
+    rotation is not kept.
     """
     asked = task.settings
     begun = replace(quick.plan, settings=asked, time=task.times)
-    claim = "the quickest motions gave it"
+    claim = "found among the quickest motions"
     cost = path_cost(
         begun.increments, asked.weights, asked.metric, asked.objective, begun.node_cost
     )
@@ -91,14 +91,14 @@ def plan_slowly(task: PlanningTask, quick: QuickMotion, finder: ClearSearch) -> 
 
 
 def _keep_if_clear(found: Refinement, finder: ClearSearch) -> Refinement:
-    """Return the refinement, not done where its plan is not clear."""
+    """Return the refinement, marked as not done if its plan is not clear."""
     if not found.done or finder.is_clear(found.plan):
         return found
-    return replace(found, done=False, statement="what keeps the limits would not be clear")
+    return replace(found, done=False, statement="the motion within the limits would not be clear")
 
 
 def plan_first_order(task: PlanningTask, finder: ClearSearch) -> Plan | None:
-    """Return the best path without (6); None where (5) alone closes the way."""
+    """Return the best path without (6); None if (5) alone leaves no path."""
     limits = task.problem.limits.without_acceleration()
     try:
         path = finder.find(find_shortest, replace(task.problem, limits=limits, method="exact"))

@@ -1,4 +1,4 @@
-"""Out of a valley: gamma changed at random, smoothly, and refined again."""
+"""Leave a local optimum: change gamma smoothly at random and refine again."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from kerfpath.plans import Plan
 __all__ = ["shaken"]
 
 SHAKES = (0.05, 0.1, 0.2, 0.4)
-"""By how much gamma is moved at most, rad, one after the other."""
+"""Largest change of gamma of each shake, rad, in this order."""
 WAVES = 4
-"""Cosines that a shake is the sum of, the slower ones larger."""
+"""Number of cosines in a shake; the slower ones are larger."""
 SEED = 16
-"""The same motion is always shaken alike."""
+"""Fixed, so that the same motion always gets the same shakes."""
 
 
 def shaken(begun: Plan, finder: ClearSearch) -> Plan:
-    """Return the best of a motion and of what it is refined to from random changes of its gamma.
+    """Return the best of a motion and its refinements from random changes of its gamma.
 
-    Where (6) binds at many nodes the valleys are many and narrow; each shake is of the best so far.
-    What is found keeps every limit and is clear.
+    If (6) binds at many nodes, there are many narrow local optima. Each shake starts from the best
+    motion so far. The result keeps every limit and is clear.
     """
     rng, best = np.random.default_rng(SEED), begun
     for size in SHAKES:
@@ -41,7 +41,7 @@ def shaken(begun: Plan, finder: ClearSearch) -> Plan:
 
 
 def _smooth(rng: np.random.Generator, nodes: int, size: float) -> Array:
-    """Return a sum of slow cosines (K,), at most so large."""
+    """Return a random sum of slow cosines (K,) whose largest absolute value is `size`."""
     t, change = np.linspace(0, np.pi, nodes), np.zeros(nodes)
     for m in range(WAVES):
         change += rng.normal() / (1 + m) * np.cos(m * t + rng.uniform(0, 2 * np.pi))

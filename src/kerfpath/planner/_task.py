@@ -1,4 +1,4 @@
-"""A planning task with everything in it cast and checked, and the plans that answer it."""
+"""Planning task: its checked inputs, its layered graph, and the plans of its paths."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ from kerfpath.windows import with_window_ends
 __all__ = ["Layered", "PlanningTask", "task_of"]
 
 MOST_EMPTY = 8
-"""Nodes without a pose that are looked at for a proof that they have none at any gamma."""
+"""Most nodes without a pose for which a proof is tried that they have none at any gamma."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Layered:
-    """A layered graph, and what is asked of a path through it.
+    """A layered graph and the search problem on it.
 
     Parameters
     ----------
@@ -55,13 +55,13 @@ class Layered:
     __repr__ = short_repr
 
     def at_nodes(self, nodes: Ints) -> Layered:
-        """Return the layers of some nodes (M,), ascending, and the same asked of them."""
+        """Return the graph of some nodes (M,), ascending, with the same search problem."""
         kept = np.zeros(len(self.graph.start) - 1, np.bool_)
         kept[nodes] = True
         return self._of(self.graph.at_nodes(nodes), np.repeat(kept, np.diff(self.graph.start)))
 
     def part(self, first: int, last: int) -> Layered:
-        """Return the layers of nodes first to last, and the same asked of them."""
+        """Return the graph of nodes `first` to `last`, with the same search problem."""
         vertices = slice(self.graph.start[first], self.graph.start[last + 1])
         return self._of(self.graph.part(first, last), vertices)
 
@@ -71,9 +71,9 @@ class Layered:
         return Layered(graph=graph, problem=problem)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)  # no slots: what is built is kept
+@dataclass(frozen=True, kw_only=True, eq=False)  # no slots: the cached property needs a dict
 class PlanningTask:
-    """One contour for one robot, its settings and its layered graph, built when it is asked for.
+    """One contour for one robot, with settings and a layered graph that is built when needed.
 
     Parameters
     ----------
@@ -81,16 +81,16 @@ class PlanningTask:
     robot : Robot
     T_flange_tip, T_base_part : (4, 4) m
     settings : PlanOptions
-        With the weights that are used.
+        Options with the weights that are used.
     dt : float s
         Time from node to node at the speed asked for.
     external : (K, E) rad or m, optional
-        Course of what a pose leaves free; None: a grid of its values at every node.
+        Course of the joints that a pose leaves free; None: a grid of their values at every node.
     placed : bool
-        The course, or the graph, was given with the task.
+        Whether the course, or the graph, was given with the task.
     layers : callable
-        Builds the layers of some nodes (M,) of a task, or of all where it is given None: then no
-        layer is empty, or it raises NoFeasiblePath.
+        Builds the layers of some nodes (M,) of a task, or of all nodes if given None; then it
+        raises NoFeasiblePath if a layer is empty.
     """
 
     contour: Contour
@@ -107,7 +107,7 @@ class PlanningTask:
 
     @cached_property
     def built(self) -> Layered:
-        """The layers of all nodes; asking for them raises NoFeasiblePath where one is empty."""
+        """The layers of all nodes, built on first access; NoFeasiblePath if one is empty."""
         return self.layers(self, None)
 
     @property
@@ -117,7 +117,7 @@ class PlanningTask:
 
     @property
     def problem(self) -> SearchProblem:
-        """What is asked of a path through it, at the speed asked for."""
+        """The search problem on the graph, at the speed asked for."""
         return self.built.problem
 
     def whole(self) -> PlanningTask:
@@ -131,11 +131,11 @@ class PlanningTask:
         return self.on(self.built)
 
     def with_problem(self, problem: SearchProblem) -> PlanningTask:
-        """Return the task with something else asked of paths through the same graph."""
+        """Return the task with another search problem on the same graph."""
         return self.on(Layered(graph=self.graph, problem=problem))
 
     def on(self, layered: Layered) -> PlanningTask:
-        """Return the task on a graph that is built."""
+        """Return the task with a graph that is already built."""
 
         def layers(task: PlanningTask, nodes: Ints | None) -> Layered:
             return layered if nodes is None else layered.at_nodes(nodes)
@@ -143,7 +143,7 @@ class PlanningTask:
         return replace(self, dt=layered.problem.dt, layers=layers)
 
     def sampled(self, step: float) -> PlanningTask:
-        """Return the task with gamma sampled in other steps, rad; its graph is not built yet."""
+        """Return the task with another step of gamma, rad; its graph is not built yet."""
         return self.with_settings(replace(self.settings, gamma_step=step))
 
     def with_settings(self, settings: PlanOptions) -> PlanningTask:
@@ -151,11 +151,11 @@ class PlanningTask:
         return replace(self, settings=settings, layers=_layers)
 
     def along(self, external: Array) -> PlanningTask:
-        """Return the task with another course (K, E) of what a pose leaves free, not built."""
+        """Return the task along another course (K, E) rad or m; its graph is not built yet."""
         return replace(self, external=external, placed=True, layers=_layers)
 
     def at_nodes(self, nodes: Ints) -> Layered:
-        """Return the layers of some nodes (M,), ascending; those of all are not built for it."""
+        """Return the layers of some nodes (M,), ascending, without building those of all nodes."""
         return self.built.at_nodes(nodes) if "built" in vars(self) else self.layers(self, nodes)
 
     @property
@@ -197,13 +197,13 @@ class PlanningTask:
 
     @property
     def samples(self) -> GammaSamples:
-        """How the vertices of the graph lie on circles of gamma."""
+        """The positions of the vertices of the graph on circles of gamma."""
         return samples_of(self.graph)
 
     def plan_between(self, path: ContinuousPath, proof: Proof) -> Plan:
-        """Return the plan of a path between the samples, its joints interpolated as the path's.
+        """Return the plan of a path between the samples, with the interpolated joints of the path.
 
-        With a periodic closure gamma is moved along the path so that it ends where it begins.
+        With a periodic closure gamma is shifted along the path so that it ends where it begins.
         """
         graph, s, near = self.graph, self.settings, path.one
         sample = graph.sample[near].astype(np.int64)
@@ -231,7 +231,7 @@ class PlanningTask:
         return replace(made, cost=path_cost(dq, s.weights, s.metric, s.objective, made.node_cost))
 
     def part(self, first: int, last: int, name: str) -> PlanningTask:
-        """Return the task of nodes first to last alone."""
+        """Return the task of nodes `first` to `last`, as a contour with another name."""
         part = self.contour.part(first, last, self.settings.frames)
         x = None if self.external is None else self.external[first : last + 1]
         part = replace(part, name=name)
@@ -250,9 +250,9 @@ def task_of(
     external: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> PlanningTask:
-    """Return the task that the arguments of `kerfpath.plan` pose; errors as there.
+    """Return the task for the arguments of `kerfpath.plan`, with the errors listed there.
 
-    Nodes without a pose are found once its graph is built.
+    Nodes without a pose are found only when its graph is built.
     """
     T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
     dt = node_interval(contour, speed)
@@ -279,7 +279,7 @@ def task_of(
 
 
 def _course_in(graph: LayeredGraph) -> Array | None:
-    """Return the course (K, E) of what is free along which a graph was built, if any."""
+    """Return the course (K, E) along which a graph was built; None if it has a grid or none."""
     x = graph.external
     return x[:, 0] if x is not None and x.shape[1] == 1 else None
 
@@ -290,7 +290,7 @@ def _layers(
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Layered:
-    """Build the layers of some nodes (M,) of a task, or of all, from its graph if that is given."""
+    """Build the layers of some nodes (M,) of a task, or of all, from a graph if one is given."""
     contour, robot, options, tool = task.contour, task.robot, task.settings, task.T_flange_tip
     if graph is None:
         graph = layered_graph(
@@ -305,7 +305,7 @@ def _layers(
         )
     elif nodes is not None:
         graph = graph.at_nodes(nodes)
-    # Of some nodes, the first and the last need not be the ends.
+    # The first and the last of some nodes need not be the ends of the contour.
     whole = nodes is None or (nodes[0] == 0 and nodes[-1] == len(contour) - 1)
     kept = options if whole else replace(options, retract=None)
     periodic = options.closure == "periodic"
@@ -343,7 +343,7 @@ def _at_any_gamma(
     tool: Array,
     options: PlanOptions,
 ) -> NoFeasiblePath:
-    """Return that nodes are without a pose, and whether one of them is so at every gamma."""
+    """Return the answer that nodes have no pose, with whether one has none at every gamma."""
     if (kept := empty.lost_by(Loss.PINNED)) and empty.counts[kept[0]]:
         left = empty.counts[kept[0]]
         empty = empty.with_message(f"{empty}; without the windows of gamma {left} would be left")
@@ -359,7 +359,7 @@ def _at_any_gamma(
 def _require_fitting(
     graph: LayeredGraph, contour: Contour, robot: Robot, options: PlanOptions
 ) -> None:
-    """Raise InputError where a graph is not one of this contour and robot, of tilt and windows."""
+    """Raise InputError if a graph does not fit the contour, the robot, its tilt or its windows."""
     tilt, windows = options.tilt, options.gamma_windows
     if len(graph.start) != len(contour) + 1:
         raise InputError(
@@ -367,9 +367,11 @@ def _require_fitting(
         )
     tilts = np.zeros((1, 2)) if tilt is None else tilt.samples()
     if not np.array_equal(graph.tilt, np.repeat(tilts, len(graph.tilt) // len(tilts), axis=0)):
-        raise InputError("graph: it was built with another tilt than is planned with")
+        raise InputError("graph: it was built with another tilt than the plan has; build it again")
     if len(with_window_ends(graph.gamma, windows)) != len(graph.gamma):
-        raise InputError("graph: it was built without the windows of gamma that are planned with")
+        raise InputError(
+            "graph: it was built without the windows of gamma that the plan has; build it again"
+        )
     if graph.q.shape[1] != robot.joints:
         raise InputError(
             f"graph: its vertices have {graph.q.shape[1]} joints, but the robot has {robot.joints}"
@@ -379,7 +381,7 @@ def _require_fitting(
 def _vertex_cost(
     graph: LayeredGraph, options: PlanOptions, robot: Robot, tool: Array
 ) -> Array | None:
-    """Return what the vertices cost (N,); None where they cost nothing."""
+    """Return the costs of the vertices (N,); None if no cost applies."""
     tilt, comfort, costs = options.tilt, options.comfort, []
     if tilt is not None and tilt.cost:
         costs.append(tilt.price(graph.tilt)[graph.variant])

@@ -1,4 +1,4 @@
-"""Very many nodes: the motion at every few of them says where that at all of them begins."""
+"""Very many nodes: a motion along every few of them is the start for all of them."""
 
 from __future__ import annotations
 
@@ -16,26 +16,27 @@ from kerfpath.plans import Plan, Proof, on_turns
 __all__ = ["ThinTask", "thinned"]
 
 MANY = 800
-"""Intervals from which on a task is thinned, for each that is free at a node.
+"""Number of intervals from which on a task is thinned, divided by the number of free variables at a
+node (gamma and the joints that a pose leaves free).
 
-The closer the nodes, the less an increment may change by (6) against the samples of gamma: paths
-through these grow poor, and what they are refined to takes long and may end in another valley."""
+The closer the nodes, the less an increment may change by (6), compared with the samples of gamma:
+paths through these become poor, and their refinement takes long and may end in another optimum."""
 EVERY = 5, 4, 6, 3, 7
-"""Of how many nodes one is kept: the first that divides the intervals, or else the first."""
+"""One of this many nodes is kept: the first number that divides the intervals, else the first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ThinTask:
-    """A task of every few nodes of another one, at the same speed.
+    """A task with every few nodes of another task, at the same speed.
 
     Parameters
     ----------
     task : PlanningTask
-        It ends before a few nodes of the other one where its intervals do not come out even.
+        The thinned task; it lacks the last few nodes if the intervals do not divide evenly.
     whole : PlanningTask
-        The other one.
+        The other task, with all nodes.
     nodes : (M,) int
-        Which of its nodes.
+        The nodes of `whole` that are kept.
     """
 
     task: PlanningTask
@@ -45,10 +46,10 @@ class ThinTask:
     __repr__ = short_repr
 
     def lifted(self, made: Plan) -> Plan | None:
-        """Return the motion at all nodes, gamma and external axes splines through some of them.
+        """Return the motion at all nodes, with gamma and external axes interpolated by splines.
 
-        It need not keep the limits; beyond the last of some it goes on as it is. None where the
-        posture changes on the way.
+        It need not keep the limits; beyond the last kept node it goes on at the same rate. None if
+        the posture changes on the way.
         """
         task, at = self.whole, np.arange(len(self.whole.contour))
         if np.ptp(made.posture):
@@ -77,10 +78,10 @@ class ThinTask:
 
 
 def thinned(task: PlanningTask) -> ThinTask | None:
-    """Return the task of every few nodes of one with very many; None of one with fewer.
+    """Return a task with very many nodes thinned to every few of them; None if it has fewer.
 
-    None, too, with a tilt, or a grid of external axes; with a periodic closure whose intervals do
-    not come out even; and where one of the few nodes has no pose. The graph of all nodes is not
+    It is also None with a tilt or a grid of external axes, with a periodic closure whose intervals
+    do not divide evenly, and if one of the kept nodes has no pose. The graph of all nodes is not
     built for it.
     """
     last, axes = len(task.contour) - 1, len(task.robot.free)

@@ -1,7 +1,7 @@
-"""How what holds on a grid alone is said: as that and no more, in figures that keep what they say.
+"""Wording of results that hold on a grid only, and rounding that keeps printed figures true.
 
-A search knows the rotations of its grid. That a path is best, fastest or not there is proved for
-those; between them there may be more.
+A search knows the rotations of its grid. A proof that a path is best, fastest or absent holds for
+these rotations; those between them may allow more.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from kerfpath.search import SearchProblem
 __all__ = ["FINER", "ON_THIS_GRID", "at_least", "at_most", "limits_named", "with_windows_said"]
 
 ON_THIS_GRID = "on this grid of the rotation"
-"""Where a statement holds."""
+"""Prefix of statements that hold on a grid."""
 FINER = "a finer gamma_step_deg or the refinement may do more"
-"""What is to be said with it."""
+"""Note that goes with such a statement."""
 
 
 def at_most(value: float, digits: int = 4) -> str:
-    """Return a positive value in so many digits, never more than it is."""
+    """Return a positive value with some digits, rounded down."""
     return _rounded(value, digits, ROUND_FLOOR)
 
 
 def at_least(value: float, digits: int = 4) -> str:
-    """Return a positive value in so many digits, never less than it is."""
+    """Return a positive value with some digits, rounded up."""
     return _rounded(value, digits, ROUND_CEILING)
 
 
 def limits_named(problem: SearchProblem) -> str:
-    """Return the limits that a search of the grid keeps."""
+    """Return the limits that a search of the grid keeps, as text."""
     held = ["velocity", "acceleration"] + ["torque"] * (problem.limits.torque is not None)
     return f"the {', '.join(held[:-1])} and {held[-1]} limits"
 
 
 def with_windows_said(broken: NoFeasiblePath, asked: PlanOptions) -> NoFeasiblePath:
-    """Return a refusal that says that windows of gamma hold, where they may be why."""
+    """Return an answer without a path that mentions windows of gamma if they may be the cause."""
     count = len(asked.gamma_windows)
     if not count or broken.closed is not None or broken.lost_by(Loss.PINNED):
         return broken
@@ -47,6 +47,6 @@ def with_windows_said(broken: NoFeasiblePath, asked: PlanOptions) -> NoFeasibleP
 
 
 def _rounded(value: float, digits: int, how: str) -> str:
-    exact = Decimal(repr(float(value)))  # as it is written: 0.1 is no more than that
+    exact = Decimal(repr(float(value)))  # the shortest decimal form, so that 0.1 is exactly 0.1
     last = Decimal(1).scaleb(exact.adjusted() - digits + 1)
     return f"{exact.quantize(last, rounding=how).normalize():f}"

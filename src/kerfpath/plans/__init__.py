@@ -1,4 +1,4 @@
-"""The plan: what the robot does at every node, by which criteria, and what has been proved."""
+"""Plan: the motion of the robot at every node, its criteria, and what is proved about it."""
 
 import warnings
 
@@ -20,6 +20,8 @@ def __getattr__(name: str) -> object:
     from kerfpath.options import PlanOptions
 
     warnings.warn(
-        "kerfpath.plans.Settings is kerfpath.PlanOptions now", DeprecationWarning, stacklevel=2
+        "kerfpath.plans.Settings is deprecated; use kerfpath.PlanOptions",
+        DeprecationWarning,
+        stacklevel=2,
     )
     return PlanOptions

@@ -1,4 +1,4 @@
-"""The table of a plan: one name for each column, with its unit."""
+"""Names of the joints in the table of a plan."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from kerfpath.robots import Robot
 __all__ = ["joint_columns"]
 
 TAKEN = frozenset({"s", "x", "y", "z", "gamma", "lead", "lean"})
-"""Columns beside the joints whose unit is a length or an angle."""
+"""Names of the other columns in lengths and angles."""
 
 
 def joint_columns(robot: Robot) -> tuple[str, ...]:
-    """Return what tables call the joints, without a unit: q1 and on, external axes by their names.
+    """Return the names of the joints in tables, without a unit: q1, q2, ..., then external axes.
 
-    An axis whose name another column has is called that with "_axis" behind it.
+    "_axis" is appended to the name of an external axis if another column has that name.
     """
     names = [f"q{i + 1}" for i in range(robot.family.joints)]
     for axis in robot.externals:

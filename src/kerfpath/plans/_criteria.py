@@ -1,4 +1,4 @@
-"""What is said of a plan: what is proved, where its speed is reduced, and its criteria."""
+"""Results about a plan: its proof, its feed reduction, and its criteria."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ class Proof:
     Parameters
     ----------
     optimal : bool
-        No path on its graph is better.
+        Whether it is proved that no path on its graph is better.
     statement : str
         The claim in words.
     grid_cost : float or None
-        Where the plan is refined: the cost of the path on the graph that it was refined from, if
-        that keeps all limits.
+        Of a refined plan: the cost of the path on the graph that it was refined from, if that path
+        keeps all limits.
     bound : float or None
         No motion that keeps (5) and (6) at the nodes costs less, at any gamma, posture and turn;
-        None where nothing of the kind is proved.
+        None if no such bound is proved.
     gap : float or None
-        How far the plan may be from the best motion: (cost - bound) / cost.
+        Largest possible distance of the plan from the best motion: (cost - bound) / cost.
     certificate : Certificate or None
-        What proves the bound, see `kerfpath.certificate`.
+        Proof of the bound, see `kerfpath.certificate`.
     """
 
     optimal: bool
@@ -51,7 +51,7 @@ class Proof:
 
     @property
     def bound_claim(self) -> str:
-        """The bound in words, as the statement has it; "" where there is none."""
+        """The bound in words, as in `statement`; "" if there is none."""
         if self.bound is None:
             return ""
         return (
@@ -60,37 +60,37 @@ class Proof:
         )
 
     def without_bound(self) -> Proof:
-        """Return what it says beside its bound: of another motion the bound and its gap do not."""
+        """Return the proof without bound, gap and certificate, which hold for this motion only."""
         rest = [part for part in self.statement.split("; ") if part != self.bound_claim]
         return replace(self, statement="; ".join(rest), bound=None, gap=None, certificate=None)
 
     @property
     def bound_shown(self) -> str:
-        """The bound to two places, never more than it is; "-" where there is none."""
+        """The bound with two decimals, rounded down; "-" if there is none."""
         return "-" if self.bound is None else f"{math.floor(self.bound * 100) / 100:.2f}"
 
     @property
     def gap_shown(self) -> str:
-        """The gap in per cent to two places, never less than it is; "-" where there is none."""
+        """The gap in per cent with two decimals, rounded up; "-" if there is none."""
         return "-" if self.gap is None else f"{max(math.ceil(self.gap * 1e4), 0) / 100:.2f}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Feed:
-    """Where a retimed path keeps the commanded speed, where it is slowest, and what binds there.
+    """Feed reduction of a retimed path: its extent, its slowest interval, and the limit there.
 
     Parameters
     ----------
     full : float
         Share of the path length at the commanded speed.
     slowest : float
-        Speed of the slowest interval as a share of the commanded speed; 1 where none is slowed.
+        Speed of the slowest interval as a share of the commanded speed; 1 if none is slowed.
     node : int
-        The node that the slowest interval starts from; -1 where none is slowed.
+        Node from which the slowest interval starts; -1 if none is slowed.
     joint : int
-        The joint nearest to its limit in that interval or at its ends, 0-based; -1 for none.
+        Joint that is nearest to its limit in that interval or at its ends, 0-based; -1 for none.
     limit : {"velocity", "acceleration"} or None
-        Which limit that is.
+        That limit; None if no interval is slowed.
     """
 
     full: float
@@ -100,33 +100,31 @@ class Feed:
     limit: Literal["velocity", "acceleration"] | None
 
     def __str__(self) -> str:
-        """Say it in one line."""
+        """Return it as one line of text."""
         if self.limit is None:
             return "full speed throughout"
         return (
-            f"full speed on {self.full:.1%} of the length; slowest, {self.slowest:.1%} of it, from "
-            f"node {self.node} on, where the {self.limit} of joint {self.joint + 1} binds"
+            f"full speed on {self.full:.1%} of the length; lowest speed {self.slowest:.1%} of it "
+            f"from node {self.node} on, where the {self.limit} of joint {self.joint + 1} binds"
         )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Criteria:
-    """Smoothness of a plan, joint by joint, each (n,), and what it comes near to.
-
-    In rad and rad/s; for a rail in m and m/s.
+    """Smoothness criteria of a plan, joint by joint, and its least measures of comfort.
 
     Parameters
     ----------
-    displacement : rad
+    displacement : (n,) rad, a rail: m
         Total displacement (7).
-    largest_increment : rad
+    largest_increment : (n,) rad, a rail: m
         Largest increment between nodes (8).
-    range : rad
+    range : (n,) rad, a rail: m
         Coordinate range (9).
-    peak_velocity, peak_acceleration : share of the limit
+    peak_velocity, peak_acceleration : (n,) share of the limit
         Largest finite difference over the joint's limit, before eta.
     nearest : mapping of str to (float, int)
-        The least of each measure of `kerfpath.comfort`, in its unit, and the node it stands at.
+        The least value of each measure of `kerfpath.comfort`, in its unit, and its node.
     """
 
     displacement: Array
@@ -146,7 +144,18 @@ def path_cost(
     objective: ObjectiveKind,
     node_cost: Array | None = None,
 ) -> float:
-    """Return the objective (14) or (15) of joint increments (K-1, n) rad, with the nodes' costs."""
+    """Return the objective (14) or (15), node costs included.
+
+    Parameters
+    ----------
+    dq : (K-1, n) rad
+        Joint increments.
+    weights : (n,) 1/rad
+    metric_name : {"manhattan", "chebychev", "euclid"}
+    objective : {"sum", "max"}
+    node_cost : (K,), optional
+        Cost of each node.
+    """
     total = metric.total_distance if objective == "sum" else metric.maximum_distance
     cost = float(total(np.ascontiguousarray(dq), weights, METRIC_CODES[metric_name]))
     if node_cost is None:

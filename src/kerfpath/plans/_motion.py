@@ -1,4 +1,4 @@
-"""Joints over time with their velocities and accelerations, and as pinocchio counts them."""
+"""Joint motion with velocities and accelerations, also in the coordinates of pinocchio."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ __all__ = ["JointMotion", "in_model", "node_rates"]
 
 
 class JointMotion(NamedTuple):
-    """A motion at its nodes."""
+    """Joints, velocities and accelerations at the nodes of a motion."""
 
     time: Array
     """(K,) s."""
     q: Array
-    """(K, n) rad; m of a linear axis."""
+    """(K, n) rad; a linear axis: m."""
     v: Array
-    """(K, n) rad/s."""
+    """(K, n) rad/s; a linear axis: m/s."""
     a: Array
-    """(K, n) rad/s^2."""
+    """(K, n) rad/s^2; a linear axis: m/s^2."""
 
 
 def node_rates(time: Array, q: Array) -> tuple[Array, Array]:
     """Return velocities and accelerations (K, n), rad/s and rad/s^2, of joints q (K, n) rad.
 
-    Those of the parabola through a node and its two neighbours; the first and the last node have
-    those of the parabola next to them. Of two nodes they are those of a straight line.
+    They are those of the parabola through a node and its two neighbours; the first and the last
+    node use the parabola of the node beside them. With only two nodes they are those of a straight
+    line. `time` (K,) is in seconds.
     """
     step = np.diff(time)[:, None]
     slope = np.diff(q, axis=0) / step
@@ -44,7 +45,7 @@ def node_rates(time: Array, q: Array) -> tuple[Array, Array]:
 
 
 def in_model(motion: JointMotion, names: Sequence[str], model: Any) -> JointMotion:
-    """Return a motion of joints called `names` (n,) as a pinocchio model of them counts.
+    """Return a motion of joints with the given names in the coordinates of a pinocchio model.
 
     Parameters
     ----------
@@ -56,7 +57,7 @@ def in_model(motion: JointMotion, names: Sequence[str], model: Any) -> JointMoti
     Raises
     ------
     InputError
-        No model; a joint that it has not, or another.
+        `model` is no pinocchio model, lacks one of the joints, or has others.
     """
     if not hasattr(model, "existJointName"):
         raise InputError(f"model: expected a pinocchio.Model, got {type(model).__name__}")
@@ -64,14 +65,14 @@ def in_model(motion: JointMotion, names: Sequence[str], model: Any) -> JointMoti
     if missing or model.nv != len(names):
         what = f"no {', '.join(missing)}" if missing else f"{model.nv} degrees of freedom"
         raise InputError(
-            f"model: expected the joints {', '.join(names)} alone, got one with {what}; "
-            "pinocchio.buildModelFromXML(plan.robot.to_urdf()) has them"
+            f"model: expected exactly the joints {', '.join(names)}, got one with {what}; "
+            "use pinocchio.buildModelFromXML(plan.robot.to_urdf())"
         )
     q = np.zeros((len(motion.time), model.nq))
     v, a = np.zeros((2, len(q), model.nv))
     for i, name in enumerate(names):
         joint = model.joints[model.getJointId(name)]
-        # A joint that turns without end is the point of a circle there.
+        # Pinocchio stores a joint that turns without end as a point on the unit circle.
         turns = joint.nq == 2
         value = motion.q[:, i]
         q[:, joint.idx_q] = np.cos(value) if turns else value

@@ -1,4 +1,4 @@
-"""The plan: what the robot does at every node."""
+"""Plan: the motion of the robot at every node."""
 
 from __future__ import annotations
 
@@ -43,30 +43,30 @@ class Plan:
         The nodes, in the part frame.
     robot : Robot
         With the limits that the plan keeps.
-    T_flange_tip, T_base_part : (4, 4)
-        Tool and placement of the part, m.
+    T_flange_tip, T_base_part : (4, 4) m
+        Tool and placement of the part.
     q : (K, n) rad
         Joints at the nodes; external axes are the last columns (a rail: m).
     gamma : (K,) rad
         Free rotation about the tool axis at the nodes.
     tilt : (K, 2) rad, optional
-        Lead and lean of the tool axis at the nodes, see `kerfpath.Tilt`; default none.
+        Lead and lean of the tool axis at the nodes, see `kerfpath.Tilt`; default: zero.
     posture : (K,) int
         Posture mu; see `kerfpath.robots.posture_name`.
     turn : (K, n) int
-        Turns of 2 pi of each joint away from (-pi, pi].
+        Number of turns of 2 pi by which each joint is away from (-pi, pi].
     time : (K,) s
         Time of each node, from 0.
     settings : PlanOptions
-        How it was asked for, with the weights that were used.
+        The options of the plan, with the weights that were used.
     cost : float
-        Objective (14) or (15), with what tilt and comfort cost.
+        Objective (14) or (15), with the costs of tilt and comfort.
     proof : Proof
     feed : Feed or None
-        Where the speed dips; None at constant speed.
+        Feed reduction; None at constant speed.
     counts : mapping of str to int
-        Candidates (node, tilt, gamma, posture) of the layered graph that was searched by what
-        became of them; of very many nodes that may be some.
+        Number of candidates (node, tilt, gamma, posture) of the searched layered graph, by reason.
+        With very many nodes the graph may have only some of them.
     """
 
     contour: Contour
@@ -126,20 +126,20 @@ class Plan:
 
     @property
     def points(self) -> Array:
-        """Tool-tip positions asked for at the nodes, robot base frame, (K, 3) m."""
+        """Required tool-tip positions at the nodes, robot base frame, (K, 3) m."""
         rotation, origin = self.T_base_part[:3, :3], self.T_base_part[:3, 3]
         return freeze(self.contour.points @ rotation.T + origin)
 
     @property
     def axes(self) -> Array:
-        """Tool axes asked for at the nodes, tilt included, robot base frame, (K, 3)."""
+        """Required tool axes at the nodes, tilt included, robot base frame, (K, 3)."""
         if not self.tilt.any():
             return freeze(self.contour.axes @ self.T_base_part[:3, :3].T)
         return freeze(self.frames[:, :3, 2])
 
     @property
     def frames(self) -> Array:
-        """Task frames that gamma counts from, tilt included, robot base frame, (K, 4, 4) m."""
+        """Task frames in which gamma is measured, tilt included, robot base frame, (K, 4, 4) m."""
         H = self.contour.frames(self.settings.frames)
         if self.tilt.any():
             H = tilt_frames(H, self.contour.along, self.tilt)
@@ -149,7 +149,7 @@ class Plan:
     def T_part_tip(self) -> Array:
         """Tip poses in the part frame, (K, 4, 4) m: points of the contour, orientation of FK(q).
 
-        A placement of few printed decimals is not quite a rotation; these are.
+        These are exact rotations, even if the placement, given with few decimals, is not quite one.
         """
         T_base_tip = self.robot.forward(self.q) @ self.T_flange_tip
         T = np.asarray(np.linalg.solve(self.T_base_part, T_base_tip), dtype=np.float64)
@@ -159,9 +159,9 @@ class Plan:
 
     @property
     def node_cost(self) -> Array | None:
-        """What tilt and comfort cost at each node, (K,); None where they cost nothing.
+        """Cost of tilt and comfort at each node, (K,); None if they have no cost.
 
-        Without what clearance costs, which only a cell tells.
+        The cost of clearance is not included, as only a cell knows it.
         """
         tilt, comfort, costs = self.settings.tilt, self.settings.comfort, []
         if tilt is not None and tilt.cost:
@@ -172,22 +172,22 @@ class Plan:
 
     @property
     def increments(self) -> Array:
-        """Joint increments between nodes, (K-1, n) rad; endless joints the short way (13)."""
+        """Joint increments between nodes, (K-1, n) rad; endless joints go the short way (13)."""
         return freeze(metric.increments(self.q, self.robot.endless))
 
     @property
     def external(self) -> Array | None:
-        """Values (K, E) of the external axes, rad or m; None where the robot has none."""
+        """Values (K, E) of the external axes, rad or m; None if the robot has none."""
         return freeze(self.q[:, self.robot.family.joints :]) if self.robot.externals else None
 
     @property
     def course(self) -> Array:
-        """Values (K, E) rad or m of what poses leave free beside gamma, as `Robot.free` has it."""
+        """Values (K, E) rad or m of the joints that poses leave free, see `Robot.free`."""
         return freeze(self.q[:, self.robot.free])
 
     @property
     def unwrapped(self) -> Array:
-        """The joints (K, n) rad with endless joints turned on, not wrapped."""
+        """The joints (K, n) rad, with endless joints not wrapped."""
         return np.vstack([self.q[:1], self.q[:1] + np.cumsum(self.increments, axis=0)])
 
     @property
@@ -206,7 +206,7 @@ class Plan:
 
     @property
     def criteria(self) -> Criteria:
-        """The criteria (7) to (9), the peak shares of the limits, and the nearest comfort."""
+        """The criteria (7) to (9), peak shares of the limits, and least measures of comfort."""
         dq = self.increments
         measured = measures(self.robot, self.q, tool=self.T_flange_tip)
         return Criteria(
@@ -220,13 +220,13 @@ class Plan:
 
     @property
     def columns(self) -> dict[str, Array | Ints | list[str]]:
-        """A table of the nodes: K values of each column by its name, which ends in the unit.
+        """Table of the nodes: K values for each column name, which ends in the unit.
 
-        Columns are named as in trajectory.csv, in SI: contour, node, kind, t_s; s_m, the way along
-        the contour; the joints, q1_rad and on, then external axes by their names (`rail_m`,
-        `table_rad`); x_m, y_m, z_m, axis_x, axis_y, axis_z, as `points` and `axes`; gamma_rad;
-        lead_rad and lean_rad, where a tilt was asked for; posture; speed_m_s, that of the tip on
-        its way to the next node, which the last has not: NaN.
+        Columns are named as in trajectory.csv, in SI: contour, node, kind, t_s; s_m, the arc length
+        along the contour; the joints q1_rad, q2_rad, ..., then external axes by their names
+        (`rail_m`, `table_rad`); x_m, y_m, z_m, axis_x, axis_y, axis_z, as `points` and `axes`;
+        gamma_rad; lead_rad and lean_rad, if a tilt is allowed; posture; speed_m_s, the speed of the
+        tip to the next node (NaN at the last).
         """
         units = zip(joint_columns(self.robot), self.robot.units, strict=True)
         joints = [f"{name}_{unit}" for name, unit in units]
@@ -247,7 +247,7 @@ class Plan:
         }
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the nodes as a DataFrame, a row each, with the columns of `columns`.
+        """Return the nodes as a DataFrame, one row per node, with the columns of `columns`.
 
         Raises
         ------
@@ -264,31 +264,31 @@ class Plan:
         """Time (K,), joints, velocities and accelerations (K, n) at the nodes, SI.
 
         Endless joints are not wrapped. Rates are those of the parabola through a node and its
-        neighbours. At the ends the robot moves: stops there are the program's.
+        neighbours. The robot moves at both ends: stops there belong to the program.
         """
         q = self.unwrapped
         v, a = node_rates(self.time, q)
         return JointMotion(self.time, freeze(q), freeze(v), freeze(a))
 
     def to_pinocchio(self, model: Any) -> JointMotion:
-        """Return `motion` as a pinocchio model counts joints: q (K, nq), v and a (K, nv).
+        """Return `motion` in the coordinates of a pinocchio model: q (K, nq), v and a (K, nv).
 
         Parameters
         ----------
         model : pinocchio.Model
-            Of `Robot.to_urdf`, or another with joints of the same names and no others.
+            Built from `Robot.to_urdf`, or another one with exactly the joints of these names.
 
         Raises
         ------
         InputError
-            Other joints.
+            No pinocchio model, or one with other joints.
         """
         return in_model(self.motion, joint_identifiers(self.robot), model)
 
     def to_ros(self) -> dict[str, object]:
         """Return a program of this plan as the fields of a trajectory_msgs/JointTrajectory.
 
-        As `kerfpath.post.joint_trajectory`, which also takes several plans and settings.
+        `kerfpath.post.joint_trajectory` does the same for several plans and with settings.
 
         Raises
         ------
@@ -298,23 +298,23 @@ class Plan:
         return dict(import_module("kerfpath.post").joint_trajectory([self]))
 
     def plot(self, what: Literal["joints", "limits", "speed"] = "joints") -> Figure:
-        """Return a figure, as reports have it: plotly's, to show, change or save.
+        """Return a figure of the report as a plotly figure, to show, change or save.
 
         Parameters
         ----------
         what : {"joints", "limits", "speed"}
-            Each joint over time with its limits, deg or mm; joint speeds and accelerations over
-            time, % of their limits; the speed along the contour, m/min.
+            "joints": each joint over time with its limits, deg or mm. "limits": joint speeds and
+            accelerations over time, % of their limits. "speed": the speed along the contour, m/min.
 
         Raises
         ------
         InputError
-            The extra `report` is not installed; another word.
+            The extra `report` is not installed, or `what` is unknown.
         """
         return import_module("kerfpath.report").plot(self, what)
 
     def _repr_html_(self) -> str:
-        """Return a small table for notebooks: the joints, their way, and shares of their limits."""
+        """Return a small table for notebooks: displacement, range and limit shares by joint."""
         of, robot = self.criteria, self.robot
         rows = [
             [
@@ -340,9 +340,9 @@ class Plan:
 
 
 def on_turns(robot: Robot, q: Array) -> tuple[Array, Ints]:
-    """Return joints q (K, n) rad as a plan has them, endless ones wrapped, and their turns (K, n).
+    """Return joints q (K, n) rad with endless joints wrapped, and the turns (K, n) of all joints.
 
-    The turns of endless joints, and of what a pose leaves free, are 0.
+    The turns of endless joints, and of joints that a pose leaves free, are 0.
     """
     turning = ~robot.endless
     turning[robot.free] = False
@@ -355,9 +355,18 @@ def _mean_step(time: Array) -> float:
 
 
 def has_room(options: PlanOptions, robot: Robot, q: Array, posture: Ints, tool: Array) -> Bools:
-    """Return of which joints (B, n) rad of an end the tool can back off as the options ask for.
+    """Return whether the tool can back off by `options.retract` from joints at an end, (B,) bool.
 
-    The margin of the joint limits is kept where it has backed off to, too.
+    The margin of the joint limits is also kept where it has backed off to.
+
+    Parameters
+    ----------
+    options : PlanOptions
+    robot : Robot
+    q : (B, n) rad
+    posture : (B,) int
+    tool : (4, 4) m
+        T_flange_tip.
     """
     limits = None if options.comfort is None else options.comfort.limits
     margin = 0.0 if limits is None else limits.margin

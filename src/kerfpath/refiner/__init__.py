@@ -1,4 +1,4 @@
-"""Refinement off the grid: gamma continuous, postures and turns fixed."""
+"""Refinement off the grid: gamma and external axes are continuous, postures and turns fixed."""
 
 from kerfpath.refiner._rates import KeptShares as KeptShares
 from kerfpath.refiner._refine import Binding as Binding

@@ -1,4 +1,4 @@
-"""The joints as functions of what is free at every node, posture and turns fixed."""
+"""Joints as functions of the free variables of every node, with posture and turns fixed."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from kerfpath.robots import Robot, base_in_part
 __all__ = ["JointCurves"]
 
 DERIVATIVE_STEP = 1e-5
-"""rad or m: the central difference is good to 1e-10 of the curvature, rounding to 1e-11."""
+"""rad or m: central differences are exact to 1e-10 of the third derivative, rounding to 1e-11."""
 
 
 class JointCurves:
-    """q_k of every node in one posture: the true kinematics, not a model of it.
+    """Joints q_k of every node in its posture, by the true kinematics.
 
-    What is free at a node are gamma, rad, joint 3 of a seven-axis arm, and the values of the
-    external axes, rad or m, in this order: F = 1 + E numbers.
+    The free variables of a node are gamma, rad, joint 3 of a seven-axis arm, and the external
+    axes, rad or m, in this order: F = 1 + E numbers.
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ class JointCurves:
         self._posture = posture
 
     def at(self, free: Array, near: Array) -> Array:
-        """Return the joints (K, n) at `free` (K, F), each on the turn nearest to `near` (K, n).
+        """Return the joints (K, n) rad at `free` (K, F), each on the turn nearest to `near` (K, n).
 
-        NaN at the nodes that are out of reach.
+        Nodes that are out of reach get NaN.
         """
         x = free[:, 1 + len(self._inner) :]
         H = self._H
@@ -61,7 +61,7 @@ class JointCurves:
         return self._robot.follow(H @ spin @ self._T_tip_flange, near, self._posture)
 
     def slope(self, free: Array, q: Array) -> Array:
-        """Return dq/dfree (K, n, F) where the joints are `q`; NaN at the edge of reach."""
+        """Return dq/dfree (K, n, F) at joints `q` (K, n); NaN at the edge of reach."""
         slopes = []
         for step in DERIVATIVE_STEP * np.eye(free.shape[1]):
             ahead, behind = self.at(free + step, q), self.at(free - step, q)

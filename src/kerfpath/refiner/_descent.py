@@ -1,4 +1,4 @@
-"""Sequential convex programming: solve the linear model, try it on the true kinematics, go on."""
+"""Sequential convex programming: solve a linear model, test the step by the true kinematics."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from kerfpath.search import Metric, ObjectiveKind
 __all__ = ["Descent", "MotionState"]
 
 MOST_PROGRAMS = 60
-"""Of one descent; it ends long before where it converges."""
+"""Most programs of one descent, which converges with far fewer."""
 CORRECTIONS = 3
-"""Times that a step is solved again through the joints it reached, before it is shortened."""
+"""Most corrections of a step, through the joints it reached, before it is shortened."""
 CONVERGED = 1e-4
-"""Relative gain that the model promises below which a descent has converged."""
+"""Relative gain promised by the model below which a descent has converged."""
 SMALLEST_RADIUS = 1e-7
 """rad: no controller resolves a smaller change."""
 NEARBY = (5e-3, 5e-4)
-"""rad: changes of gamma by which a motion that all but keeps the limits is brought inside them."""
+"""rad: largest changes of gamma tried to bring a nearly admissible motion within the limits."""
 WIDER = 4.0
-"""Factor by which a radius grows that promises little because it is small."""
+"""Factor by which a radius grows if it promises little because it is small."""
 AWAY = 1e3
-"""1/rad: being out of a range counts for more than any share of a limit."""
+"""1/rad: price of being out of a range, above any share of a limit."""
 ENOUGH = 0.1
-"""Share of the gain promised that a step must bring to be taken."""
+"""Share of the promised gain that a step must bring to be taken."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MotionState:
-    """A motion by its true kinematics.
+    """A motion by the true kinematics.
 
     Parameters
     ----------
@@ -49,12 +49,13 @@ class MotionState:
     q : (K, n) rad
         Joints, not wrapped.
     cost : float
+        Objective of the motion.
     excess : float
-        Largest share of a limit in time, or of the cap, less one.
+        Largest share of a rate or torque limit, or of the cap, minus one.
     lost : float
-        What all intervals and nodes ask for beyond the limits in time, in shares of them.
+        Sum over intervals and nodes of the excess over rate and torque limits, in shares of them.
     outside : float rad
-        By how much a joint or a coupling is out of its range; negative inside.
+        Largest distance of a joint or a coupling outside its range; negative inside.
     """
 
     free: Array
@@ -68,11 +69,11 @@ class MotionState:
 
     @property
     def admitted(self) -> bool:
-        """Every limit is kept."""
+        """Whether every limit is kept."""
         return self.excess <= 0 and self.outside <= 0
 
     def value(self, target: Target) -> float:
-        """Return what is brought down: the excess, or the cost."""
+        """Return the value that is minimised: the excess, the cost, or the cost with `lost`."""
         away = AWAY * max(self.outside, 0)
         if target == "excess":
             return self.excess + away
@@ -80,7 +81,7 @@ class MotionState:
 
 
 class _Step(NamedTuple):
-    """Where a step leads, if anywhere admissible; what the model promised; and what it took."""
+    """Result of a step: admissible motion or None, promised gain, largest change, programs."""
 
     to: MotionState | None
     promised: float
@@ -90,29 +91,28 @@ class _Step(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Descent:
-    """What is minimised over what is free, and what holds it.
+    """Minimisation over the free variables of a motion: objective and constraints.
 
     Parameters
     ----------
     curves : JointCurves
     rates : RateLimits
     limits : JointLimits
-    rotation : (6,) rad
-        How far a joint may turn away from where it begins.
-    weight : (6,) 1/rad
+    rotation : (n,) rad
+        Largest rotation of a joint away from where it begins.
+    weight : (n,) 1/rad
     metric : str
     objective : {"sum", "max"}
     radius : float rad or m
-        Largest change in the first iteration, and that a descent has to have tried before it counts
-        as converged.
+        Largest change in the first iteration; a descent must have tried it to count as converged.
     first : float rad, optional
-        Largest change in the first iteration where that is less.
+        Largest change in the first iteration, if smaller.
     low, high : (K, F) rad or m
-        Where what is free is kept; infinite where that is anywhere.
+        Bounds on the free variables; infinite for none.
     node_cost : (K,), optional
-        What each node costs, taken as fixed; what it comes to once gamma has moved is found after.
+        Cost of each node, taken as fixed; the cost after gamma has moved is computed at the end.
     cap : float
-        Largest distance that is allowed.
+        Largest distance that is allowed in a step.
     most : int
         Programs after which a descent ends.
     """
@@ -135,7 +135,7 @@ class Descent:
     __repr__ = short_repr
 
     def stand(self, free: Array, near: Array) -> MotionState:
-        """Return where `free` brings the joints; infinite where it is out of reach."""
+        """Return the motion at `free` on the turns near `near`; infinite values if out of reach."""
         q = self.curves.at(free, near)
         if not np.isfinite(q).all():
             return MotionState(
@@ -155,15 +155,16 @@ class Descent:
         )
 
     def cost(self, q: Array) -> float:
-        """Return the objective (14) or (15) of joints (K, 6), not wrapped."""
+        """Return the objective (14) or (15) of joints (K, n) rad, not wrapped."""
         dq = np.diff(q, axis=0)
         return path_cost(dq, self.weight, self.metric, self.objective, self.node_cost)
 
     def admitted(self, at: MotionState) -> tuple[MotionState, int]:
-        """Return the first motion found that keeps every limit, and how many programs it took.
+        """Return the first motion found that keeps every limit, and the number of programs.
 
-        At little cost where that can be: at once; or once little is asked for beyond the limits;
-        else whatever it costs. Where none is found, the one that breaks them least.
+        It looks for one of little cost: from the motion as it is, then from the motion eased to
+        exceed the limits little; else at any cost. If none is found, it returns the motion that
+        breaks the limits least.
         """
         programs = 0
         if at.admitted:
@@ -178,24 +179,24 @@ class Descent:
         return found, programs + more
 
     def _nearer(self, at: MotionState) -> Iterator[MotionState]:
-        """Yield where to bring a motion inside the limits from: as it is, then eased."""
+        """Yield motions to bring inside the limits: the motion as it is, then eased."""
         yield at
         eased = self.eased(at)
         if eased.outside <= 0:
             yield eased
 
     def gentlest(self, at: MotionState) -> MotionState:
-        """Return the motion whose largest share of a limit is least."""
+        """Return the motion with the least largest share of a limit."""
         return self._run(at, "excess")[0]
 
     def eased(self, at: MotionState) -> MotionState:
-        """Return a motion of little cost that asks for little beyond the limits, here and there."""
+        """Return a motion of little cost that exceeds the limits in few places and by little."""
         return self._run(at, "lost")[0]
 
     def best(self, at: MotionState) -> tuple[MotionState, int]:
-        """Return the best motion found from an admissible one, and how many programs it took.
+        """Return the best motion found from an admissible one, and the number of programs.
 
-        For a maximum, of those with the same the one with the least sum.
+        With the objective "max", of motions with the same maximum it takes the least sum.
         """
         found, programs = self._run(at, self.objective)
         if self.objective == "max":
@@ -207,7 +208,7 @@ class Descent:
     def _run(
         self, at: MotionState, target: Target, enough: float = -np.inf
     ) -> tuple[MotionState, int]:
-        """Go down in steps of at most a radius, which grows and shrinks as the model proves."""
+        """Descend in steps within a radius, which grows and shrinks with the model's accuracy."""
         radius, programs, failed = self.first or self.radius, 0, np.inf
         while radius > SMALLEST_RADIUS and programs < self.most:
             step = self._step(at, radius, target)
@@ -229,7 +230,7 @@ class Descent:
         return at, programs
 
     def _step(self, at: MotionState, radius: float, target: Target) -> _Step:
-        """Solve the model, and again laid on where it led, until the true motion is admissible."""
+        """Solve the model and correct it at the joints reached, until the motion is admissible."""
         model, promised, longest = self._model(at, radius), 0.0, radius
         for programs in range(1, 2 + CORRECTIONS):
             may_stop()
@@ -249,7 +250,7 @@ class Descent:
         return _Step(None, promised, longest, programs)
 
     def _within(self, free: Array) -> Array:
-        """Return `free` with the external axes where they are kept, which solvers do but nearly."""
+        """Return `free` with axes clipped to their bounds, which solvers keep only nearly."""
         free[:, 1:] = np.clip(free[:, 1:], self.low[:, 1:], self.high[:, 1:])
         return free
 
@@ -261,7 +262,7 @@ class Descent:
 
     def _model(self, at: MotionState, radius: float) -> LinearModel:
         slope = self.curves.slope(at.free, at.q)
-        # At the edge of reach a node stays where it is.
+        # A node at the edge of reach does not move.
         movable = np.asarray(np.isfinite(slope).all(axis=(1, 2)))
         slope = np.where(movable[:, None, None], slope, 0.0)
         endless = self.limits.endless

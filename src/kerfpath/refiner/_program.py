@@ -1,10 +1,10 @@
-"""The convex program of one step: limits and ranges linear in what is free, costs convex.
+"""The convex program of one step: limits and ranges linear in the free variables, costs convex.
 
-Free at a node are gamma and its external axes, F numbers f_k. With
-q_k(f_k + delta_k) = q_k + J_k delta_k the limits (5), (6) and on jerks and the ranges of the joints
-are linear in delta, and torques, of arms without such axes, are taken to be. The distances of (14)
-and (15) are convex: a linear program for the Manhattan and Chebychev metrics, a second-order cone
-program for the Euclidean one. The unknowns are x = delta / radius, so that all lie in [-1, 1].
+The free variables of a node are gamma and its external axes, F numbers f_k. With
+q_k(f_k + delta_k) = q_k + J_k delta_k, the limits (5), (6) and on jerks and the ranges of the
+joints are linear in delta; the torques of arms without such axes are linearised. The distances of
+(14) and (15) are convex: a linear program for the Manhattan and Chebychev metrics, a second-order
+cone program for the Euclidean one. The unknowns are x = delta / radius, which lie in [-1, 1].
 """
 
 from __future__ import annotations
@@ -24,32 +24,32 @@ from kerfpath.search import Metric
 __all__ = ["MARGIN", "PRICE", "LinearModel", "Target", "solve"]
 
 Target = Literal["sum", "max", "excess", "lost"]
-"""(14); (15); the largest share of the limits (5) and (6), whatever the distances; or (14) and, at
-`PRICE` each, what every interval and every node asks for beyond them."""
+"""Objectives: (14); (15); the largest share of a limit, whatever the distances; or (14) plus, at
+`PRICE` each, the excess of every interval and every node over the limits."""
 
 PRICE = 100.0
-"""Price of once a limit beyond the limits, against distances that rarely come to 1 an interval."""
+"""Price of exceeding a limit by once the limit; distances are rarely above 1 per interval."""
 
 MARGIN = 1e-8
-"""Share of a limit, or rad, that is kept free against rounding."""
+"""Share of a limit, or rad, that is left free for rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinearModel:
-    """The joints as linear functions of the change of what is free, and what they are held to.
+    """Joints as linear functions of the change of the free variables, and their constraints.
 
     Parameters
     ----------
     q, slope : (K, n) rad, (K, n, F)
-        Joints at no change, not wrapped, and their derivatives by what is free.
+        Joints without a change, not wrapped, and their derivatives by the free variables.
     radius : (K, F) rad or m
-        Largest change of it at each node.
+        Largest change of each free variable.
     least, most : (K, F)
-        Share of it that the change is held to, from -1 to 1.
+        Bounds on the change as a share of the radius, from -1 to 1.
     lower, upper : (n,) rad
-        Ranges of the joints; infinite where there is none.
+        Ranges of the joints; infinite for none.
     rotation : (n,) rad
-        How far a joint may turn away from where it begins; infinite where that is not limited.
+        Largest rotation of a joint away from where it begins; infinite for no limit.
     rows, row_lower, row_upper : (m, n), (m,) rad, (m,) rad
         Couplings.
     weight : (n,) 1/rad
@@ -57,7 +57,7 @@ class LinearModel:
     cap : float
         Largest distance that is allowed; infinite: any.
     torque : LinearTorque or None
-        Shares of the torque limits; None where there are none.
+        Shares of the torque limits; None if there are no such limits.
     """
 
     q: Array
@@ -79,11 +79,11 @@ class LinearModel:
     __repr__ = short_repr
 
     def moved(self, delta: Array) -> Array:
-        """Return by how much the joints (K, n) move where `delta` (K, F) does."""
+        """Return the changes (K, n) of the joints for changes `delta` (K, F)."""
         return np.asarray((self.slope @ delta[..., None])[..., 0])
 
     def through(self, delta: Array) -> LinearModel:
-        """Return the model, whose values are those after changes delta (K, F), before them."""
+        """Return the model, made after changes delta (K, F), with its values before them."""
         torque = self.torque
         return replace(
             self,
@@ -93,7 +93,7 @@ class LinearModel:
 
 
 def solve(model: LinearModel, rates: RateLimits, target: Target) -> Array | None:
-    """Return the best change (K, F) by the linear model; None where there is none."""
+    """Return the best change (K, F) by the linear model; None if the program has no solution."""
     free = model.radius.shape
     rows = ConstraintRows(size := model.radius.size)
     dq, D = np.diff(model.q, axis=0), _increments(model)
@@ -135,18 +135,18 @@ def _scaled(factors: Array, matrix: Sparse) -> Sparse:
 
 
 def _less(rows: Sparse, one: Sparse) -> Sparse:
-    """Subtract a single row from each of the rows; it has no fewer unknowns than they."""
+    """Subtract a single row from each of the rows; it has at least as many unknowns as they."""
     return wide(rows, one.shape[1]) - sparse.csr_array(np.ones((rows.shape[0], 1))) @ one
 
 
 def _increments(model: LinearModel) -> Sparse:
-    """Slopes ((K-1) n, K F) of the increments, edge after edge."""
+    """Return the slopes ((K-1) n, K F) of the increments, edge after edge."""
     n, slopes = model.q.shape[1], _slopes(model)
     return slopes[n:] - slopes[:-n]
 
 
 def _slopes(model: LinearModel) -> Sparse:
-    """Slopes (K n, K F) of the joints by the unknowns, node after node."""
+    """Return the slopes (K n, K F) of the joints by the unknowns, node after node."""
     K, n, F = model.slope.shape
     values = (model.slope * model.radius[:, None]).ravel()
     row = np.repeat(np.arange(K * n), F)
@@ -162,9 +162,9 @@ def _limits(
     rates: RateLimits,
     beyond: Sparse | None,
 ) -> None:
-    """Hold (5), (6), torques and jerks, up to a share beyond them where that is unknown.
+    """Add the limits (5), (6), on torques and on jerks, with an excess `beyond` if it is unknown.
 
-    One unknown for all, or one for each interval and then each node, none of these negative.
+    The excess is one unknown for all, or one for each interval and then each node, not negative.
     """
     edges, n = dq.shape
     meetings, (v, a) = rates.meetings, rates.of(dq)
@@ -200,7 +200,7 @@ def _limits(
 
 
 def _torques(model: LinearModel, torque: LinearTorque) -> Sparse:
-    """Slopes (M n, K) of the shares of torque limits, node after node; gamma alone is free."""
+    """Return the slopes (M n, K) of the shares of torque limits by gamma, node after node."""
     values = torque.slope * model.radius[torque.column]
     m, n = torque.share.shape
     row = np.tile(np.arange(m * n), 3)
@@ -209,7 +209,7 @@ def _torques(model: LinearModel, torque: LinearTorque) -> Sparse:
 
 
 def _ranges(rows: ConstraintRows, model: LinearModel) -> None:
-    """Hold the ranges of joints and of couplings."""
+    """Add the ranges of joints, rotation limits and couplings."""
     K, n = model.q.shape
     one = _slopes(model)
     rows.at_most(model.q.ravel(), one, np.tile(model.upper, K))
@@ -226,7 +226,7 @@ def _ranges(rows: ConstraintRows, model: LinearModel) -> None:
 
 
 def _cost(rows: ConstraintRows, dq: Array, D: Sparse, model: LinearModel, minimax: bool) -> Array:
-    """Return the coefficients of what is minimised: the sum of the distances, or the largest."""
+    """Return the coefficients of the objective: the sum of the distances, or the largest."""
     lengths, constant = _lengths(rows, dq, D, model)
     if model.cap < np.inf:
         rows.hold(lengths, model.cap - constant)
@@ -240,13 +240,13 @@ def _cost(rows: ConstraintRows, dq: Array, D: Sparse, model: LinearModel, minima
 def _lengths(
     rows: ConstraintRows, dq: Array, D: Sparse, model: LinearModel
 ) -> tuple[Sparse, Array]:
-    """Return the distances rho from above, as lengths (K-1, any) @ x + constant (K-1,)."""
+    """Return upper bounds on the distances rho, as lengths (K-1, any) @ x + constant (K-1,)."""
     edges, n = dq.shape
     value = (model.weight * dq).ravel()
     slope, edge = _scaled(np.tile(model.weight, edges), D), np.repeat(np.arange(edges), n)
     reach = span_of(slope)
     if model.metric == "manhattan":
-        # Where no step turns a joint round, its absolute value is linear.
+        # Where no step reverses a joint, its absolute value is linear.
         turns = np.flatnonzero(np.abs(value) <= reach)
         sign = np.sign(value)
         sign[turns] = 0.0
@@ -259,7 +259,7 @@ def _lengths(
         return wide(total @ slope, rows.variables) + parts @ part, total @ value
     length = rows.new(edges)
     if model.metric == "chebychev":
-        # A joint that stays below another's least cannot be the largest.
+        # A joint that stays below the least value of another one cannot be the largest.
         least = np.maximum(np.abs(value) - reach, 0).reshape(edges, n).max(axis=1)
         can = np.flatnonzero(np.abs(value) + reach >= least[edge])
         _absolute(rows, value[can], slope[can], length[edge[can]])
@@ -272,6 +272,6 @@ def _lengths(
 
 
 def _absolute(rows: ConstraintRows, value: Array, slope: Sparse, above: Sparse) -> None:
-    """Hold |value + slope x| <= above x."""
+    """Add |value + slope x| <= above x."""
     rows.hold(wide(slope, rows.variables) - above, -value)
     rows.hold(-wide(slope, rows.variables) - above, value)

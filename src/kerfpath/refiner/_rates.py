@@ -1,4 +1,4 @@
-"""What a motion is held to in time, as the audit measures it: finite differences at the nodes."""
+"""Limits on the rates of a motion, as the audit measures them: finite differences at the nodes."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from kerfpath.limits import Limits, jerks_of, meetings, rates_of
 __all__ = ["KeptShares", "LinearTorque", "RateLimits"]
 
 DERIVATIVE_STEP = 1e-4
-"""rad: central differences are good to 1e-8 of the third derivative, rounding to 1e-11."""
+"""rad: central differences are exact to 1e-8 of the third derivative, rounding to 1e-11."""
 
 
 class KeptShares(NamedTuple):
-    """How much of what may be used of the limits a motion is to use, place by place.
+    """Shares of the usable limits that a motion may use, place by place.
 
     velocity : (K-1, n), in each interval; acceleration : (M, n), where two intervals meet.
     """
@@ -45,18 +45,18 @@ class LinearTorque(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RateLimits:
-    """What the motion is held to, in time.
+    """Limits of a motion on velocity, acceleration, torque and jerk.
 
     Parameters
     ----------
     tau : (K-1,) s
         Time of each interval.
     limits : Limits
-        What (5) and (6) hold it to, and limits on torque and jerk where there are any.
+        Limits of (5) and (6), and on torque and jerk if there are any.
     periodic : bool
-        The last node is the first one again, and (6) holds across the seam.
+        Whether the last node is the first one again, and (6) holds across the seam.
     kept : KeptShares, optional
-        Less of the limits here and there; None: all that may be used, everywhere.
+        Lower shares of the limits in some places; None: all that may be used, everywhere.
     """
 
     tau: Array
@@ -68,7 +68,7 @@ class RateLimits:
 
     @property
     def meetings(self) -> tuple[Ints, Ints]:
-        """Intervals that end and that begin at the nodes where (6) is tested, (M,) each."""
+        """Intervals that end, and that begin, at the nodes where (6) is tested, (M,) each."""
         return meetings(len(self.tau), periodic=self.periodic)
 
     def of(self, dq: Array) -> tuple[Array, Array]:
@@ -82,22 +82,22 @@ class RateLimits:
 
     @property
     def velocity(self) -> Array:
-        """What the velocities may be in each interval, (K-1, n) rad/s or its like."""
+        """Largest velocities in each interval, (K-1, n) rad/s (a rail: m/s)."""
         share = np.ones(len(self.tau))[:, None] if self.kept is None else self.kept.velocity
         return np.asarray(share * self.limits.velocity.usable)
 
     @property
     def acceleration(self) -> Array:
-        """What the accelerations may be where intervals meet, (M, n) rad/s^2."""
+        """Largest accelerations where intervals meet, (M, n) rad/s^2 (a rail: m/s^2)."""
         share = (
             np.ones(len(self.meetings[0]))[:, None] if self.kept is None else self.kept.acceleration
         )
         return np.asarray(share * self.limits.acceleration.usable)
 
     def torque_share(self, q: Array) -> Array:
-        """Return the signed shares (M, n) of the torque limits of joints (K, n) rad; (0, n): none.
+        """Return the signed shares (M, n) of the torque limits at joints (K, n) rad; (0, n): none.
 
-        M counts the nodes where intervals meet.
+        M is the number of nodes where intervals meet.
         """
         if self.limits.torque is None:
             return np.empty((0, q.shape[1]))
@@ -106,7 +106,7 @@ class RateLimits:
     def jerk_share(self, dq: Array) -> Array:
         """Return the signed shares (J, n) of the jerk limits of increments (K-1, n); (0, n): none.
 
-        J counts the intervals at both ends of which others meet them.
+        J is the number of intervals with another interval at both ends.
         """
         if self.limits.jerk is None:
             return np.empty((0, dq.shape[1]))
@@ -114,9 +114,9 @@ class RateLimits:
         return np.asarray(jerk / self.limits.jerk.usable)
 
     def linear_torque(self, q: Array, slope: Array) -> LinearTorque | None:
-        """Return how shares of torque limits change with gamma; None where there are none.
+        """Return the shares of torque limits as linear functions of gamma; None without limits.
 
-        slope : (K, n) is that of the joints q (K, n) rad by gamma.
+        slope (K, n) is the derivative of the joints q (K, n) rad by gamma.
         """
         limit = self.limits.torque
         before, after = self.meetings
@@ -125,7 +125,7 @@ class RateLimits:
         v, a = self.of(np.diff(q, axis=0))
         middle, b, c = (v[before] + v[after]) / 2, self.tau[before, None], self.tau[after, None]
         column = np.stack([before, after, after + 1])
-        # How joints, velocities and accelerations at the node move with each of the three nodes.
+        # Change of joints, velocities and accelerations at the node with each of the three nodes.
         moves = (
             (0.0, -1 / (2 * b), 2 / (b * (b + c))),
             (1.0, 1 / (2 * b) - 1 / (2 * c), -2 / (b * c)),
@@ -147,16 +147,16 @@ class RateLimits:
         return LinearTorque(share, column, np.array(slopes))
 
     def excess(self, q: Array) -> float:
-        """Return the largest share of a limit that joints (K, n) rad ask for, less one."""
+        """Return the largest share of a limit that joints (K, n) rad need, minus one."""
         return float(max(share.max(initial=0.0) for share in self._every_share(q))) - 1
 
     def lost(self, q: Array) -> float:
-        """Return what all intervals and nodes ask for beyond the limits, in shares of them."""
+        """Return the sum over intervals and nodes of the excess over limits, in shares of them."""
         shares = [share for share in self._every_share(q) if len(share)]
         return float(sum(np.maximum(share.max(axis=1) - 1, 0).sum() for share in shares))
 
     def _every_share(self, q: Array) -> tuple[Array, Array, Array, Array]:
-        """Return the shares of limits of every kind, not signed, a row for each place."""
+        """Return the absolute shares of all limits, one row for each place."""
         dq = np.diff(q, axis=0)
         torque, jerk = np.abs(self.torque_share(q)), np.abs(self.jerk_share(dq))
         return *self.shares(dq), torque, jerk

@@ -1,4 +1,4 @@
-"""refine(): a plan off the grid, gamma and external axes continuous; tilts and postures kept."""
+"""refine(): move gamma and external axes of a plan off the grid; tilts and postures stay."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ from kerfpath.windows import nearest_inside, room_beside
 __all__ = ["Binding", "Refinement", "ease", "promise", "quicken", "refine"]
 
 MOST_INTERVALS = 10
-"""Times that the interval is shortened; each gets nearer to the least by its square."""
+"""Most times that the interval is shortened; convergence to the least is quadratic."""
 SAME_INTERVAL = 1e-4
-"""Relative change of the interval below which it is the least."""
+"""Relative change of the interval below which it counts as the least."""
 
 FIRST_STEPS = 2
-"""Grid steps that gamma may move by in the first iteration; what is gained sets it from then on."""
+"""Grid steps by which gamma may move in the first iteration; later steps adapt to the gain."""
 REPAIR = 0.2
-"""Share of its cost that a motion is taken to cost more where it breaks a limit by that limit."""
+"""Estimated relative extra cost of a motion for each limit that it exceeds by once the limit."""
 CLOSE = 3e-5
-"""Share of what motions cost at least by which one may cost more and is left as it is: a third of
-the gain below which a descent ends."""
+"""Relative cost above the lower bound up to which a motion is not refined further: a third of the
+gain below which a descent ends."""
 SAME_NODE = 1e-6
 """m: a node of a finer contour counts as one of the plan's up to this distance."""
 
 
 class Binding(NamedTuple):
-    """What is used up: which limit of which joint (0-based) at which node."""
+    """The limit that binds: its kind, its joint (0-based) and its node."""
 
     joint: int
     node: int
@@ -51,20 +51,20 @@ class Binding(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Refinement:
-    """What came of a refinement.
+    """Result of a refinement.
 
     Parameters
     ----------
     plan : Plan
-        The refined plan; the one it began from where `done` is False.
+        The refined plan, or the original plan if `done` is False.
     done : bool
-        The refined plan keeps every limit by the true kinematics.
+        Whether the refined plan keeps every limit by the true kinematics.
     cost_before, cost_after : float
-        Objective of the motion it began from and of the plan.
+        Objective of the original motion and of `plan`.
     programs : int
-        Convex programs solved.
+        Number of convex programs solved.
     statement : str
-        What was done, or what could not be done and why.
+        What was done, or why it could not be done.
     """
 
     plan: Plan
@@ -89,40 +89,46 @@ def refine(
     least: float = 0.0,
     most: int | None = None,
 ) -> Refinement:
-    """Return the plan with gamma moved off its grid: better, or within limits the grid cannot meet.
+    """Move gamma of a plan off its grid, to a lower cost or within limits that the grid breaks.
 
-    Sequential convex programming on the true kinematics: (5), (6), limits on torque and jerk, the
-    ranges of joints and of couplings and a periodic closure are hard constraints of every
-    iteration, and a motion is taken only when, evaluated with the kinematics and the dynamics and
-    not with the linear model, it keeps all of them.
+    Sequential convex programming on the true kinematics. (5), (6), limits on torque and jerk, the
+    ranges of joints and couplings and a periodic closure are hard constraints of every iteration. A
+    motion is accepted only if it keeps all of them by the kinematics and the dynamics themselves,
+    not only by the linear model.
 
     Parameters
     ----------
     plan : Plan
-        It may break (5) or (6), as after a change of eta: the limits are met first, if they can be.
+        It may break (5) or (6), for example after a change of eta; the limits are met first, if
+        possible.
     nodes : Contour, optional
-        The same contour divided more finely, every interval into the same number: the plan then
-        holds (5) and (6) at the shorter time step.
+        The same contour with every interval divided into the same number of parts; the refined plan
+        keeps (5) and (6) at the shorter time step.
     eta_v, eta_a : float, optional
         Share of the velocity and acceleration limits; default: the plan's.
     kept : KeptShares, optional
-        Shares of what eta leaves, in every interval and where two meet; default: all of it.
+        Shares of the usable limits, in every interval and where two meet; default: all.
     first : float rad, optional
         Largest change of gamma in the first iteration, for a motion that is close to the best;
         default: two steps of the plan's grid.
     within : two of (K, 1 + E) rad or m, optional
-        Least and largest gamma of each node, on the turn of the plan's, and of its external axes.
+        Least and largest gamma of each node, on the turn of the plan's gamma, and of its external
+        axes.
     least : float
-        What motions such as this one are known to cost at least: one that comes to hardly more is
-        not refined any further.
+        Known lower bound on the cost of such motions; a motion that costs hardly more is not
+        refined further.
     most : int, optional
-        Convex programs after which a descent ends: soon, and not yet where it leads to. Default:
-        when it has converged.
+        Convex programs after which a descent ends early; default: when it has converged.
+
+    Returns
+    -------
+    Refinement
+        If it fails, `done` is False, `plan` is the original plan, and `statement` says why.
 
     Raises
     ------
     InputError
-        Nodes that do not divide the plan's intervals evenly, values out of range.
+        Nodes that do not divide the plan's intervals evenly, or values out of range.
     """
     settings = replace(
         plan.settings,
@@ -139,7 +145,7 @@ def refine(
         asked = divided
     comfort = plan.settings.comfort
     if comfort is not None and comfort.prices_clearance:
-        return _unrefined(plan, "what clearance costs is known on the grid only")
+        return _unrefined(plan, "the cost of clearance is known on the grid only")
     descent, start = _descent(asked, kept)
     low, high = descent.low.copy(), descent.high.copy()
     if within is not None:
@@ -177,7 +183,7 @@ def refine(
 
 
 def _lowest(descent: Descent, start: MotionState, least: float) -> tuple[MotionState, int]:
-    """Return the best motion found, or the one that breaks the limits least; and its programs."""
+    """Return the best motion found, or the one that breaks the limits least; number of programs."""
     begun, programs = descent.admitted(start)
     if not begun.admitted or begun.cost <= (1 + CLOSE) * least:
         return begun, programs
@@ -186,9 +192,9 @@ def _lowest(descent: Descent, start: MotionState, least: float) -> tuple[MotionS
 
 
 def _room_kept(plan: Plan, found: MotionState) -> bool:
-    """Return whether the tool can still back off at both ends where external axes have moved."""
+    """Return whether the tool can still back off at both ends after external axes have moved."""
     if plan.settings.retract is None or not plan.robot.free.size:
-        return True  # gamma is held where it can
+        return True  # the bounds on gamma ensure it
     ends = [0, -1]
     q, _ = on_turns(plan.robot, found.q)
     room = has_room(plan.settings, plan.robot, q[ends], plan.posture[ends], plan.T_flange_tip)
@@ -196,36 +202,35 @@ def _room_kept(plan: Plan, found: MotionState) -> bool:
 
 
 def _ends_held(descent: Descent, start: MotionState) -> Descent:
-    """Return the descent with the external axes held at both ends where they start from."""
+    """Return the descent with the external axes fixed at both ends to where they start."""
     low, high = descent.low.copy(), descent.high.copy()
     low[[0, -1], 1:] = high[[0, -1], 1:] = start.free[[0, -1], 1:]
     return replace(descent, low=low, high=high)
 
 
 def promise(plan: Plan) -> float:
-    """Return what the refinement of a plan may come to: its cost, and more for limits it breaks.
+    """Return an estimate of the refined cost of a plan: its cost, plus a share for broken limits.
 
-    By the true kinematics; infinite out of reach and out of a range.
+    It is by the true kinematics, and infinite if a node is out of reach or a joint out of range.
     """
     _, start = _descent(plan)
     return start.cost * (1 + REPAIR * start.lost) if start.outside <= 0 else np.inf
 
 
 def ease(plan: Plan) -> Plan:
-    """Return the plan with gamma moved so that little is asked for beyond the limits.
+    """Return the plan with gamma moved so that it exceeds the limits little, at little cost.
 
-    What every interval and every node asks for beyond them has a price; the rest is the cost.
+    The excess of every interval and every node over the limits has a price on top of the cost.
     """
     descent, start = _descent(plan)
     return _plan_with_motion(plan, descent.eased(start))
 
 
 def quicken(plan: Plan) -> tuple[Plan, Binding] | None:
-    """Return the plan with gamma moved so that the interval between its nodes is the least.
+    """Return the plan with gamma moved for the least interval between nodes, and what binds there.
 
-    All intervals change alike; also says where a limit is then used up. The cost is what it comes
-    to. None where a node of the plan is out of the reach of its posture, as one between two samples
-    may be.
+    All intervals change by the same factor; the cost is not minimised. None if a node of the plan
+    is out of reach in its posture, as a node between two samples may be.
     """
     for _ in range(MOST_INTERVALS):
         descent, start = _descent(plan)
@@ -241,7 +246,7 @@ def quicken(plan: Plan) -> tuple[Plan, Binding] | None:
 
 
 def _binding(descent: Descent, fast: Array, sharp: Array) -> tuple[float, Binding]:
-    """Return the share of the interval that would do, and what asks for it."""
+    """Return the share of the interval that would be enough, and the limit that binds there."""
     velocity, acceleration = float(fast.max()), float(np.sqrt(sharp.max(initial=0.0)))
     if velocity >= acceleration:
         edge, joint = np.unravel_index(np.argmax(fast), fast.shape)
@@ -251,7 +256,7 @@ def _binding(descent: Descent, fast: Array, sharp: Array) -> tuple[float, Bindin
 
 
 def _describe(plan: Plan, asked: Plan, start: MotionState, cost: float) -> str:
-    """Say what was done, and what it did to the cost."""
+    """Return text on what was done, with the cost before and after."""
     parts = (len(asked.q) - 1) // (len(plan.q) - 1)
     what = "refined off the grid" if parts == 1 else f"held at {parts} parts of every interval"
     if not start.admitted:
@@ -271,7 +276,7 @@ def _unrefined(plan: Plan, why: str) -> Refinement:
 
 
 def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, MotionState]:
-    """Return the task of refining a plan, and where it stands."""
+    """Return the descent of a plan, and the motion that it starts from."""
     settings, comfort = plan.settings, plan.settings.comfort
     low, high = room_at_ends(plan)
     gamma, windows, q = plan.gamma, settings.gamma_windows, plan.unwrapped
@@ -305,9 +310,9 @@ def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, Motio
 
 
 def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
-    """Return the plan with the motion found, and what that costs at its own nodes.
+    """Return the plan with the motion found and its cost.
 
-    The bound of the plan is not taken over: its gap is that of another motion.
+    The bound of the plan is dropped, as its gap is that of another motion.
     """
     q, turn = on_turns(plan.robot, found.q)
     proof = plan.proof.without_bound()
@@ -317,7 +322,7 @@ def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
 
 
 def _divide_plan(plan: Plan, nodes: Contour) -> Plan | str:
-    """Return the plan on finer nodes, gamma a spline through its own; or why that cannot be."""
+    """Return the plan on finer nodes, with gamma by a spline; or the reason why it cannot be."""
     K, parts = len(plan.contour), (len(nodes) - 1) // (len(plan.contour) - 1)
     if len(nodes) != (K - 1) * parts + 1:
         raise InputError(
@@ -362,7 +367,7 @@ def _divide_plan(plan: Plan, nodes: Contour) -> Plan | str:
 
 
 def _closest(descent: Descent, at: MotionState) -> str:
-    """Say which limit the motion that breaks them least still breaks, and where."""
+    """Return text on the limit that the motion breaking them least still breaks, and where."""
     if at.outside == np.inf:
         return "the motion leaves the reach of its posture between the nodes"
     rates = descent.rates

@@ -1,4 +1,4 @@
-"""Where gamma may be at both ends of a plan, so that the tool can back off there."""
+"""Range of gamma at both ends of a plan in which the tool can back off."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from kerfpath.refiner._curves import JointCurves
 __all__ = ["room_at_ends"]
 
 STEP = np.radians(1.5)
-"""rad: how finely gamma is looked at, from that of the plan on; up to as much of it is given up."""
+"""rad: step in which gamma is tested, from that of the plan on; the range may lose up to this."""
 AWAY = STEP * np.arange(61)
-"""rad: how far, either way; where all of it has room, nothing is held."""
+"""rad: distances tested in either direction; if all of them have room, gamma is not bounded."""
 
 
 def room_at_ends(plan: Plan) -> tuple[Array, Array]:
     """Return the least and the largest gamma (K,) rad with room for the retract of a plan.
 
-    Infinite between the ends, where no retract is asked for, and at an end without room as it is.
+    They are infinite between the ends, without a retract, and at an end that has no room as it is.
     """
     K, n = plan.q.shape
     low, high = np.full(K, -np.inf), np.full(K, np.inf)

@@ -25,7 +25,7 @@ class ConstraintRows:
         self._cones: list[tuple[Sparse, Array, int]] = []
 
     def new(self, count: int) -> Sparse:
-        """Add `count` unknowns, free ones; return them as rows of the identity."""
+        """Add `count` free unknowns; return them as rows of the identity."""
         first, self.variables = self.variables, self.variables + count
         place = np.arange(count), np.arange(first, self.variables)
         return sparse.csr_array((np.ones(count), place), shape=(count, self.variables))
@@ -41,11 +41,11 @@ class ConstraintRows:
             self.hold(slope[kept], (bound - value)[kept])
 
     def cone(self, slope: Sparse, value: Array, size: int) -> None:
-        """Hold, of every `size` rows of slope x + value, the first above the length of the rest."""
+        """Add cones: of each `size` rows of slope x + value, the first is >= the others' norm."""
         self._cones.append((slope, value, size))
 
     def solve(self, cost: Array, equal: Sparse | None) -> Array | None:
-        """Minimise cost x with equal x = 0; None where the solver finds no optimum."""
+        """Minimise cost x subject to equal x = 0; None if the solver finds no optimum."""
         zero = [] if equal is None else [(equal, np.zeros(equal.shape[0]))]
         cones = [(-slope, value) for slope, value, _ in self._cones]
         blocks = [(wide(a, self.variables), b) for a, b in zero + self._flat + cones]
@@ -68,11 +68,11 @@ class ConstraintRows:
 
 
 def span_of(rows: Sparse) -> Array:
-    """Return the most that each of the rows (m,) can be over unknowns in [-1, 1]."""
+    """Return the largest value (m,) of each row over unknowns in [-1, 1]."""
     row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
     return np.bincount(row, np.abs(rows.data), rows.shape[0]).astype(np.float64, copy=False)
 
 
 def wide(rows: Sparse, variables: int) -> Sparse:
-    """Return the rows over more unknowns, the further ones with coefficient zero."""
+    """Return the rows over more unknowns, with zero coefficients for the added ones."""
     return sparse.csr_array((rows.data, rows.indices, rows.indptr), (rows.shape[0], variables))

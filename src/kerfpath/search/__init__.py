@@ -1,4 +1,4 @@
-"""The best path through a layered graph: each search takes a `SearchProblem`."""
+"""Searches for the best path through a layered graph; each takes a `SearchProblem`."""
 
 from kerfpath.search._clear import CheckedEdges as CheckedEdges
 from kerfpath.search._clear import FoundPath as FoundPath

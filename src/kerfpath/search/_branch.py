@@ -1,9 +1,9 @@
-"""Branch and bound over where a path begins, for what is measured from there.
+"""Branch and bound over the start of a path, for constraints that depend on the start.
 
-A closed path returns to the vertex it left, and an endless joint may have turned only so far from
-where it began. A relaxation lets the path begin at any vertex of a set, return to any other of it,
-and turn as far as the least strict of them allows. Where the cheapest relaxation's own path keeps
-what is asked, it is the answer; else the set is parted so that this path falls away.
+A closed path returns to the vertex it left, and the rotation of an endless joint may be limited
+from its start. A relaxation lets the path begin at any vertex of a set, return to any other of it,
+and turn as far as the least strict of them allows. If the path of the cheapest relaxation keeps the
+constraints, it is the answer; else the set is split so that this path is excluded.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["best_closed_path", "best_near_start"]
 
 
 def best_closed_path(layers: SortedLayers, aim: Aim) -> BestPath | NoPathProof:
-    """Return the best path that returns to the vertex it left, with (6) and torques kept there."""
+    """Return the best path that returns to the vertex it left, with (6) and torques at the seam."""
     if len(layers.start) == 2:
         return best_path(layers, aim)
     free = np.full(len(layers.endless), np.inf)
@@ -35,7 +35,7 @@ def best_closed_path(layers: SortedLayers, aim: Aim) -> BestPath | NoPathProof:
 def best_near_start(
     layers: SortedLayers, aim: Aim, rotation: Array, *, closed: bool
 ) -> BestPath | None:
-    """Return the best path that keeps its distance (n,) rad from its start, K >= 2; None if none.
+    """Return the best path within `rotation` (n,) rad of its start, K >= 2; None if there is none.
 
     If `closed`, it returns to the vertex it left, and (6) holds across the seam.
     """
@@ -49,7 +49,7 @@ def best_near_start(
         for starts, firsts in parts:
             found = within.relaxed(starts, firsts, floor)
             if found is not None:
-                # Maxima that are the same but for rounding tie, and sums say which is first.
+                # Maxima that differ only by rounding tie; their sums decide.
                 cost = float(f"{found.cost:.12g}") if aim.minimax else found.cost
                 entry = (cost, found.total, next(count), found, starts, firsts)
                 heapq.heappush(queue, entry)
@@ -64,9 +64,9 @@ def best_near_start(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Starts:
-    """What is asked of a path from its start, and the relaxations of it.
+    """The constraints of a path from its start, and their relaxations.
 
-    A relaxation is given by vertices to begin at, and vertices to go to from there.
+    A relaxation is a set of start vertices and a set of vertices of the second layer.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class _Starts:
     rotation : (n,) rad
         Largest distance of a joint from where the path begins.
     twin : (m,) int or None
-        The vertex of the first layer that each vertex of the last one repeats, -1 where that is
+        The vertex of the first layer that each vertex of the last one repeats, -1 if that vertex is
         closed; None: the path need not return.
     """
 
@@ -85,7 +85,7 @@ class _Starts:
     twin: Ints | None
 
     def relaxed(self, starts: Ints, firsts: Ints, floor: float) -> BestPath | None:
-        """Return the best path of a relaxation; one start and one first edge leave nothing open."""
+        """Return the best path of a relaxation, which is exact for one start and one first edge."""
         start = self.layers.start
         allowed = self.near(starts)
         allowed[: start[1]] = False
@@ -99,7 +99,7 @@ class _Starts:
         return best_allowed(self.layers, self.aim, allowed, seam, floor)
 
     def near(self, starts: Ints) -> Bools:
-        """Return which vertices some path that begins at one of `starts` may turn to."""
+        """Return which vertices are within the rotation limits of at least one of `starts`."""
         allowed = np.ones(len(self.layers.low), np.bool_)
         for i in np.flatnonzero(np.isfinite(self.rotation)):
             q, reach = self.layers.q[i], self.rotation[i] + LIMIT_TOLERANCE
@@ -107,7 +107,7 @@ class _Starts:
         return allowed
 
     def parted(self, starts: Ints, firsts: Ints, path: Ints) -> list[tuple[Ints, Ints]]:
-        """Part a relaxation so that its path falls away; nothing if the path is as asked."""
+        """Split a relaxation so that its path is excluded; empty if the path keeps everything."""
         left = path[0]
         if self.twin is not None:
             returned = self.twin[path[-1] - self.layers.start[-2]]
@@ -123,9 +123,9 @@ class _Starts:
         return [(starts, firsts[firsts == path[1]]), (starts, firsts[firsts != path[1]])]
 
     def split_by_rotation(self, starts: Ints, path: Ints) -> tuple[Ints, Ints]:
-        """Part the vertices by the joint that turns too far, the start of the path from the far.
+        """Split the starts by the joint that turns too far, away from the start of the path.
 
-        In the half of the start no path goes as far as this one, or the half is smaller.
+        In the half with that start no path turns as far as this one, or the half is smaller.
         """
         limited = np.flatnonzero(np.isfinite(self.rotation))
         q = self.layers.q[limited][:, path]
@@ -135,7 +135,7 @@ class _Starts:
         sign = 1.0 if ahead[i] > behind[i] else -1.0
         x, own = sign * self.layers.q[limited[i]][starts], sign * q[i, 0]
         middle = (x.min() + x.max()) / 2
-        # The path keeps the limit of a start at `far` or beyond.
+        # From a start at `far` or beyond, the path would keep the limit.
         far = own + max(ahead[i], behind[i])
         nearer = x < far if middle >= far else x <= max(own, middle)
         if nearer.all():
@@ -164,7 +164,7 @@ def _passes_seam(layers: SortedLayers, aim: Aim, path: Ints) -> bool:
 
 
 def _split(layers: SortedLayers, starts: Ints, a: int, b: int) -> tuple[Ints, Ints]:
-    """Part the vertices by which of a and b they are nearer to; these come to different parts."""
+    """Split the vertices by whether a or b is nearer; a and b come to different parts."""
     nearer = _gap(layers, starts, a) < _gap(layers, starts, b)
     nearer |= starts == a
     nearer &= starts != b
@@ -172,6 +172,6 @@ def _split(layers: SortedLayers, starts: Ints, a: int, b: int) -> tuple[Ints, In
 
 
 def _gap(layers: SortedLayers, vertices: Ints, v: int) -> Array:
-    """Return the sum of joint differences from vertex v to others of its layer, rad."""
+    """Return the sums of absolute joint differences from vertex v to others of its layer, rad."""
     gap = increments_between(layers.q[:, [v]].T, layers.q[:, vertices].T, layers.endless)
     return np.asarray(np.abs(gap).sum(axis=1))

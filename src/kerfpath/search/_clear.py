@@ -1,9 +1,9 @@
-"""The best path that is clear, looking only at what the search wants to use.
+"""The best clear path, checking only the vertices and edges that the search would use.
 
-Whatever has not been looked at counts as clear and free of charge, so the best path of a search is
-a lower bound; where all it uses has been looked at, it is the best of all. What is found closed is
-taken out of the graph and the search runs again: the optimum of checking everything, at a few
-checks.
+Vertices and edges that have not been checked count as clear and free of cost, so the best path of a
+search is a lower bound; once everything on it has been checked, it is the best of all. Vertices and
+edges found closed are removed and the search runs again. The result is the same as if everything
+were checked, with few checks.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ FoundPath = LayeredPath | SlowedPath | InterruptedPath | LeastInterval
 _P = TypeVar("_P", bound=FoundPath)
 
 LIKELY, OPEN, CLOSED = 1, 2, 3
-"""What is known of an edge: not seen to be closed, passable, or closed."""
+"""Knowledge about an edge: not seen to be closed (by the quick test), passable, or closed."""
 
 FIRST_ASKED = 8
-"""Vertices of a layer that are asked about at once to find an open one, to begin with."""
+"""Size of the first batch of vertices of a layer that is checked to find an open one."""
 WIDEST = 16
-"""Rings around a closed edge that are looked at, at most."""
+"""Most rings around a closed edge that are checked."""
 
 
 class CheckedEdges:
-    """What has been found out about a graph, for one search after another.
+    """Vertices and edges of a graph that have been checked, shared by successive searches.
 
     Parameters
     ----------
@@ -51,21 +51,27 @@ class CheckedEdges:
     start : (K+1,) int
         As in `shortest_path`.
     price : callable
-        Given vertices (B,) int, rows of q: what each costs on top of its `vertex_cost`, (B,), not
-        negative; infinite where it is closed. It must always answer the same.
+        Takes vertices (B,) int, rows of q, and returns the cost of each on top of its
+        `vertex_cost`, (B,), not negative; infinite if it is closed. The answers must not change.
     passable : callable
-        Given vertices (B,) and vertices (B,) of the next layer: which edges may be used, (B,) bool.
+        Takes vertices (B,) and vertices (B,) of the next layer, and returns which edges may be
+        used, (B,) bool.
     blocked : callable, optional
-        Given the same: of which edges it is seen at little cost that they may not.
+        Takes the same, and returns for which edges a quick test shows that they may not be used.
     around : (N, 2) int, optional
-        Neighbours of each vertex that are likely to be closed with it, -1 for none: they are looked
-        at, too, outwards until one is open. Around a closed edge, those between neighbours of its
-        ends are asked whether they are `blocked`. It saves searches and changes nothing else.
+        Neighbours of each vertex that are likely to be closed with it, -1 for none. They are
+        checked, too, outwards until one is open. Around a closed edge, the edges between neighbours
+        of its ends are tested with `blocked`. This saves searches and changes nothing else.
 
     Attributes
     ----------
     searches : int
-        How often a search ran.
+        Number of searches so far.
+
+    Raises
+    ------
+    InputError
+        `start` or `around` does not fit the vertices.
     """
 
     def __init__(
@@ -91,22 +97,22 @@ class CheckedEdges:
 
     @property
     def vertices_checked(self) -> int:
-        """How many vertices were asked about, each once."""
+        """Number of vertices that were checked."""
         return int(self._asked.sum())
 
     @property
     def vertices_closed(self) -> int:
-        """How many vertices were found closed."""
+        """Number of vertices found closed."""
         return int(np.isinf(self.cost).sum())
 
     @property
     def edges_checked(self) -> int:
-        """How many edges are known to be passable or closed."""
+        """Number of edges known to be passable or closed."""
         return int((self._state >= OPEN).sum())
 
     @property
     def edges_closed(self) -> int:
-        """How many edges were found closed."""
+        """Number of edges found closed."""
         return int((self._state == CLOSED).sum())
 
     @property
@@ -115,14 +121,15 @@ class CheckedEdges:
         return np.stack(np.divmod(self._edges[self._state == CLOSED], len(self.q)), axis=1)
 
     def learn(self, runs: list[Ints], near: Passable) -> bool:
-        """Ask for what is not known of a path; False where all of it is clear and free.
+        """Check the unchecked parts of a path; return False if all of it is clear and free of cost.
 
         Parameters
         ----------
         runs : list of (m,) int
-            Vertices of successive layers.
+            Vertices of successive layers, one array for each piece of the path.
         near : callable
-            Given vertices (B,) and (B,) of the next layer, which edges a search might use.
+            Takes vertices (B,) and (B,) of the next layer, and returns which edges a search might
+            use.
         """
         self.searches += 1
         if self._look_at_vertices(np.concatenate(runs)):
@@ -131,15 +138,15 @@ class CheckedEdges:
         return self._look_at_edges(edges, near)
 
     def learn_vertices(self, vertices: Ints) -> bool:
-        """Ask for what is not known of vertices, and about; True where one of them is closed."""
+        """Check vertices, and neighbours of closed ones; return True if one of them is closed."""
         self.searches += 1
         self._look_at_vertices(vertices)
         return bool(np.isinf(self.cost[vertices]).any())
 
     def open_run(self, vertices: Ints, side: int, most: int) -> Ints:
-        """Return how many neighbours of vertices (B,) on a side are open in a row, `most` at most.
+        """Return the number of successive open neighbours of vertices (B,) on a side, up to `most`.
 
-        side: column of `around`; what is not known of them is asked for.
+        `side` is the column of `around`; unchecked neighbours are checked.
         """
         assert self._around is not None
         run, front = np.zeros(len(vertices), np.int64), vertices
@@ -152,7 +159,7 @@ class CheckedEdges:
         return run
 
     def _look_at_vertices(self, vertices: Ints) -> bool:
-        """Ask for what is not known of a path's vertices; True where one costs something."""
+        """Check the unchecked vertices of a path; return True if one of them has a cost."""
         dearer = self._ask(vertices)
         closed = dearer[np.isinf(self.cost[dearer])]
         if self._around is not None:
@@ -168,7 +175,7 @@ class CheckedEdges:
         return bool(dearer.size)
 
     def _ask(self, vertices: Ints) -> Ints:
-        """Learn the price of vertices; returns those now known to cost something."""
+        """Ask for the price of unchecked vertices; return those of them that have a cost."""
         may_stop()
         new = np.unique(vertices[~self._asked[vertices]])
         if not new.size:
@@ -183,9 +190,10 @@ class CheckedEdges:
         return new[price > 0]
 
     def _look_at_edges(self, edges: Ints, near: Passable) -> bool:
-        """Ask for what is not known of a path's edges; True where one is closed.
+        """Check the unchecked edges of a path; return True if one is closed.
 
-        Around closed ones it looks the wider, the more often edges of that layer were closed.
+        The more often edges of a layer were closed, the wider the edges around a closed one are
+        checked.
         """
         closed = edges[self._closed(edges, self._passable, OPEN)]
         self._hits[np.unique(self._layer[closed[:, 0]])] += 1
@@ -206,7 +214,7 @@ class CheckedEdges:
         return bool(closed.size)
 
     def _beside(self, vertices: Ints, steps: int) -> Ints:
-        """Return the vertices (B, 2 steps + 1) up to so many neighbours away, -1 beyond the end."""
+        """Return the vertices (B, 2 steps + 1) up to `steps` neighbours away, -1 beyond the end."""
         assert self._around is not None
         out = np.full((len(vertices), 2 * steps + 1), -1)
         out[:, steps] = vertices
@@ -221,7 +229,7 @@ class CheckedEdges:
         return np.asarray(~np.asarray(self._blocked(p, j), dtype=np.bool_))
 
     def _closed(self, edges: Ints, ask: Passable, verdict: int) -> Bools:
-        """Return which edges (B, 2) are closed, `ask` giving the others at least the verdict."""
+        """Return which edges (B, 2) are closed; edges that `ask` passes get at least `verdict`."""
         key = edges[:, 0] * len(self.q) + edges[:, 1]
         new = np.setdiff1d(key, self._edges[self._state >= verdict])
         if new.size:
@@ -234,9 +242,9 @@ class CheckedEdges:
         return np.asarray(self._state[np.searchsorted(self._edges, key)] == CLOSED)
 
     def closed_layers(self, most: int) -> tuple[list[int], int]:
-        """Return the layers that hold no open vertex, and how many layers that is settled of.
+        """Return the layers without an open vertex, and the number of layers that were decided.
 
-        Layer by layer from the first, until `most` vertices have been asked about.
+        Layers are checked from the first on, until `most` vertices have been checked.
         """
         closed: list[int] = []
         for k in range(len(self.start) - 1):
@@ -258,7 +266,7 @@ class CheckedEdges:
         return closed, len(self.start) - 1
 
     def explain(self, broken: NoFeasiblePath) -> NoFeasiblePath:
-        """Return a break with what collision has to do with it."""
+        """Return an answer without a path, with the collisions that contribute to it."""
         counts = dict(broken.counts)
         counts.pop(Reason(Loss.CLOSED), None)
         there, closed = broken.node + 1, np.isinf(self.cost)
@@ -273,7 +281,7 @@ class CheckedEdges:
             return broken
         counts |= {name: number for name, number in ways.items() if number}
         reasons = ", ".join(f"{name}: {number}" for name, number in counts.items())
-        message = f"no admissible way to node {there} that is clear; forbidden by {reasons}"
+        message = f"no admissible edge to node {there} is clear; forbidden by {reasons}"
         if elsewhere in ways:
             message = f"{broken}, {elsewhere}: {ways[elsewhere]}"
         return broken.with_message(message, counts)
@@ -282,7 +290,7 @@ class CheckedEdges:
 def find_clear(
     search: Callable[[SearchProblem], _P], problem: SearchProblem, known: CheckedEdges
 ) -> _P:
-    """Return the best path of a search through open vertices and passable edges alone, exactly.
+    """Return the exact best path of a search through open vertices and passable edges.
 
     Parameters
     ----------
@@ -290,12 +298,12 @@ def find_clear(
         `find_shortest`, `find_slowed`, `find_interrupted` or `find_least_interval`.
     problem : SearchProblem
     known : CheckedEdges
-        What is known of its graph; it learns more.
+        Checked vertices and edges of its graph; it is extended.
 
     Raises
     ------
     NoFeasiblePath
-        Proved: what is closed was found closed; the counts say how much.
+        There is no clear path, which is proved; the counts include what was found closed.
     InputError
         As the search; another method; a price that is negative or not a number.
     """
@@ -320,7 +328,7 @@ def _runs(found: FoundPath, start: Ints) -> list[Ints]:
 
 
 def _near(problem: SearchProblem, found: FoundPath) -> Passable:
-    """Return what tells which edges keep the velocity limit; at the least interval, all do."""
+    """Return a function that finds edges within the velocity limit; all, for a least interval."""
     bound = np.inf if isinstance(found, LeastInterval) else problem.aim.velocity
 
     def near(p: Ints, j: Ints) -> Bools:

@@ -1,4 +1,4 @@
-"""The first-order search over continuous gamma: values between the samples, and paths by them."""
+"""Search over continuous gamma: a first-order value function, and paths guided by it."""
 
 from __future__ import annotations
 
@@ -22,21 +22,22 @@ from kerfpath.search._rotation import unroll
 __all__ = ["ContinuousPath", "ContinuousSearch", "Effort", "GammaSamples"]
 
 WIDEST, WIDEST_STEPS, WIDEST_OF_ALL = 0.5, 6.0, 1.5
-"""rad, steps of gamma, and rad: neighbouring samples are joined where no joint moves further than
-the larger of the first two and the last one."""
+"""rad, steps of gamma, and rad: neighbouring samples are joined if no joint moves further between
+them than the larger of the first two, and than the last one."""
 MOST_ENDS = 12
-"""First vertices that are tried, one by one, where the way depends on which it is."""
+"""Most first vertices that are tried one by one, if the constraints depend on the first vertex."""
 SAME_COST, MOST_TURNS = 1e-9, 16
-"""Relative difference of paths that cost the same, and how many of them are looked at."""
+"""Relative difference of paths that count as equally costly, and most of them that are compared."""
 APART = 0.15
-"""rad by which some joint of two of them differs: the refinement moves them."""
+"""rad: some joint of two first vertices that are both tried differs by more; the refinement can
+move a path by less."""
 _LAYERS_SAMPLED, _VERTICES_SAMPLED = 12, 16
-"""Layers, and vertices of each, by which the joint that sorts the targets is chosen."""
+"""Layers, and vertices of each, that are sampled to choose the joint that sorts the targets."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GammaSamples:
-    """How the vertices of a problem lie on circles of gamma.
+    """Positions of the vertices of a problem on circles of gamma.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ class GammaSamples:
     __repr__ = short_repr
 
     def of(self, vertices: Ints) -> GammaSamples:
-        """Return the samples of other vertices, each one of these."""
+        """Return the positions of other vertices (M,), given as indices of these."""
         return replace(
             self,
             sample=self.sample[vertices],
@@ -66,14 +67,14 @@ class GammaSamples:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ContinuousPath:
-    """One point of each layer, at a vertex or between two of neighbouring samples.
+    """One point of each layer, at a vertex or between the vertices of two neighbouring samples.
 
     Parameters
     ----------
     one, other : (K,) int
-        Rows of q that each point is between; the same at a vertex.
+        Rows of q between which each point lies; equal if it is at a vertex.
     share : (K,)
-        Where between them, from 0 to 1.
+        Position between them, from 0 to 1.
     q : (K, n) rad
         Joints, interpolated.
     """
@@ -87,18 +88,19 @@ class ContinuousPath:
 
 
 class Effort(NamedTuple):
-    """How widely paths are looked for."""
+    """Width of a beam search."""
 
     width: int
-    """States of each layer that are kept."""
+    """States that are kept in each layer."""
     alike: tuple[float, float]
-    """Apart by which share of a target, and of what (6) lets an increment change by, two are."""
+    """States count as alike up to these distances: in shares of a target, and of the change of an
+    increment that (6) allows."""
     ways: int = 1
-    """First vertices that are followed, where the way depends on which it is."""
+    """Ways that are followed, if the constraints depend on the first vertex."""
 
 
 class _Way(NamedTuple):
-    """What guides paths from some first vertices on."""
+    """Value function and costs that guide paths from some first vertices."""
 
     value: float
     first: Ints
@@ -108,27 +110,31 @@ class _Way(NamedTuple):
 
 
 class ContinuousSearch:
-    """The paths over continuous gamma of a problem, by its value function.
+    """Paths over continuous gamma of a problem, guided by its value function.
 
-    Each path keeps (5) between the points of its layers, and (6) where the search finds how; the
-    rotation limits of the problem, too; and with its periodic closure ends less than a sample from
+    Each path keeps (5) between the points of its layers, the rotation limits of the problem, and
+    (6) where the search finds a way to. With a periodic closure it ends less than a sample from
     where it begins. Joints between two samples are interpolated.
 
     Parameters
     ----------
     problem : SearchProblem
-        Without shut edges.
+        A problem without shut edges.
     samples : GammaSamples
+        Positions of its vertices on circles of gamma.
 
     Raises
     ------
     InputError
-        Shut edges.
+        The problem has shut edges.
     """
 
     def __init__(self, problem: SearchProblem, samples: GammaSamples) -> None:
         if len(problem.shut):
-            raise InputError("shut: the search over continuous gamma knows closed vertices only")
+            raise InputError(
+                "shut: expected no shut edges, because the search over continuous gamma supports "
+                f"closed vertices only, got {len(problem.shut)}"
+            )
         layers, self._origin = problem.layers, np.arange(len(problem.q))
         velocity, limited = problem.aim.velocity, np.isfinite(problem.rotation)
         if limited.any():
@@ -151,36 +157,36 @@ class ContinuousSearch:
 
     @property
     def value(self) -> float:
-        """What the value function says of the best path under (5) alone; infinite without one.
+        """Cost of the best path under (5) alone by the value function; infinite if there is none.
 
-        It is interpolated, and no bound.
+        It is interpolated and no bound.
         """
         return min((way.value for way in self._ways), default=np.inf)
 
     def paths(self, effort: Effort) -> Iterator[ContinuousPath]:
-        """Yield the best paths that so much effort finds; none where it finds none."""
+        """Yield the best paths found with an effort; there may be none."""
         for way in self._ways[: effort.ways]:
             path = self._beam(way, effort)
             if path is not None:
                 yield path
 
     def _values(self, steps: Steps, cost: Array, last: Bools | None = None) -> Array:
-        """Return the value function (N,) where vertices cost (N,); ends of the last layer (m,)."""
+        """Return the value function (N,) for vertex costs (N,) and allowed last vertices (m,)."""
         a, V = self._targets.start[-2], np.full(len(cost), np.inf)
         V[a:] = cost[a:] if last is None else np.where(last, cost[a:], np.inf)
         kernel.values_to_go(self._targets, steps, cost, V)
         return V
 
     def _one_way(self) -> list[_Way]:
-        """Return the way from any first vertex to any last one, if there is one."""
+        """Return the way from any first vertex to any last one, or an empty list."""
         way = self._way(np.arange(self._targets.start[1]), self._cost)
         return [] if way is None else [way]
 
     def _way(self, first: Ints, cost: Array, last: Bools | None = None) -> _Way | None:
-        """Return what guides paths from some first vertices; None where (5) leaves none.
+        """Return the way from some first vertices; None if (5) leaves no path.
 
-        Of all with the same maximum, along the one with the least sum: the distances and costs
-        beyond the least maximum are dear.
+        Of paths with the same maximum it prefers the least sum: distances and costs beyond the
+        least maximum get a high price.
         """
         V, steps = self._values(self._steps, cost, last), self._steps
         best = float(V[first].min())
@@ -193,7 +199,7 @@ class ContinuousSearch:
         return _Way(best, self._by_valleys(first, V), steps, cost, V)
 
     def _by_valleys(self, first: Ints, V: Array) -> Ints:
-        """Return first vertices from which paths lead, the bottoms of valleys before the others."""
+        """Return first vertices that have a path, those at local minima of the value first."""
         targets, bottom = self._targets, np.ones(int(self._targets.start[1]), np.bool_)
         joined = slice(0, int(targets.begin[1]))
         one, other = targets.one[joined], targets.other[joined]
@@ -203,10 +209,10 @@ class ContinuousSearch:
         return first[np.lexsort((V[first], ~bottom[first]))]
 
     def _tied_ways(self, *, closed: bool) -> list[_Way]:
-        """Return the ways where what is allowed depends on the first vertex, the best ones first.
+        """Return the ways if the constraints depend on the first vertex, the best ones first.
 
-        A path must end where it began, or may not turn a joint too far from there: one way for each
-        first vertex that may do better than all before.
+        A path must end where it began, or a joint may turn only so far from there. There is one way
+        for each first vertex that may give a better path than all before.
         """
         start, q = self._targets.start, self._targets.q
         free = self._values(self._steps, self._cost)[: start[1]]
@@ -228,7 +234,7 @@ class ContinuousSearch:
         return sorted(ways, key=lambda way: way.value)
 
     def _near_end(self, p: int) -> Bools:
-        """Return which of the last layer (m,) repeat a vertex of the first, or are beside it."""
+        """Return which vertices of the last layer (m,) repeat vertex `p` or its neighbours."""
         targets = self._targets
         joined = slice(int(targets.begin[0]), int(targets.begin[1]))
         one, other = targets.one[joined], targets.other[joined]
@@ -237,7 +243,7 @@ class ContinuousSearch:
         return np.isin(place, self._origin[beside])
 
     def _beam(self, way: _Way, effort: Effort) -> ContinuousPath | None:
-        """Return the best path of a beam along a way."""
+        """Return the best path of a beam search along a way; None if it does not reach the end."""
         targets = self._targets
         first = way.first[: effort.width]
         K = len(targets.start) - 1
@@ -252,7 +258,7 @@ class ContinuousSearch:
             return None
         cost = beam.cost[-1, : beam.size[-1]]
         ends = np.flatnonzero(cost <= cost.min() + SAME_COST * abs(cost.min()))
-        # Turns of a joint cost the same: of such paths, the one that is nowhere far from zero.
+        # Paths on other turns cost the same: take the one whose joints stay closest to zero.
         ways = [self._traced(beam, int(b)) for b in ends[np.argsort(cost[ends])][:MOST_TURNS]]
         return min(ways, key=lambda path: float(np.abs(path.q).max()))
 
@@ -276,7 +282,7 @@ class ContinuousSearch:
 def _targets(
     q: Array, start: Ints, endless: Bools, samples: GammaSamples, velocity: Array
 ) -> Targets:
-    """Return where steps may lead, sorted by the joint that leaves the fewest."""
+    """Return the targets of steps, sorted by the joint that leaves the fewest within (5)."""
     (N, n), K = q.shape, len(start) - 1
     one, other, begin = np.empty(N, np.int64), np.empty(N, np.int64), np.empty(K + 1, np.int64)
     widest = max(WIDEST, WIDEST_STEPS * 2 * np.pi / samples.samples)

@@ -1,4 +1,4 @@
-"""The exact search: bounds that grow until a path is found, or nothing is left to drop."""
+"""Exact search: a bound on the cost grows until a path is found or nothing is dropped any more."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ __all__ = [
 ]
 
 ROUNDING = 1e-12
-"""Relative slack on a bound, so that rounding never drops the path that the bound came from."""
+"""Relative slack of a bound, so that rounding never drops the path that gave the bound."""
 FIRST_GAP = 1e-3
-"""First growth of the bound over the first-order optimum, relative; it doubles from there."""
+"""First relative growth of the bound over the first-order optimum; it doubles from there."""
 NARROW = 2
-"""States of a vertex that the search for a good path keeps, whose cost is then a ceiling."""
+"""States kept for each vertex in the search for a good path, whose cost is then a ceiling."""
 WORTH_A_CEILING = 0.1
-"""States per vertex from which on that search takes less time than it saves."""
+"""States per vertex from which on that search saves more time than it takes."""
 ROOM = 10_000_000
-"""States that a search under a loose bound may remember: 80 MB."""
+"""Most states that a search under a loose bound may remember: 80 MB."""
 UNLIMITED = 2**62
 NO_SEAM = np.empty(0)
-"""Where the last increment need not go on to any."""
+"""Seam of an open path: (6) need not hold between its last increment and a first one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NoPathProof:
-    """Proof that no admissible path exists: how far any goes, and what forbids to go on.
+    """Proof that no admissible path exists: how far paths go, and what blocks them there.
 
     Parameters
     ----------
     layers : int
         Number of layers that some admissible path reaches.
     counts : (3, n) int
-        Of the ways into the next layer, how many each joint's velocity (row 0), acceleration
-        (row 1) and torque (row 2) forbids,
+        Number of edges into the next layer that each joint's velocity (row 0), acceleration
+        (row 1) and torque (row 2) forbids.
     shut : int
-        and how many are shut edges.
+        Number of edges into the next layer that are shut.
     reached : (m,) int
-        Vertices of the sorted graph, in the last layer reached, that some path ends in.
+        Vertices of the sorted graph, in the last layer reached, where some path ends.
     """
 
     layers: int
@@ -75,7 +75,7 @@ class BestPath:
     cost : float
         Its objective.
     total : float
-        Its sum; what ties of a maximum are broken by.
+        Its sum, which breaks ties of a maximum.
     """
 
     path: Ints
@@ -86,17 +86,17 @@ class BestPath:
 
 
 def best_path(layers: SortedLayers, aim: Aim) -> BestPath | NoPathProof:
-    """Return the best path, or how far any goes."""
+    """Return the best path, or the proof that there is none."""
     every = np.ones(len(layers.low), np.bool_)
     return best_allowed(layers, aim, every, NO_SEAM) or dead_end(layers, aim)
 
 
 def quickest_path(layers: SortedLayers, aim: Aim, ceiling: float) -> BestPath | None:
-    """Return the path of least node interval, if that is `ceiling` or less (a timed objective)."""
+    """Return the path of least node interval (a timed objective); None if it is over `ceiling`."""
     every = np.ones(len(layers.low), np.bool_)
     found = _grow(layers, aim, every, NO_SEAM, ceiling=ceiling)
-    # A bound that grew past the ceiling can let a path through, but not prove it: edges beyond the
-    # ceiling may have been left out.
+    # A path found under a bound above the ceiling is not proved: edges beyond the ceiling may have
+    # been left out.
     if found is None or found[1] > ceiling:
         return None
     return BestPath(path=found[0], cost=found[1], total=found[1])
@@ -105,10 +105,10 @@ def quickest_path(layers: SortedLayers, aim: Aim, ceiling: float) -> BestPath | 
 def best_allowed(
     layers: SortedLayers, aim: Aim, allowed: Bools, seam: Array, floor: float = -np.inf
 ) -> BestPath | None:
-    """Return the best path through allowed vertices, (6) across a seam kept; None if there is none.
+    """Return the best path through allowed vertices, with (6) across a seam; None if none exists.
 
-    Of several with the same maximum, the one with the least sum. `floor` is a cost that none is
-    below, where one is known.
+    Of several with the same maximum, it is the one with the least sum. `floor` is a known lower
+    bound on the cost.
     """
     found = _grow(layers, aim, allowed, seam, floor)
     if found is None:
@@ -123,11 +123,11 @@ def best_allowed(
 
 
 def lifted(layers: SortedLayers, aim: Aim) -> tuple[SortedLayers, float]:
-    """Return the graph with no cost of a vertex below 0, and by how much all are raised.
+    """Return the graph with no vertex cost below 0, and the rise of all costs.
 
-    Bounds grow by shares of themselves, so that none may be negative. Every path visits as many
-    vertices, and its sum grows by as many times the rise. A maximum over a step, which costs 0 at
-    least, does not see costs below 0.
+    Bounds grow by shares of themselves, so they may not be negative. Every path visits the same
+    number of vertices, so its sum grows by that number times the rise. A maximum needs no rise if
+    there is a step: a step costs at least 0, so costs below 0 have no effect.
     """
     below = -float(layers.cost.min(initial=0.0))
     if below <= 0:
@@ -145,9 +145,9 @@ def _grow(
     floor: float = -np.inf,
     ceiling: float = np.inf,
 ) -> tuple[Ints, float] | None:
-    """Raise the bound until the recursion comes through, or drops nothing for its cost.
+    """Raise the bound until the recursion finds a path, or drops no state for its cost.
 
-    No path dearer than `ceiling` is looked for.
+    Paths that cost more than `ceiling` are not looked for.
     """
     layers, rise = lifted(layers, aim)
     h, K = np.empty(len(layers.low)), len(layers.start) - 1
@@ -171,7 +171,7 @@ def _grow(
         grown = good if good < np.inf else least + max(2 * (bound - least), first_gap)
         bound = max(min(grown, ceiling), reached.lowest * (1 + ROUNDING))
     if not reached.recorded:
-        # Once more at the tightest bound: few states are left to remember.
+        # Repeat at the tightest bound, where few states have to be remembered.
         bound = reached.cost * (1 + ROUNDING)
         reached = exact.recursion(layers, aim, h, bound, seam, UNLIMITED, EVERY)
     path = np.empty(K, np.int64)
@@ -180,7 +180,7 @@ def _grow(
 
 
 def dead_end(layers: SortedLayers, aim: Aim) -> NoPathProof:
-    """Go as far as any admissible path goes, and count what forbids to go on."""
+    """Follow admissible paths as far as they go, and count what forbids the next step."""
     reached = _reach_farthest(layers, aim)
     K, n = len(layers.start) - 1, len(layers.endless)
     ends = np.unique(reached.last.vertex)
@@ -197,6 +197,6 @@ def layers_reached(layers: SortedLayers, aim: Aim) -> int:
 
 
 def _reach_farthest(layers: SortedLayers, aim: Aim) -> exact.RecursionResult:
-    """Go as far as any admissible path goes, whatever it costs."""
+    """Follow admissible paths of any cost as far as they go."""
     free = np.zeros(len(layers.low))
     return exact.recursion(layers, aim, free, np.inf, NO_SEAM, 0, EVERY)

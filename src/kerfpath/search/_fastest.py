@@ -1,4 +1,4 @@
-"""The least node interval: the fastest constant speed as a second-order minimax problem."""
+"""Least node interval: the fastest constant speed as a second-order minimax problem."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ __all__ = [
 ]
 
 _LAYERS_SAMPLED = 8
-"""Layers whose nearest pairs give the first guess of the interval; any guess ends right."""
+"""Layers whose nearest pairs give the first guess of the interval, which affects only the time."""
 _VERTICES_SAMPLED = 64
-"""Vertices of a layer that stand for all of them."""
+"""Vertices sampled of a layer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LeastInterval:
-    """The least time from node to node in which a path exists, and what binds there.
+    """Least time from node to node in which a path exists, and the limit that binds there.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ class LeastInterval:
     joint : int
         The joint that binds, 0-based.
     node : int
-        Where: the node at which the binding increment ends, or at which the acceleration acts.
+        The node at which the binding increment ends, or at which the acceleration acts.
     limit : {"velocity", "acceleration"}
-        Which of its limits binds.
+        The limit of the joint that binds.
     """
 
     dt: float
@@ -61,36 +61,39 @@ class LeastInterval:
 
 
 def find_least_interval(problem: SearchProblem) -> LeastInterval:
-    """Return the least node interval in which a path through the layers keeps (5) and (6), exactly.
+    """Return the exact least node interval in which a path through the layers keeps (5) and (6).
 
-    Minimises over all paths the largest of |dq_i| / (eta_v q'max_i) over edges and of
+    Over all paths it minimises the largest of |dq_i| / (eta_v q'max_i) over edges and of
     sqrt(|ddq_i| / (eta_a q''max_i)) over pairs of edges.
 
     Parameters
     ----------
     problem : SearchProblem
-        K >= 2; vertices cost 0, or infinity where they are closed. Its dt, weights, metric and
-        objective play no part.
+        K >= 2; vertices cost 0, or infinity if closed. Its dt, weights, metric and objective do not
+        matter.
 
     Raises
     ------
     NoFeasiblePath
-        An empty layer, or closed vertices and shut edges that leave no path; says where.
+        A layer is empty, or closed vertices and shut edges leave no path; the message says where.
     InputError
-        A single layer, other vertex costs, a closure or a limit on rotation, torque or jerk.
+        A single layer, other vertex costs, a closure, or a limit on rotation, torque or jerk.
     """
     refuse_ends(problem, "least node interval")
     refuse_torque(problem, "least node interval")
     if len(problem.start) < 3:
         raise InputError("start: a node interval needs at least two layers, got 1")
     if not np.isin(problem.vertex_cost, (0.0, np.inf)).all():
-        raise InputError("vertex_cost: here a vertex is open (0) or closed (infinity)")
+        raise InputError(
+            "vertex_cost: for the least node interval a vertex is open (0) or closed (infinity), "
+            "got another cost"
+        )
     layers = problem.layers
     require_joined(layers)
     v, a = problem.limits.velocity.usable, problem.limits.acceleration.usable
     aim, ceiling = aim_at_least_time(1 / v, a), first_guess(layers, v)
     while True:
-        # Edges that take longer than the ceiling are not looked at: right if a path keeps it.
+        # Edges that take longer than the ceiling are left out, which is exact if a path keeps it.
         found = quickest(layers, aim, ceiling * v, ceiling)
         if found is not None:
             return binding(layers, found[0], v, a)
@@ -98,10 +101,10 @@ def find_least_interval(problem: SearchProblem) -> LeastInterval:
 
 
 def aim_at_least_time(weight: Array, acceleration: Array) -> Aim:
-    """Return the aim that the slowest step or change of a path asks for the least time, s.
+    """Return the aim to minimise the time, s, that the slowest step or change of a path needs.
 
-    A step asks for its Chebychev distance under `weight` (n,) s/rad, a change for the time in which
-    `acceleration` (n,) rad/s^2 allows it: node intervals of a second.
+    A step needs its Chebychev distance under `weight` (n,) s/rad, a change of increments the time
+    in which `acceleration` (n,) rad/s^2 allows it. The node interval of the aim is one second.
     """
     return Aim(
         weight=freeze(weight),
@@ -116,7 +119,7 @@ def aim_at_least_time(weight: Array, acceleration: Array) -> Aim:
 def quickest(layers: Layers, aim: Aim, bound: Array, ceiling: float) -> tuple[Ints, float] | None:
     """Return the path of least time whose steps keep `bound` (n,) rad, and its time.
 
-    None where more than `ceiling` s is asked for, or no path keeps the bound.
+    None if it needs more than `ceiling` s, or if no path keeps the bound.
     """
     graph = sort_layers(layers, bound)
     best = quickest_path(graph, aim._replace(velocity=freeze(bound), cap=ceiling), ceiling)
@@ -124,17 +127,17 @@ def quickest(layers: Layers, aim: Aim, bound: Array, ceiling: float) -> tuple[In
 
 
 def times_asked(path: Array, endless: Bools, velocity: Array, acceleration: Array) -> list[Array]:
-    """Return the times in which (5) and (6) would hold on a path (K, n) rad.
+    """Return the node intervals in which (5) and (6) would hold on a path (K, n) rad.
 
-    Those of its steps, (K-1, n), and of their changes, (K-2, n): in s under limits (n,) in rad/s
-    and rad/s^2, in node intervals under limits in rad.
+    They are those of its steps, (K-1, n), and of the changes of its steps, (K-2, n). They are in s
+    with limits (n,) in rad/s and rad/s^2, and in node intervals with limits in rad.
     """
     dq = increments(path, endless)
     return [np.abs(dq) / velocity, np.sqrt(np.abs(np.diff(dq, axis=0)) / acceleration)]
 
 
 def first_guess(layers: Layers, v: Array) -> float:
-    """Return a node interval to begin with: twice what the nearest vertices of some layers need."""
+    """Return a first node interval: twice the one that the nearest vertices of some layers need."""
     least = 0.0
     for steps in sampled_steps(layers, _LAYERS_SAMPLED):
         least = max(least, min(float((step / v).max(axis=1).min()) for step in steps))
@@ -142,7 +145,7 @@ def first_guess(layers: Layers, v: Array) -> float:
 
 
 def sampled_steps(layers: Layers, count: int) -> Iterator[Iterator[Array]]:
-    """Yield for some `count` layers the steps (m, n) rad from all vertices to each of some next."""
+    """Yield, for `count` layers, the steps (m, n) rad from all vertices to some of the next."""
     q, start = layers.q, layers.start
     for k in np.unique(np.linspace(0, len(start) - 3, count).astype(int)):
         here, there = (q[start[i] : start[i + 1]] for i in (k, k + 1))
@@ -151,7 +154,7 @@ def sampled_steps(layers: Layers, count: int) -> Iterator[Iterator[Array]]:
 
 
 def binding(layers: Layers, index: Ints, v: Array, a: Array) -> LeastInterval:
-    """Measure a path: its least interval, and what asks for it."""
+    """Return the least interval of a path, and the limit that requires it."""
     path = layers.q[layers.start[:-1] + index]
     fast, sharp = times_asked(path, layers.endless, v, a)
     limit: Literal["velocity", "acceleration"]

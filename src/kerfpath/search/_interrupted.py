@@ -1,10 +1,10 @@
-"""Where no path keeps the limits all along: the fewest interruptions, and the cheapest such plan.
+"""Paths in pieces, if no path keeps the limits all along: fewest interruptions, least cost.
 
-A piece of an admissible path is itself admissible. So a plan that reaches as far as any path can
-before each interruption (the greedy reach) never falls behind another one with as many, and its
-number is the least. From the front the reach says which node interruption i lies before at the
-latest, from the back which at the earliest, and these spans of nodes do not overlap. Where pieces
-must have a least length, `_long_enough` finds the spans.
+A piece of an admissible path is itself admissible. So a plan that goes as far as any path can
+before each interruption (the greedy reach) is never behind another one with as many, and its
+number of interruptions is the least. The reach from the front gives the last node, and the reach
+from the back the first node, at which interruption i can be; these spans of nodes do not overlap.
+If pieces must have a least length, `_long_enough` finds the spans.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ __all__ = ["InterruptedPath", "Piece", "find_interrupted"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Piece:
-    """What is cut without interruption: one vertex for each of several successive layers.
+    """Part of a path without interruption: one vertex for each of several successive layers.
 
     Parameters
     ----------
     first : int
-        Node it begins at.
+        Node at which it begins.
     index : (m,) int
         Vertex of layers first to first + m - 1, 0-based inside its layer; m >= 2 unless K = 1.
     """
@@ -53,16 +53,16 @@ class Piece:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InterruptedPath:
-    """A path in pieces: each begins at the node where the one before ends, at any vertex of it.
+    """A path in pieces: each begins, at any vertex, at the node where the one before ends.
 
     Parameters
     ----------
     pieces : tuple of Piece
     cost : float
-        Objective (14) or (15) over all pieces, vertex costs included; a node that is in two pieces
-        is visited in both.
+        Objective (14) or (15) over all pieces, vertex costs included; a node in two pieces counts
+        in both.
     optimal : bool
-        True: proved to have the fewest interruptions, and of all such plans the least cost.
+        True if it is proved to have the fewest interruptions, and the least cost with these.
     """
 
     pieces: tuple[Piece, ...]
@@ -80,31 +80,31 @@ class InterruptedPath:
 def find_interrupted(
     problem: SearchProblem, *, s: ArrayLike | None = None, least_piece: float | None = None
 ) -> InterruptedPath:
-    """Return the cheapest of the plans with the fewest interruptions, exactly.
+    """Return the exact cheapest of the plans with the fewest interruptions.
 
-    At an interruption the laser goes off at a node, the robot moves to any vertex of the same node
-    (or stops where it is), and the cut goes on from there as a path begins: (6) is not tested
-    across. Every edge between neighbouring nodes is cut. The moves between cost nothing; the node
-    is visited before and after, and its vertex costs count for both. Of several plans with the same
-    maximum, the one with the least sum.
+    At an interruption the beam goes off at a node, the robot moves to any vertex of the same node
+    (or stops where it is), and the cut goes on from there as a path begins: (6) does not hold
+    across an interruption. Every edge between neighbouring nodes is cut. The moves in between cost
+    nothing; the node is visited before and after, and its vertex costs count twice. Of several
+    plans with the same maximum, the result has the least sum.
 
     Parameters
     ----------
     problem : SearchProblem
     s : (K,) m, optional
-        How far along the cut each node is, increasing; what `least_piece` is measured on.
+        Arc length of the nodes, increasing; needed for `least_piece`.
     least_piece : float m, optional
-        Where the cut is interrupted every piece is at least as long. The number of interruptions is
-        the least with which that can be, and of all such plans the cost is the least.
+        Least length of every piece if the cut is interrupted. The number of interruptions is then
+        the least possible with this length, and the cost the least of all such plans.
 
     Raises
     ------
     NoFeasiblePath
         No number of interruptions helps: a layer is empty, or no edge between two neighbouring
-        layers is open and keeps (5). `node` is the last one before. Or no division has only pieces
-        of the least length; `node` is then where the first one breaks at the latest.
+        layers is open and keeps (5); `node` is the last one before. Or no division has only pieces
+        of the least length; `node` is then the last one that the first piece can reach.
     InputError
-        A closure or a rotation limit; nodes that do not fit the layers.
+        A closure or a rotation limit, or `s` that does not fit the layers.
     """
     refuse_ends(problem, "interrupted path")
     if least_piece is not None:
@@ -124,11 +124,11 @@ def find_interrupted(
 
 def _increasing(s: ArrayLike | None, K: int) -> Array:
     if s is None:
-        raise InputError("s: expected where each node is, which least_piece needs, got nothing")
+        raise InputError("s: expected the arc length of each node for least_piece, got nothing")
     s = floats(s, "s", (K,))
     if not (np.diff(s) > 0).all():
         raise InputError(
-            "s: expected nodes farther and farther along the cut, got some that are not"
+            "s: expected increasing arc lengths, got a node that is not farther than the one before"
         )
     return s
 
@@ -138,7 +138,7 @@ def _long_enough(
 ) -> InterruptedPath:
     """Return the cheapest plan of the fewest pieces that are all long enough.
 
-    `last` is how far the greedy reach comes with each interruption.
+    `last` has the last node of the greedy reach for each number of interruptions.
     """
     K, apart = len(s), PieceLengths.of(s, least_piece)
 
@@ -149,8 +149,8 @@ def _long_enough(
     spans = fewest(reached, apart)
     if spans is None:
         raise NoFeasiblePath(
-            f"no division into pieces of {least_piece:g} m or more keeps the limits; "
-            f"{len(last) - 1} interruptions do where pieces may be shorter",
+            f"no division into pieces of {least_piece:g} m or more keeps the limits; with shorter "
+            f"pieces the least number of interruptions is {len(last) - 1}",
             proved=True,
             node=int(last[0]),
         )
@@ -170,12 +170,12 @@ def _long_enough(
 
 
 def _reach(given: Layers, layers: SortedLayers, aim: Aim) -> Ints:
-    """Return the farthest node that can be cut with 0, 1, 2... interruptions, up to the last one.
+    """Return the farthest node that can be cut with 0, 1, 2... interruptions, up to the last node.
 
     Raises
     ------
     NoFeasiblePath
-        From some node on nothing can be cut.
+        From some node no next node can be cut.
     """
     K, k = len(layers.start) - 1, 0
     if layers.start[1] == 0:
@@ -195,9 +195,10 @@ def _reach(given: Layers, layers: SortedLayers, aim: Aim) -> Ints:
 
 
 def _first(given: Layers, aim: Aim) -> Ints:
-    """Return the first node from which the end is cut with as few interruptions as are left.
+    """Return the first node at which each piece can begin with the fewest interruptions after it.
 
-    (5) and (6) hold for a path and its reverse alike: it is the reach from the last layer back.
+    (5) and (6) hold for a path and its reverse alike, so this is the reach from the last layer
+    back.
     """
     given = reverse(given)
     layers = sort_layers(given, aim.velocity)
@@ -205,10 +206,10 @@ def _first(given: Layers, aim: Aim) -> Ints:
 
 
 def _in_stages(layers: SortedLayers, first: Ints, last: Ints) -> tuple[SortedLayers, Ints]:
-    """Lay out, one after the other, the layers first[i]..last[i] that piece i can go through.
+    """Return a graph of the layers first[i]..last[i] of each piece i in turn, and their nodes.
 
-    Where the layers of two pieces are the same nodes, a path may break off in the one and begin
-    anew in the other. Returns the graph, and the node of each of its layers.
+    Where the layers of two pieces are the same nodes, a path may end in one piece and begin again
+    in the next.
     """
     nodes = np.concatenate([np.arange(a, b + 1) for a, b in zip(first, last, strict=True)])
     begin = np.concatenate([[0], np.cumsum(last + 1 - first)])
@@ -246,7 +247,7 @@ def _in_stages(layers: SortedLayers, first: Ints, last: Ints) -> tuple[SortedLay
 def _shut_in_stages(
     layers: SortedLayers, order: Ints, onwards: Ints, leading: Bools
 ) -> tuple[Ints, Ints]:
-    """Return the shut edges of the vertices `order` (N,), which lead `onwards` vertices before.
+    """Return the shut edges of the vertices `order` (N,), their targets lowered by `onwards` (N,).
 
     Only vertices that are `leading` (N,) have any.
     """
@@ -260,7 +261,7 @@ def _shut_in_stages(
 
 
 def _pieces(layers: SortedLayers, nodes: Ints, path: Ints) -> tuple[Piece, ...]:
-    """Part a path through the stages, -1 where it skips a layer, into its pieces."""
+    """Split a path through the stages (-1 where it skips a layer) into its pieces."""
     visited = np.flatnonzero(path >= 0)
     again = nodes[visited[1:]] == nodes[visited[:-1]]
     return tuple(

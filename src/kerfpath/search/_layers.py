@@ -1,4 +1,4 @@
-"""A layered graph as it is given, and sorted as the kernels search it."""
+"""Layered graph as given, and sorted for the kernels."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ __all__ = [
 ]
 
 _LAYERS_SAMPLED = 32
-"""Layers looked at to choose the joint that sorts them: enough to rank the joints."""
+"""Layers sampled to choose the joint that sorts them: enough to rank the joints."""
 _VERTICES_SAMPLED = 16
-"""Vertices of each of them whose windows are counted."""
+"""Vertices of each sampled layer whose windows are counted."""
 
 
 TESTS = (Loss.VELOCITY, Loss.ACCELERATION, Loss.TORQUE)
-"""What may forbid an edge, in the order in which it is tested."""
+"""Tests that may forbid an edge, in the order in which they are made."""
 
 
 class Layers(NamedTuple):
-    """A layered graph as it is given: a row for each vertex."""
+    """A layered graph as given: one row for each vertex."""
 
     q: Array
     """(N, n) rad."""
@@ -43,9 +43,9 @@ class Layers(NamedTuple):
     endless: Bools
     """(n,): joints that turn without end."""
     cost: Array
-    """(N,): what visiting a vertex costs, infinite where it is closed."""
+    """(N,): cost of visiting a vertex; infinite if it is closed."""
     shut: Ints
-    """(E, 2): edges that may not be used, from and to."""
+    """(E, 2): edges that may not be used, as rows of q, from and to."""
 
 
 def sort_layers(
@@ -53,9 +53,9 @@ def sort_layers(
 ) -> SortedLayers:
     """Return the graph without closed vertices, each layer sorted by a key (N,).
 
-    Along an edge the key may change by `width`. Without a key they are sorted by the joint whose
-    window under `velocity` (n,) rad leaves the fewest vertices. Ranks count all vertices of a
-    layer, the closed ones too.
+    Along an edge the key may change by at most `width`. Without a key, layers are sorted by the
+    joint whose window under `velocity` (n,) rad leaves the fewest vertices. Ranks count all
+    vertices of a layer, including closed ones.
     """
     q, start, endless, cost, shut = layers
     kept, circular = None, False
@@ -102,7 +102,7 @@ def _is_wrapped(layers: Layers) -> bool:
 
 
 def _by_vertex(edges: Ints, order: Ints, vertices: int) -> tuple[Ints, Ints]:
-    """Return shut edges as `SortedLayers` holds them, those of closed vertices left out."""
+    """Return shut edges as `SortedLayers` stores them, without those of closed vertices."""
     if not len(edges):
         return np.empty(0, np.int64), np.empty(0, np.int64)
     place = np.full(vertices, -1)
@@ -113,7 +113,7 @@ def _by_vertex(edges: Ints, order: Ints, vertices: int) -> tuple[Ints, Ints]:
 
 
 def empty_layer(layers: Layers, k: int) -> NoFeasiblePath:
-    """Return the answer for a graph whose layer k has no vertex, or none that is open."""
+    """Return the answer for a graph whose layer k has no open vertex."""
     closed = int(layers.start[k + 1] - layers.start[k])
     why = "no path can start" if k == 0 else "no admissible pose at that node"
     return NoFeasiblePath(
@@ -125,7 +125,7 @@ def empty_layer(layers: Layers, k: int) -> NoFeasiblePath:
 
 
 def broken_edge(k: int, forbidden: Ints, shut: int, *, proved: bool) -> NoFeasiblePath:
-    """Return the answer that no admissible edge leads into layer k: what forbids how many."""
+    """Return the answer that no admissible edge leads into layer k, with the reasons counted."""
     counts: dict[str, int] = {
         Reason(test, i + 1): int(number)
         for test, row in zip(TESTS, forbidden, strict=True)
@@ -146,7 +146,7 @@ def broken_edge(k: int, forbidden: Ints, shut: int, *, proved: bool) -> NoFeasib
 
 
 def require_joined(layers: Layers) -> None:
-    """Raise NoFeasiblePath where closed vertices and shut edges alone leave no path."""
+    """Raise NoFeasiblePath if closed vertices and shut edges alone leave no path."""
     q, start, _, cost, edges = layers
     open_ = reached = cost < np.inf
     edges = edges[np.argsort(edges[:, 0])]
@@ -171,7 +171,7 @@ def reverse(layers: Layers) -> Layers:
     q, start, endless, cost, shut = layers
     sizes = np.diff(start)[::-1]
     begin = np.concatenate([[0], np.cumsum(sizes)])
-    # Vertex i of reversed layer k comes from where that layer stood.
+    # Vertex i of reversed layer k comes from the old position of that layer.
     order = np.arange(len(q)) + np.repeat(start[:-1][::-1] - begin[:-1], sizes)
     return Layers(
         q=freeze(q[order]),
@@ -196,5 +196,5 @@ def _narrowest_key(
     best = int(np.argmin(pairs))
     key = np.empty(len(q))
     kernel.fill_key(q, best, bool(endless[best]), key)
-    # Twice the slack of (5): the key must never exclude what the test itself would pass.
+    # Twice the slack of (5): the key must never exclude an edge that the test itself would pass.
     return key, float(bound[best] + 2 * LIMIT_TOLERANCE), bool(endless[best])

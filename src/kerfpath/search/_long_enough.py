@@ -1,9 +1,9 @@
-"""Where a cut may be interrupted if no piece may be short: spans of nodes, halved until all are.
+"""Interruptions with a least length of pieces: spans of nodes, halved until all pieces fit.
 
-Node b can end a piece that begins at node a if an admissible path leads from a to b: up to the
-reach of a, which never falls behind that of a node before. With a least length the fewest pieces
-are a shortest path over nodes; for the cheapest of such cuts the nodes of every interruption have a
-span, and a cut that is best within the spans but has a short piece halves one of them.
+Node b can end a piece that begins at node a if an admissible path leads from a to b, that is, up to
+the reach of a, which never decreases from node to node. The fewest pieces with a least length are a
+shortest path over nodes. To find the cheapest of such cuts, each interruption gets a span of nodes;
+if the best cut within the spans has a short piece, one of the spans is halved.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from kerfpath._arrays import Array, Bools, Ints
 __all__ = ["PieceLengths", "PieceSpans", "all_reaches", "cheapest", "fewest"]
 
 ROUNDING = 1e-9
-"""Relative slack of a length, so that a piece that is just as long as asked passes."""
+"""Relative slack of a length, so that a piece of exactly the least length passes."""
 
 _T = TypeVar("_T")
 
 
 class PieceLengths(NamedTuple):
-    """Which nodes are far enough apart to bound a piece."""
+    """Nodes that are far enough apart to bound a piece."""
 
     after: Ints
-    """(K,): the first node that a piece from each node may end at; K where there is none."""
+    """(K,): the first node at which a piece from each node may end; K if there is none."""
     before: Ints
-    """(K,): the last node that a piece to each node may begin at; -1 where there is none."""
+    """(K,): the last node at which a piece to each node may begin; -1 if there is none."""
 
     @classmethod
     def of(cls, s: Array, least: float) -> PieceLengths:
-        """Return them for nodes at `s` (K,) m, increasing, and pieces of `least` m or more."""
+        """Return the nodes for arc lengths `s` (K,) m, increasing, and pieces of `least` m."""
         least *= 1 - ROUNDING
         return cls(
             after=np.searchsorted(s, s + least, side="left"),
@@ -44,19 +44,19 @@ class PieceLengths(NamedTuple):
 
 
 class PieceSpans(NamedTuple):
-    """First and last node, both (m + 1,), at which each of m pieces may begin, and the last end."""
+    """First and last node, (m + 1,) each, at which each of m pieces may begin and the last end."""
 
     low: Ints
     high: Ints
 
 
 def all_reaches(reach: Callable[[int], int], K: int) -> Ints:
-    """Return the last node (K,) that a path from each node can end at; it never decreases."""
+    """Return the last node (K,) at which a path from each node can end; it never decreases."""
     found = np.full(K, K - 1)
     found[0] = reach(0)
 
     def fill(a: int, b: int) -> None:
-        """Fill between nodes a and b, whose reaches are known."""
+        """Fill in the reaches between nodes a and b, whose own are known."""
         if found[a] == found[b]:
             found[a : b + 1] = found[a]
         elif b - a > 1:
@@ -70,7 +70,7 @@ def all_reaches(reach: Callable[[int], int], K: int) -> Ints:
 
 
 def fewest(reach: Ints, apart: PieceLengths) -> PieceSpans | None:
-    """Return where the fewest pieces, two or more, may begin; None where no number will do."""
+    """Return the spans of the fewest pieces, two or more; None if no number of pieces fits."""
     K = len(reach)
     begun = [np.arange(K) == 0]
     while not begun[-1][K - 1]:
@@ -90,7 +90,7 @@ def fewest(reach: Ints, apart: PieceLengths) -> PieceSpans | None:
 
 
 def _between(nodes: Ints, after: Ints, reach: Ints, K: int) -> Bools:
-    """Return which nodes (K,) a piece from one of `nodes` can end at."""
+    """Return at which nodes (K,) a piece from one of `nodes` can end."""
     begin, end = after[nodes], reach[nodes] + 1
     some = begin < end
     marks = np.zeros(K + 1, np.int64)
@@ -110,12 +110,12 @@ def cheapest(
     Parameters
     ----------
     spans : PieceSpans
-        Some such cut is within them.
+        Spans that contain at least one such cut.
     reach : (K,) int
     apart : PieceLengths
     solve : callable
-        Returns, for spans, what no cut within them costs less than, the nodes (m + 1,) at which the
-        cut with that cost begins its pieces and ends, and that cut; None where there is none.
+        Takes spans and returns the cost of the cheapest cut within them, the nodes (m + 1,) at
+        which its pieces begin and it ends, and the cut itself; None if there is no cut.
     """
     order, heap = count(), list[tuple[tuple[float, float], int, PieceSpans, Ints, _T]]()
 
@@ -131,7 +131,7 @@ def cheapest(
         if not short:
             return cut
         i = short[0]
-        # Begun here or later it would have to end later, and else it would begin earlier.
+        # Split the start of the short piece: if it begins at `middle` or later, it must end later.
         middle = (apart.before[nodes[i + 1]] + 2 + nodes[i]) // 2
         low, high = spans.low.copy(), spans.high.copy()
         low[i], high[i] = middle, middle - 1
@@ -140,7 +140,7 @@ def cheapest(
 
 
 def _tight(spans: PieceSpans, reach: Ints, apart: PieceLengths) -> PieceSpans | None:
-    """Return the spans without what their neighbours leave no room for; None if nothing is left."""
+    """Return the spans without nodes that no neighbouring span allows; None if one is empty."""
     low, high = spans.low.copy(), spans.high.copy()
     while True:
         was = low.sum(), high.sum()

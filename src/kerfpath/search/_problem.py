@@ -1,4 +1,4 @@
-"""What a search is to solve, cast and checked once."""
+"""Search problem: a layered graph, limits and objective, cast and checked once."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ METRIC_CODES: dict[str, int] = {
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class SearchProblem:
-    """A layered graph given as bare arrays, and what is asked of a path through it.
+    """A layered graph given as arrays, and the limits and objective of a path through it.
 
     A path takes one vertex of each layer, in order.
 
@@ -63,15 +63,15 @@ class SearchProblem:
     q, start, dt, endless, vertex_cost, shut, weights, metric, objective, closure, rotation, posture
         As in `kerfpath.shortest_path`; q is not copied.
     limits : Limits
-        What (5), (6) and torque limits hold each step to; a limit on the jerk is not held here.
+        Limits (5) and (6) and on the torque of each step; searches do not keep a jerk limit.
     method : {"exact", "paper", "known"}
-        How the shortest path is searched; all other searches are exact.
+        Method of `find_shortest`; all other searches are exact.
 
     Raises
     ------
     InputError
-        Arrays that do not fit each other, NaN, a dt that is not positive, unknown names, a finite
-        rotation of a joint that is not endless, another method than the exact one for a closure, a
+        Arrays whose shapes do not fit, NaN, a dt that is not positive, unknown names, a finite
+        rotation of a joint that is not endless, or another method than "exact" with a closure, a
         rotation, or a limit on torque or jerk.
     """
 
@@ -157,7 +157,7 @@ class SearchProblem:
         return Layers(self.q, self.start, self.endless, self.vertex_cost, self.shut)
 
     def free(self) -> SearchProblem:
-        """Return the problem with no closure, no rotation limit and no cost of open vertices."""
+        """Return the problem without closure, rotation limits and costs of open vertices."""
         return replace(
             self,
             vertex_cost=np.where(self.vertex_cost < np.inf, 0.0, np.inf),
@@ -167,7 +167,7 @@ class SearchProblem:
 
     @property
     def aim(self) -> Aim:
-        """What the kernels are to minimise, and the bounds on the increments."""
+        """Objective and bounds on the increments, for the kernels."""
         torque = self.limits.torque
         return Aim(
             weight=self.weights,
@@ -182,7 +182,7 @@ class SearchProblem:
 
 
 def offsets(start: ArrayLike, vertices: int) -> Ints:
-    """Return `start` as offsets of layers, or refuse it."""
+    """Return `start` as checked offsets of layers; InputError if it is not."""
     start = integers(start, "start", (None,))
     if len(start) < 2 or start[0] != 0 or start[-1] != vertices or (np.diff(start) < 0).any():
         raise InputError(
@@ -243,21 +243,21 @@ def rotation_limits(rotation: ArrayLike | None, endless: Bools) -> Array:
     plain = np.flatnonzero(np.isfinite(limit) & ~endless)
     if plain.size:
         raise InputError(
-            f"rotation: joint {plain[0] + 1} is not endless, its range limits it: give infinity, "
-            f"got {limit[plain[0]]:g}"
+            f"rotation: joint {plain[0] + 1} is not endless and already limited by its range; "
+            f"expected infinity, got {limit[plain[0]]:g}"
         )
     return limit
 
 
 def refuse_torque(problem: SearchProblem, what: str) -> None:
-    """Refuse limits on torque and jerk, which a search does not know."""
+    """Raise InputError for limits on torque or jerk, which a search does not support."""
     for name in ("torque", "jerk"):
         if getattr(problem.limits, name) is not None:
-            raise InputError(f"{what}: limits on the {name} are not known to it")
+            raise InputError(f"{what}: limits on the {name} are not supported; remove them")
 
 
 def refuse_ends(problem: SearchProblem, what: str) -> None:
-    """Refuse a closure or a rotation limit, which a search does not know."""
+    """Raise InputError for a closure or a rotation limit, which a search does not support."""
     if problem.closure != "free" or np.isfinite(problem.rotation).any():
         raise InputError(
             f'{what}: needs closure "free" and no rotation limit, got {problem.closure!r} and '

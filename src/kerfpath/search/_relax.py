@@ -1,4 +1,4 @@
-"""What would open a closed way: the least relaxation of each limit on its own, exactly."""
+"""Relaxations for a graph without a path: the exact least one of each limit on its own."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from kerfpath.search._shortest import find_shortest
 __all__ = ["Relaxations", "find_relaxations"]
 
 LARGEST_ETA_V = 2.0
-"""Velocity limits are not raised further than this: beyond it no robot goes."""
+"""Largest eta_v that is tried; no robot exceeds its velocity limits by more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Relaxations:
-    """The least change of each limit with which a path exists, the other limits as they are.
+    """The least change of each limit with which a path exists, with the other limits unchanged.
 
     Parameters
     ----------
     eta_v : float or None
-        Least share of the velocity limits; None where no share up to 2 opens the way.
+        Least share of the velocity limits; None if no share up to 2 gives a path.
     eta_a : float or None
-        Least share of the acceleration limits; None where velocity alone closes the way.
+        Least share of the acceleration limits; None if the velocity limits alone leave no path.
     slower : LeastInterval
-        Least node interval, and what binds there.
+        Least node interval, and the limit that binds there.
     """
 
     eta_v: float | None
@@ -47,7 +47,7 @@ class Relaxations:
 def find_relaxations(problem: SearchProblem) -> Relaxations:
     """Return the least eta_v, eta_a and dt, each on its own, with which a path exists.
 
-    Each is a second-order minimax problem on the graph and exact.
+    Each is the exact solution of a second-order minimax problem on the graph.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ def find_relaxations(problem: SearchProblem) -> Relaxations:
     Raises
     ------
     NoFeasiblePath
-        An empty layer, which no limit opens.
+        A layer is empty, so no limit helps.
     InputError
         As `find_least_interval`.
     """
     slower = find_least_interval(problem)
-    # Velocity as it is, and of all paths the one whose sharpest change asks for the least time.
+    # Velocity limits unchanged; of all paths the one whose sharpest change needs the least time.
     velocity, limits = problem.aim.velocity, problem.limits
     changes = aim_at_least_time(np.zeros(len(velocity)), limits.acceleration.bound)
     sharpest = quickest(problem.layers, changes, velocity, np.inf)
@@ -74,10 +74,10 @@ def find_relaxations(problem: SearchProblem) -> Relaxations:
 
 
 def _least_eta_v(problem: SearchProblem) -> float | None:
-    """Return the least largest share of the velocity limits over paths that keep (6)."""
+    """Return the least eta_v with which a path exists; None if it is above `LARGEST_ETA_V`."""
     limits, tried = problem.limits, problem.limits.velocity.share
     while True:
-        # Within the share tried, the share itself is a Chebychev distance to be minimised.
+        # Within the share tried, the share needed is a Chebychev distance to be minimised.
         asked = replace(
             problem,
             limits=replace(limits, velocity=replace(limits.velocity, share=tried)),

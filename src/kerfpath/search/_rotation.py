@@ -1,8 +1,9 @@
-"""Limits on how far endless joints turn away from where a path begins (hoses and cables).
+"""Limits on the rotation of endless joints from where a path begins (hoses and cables).
 
-A limited joint is not wrapped: it no longer counts modulo 2 pi, and each vertex is there once for
-each turn inside the limit. The first layer keeps one copy, on turn 0. Only joints that a best path
-would turn too far are taken so: one that keeps the other limits anyway is the best within all.
+A limited joint is not wrapped: it no longer counts modulo 2 pi, and the graph has a copy of each
+vertex for each turn within the limit. The first layer has one copy, on turn 0. Only joints that a
+best path would turn too far are treated like this: if the path then keeps the limits of all other
+joints anyway, it is the best within all limits.
 """
 
 from __future__ import annotations
@@ -29,10 +30,10 @@ def too_far(path: Array, endless: Bools, rotation: Array) -> Bools:
 def best_within_rotation(
     layers: Layers, aim: Aim, rotation: Array, unroll: Bools, *, closed: bool
 ) -> tuple[Bools, tuple[Ints, float] | None]:
-    """Return the joints not wrapped in the end, and the best path that keeps `rotation` (n,) rad.
+    """Return the joints not wrapped at last, and the best path that keeps `rotation` (n,) rad.
 
-    `unroll` (n,) says which joints to begin with, K >= 2. The path is the vertices (K,) and the
-    cost; None where the limits of the joints unrolled leave none.
+    `unroll` (n,) are the joints that are not wrapped at first; K >= 2. The path is given by its
+    vertices (K,) and cost; None if the limits of the joints that are not wrapped leave none.
     """
     while True:
         found = _best(layers, aim, np.where(unroll, rotation, np.inf), closed=closed)
@@ -48,7 +49,7 @@ def best_within_rotation(
 def closed_before(
     layers: Layers, aim: Aim, rotation: Array, broken: NoFeasiblePath
 ) -> NoFeasiblePath | None:
-    """Return the answer that limits close the way before it breaks without them; else None.
+    """Return the answer that rotation limits end all paths before they break anyway; else None.
 
     `broken` is the answer without limits on the rotation.
     """
@@ -67,7 +68,7 @@ def closed_before(
 def why_closed(
     layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, closed: bool
 ) -> NoFeasiblePath:
-    """Return the answer that limits close the way: those of the joints `closing` (n,)."""
+    """Return the answer that the rotation limits of the joints `closing` (n,) leave no path."""
     aim, layers = _turning_least(layers, aim, closing)
     joints = np.flatnonzero(closing).tolist()
     only = np.isfinite(rotation).sum() == 1
@@ -79,7 +80,7 @@ def why_closed(
     one = "it" if len(named) == 1 else "any one of them"
     without = one if opening else "rotation limits"
     return NoFeasiblePath(
-        f"the rotation limit of {' and of '.join(named)} closes the way"
+        f"the rotation limit of {' and of '.join(named)} leaves no path"
         f"{'' if closed else f' from node {node} on'}; without {without} there is a path",
         proved=True,
         node=node,
@@ -89,14 +90,14 @@ def why_closed(
 def _turning_least(layers: Layers, aim: Aim, joints: Bools) -> tuple[Aim, Layers]:
     """Return aim and layers of the path whose `joints` (n,) turn least.
 
-    Whether limits leave a path is soonest seen from that one.
+    That path shows soonest whether the limits leave a path.
     """
     aim = aim._replace(weight=freeze(joints.astype(float)), metric=MANHATTAN, minimax=False)
     return aim, layers._replace(cost=np.where(layers.cost < np.inf, 0.0, np.inf))
 
 
 def _until(layers: Layers, node: int) -> Layers:
-    """Return the layers up to a node and with it."""
+    """Return the layers up to and including a node."""
     q, start, endless, cost, shut = layers
     N = start[node + 1]
     return Layers(q[:N], start[: node + 2], endless, cost[:N], shut[shut[:, 1] < N])
@@ -105,7 +106,7 @@ def _until(layers: Layers, node: int) -> Layers:
 def _opens(
     layers: Layers, aim: Aim, rotation: Array, closing: Bools, i: int, *, closed: bool
 ) -> bool:
-    """Return whether there is a path once the limit of joint i alone is taken away."""
+    """Return whether there is a path if only the limit of joint i is removed."""
     others = np.arange(len(rotation)) != i
     unlimited = np.where(others, rotation, np.inf)
     return (
@@ -114,9 +115,9 @@ def _opens(
 
 
 def _last_node(layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, closed: bool) -> int:
-    """Return the last node that a path within `rotation` reaches, by halving.
+    """Return the last node that a path within `rotation` reaches, by bisection.
 
-    Without `closed` it is known that none reaches the end.
+    Without `closed`, it is known that no path reaches the end.
     """
     reached, beyond = 0, len(layers.start) - (1 if closed else 2)
     while beyond - reached > 1:
@@ -130,9 +131,9 @@ def _last_node(layers: Layers, aim: Aim, rotation: Array, closing: Bools, *, clo
 
 
 def _best(layers: Layers, aim: Aim, rotation: Array, *, closed: bool) -> tuple[Ints, float] | None:
-    """Return the best path that keeps `rotation`, all joints that have a limit unrolled."""
+    """Return the best path that keeps `rotation`, with all limited joints not wrapped."""
     unrolled, place = unroll(layers, rotation, aim.velocity)
-    # The other way round would be shorter.
+    # A limited joint turns by at most pi in a step: the other direction would be shorter.
     most = np.where(np.isfinite(rotation), np.minimum(aim.velocity, np.pi), aim.velocity)
     graph = sort_layers(unrolled, freeze(most))
     sizes = np.diff(graph.start)
@@ -145,10 +146,10 @@ def _best(layers: Layers, aim: Aim, rotation: Array, *, closed: bool) -> tuple[I
 
 
 def unroll(layers: Layers, rotation: Array, velocity: Array) -> tuple[Layers, Ints]:
-    """Return the graph with its limited joints not wrapped, and which of its layer each vertex is.
+    """Return the graph with its limited joints not wrapped, and the rank of each vertex's original.
 
-    Vertices that are too far from wherever a path begins are left out, and half a turn goes the way
-    that it goes in the graph alone, where `velocity` (n,) rad lets a joint take one.
+    Vertices that are too far from every start are left out. If `velocity` (n,) rad allows a step of
+    half a turn, it keeps the direction that it has in the original graph.
     """
     q, start, endless, cost, shut = layers
     place = np.arange(len(q)) - np.repeat(start[:-1], np.diff(start))
@@ -179,9 +180,9 @@ def unroll(layers: Layers, rotation: Array, velocity: Array) -> tuple[Layers, In
 
 
 def _wrong_half_turns(given: Array, unrolled: Array, start: Ints) -> Ints:
-    """Return the edges (E, 2) along which a joint unrolled takes half a turn the other way.
+    """Return the edges (E, 2) along which a joint makes half a turn in the wrong direction.
 
-    given, unrolled (N,) rad are its angle as it is given and unrolled.
+    given, unrolled (N,) rad are its angles as given and not wrapped.
     """
     found = [np.empty((0, 2), np.int64)]
     for k in range(len(start) - 2):
@@ -194,7 +195,7 @@ def _wrong_half_turns(given: Array, unrolled: Array, start: Ints) -> Ints:
 
 
 def _every_copy(shut: Ints, origin: Ints, vertices: int) -> Ints:
-    """Return the shut edges (E, 2) from each copy of the one end to each of the other."""
+    """Return the shut edges (E, 2) between all copies of their ends."""
     if not len(shut):
         return shut
     copies = np.bincount(origin, minlength=vertices)

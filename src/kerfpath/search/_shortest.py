@@ -1,4 +1,4 @@
-"""The best path through a layered graph given as bare arrays (section 3.2 of the paper)."""
+"""The best path through a layered graph given as arrays (section 3.2 of the paper)."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from kerfpath.search._rotation import best_within_rotation, closed_before, too_f
 __all__ = ["LayeredPath", "find_shortest", "shortest_path"]
 
 SAME_END = 1e-6
-"""Joint difference (rad) up to which the ends of a closed contour count as the same vertex."""
+"""rad: joint difference up to which the ends of a closed contour count as the same vertex."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LayeredPath:
-    """One vertex per layer, and what the path costs.
+    """One vertex per layer, and the cost of the path.
 
     Parameters
     ----------
@@ -39,8 +39,8 @@ class LayeredPath:
     cost : float
         Objective (14) or (15), vertex costs included.
     optimal : bool
-        True only when the path is proved to be the best on this graph under (5), (6) and what
-        limits torques.
+        True only if the path is proved to be the best on this graph under (5), (6) and torque
+        limits.
     """
 
     index: Ints
@@ -71,7 +71,7 @@ def shortest_path(
     eta_a: float = 1.0,
     torque: TorqueLimit | None = None,
 ) -> LayeredPath:
-    """Return the best path that takes one vertex of each layer, in order.
+    """Return the best path through a layered graph, with one vertex of each layer, in order.
 
     Parameters
     ----------
@@ -84,14 +84,15 @@ def shortest_path(
     velocity, acceleration : (n,) rad/s, rad/s^2
         Limits of each joint, used in (5) and (6) with `eta_v` and `eta_a`.
     endless : (n,) bool, optional
-        Joints that turn without end, compared modulo 2 pi (13); default none. Half a turn, as long
-        either way, goes the way that the values in `q` go.
+        Joints that turn without end, compared modulo 2 pi (13); default none. Half a turn goes in
+        the direction of the values in `q`.
     posture : (N,) int, optional
-        Posture of each vertex; the "known" method stays on one.
+        Posture of each vertex; the "known" method stays in one.
     vertex_cost : (N,), optional
-        Added for each visited vertex (with objective "max": maximised); infinite: it is closed.
+        Cost added for each visited vertex (with objective "max": maximised); infinite: the vertex
+        is closed.
     shut : (E, 2) int, optional
-        Edges that may not be used: rows of q, from a vertex to one of the next layer.
+        Edges that may not be used, as rows of q: from a vertex to one of the next layer.
     weights : (n,) 1/rad, optional
         Weights of the distance; default 1 / (velocity dt).
     metric : {"manhattan", "chebychev", "euclid"}
@@ -100,36 +101,36 @@ def shortest_path(
         (14) or (15).
     method : {"exact", "paper", "known"}
         "paper": the procedure of section 3.2, whose acceleration test sees only the best
-        predecessor. "known": the technique of 2004, without (5) and (6), on one posture.
-        "exact": the optimum under (5) and (6), proved; of several with the same maximum, the one
+        predecessor. "known": the technique of 2004, without (5) and (6), in one posture.
+        "exact": the proved optimum under (5) and (6); of several with the same maximum, the one
         with the least sum.
     closure : {"free", "periodic"}
         "periodic": the last layer repeats the first, the path returns to the vertex it left
         (endless joints modulo 2 pi), and (6) holds across the seam; exact method only.
     rotation : (n,) rad, optional
-        Largest angle that an endless joint may have turned away, either way, from where the path
-        begins; infinity: no limit (default); exact method only.
+        Largest angle that an endless joint may turn away from where the path begins, in either
+        direction; infinity: no limit (default); exact method only.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
     torque : TorqueLimit, optional
-        Held where (6) holds the acceleration, by central differences; exact method only.
+        Kept at the nodes where (6) holds, by central differences; exact method only.
 
     Raises
     ------
     NoFeasiblePath
-        No admissible path was found; says where and what forbids it.
+        No admissible path was found; the message says where, and which limits forbid it.
     InputError
-        Arrays that do not fit each other, NaN, limits or dt that are not positive, unknown names,
-        a periodic closure whose end layers differ, a finite rotation of a joint that is not
+        Arrays whose shapes do not fit, NaN, limits or dt that are not positive, unknown names,
+        a periodic closure whose end layers differ, or a finite rotation of a joint that is not
         endless.
 
     Notes
     -----
-    Nothing is stored per edge that is not shut. Beside `q`, the search takes about 100 bytes a
-    vertex with six joints, 80 MB at most for the states (p, j) remembered under a bound that is
-    still loose, and at last 8 bytes for each state within the cost of the answer. Time grows with
-    the number of layers. It runs on the thread that calls it, without the interpreter lock:
-    searches may run at once, and each answer is the same to the bit.
+    Nothing is stored per edge that is not shut. Besides `q`, the search takes about 100 bytes per
+    vertex with six joints, at most 80 MB for the states (p, j) remembered under a loose bound, and
+    finally 8 bytes for each state within the cost of the answer. The time grows with the number of
+    layers. The search runs on the calling thread, without the interpreter lock: several may run at
+    once, and each answer is the same to the bit.
     """
     problem = SearchProblem(
         q=q,
@@ -176,20 +177,20 @@ def find_shortest(problem: SearchProblem) -> LayeredPath:
         if np.isinf(problem.rotation).all():
             broken.back, broken.leaving = _from_the_back(given, aim)
         else:
-            broken.reached = None  # within the limits it may be fewer
+            broken.reached = None  # within the rotation limits there may be fewer vertices
         raise
     over = too_far(given.q[given.start[:-1] + found.index], given.endless, problem.rotation)
     return _turn_less(given, aim, problem.rotation, over, closed=closed) if over.any() else found
 
 
 def _filled(layers: SortedLayers) -> int:
-    """Return the first layer that has no vertex; without one, the number of layers."""
+    """Return the first layer that has no vertex, or the number of layers if all have some."""
     sizes = np.diff(layers.start)
     return int(np.argmin(sizes)) if (sizes == 0).any() else len(sizes)
 
 
 def _find_exactly(given: Layers, layers: SortedLayers, aim: Aim, *, closed: bool) -> LayeredPath:
-    """Return the proved optimum, or prove that there is no path (and say where it breaks)."""
+    """Return the proved optimum; raise NoFeasiblePath, proved, where the path breaks."""
     filled = _filled(layers)
     whole = filled == len(layers.start) - 1
     if closed and whole:
@@ -205,7 +206,7 @@ def _find_exactly(given: Layers, layers: SortedLayers, aim: Aim, *, closed: bool
     if closed and found.layers >= filled - 1 and not breaks:
         raise NoFeasiblePath(
             "paths reach the last node, but none returns to the vertex that it left"
-            " with its acceleration across the seam admissible",
+            " with an admissible acceleration across the seam",
             proved=True,
             node=len(layers.start) - 2,
         )
@@ -217,7 +218,7 @@ def _find_exactly(given: Layers, layers: SortedLayers, aim: Aim, *, closed: bool
 def _turn_less(
     given: Layers, aim: Aim, rotation: Array, over: Bools, *, closed: bool
 ) -> LayeredPath:
-    """Return the proved optimum within the limits that the joints `over` do not keep without."""
+    """Return the proved optimum within rotation limits, which the joints `over` (n,) exceed."""
     unrolled, found = best_within_rotation(given, aim, rotation, over, closed=closed)
     if found is None:
         raise why_closed(given, aim, rotation, unrolled, closed=closed)
@@ -228,8 +229,8 @@ def _turn_less(
 def _from_the_back(given: Layers, aim: Aim) -> tuple[int, Ints | None]:
     """Return the first node from which admissible paths reach the end, and their vertices there.
 
-    (5) and (6) hold for a path and its reverse alike, so that it is as far as any path goes from
-    the last layer backwards.
+    (5) and (6) hold for a path and its reverse alike, so this is as far as any path goes backwards
+    from the last layer.
     """
     layers = sort_layers(reverse(given), aim.velocity)
     K, filled = len(layers.start) - 1, _filled(layers)
@@ -242,7 +243,7 @@ def _from_the_back(given: Layers, aim: Aim) -> tuple[int, Ints | None]:
 def _follow_procedure(
     given: Layers, layers: SortedLayers, aim: Aim, *, may_prove: bool
 ) -> LayeredPath:
-    """Run steps (1) to (5) of the procedure and read the path back (or say where it breaks)."""
+    """Run steps (1) to (5) of the procedure and trace the path; NoFeasiblePath if it breaks."""
     start, filled = layers.start, _filled(layers)
     dist, before = np.full(len(layers.low), np.inf), np.full(len(layers.low), -1)
     to_search = layers._replace(start=start[: filled + 1])
@@ -265,7 +266,7 @@ def _follow_procedure(
 
 
 def _ends(layers: SortedLayers, dist: Array, before: Ints, k: int) -> States:
-    """Return the last edges of the paths that the procedure has found into layer k."""
+    """Return the last edges of the paths into layer k that the procedure has found."""
     a, b = layers.start[k : k + 2]
     vertex = a + np.flatnonzero(dist[a:b] < np.inf)
     parent = before[vertex]

@@ -1,7 +1,7 @@
-"""A path for speeds far below those asked for, by first-order recursions alone.
+"""A path for speeds far below the one asked for, by first-order recursions alone.
 
-The exact search for the least interval remembers edges. Where nodes have to be far apart in time
-the velocity leaves nearly all of them, and it takes minutes; a recursion over vertices does not.
+The exact search for the least interval remembers edges. If nodes must be far apart in time, the
+velocity limits leave nearly all edges and it takes minutes; a recursion over vertices does not.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from kerfpath.search._shortest import LayeredPath, find_shortest
 __all__ = ["edges_allowed", "find_slow_path", "velocity_allows"]
 
 LAYERS_SAMPLED = 16
-"""Layers by which edges are counted."""
+"""Layers sampled to estimate the number of edges."""
 ROUNDING = 1e-9
-"""Share of an interval by which a path that needs just that much may be longer."""
+"""Relative slack of an interval, so that a path that needs exactly this interval passes."""
 
 
 def velocity_allows(problem: SearchProblem, dt: float) -> bool:
-    """Return whether a path keeps (5), whatever it accelerates, with dt s from node to node."""
+    """Return whether some path keeps (5), at any acceleration, with `dt` s from node to node."""
     try:
         find_shortest(_first_order(problem, dt))
     except NoFeasiblePath:
@@ -37,13 +37,13 @@ def velocity_allows(problem: SearchProblem, dt: float) -> bool:
 def find_slow_path(problem: SearchProblem) -> LeastInterval:
     """Return the shortest path that keeps (5) in the least interval in which any path does.
 
-    And the interval in which it keeps (6), too: no path keeps both in less than it would without
-    (6), but one may in less than this.
+    Its `dt` is the interval in which that path keeps (6), too. Another path may keep both in less,
+    but none in less than the least interval for (5) alone.
 
     Raises
     ------
     NoFeasiblePath
-        An empty layer, or closed vertices and shut edges that leave no path; says where.
+        A layer is empty, or closed vertices and shut edges leave no path; the message says where.
     """
     require_joined(problem.layers)
     v, a = problem.limits.velocity.usable, problem.limits.acceleration.usable
@@ -59,7 +59,7 @@ def find_slow_path(problem: SearchProblem) -> LeastInterval:
 
 
 def edges_allowed(problem: SearchProblem, dt: float) -> float:
-    """Return about how many edges keep (5) with dt s from node to node: by some of them."""
+    """Return an estimate, from samples, of the edges that keep (5) with `dt` s between nodes."""
     sizes = np.diff(problem.start)
     most = problem.limits.velocity.per_interval(dt)
     looked_at, kept = 0, 0
@@ -71,7 +71,7 @@ def edges_allowed(problem: SearchProblem, dt: float) -> float:
 
 
 def _first_order(problem: SearchProblem, dt: float) -> SearchProblem:
-    """Return the problem of the shortest path at an interval, by the velocities alone."""
+    """Return the problem of the shortest path under the velocity limits at an interval."""
     free = AccelerationLimit(bound=np.full(len(problem.weights), np.inf))
     return replace(
         problem.free(),
@@ -85,5 +85,5 @@ def _first_order(problem: SearchProblem, dt: float) -> SearchProblem:
 
 
 def _slowest_step(problem: SearchProblem, dt: float) -> SearchProblem:
-    """Return the problem of the path whose longest step, s at the velocities, is least."""
+    """Return the problem of the path whose longest step takes the least time, s."""
     return replace(_first_order(problem, dt), metric="chebychev", objective="max")

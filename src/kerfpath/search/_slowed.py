@@ -1,4 +1,4 @@
-"""The path to be slowed down where none keeps the commanded node interval everywhere."""
+"""The path to slow down if no path keeps the commanded node interval everywhere."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from kerfpath.search._problem import SearchProblem, refuse_ends, refuse_torque
 __all__ = ["SlowedPath", "find_slowed"]
 
 FIRST_STRETCH = 2.0
-"""Steps that take longer than this many node intervals are left out at first; it doubles."""
+"""Steps longer than this many node intervals are left out at first; the number doubles."""
 CORNER = 0.1
-"""Node intervals of lost time whose price gets through where there is no corner."""
+"""Lost time, in node intervals, with which the recursion gets through where there is no corner."""
 AROUND = 32
-"""Layers before and behind a corner in which a path prepares for it and recovers."""
+"""Layers before and after a corner in which a path prepares for it and recovers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SlowedPath:
-    """One vertex per layer, what the path costs, and where it cannot keep the node interval.
+    """One vertex per layer, the cost of the path, and where it exceeds the node interval.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class SlowedPath:
     cost : float
         Distances, vertex costs and the price of the time lost; proved to be the least.
     lost : (K-1,) node intervals
-        Time that each step asks for on its own, beyond the one it has.
+        Time that each step on its own needs beyond its node interval.
     """
 
     index: Ints
@@ -49,13 +49,13 @@ class SlowedPath:
 
 
 def find_slowed(problem: SearchProblem, *, penalty: float = 100.0) -> SlowedPath:
-    """Return the path with the least sum of distances and of time lost, at `penalty` an interval.
+    """Return the path with the least sum of distances, vertex costs and priced lost time.
 
-    A step asks for the time t in which (5) would hold on it, and (6) with the step before it: the
+    A step needs the time t in which (5) would hold on it, and (6) with the step before it: the
     larger of |dq_i| / (eta_v q'max_i) and sqrt(|ddq_i| / (eta_a q''max_i)). It loses t / dt - 1
     node intervals, if that is positive. The answer is exact: the second-order recursion with both
-    tests turned into prices. Where a path keeps dt throughout and the penalty outweighs the
-    distances, it is that of `find_shortest`.
+    tests turned into prices. If some path keeps dt throughout and the penalty outweighs the
+    distances, the result is that of `find_shortest`.
 
     Parameters
     ----------
@@ -67,9 +67,9 @@ def find_slowed(problem: SearchProblem, *, penalty: float = 100.0) -> SlowedPath
     Raises
     ------
     NoFeasiblePath
-        An empty layer, or closed vertices and shut edges that leave no path; says where.
+        A layer is empty, or closed vertices and shut edges leave no path; the message says where.
     InputError
-        Another objective, a closure or a limit on rotation, torque or jerk; a penalty that is not
+        Another objective, a closure, a limit on rotation, torque or jerk, or a penalty that is not
         positive.
     """
     refuse_ends(problem, "slowed path")
@@ -93,9 +93,9 @@ def find_slowed(problem: SearchProblem, *, penalty: float = 100.0) -> SlowedPath
 def _least(layers: Layers, aim: Aim, penalty: float) -> tuple[Ints, float]:
     """Return the best path, as vertices of each layer, and its cost.
 
-    Steps beyond `stretch` times the velocity are left out, but a step at the least price that any
-    of them has may lead from anywhere to anywhere. A best path without such a leap is the best of
-    all; else more steps are let in.
+    Steps beyond `stretch` times the velocity are left out. In their place a leap may lead from
+    any vertex to any other, at the least price that such a step can have. A best path without a
+    leap is the best of all; else more steps are let in.
     """
     reach = np.where(layers.endless, np.pi, np.ptp(layers.q, axis=0))
     every = float((reach / aim.velocity).max())
@@ -113,7 +113,7 @@ def _least(layers: Layers, aim: Aim, penalty: float) -> tuple[Ints, float]:
 
 
 def _best(layers: SortedLayers, aim: Aim) -> tuple[Ints, float]:
-    """Let the bound grow until the recursion comes through; return the path and its cost."""
+    """Raise the bound until the recursion finds a path; return the path and its cost."""
     layers, rise = lifted(layers, aim)
     K, h = len(layers.start) - 1, np.empty(len(layers.low))
     to_go.cost_to_go(layers, aim, np.ones(len(h), np.bool_), h)
@@ -132,12 +132,12 @@ def _best(layers: SortedLayers, aim: Aim) -> tuple[Ints, float]:
 
 
 def _add_corners(layers: SortedLayers, aim: Aim, h: Array) -> None:
-    """Add to the first-order bound h (N,) what is lost at corners at least.
+    """Add to the first-order bound h (N,) the least loss at corners.
 
-    Measured by h, no step costs less than nothing. So what it takes at least to come through some
-    layers with (6), from any vertex to any other, is still to come wherever they all are, and the
-    prices of stretches of the path that share no step add up. A stretch is laid around each layer
-    that the recursion does not reach at a small price.
+    Measured by h, no step costs less than zero. So the least price of passing some layers with (6),
+    from any vertex to any other, is still to be paid by every path before them, and the prices of
+    stretches that share no step add up. There is a stretch around each layer that the recursion
+    does not reach at a small price.
     """
     last, at = len(layers.start) - 2, 0
     prices = []
@@ -157,7 +157,7 @@ def _add_corners(layers: SortedLayers, aim: Aim, h: Array) -> None:
 def _search_window(
     layers: SortedLayers, aim: Aim, h: Array, first: int, last: int, gap: float
 ) -> exact.RecursionResult:
-    """Go through the layers first..last with all costs measured by h, for `gap` at most."""
+    """Run the recursion through layers first..last with costs measured by h and bound `gap`."""
     enter, leave = (slice(layers.start[k], layers.start[k + 1]) for k in (first, last))
     cost, rest = layers.cost.copy(), h.copy()
     cost[enter] = np.where(h[enter] < np.inf, -h[enter], 0.0)

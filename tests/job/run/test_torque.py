@@ -198,5 +198,5 @@ def test_jobs_that_no_motion_keeps_say_so(folder):
     assert "jerk" in found.stdout
     for command in ("speed", "pareto", "layout"):
         assert_refused(
-            run(command, path, cwd=folder), "limits on velocity and acceleration alone are known"
+            run(command, path, cwd=folder), "takes limits on velocity and acceleration only"
         )
