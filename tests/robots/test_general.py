@@ -264,7 +264,7 @@ def test_an_arm_that_the_solver_does_not_solve_is_refused(monkeypatch):
 def test_a_general_robot_is_its_chain():
     with pytest.raises(InputError, match="needs the chain of its six joints"):
         Robot(id="x", kinematics="general", geometry={}).forward(np.zeros(6))
-    with pytest.raises(InputError, match="no sign, no offset"):
+    with pytest.raises(InputError, match="remove sign= and offset="):
         arm_from(*OFFSET_WRIST, offset=np.ones(6)).forward(np.zeros(6))
 
 

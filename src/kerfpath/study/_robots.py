@@ -145,7 +145,7 @@ def which_robots(
     job, known = read_job(path), (NEAREST, *acceleration_ratios())
     if acceleration_ratio is not None and acceleration_ratio not in known:
         raise InputError(
-            f"acceleration_ratio: {acceleration_ratio!r} is not one of {', '.join(known)}"
+            f"acceleration_ratio: expected one of {', '.join(known)}, got {acceleration_ratio!r}"
         )
     ratio = acceleration_ratio or job.source["robot"].get("acceleration_ratio")
     names = [name for name in robots or robot_ids() if name != job.robot.id]
