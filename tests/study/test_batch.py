@@ -243,6 +243,6 @@ def test_workers_of_a_cluster_need_the_job_folder_alone_and_that_they_need(
     def lost(what, done, total):
         (shared / other).unlink()
 
-    with pytest.raises(InputError, match="every worker needs job and files at the same path"):
+    with pytest.raises(InputError, match="needs the job and its files at the same path"):
         batch([shared / other], out, scheduler=scheduler, progress=lost)
     assert not (out / "other").exists()

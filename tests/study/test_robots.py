@@ -63,7 +63,7 @@ def test_those_that_can_come_first_and_the_others_say_why_not(found):
     assert all(each.binding is None for each in found[2:])
     said = {
         SMALL: "2 of 2 contours; a: no pose at 11 of 11 nodes, at node 0 mostly: unreachable",
-        SILENT: "in reach of every node, but its accelerations are not known",
+        SILENT: "it reaches every node, but its accelerations are not known",
         UNKNOWN: "joint limits are not known: the published description carries",
     }
     assert all(by_id[name].reason.startswith(why) for name, why in said.items())

@@ -33,7 +33,7 @@ def test_a_worker_refuses_a_job_that_has_changed(bracket):
     assert load_job(str(bracket), then) is load_job(str(bracket), then)
     bracket.write_text(bracket.read_text() + "\n# a remark\n")
     load_job.cache_clear()
-    with pytest.raises(UnfitWorker, match="changed, or is another one on this worker"):
+    with pytest.raises(UnfitWorker, match="since the study began, or differs on this worker"):
         load_job(str(bracket), then)
 
 
