@@ -212,7 +212,7 @@ def problem_of_job(
     asked = task.asked(job.options)
     speed = task.speed if nodes.time is None else None
     if asked.method == "continuous":
-        job.robot.require_no_free_joint("a Pareto front off the grid")
+        job.robot.require_no_free_joint("a Pareto set off the grid")
     options = replace(asked, feed="constant", refine=False, certify=None)
     return ParetoProblem(
         contour=nodes,
