@@ -213,7 +213,7 @@ def test_what_is_refused(job, studied, tmp_path):
     refused("runs: expected a whole number", runs=0)
     refused("ahead: expected a whole number", ahead=0)
     (tmp_path / "s").write_text("no store")
-    refused("no store of a sweep", runs=1)
+    refused("not the store of a sweep", runs=1)
 
 
 def test_where_no_run_can_have_a_plan_it_says_why(job, tmp_path):

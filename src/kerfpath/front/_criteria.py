@@ -231,9 +231,7 @@ class Clearance(Criterion):
 
     def require(self, options: PlanOptions, cell: Cell | None, home: ArrayLike | None) -> None:
         if cell is None:
-            raise InputError(
-                "criteria: 'clearance' needs a cell; give one, or remove 'clearance'"
-            )
+            raise InputError("criteria: 'clearance' needs a cell; give one, or remove 'clearance'")
         if not counts_as_clearance(cell).any():
             raise InputError(
                 "criteria: 'clearance' needs a part or a fixture in the cell that uses the general "
