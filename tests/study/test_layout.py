@@ -307,7 +307,7 @@ def test_ranges_on_the_command_line():
         "yaw_deg": (-5.0, 5.5),
     }
     for text, said in {
-        "x=-1:1": "vary: expected one of x_mm, y_mm, .*got 'x'",
+        "x=-1:1": "vary: expected one of x_mm, y_mm, z_mm",
         "x_mm=1": "expected x_mm=LOW:HIGH",
         "x_mm=a:b": "expected x_mm=LOW:HIGH",
         "x_mm=2:-2": "with LOW below HIGH",
