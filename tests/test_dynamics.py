@@ -130,7 +130,7 @@ def test_a_held_positioner_takes_gravity_along(tmp_path):
     limits = {"lower": -3.0, "upper": 3.0, "velocity": 1.0, "acceleration": 1.0, "step": 0.1}
     loaded = arm_with_masses(tmp_path, ratio="iontec_20_to_70kg").with_load(LOAD)
     turned = loaded.with_positioner((0.3, 1.0, 0.2), (1.0, 0.0, 0.5), **limits)
-    with pytest.raises(InputError, match="what positioner does to them is not known"):
+    with pytest.raises(InputError, match="the effect of positioner on them is not known"):
         turned.torque_limit()
     q, dq, ddq = motions(6)
     want = loaded.torque_limit().dynamics.torque(q, dq, ddq)

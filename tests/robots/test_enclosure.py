@@ -301,8 +301,8 @@ def five_joints(r):
     ("node", "gamma", "half", "words"),
     [
         ([0, 1], [0.0, 0.0], [0.1, 0.1], "from 0 to 0, got frame 1 for cell 1"),
-        ([0], [0.0], [-0.1], "cell 0 is 0 .- -0.1"),
-        ([0], [np.nan], [0.1], "cell 0 is nan"),
+        ([0], [0.0], [-0.1], "got 0 .- -0.1 rad for cell 0"),
+        ([0], [np.nan], [0.1], "got nan .* for cell 0"),
         ([0], [0.0], [0.1, 0.1], "of the same length"),
     ],
 )

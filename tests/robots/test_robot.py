@@ -307,7 +307,7 @@ def test_a_robot_without_limits_is_refused_until_they_are_given():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: robot("abb_irb4600"), "not in the library of 69; nearest: .*abb_irb4600_60_205"),
+        (lambda: robot("abb_irb4600"), "the library of 69 robots; nearest: .*abb_irb4600_60_205"),
         (lambda: robot("zzz"), "no id there is similar"),
         (lambda: robot("staubli_tx60", acceleration_ratio="fast"), "one of .*, got 'fast'"),
         (lambda: robot("staubli_tx60").with_limits(lower=np.full(6, 9.0)), "joint 1 are reversed"),

@@ -156,7 +156,7 @@ LIMITS = [
         '<limit lower="0" upper="4" velocity="1" acceleration="0" effort="1"/>',
         r"acceleration is 0 m/s\^2 in arm.urdf, so it cannot move",
     ),
-    ('<limit lower="0" upper="0" velocity="1" acceleration="1" effort="1"/>', "only be at 0 m"),
+    ('<limit lower="0" upper="0" velocity="1" acceleration="1" effort="1"/>', "are both 0 m"),
     ('<limit lower="2" upper="1" velocity="1" acceleration="1" effort="1"/>', "are reversed"),
 ]
 

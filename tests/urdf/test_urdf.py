@@ -156,7 +156,7 @@ def test_accelerations_of_every_joint_are_read_the_smaller_of_both_ways(tmp_path
         ('<limit velocity="1"/>', "joint 'j1' has no position limits"),
         ('<limit lower="0" upper="0" velocity="1"/>', "has the same lower and upper limit, 0 rad"),
         ('<limit lower="-3" upper="3"/>', "joint 'j1' has no velocity limit; give velocity="),
-        ('<limit lower="-3" upper="3" velocity="0"/>', "the velocity limit 0 rad/s, so that"),
+        ('<limit lower="-3" upper="3" velocity="0"/>', "the velocity limit 0 rad/s, so it"),
     ],
 )
 def test_limits_that_are_missing_or_zero_are_asked_for(tmp_path, limit, message):
