@@ -240,7 +240,9 @@ def test_seven_joints_without_a_spherical_shoulder_are_refused(tmp_path):
         for i in range(7)
     ]
     path = urdf(tmp_path, joints, names)
-    with pytest.raises(InputError, match=r"axes 1, 2 and 3 do not meet .* no other arms of seven"):
+    with pytest.raises(
+        InputError, match=r"axes 1, 2 and 3 miss a common point .* other seven-axis arms"
+    ):
         Robot.from_urdf(path)
 
 
