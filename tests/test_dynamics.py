@@ -130,7 +130,7 @@ def test_a_held_positioner_takes_gravity_along(tmp_path):
     limits = {"lower": -3.0, "upper": 3.0, "velocity": 1.0, "acceleration": 1.0, "step": 0.1}
     loaded = arm_with_masses(tmp_path, ratio="iontec_20_to_70kg").with_load(LOAD)
     turned = loaded.with_positioner((0.3, 1.0, 0.2), (1.0, 0.0, 0.5), **limits)
-    with pytest.raises(InputError, match="what positioner does to them is not known"):
+    with pytest.raises(InputError, match="the effect of positioner on them is not known"):
         turned.torque_limit()
     q, dq, ddq = motions(6)
     want = loaded.torque_limit().dynamics.torque(q, dq, ddq)
@@ -206,7 +206,7 @@ def test_masses_that_are_missing_or_impossible_are_refused_where_torques_are_ask
     path.write_text(text)
     found = Robot.from_urdf(path)  # kinematics need no masses
     assert found.inertia is None
-    with pytest.raises(InputError, match="its torques are not known: ") as fault:
+    with pytest.raises(InputError, match="its torques cannot be computed: ") as fault:
         found.with_load(LOAD)
     said = why.replace("no inertial", "link 'link_3' has no <inertial>")
     assert said in str(fault.value)
@@ -229,7 +229,7 @@ def test_a_frame_needs_no_mass_and_a_link_on_a_foreign_joint_is_refused(tmp_path
 
 
 def test_what_is_not_known_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"only a description \(URDF\) says what its links weigh"):
+    with pytest.raises(InputError, match=r"the masses of its links come only from a description"):
         robot("ur_ur10e").with_load(LOAD)
     path = described_with_masses(tmp_path, "ur_ur10e")
     path.write_text(re.sub(r' effort="[^"]*"', "", path.read_text()))

@@ -173,5 +173,5 @@ def test_bad_arguments_are_refused(good, drawn):
     with pytest.raises(InputError, match="path_tolerance"):
         audit(good, path_tolerance=-1.0)
     half = Contour(drawn.points[:2000], drawn.axes[:2000])
-    with pytest.raises(InputError, match=r"reference: .* m long"):
+    with pytest.raises(InputError, match=r"reference: .* as long as the plan's"):
         audit(good, reference=half)

@@ -312,7 +312,7 @@ FIELDS = ("node", "posture", "level", "index", "lift", "value", "dual")
         (lambda s: {"value": s.value[:-1]}, "value: expected shape"),
         (lambda s: {"value": s.value * np.nan}, "value: expected numbers up to"),
         (lambda s: {"dual": s.dual + np.float32(np.inf)}, "dual: expected numbers up to"),
-        (lambda s: {"node": s.node.astype(float)}, "numbers of another kind"),
+        (lambda s: {"node": s.node.astype(float)}, "node: expected integers"),
         (lambda s: {"multipliers": np.zeros((8, 6))}, "multipliers: expected shape"),
         (lambda s: {"multipliers": np.ones((9, 6))}, "zeros at the first node"),
         (lambda s: {"multipliers": np.full((9, 6), np.nan)}, "multipliers: expected numbers"),

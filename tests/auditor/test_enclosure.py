@@ -420,6 +420,6 @@ def test_what_has_no_closed_form_here_is_refused():
         **six,
     )
     cell = np.zeros(1)
-    for other, words in ((five, "families opw, ur only"), (rail, "has rail")):
+    for other, words in ((five, "of family opw or ur, got"), (rail, "has rail")):
         with pytest.raises(InputError, match=words):
             enclose(other, np.eye(4)[None], np.zeros(1, int), cell, cell, TOOL)

@@ -117,7 +117,7 @@ def test_an_arm_of_no_known_family_is_drawn_along_its_chain(monkeypatch):
     wrist = [body.frame for body in link_capsules(robot("abb_irb4600_60_205"))]
     assert wrist == [0, 1, 2, 3, 6]  # joints 4 to 6 are in one place
     monkeypatch.delitem(_chain._MODELS, "ur")
-    with pytest.raises(InputError, match="only its description says where the joints"):
+    with pytest.raises(InputError, match="are known only from a robot description"):
         chain_of(arm)
 
 

@@ -309,7 +309,7 @@ def audit_issue():
         ({"workers": 1.5}, "workers: expected a whole number"),
         ({"ahead": 0}, "ahead: expected a whole number"),
         ({"criteria": ["clearance"]}, "'clearance' needs a cell"),
-        ({"criteria": ["time"]}, "'time' needs home"),
+        ({"criteria": ["time"]}, "'time' needs a home position"),
         ({"search": "luck"}, "search: expected one of adaptive, grid"),
     ],
 )
@@ -523,7 +523,7 @@ def test_clearance_is_one_thing_or_the_other(task, tool, placement):
     comfort = Comfort(clearance=Band(width=0.02, cost=1.0))
     room = cell_of(task["robot"], fixtures={"post": box_between([2, 2, 0], [2.1, 2.1, 1])}, **where)
     options = task | {"criteria": ["clearance"]}
-    with pytest.raises(InputError, match="a cost of comfort already"):
+    with pytest.raises(InputError, match="already a penalty in comfort"):
         pareto(**options, cell=room, comfort=comfort)
-    with pytest.raises(InputError, match="needs a part or fixtures in the cell"):
+    with pytest.raises(InputError, match="needs a part or a fixture in the cell"):
         pareto(**options, cell=cell_of(task["robot"], fixtures={}, **where))

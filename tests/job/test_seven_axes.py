@@ -162,8 +162,8 @@ elbow_step_deg = 5
 
 def test_studio_and_lists_of_robots_say_that_they_do_not_know_it(folder):
     job = read_job(folder / "job.toml")
-    with pytest.raises(InputError, match="the studio does not know arms of seven axes"):
+    with pytest.raises(InputError, match="the studio does not support seven-axis arms"):
         scene_of_robot(job, 1)
     six = robot("abb_irb4600_60_205", acceleration_ratio="iontec_20_to_70kg")
-    with pytest.raises(InputError, match="a list of robots does not know arms of seven axes"):
+    with pytest.raises(InputError, match="a list of robots does not support seven-axis arms"):
         with_robot(job, six)

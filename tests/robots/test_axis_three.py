@@ -119,7 +119,7 @@ def test_the_parallel_rod_of_a_description_is_that_of_the_library(tmp_path):
     ("name", "options", "said"),
     [
         ("abb_irb2400_155", {"axis_3": "serial"}, "expected 'horizontal', got 'serial'"),
-        ("fanuc_m20ia", {"axis_3": "serial"}, "expected 'horizontal', as controllers by FANUC"),
+        ("fanuc_m20ia", {"axis_3": "serial"}, "the convention of controllers by FANUC"),
         ("kuka_kr16_2", {"axis_3": "horizontal", "axis_3_limits": [-1, 1]}, "expected 'serial'"),
         ("abb_irb2400_155", {"axis_3": "horizontal"}, 'two limits of axis 3 with "horizontal"'),
         ("abb_irb2400_155", {"axis_3_limits": [-1, 1]}, 'expected them with axis_3="horizontal"'),
@@ -127,7 +127,7 @@ def test_the_parallel_rod_of_a_description_is_that_of_the_library(tmp_path):
         (
             "abb_irb2400_155",
             {"axis_3": "horizontal", "axis_3_limits": [9, 10]},
-            "lie outside the range of axis 3",
+            "is outside the range of axis 3",
         ),
     ],
 )

@@ -259,7 +259,7 @@ def test_what_does_not_go_with_an_extra_joint_is_refused_in_one_line(
     railed, turning, arm, short, options, tool, placement
 ):
     for robot in (railed, turning):
-        with pytest.raises(InputError, match=r"ask robot.held\(x\).inverse"):
+        with pytest.raises(InputError, match=r"use robot.held\(x\).inverse"):
             robot.inverse(np.eye(4))
     cell = cell_of(arm, tool=tool)
     made = plan(short, railed, **options)
@@ -330,5 +330,5 @@ def test_a_general_arm_is_held_where_its_rail_stands(arm):
     np.testing.assert_allclose(chain_of(rides).forward(q[None])[0], want, atol=1e-9)
     found = rides.held(0.7).inverse(want).q
     assert np.abs(found - q[:6]).max(axis=1).min() < 1e-6
-    with pytest.raises(InputError, match=r"ask robot.held\(x\)"):
+    with pytest.raises(InputError, match=r"use robot.held\(x\)"):
         rides.follow(want[None], q[None, :6], np.zeros(1, int))

@@ -148,7 +148,7 @@ def test_a_course_may_be_given_and_is_checked(arm, tool):
     bound = chuck(arm, endless=False)
     with pytest.raises(InputError, match=r"external: chuck is at .* outside its range"):
         plan(contour, bound, external=rule, **options)
-    with pytest.raises(InputError, match=r"chuck: the exact search .* needs their step"):
+    with pytest.raises(InputError, match=r"chuck: the exact search .* needs a step"):
         plan(contour, robot, method="exact", **options)
 
 

@@ -129,23 +129,21 @@ def test_what_is_out_of_reach_has_no_solution_and_limits_are_kept(lbr):
 
 def test_the_joint_that_is_given_must_be(lbr):
     T = lbr.forward(np.zeros(7))
-    with pytest.raises(InputError, match=r"solutions without end; give where joint 3 stands"):
+    with pytest.raises(InputError, match=r"infinitely many .*; give the value of joint 3"):
         lbr.inverse(T)
-    with pytest.raises(InputError, match=r"given: ortho-parallel arm .* leaves no joint free"):
+    with pytest.raises(InputError, match=r"given=: poses leave no joint free .ortho-parallel arm"):
         robot("staubli_tx60").inverse(T, given=0.0)
-    with pytest.raises(InputError, match="no joint of it is free"):
+    with pytest.raises(InputError, match="leave no joint of this arm free"):
         robot("staubli_tx60").with_elbow_step(0.1)
     with pytest.raises(InputError, match="elbow_step: expected a number above 0 rad"):
         lbr.with_elbow_step(0.0)
-    with pytest.raises(InputError, match="is for 6 joints, and 'kuka_lbr_iiwa14_r820' has 7"):
+    with pytest.raises(InputError, match="is for 6 joints, but robot 'kuka_lbr_iiwa14_r820' has 7"):
         robot(LBR, acceleration_ratio="iontec_20_to_70kg")
     rides = lbr.on_rail([1, 0, 0], **RAIL).on_rail([0, 1, 0], name="cross", **RAIL)
     assert rides.joint_names == (*(f"joint {i}" for i in range(1, 8)), "rail", "cross")
     np.testing.assert_array_equal(rides.free, [2, 7, 8])
     np.testing.assert_array_equal(rides.solved, [0, 1, 3, 4, 5, 6])
-    with pytest.raises(
-        InputError, match="at most 2 external axes, as the elbow of the arm is free"
-    ):
+    with pytest.raises(InputError, match="at most 2 external axes, because the elbow of the arm"):
         rides.on_rail([0, 0, 1], name="lift", **RAIL)
 
 
@@ -172,7 +170,7 @@ def test_it_is_recognised_in_whatever_joint_frames(tmp_path, lbr, seed):
 
 
 def test_torques_of_an_arm_whose_elbow_is_free_are_refused(lbr):
-    with pytest.raises(InputError, match="whose joint 3 is free limits on them are not kept yet"):
+    with pytest.raises(InputError, match="whose joint 3 is free are not supported yet"):
         lbr.with_load(Load(mass=2.0, centre=[0, 0, 0.1]))
 
 
@@ -185,7 +183,7 @@ def test_arms_of_seven_axes_that_are_not_of_this_kind_are_refused(lbr):
         return KinematicChain(origins=origins, axes=chain.axes, end=chain.end)
 
     for joint, where in ((3, "3, 4 and 5"), (5, "5, 6 and 7"), (1, "1, 2 and 3")):
-        with pytest.raises(InputError, match=f"axes {where} do not meet in a point.*no other arms"):
+        with pytest.raises(InputError, match=f"axes {where} miss a common point.*other seven-axis"):
             recognise(moved(joint, [0.08, 0, 0]))  # 82.5 mm at the elbow of a Franka arm
     with pytest.raises(InputError, match="axes 4 and 5 are not at right angles"):
         recognise(moved(4, [0, 0, 0], [0.1, 0, 0]))

@@ -157,7 +157,7 @@ def test_what_a_urdf_cannot_say_is_refused_in_one_line():
     page = (ROOT / "docs" / "interoperability.md").read_text(encoding="utf-8")
     assert f"{len(coupled)} of the {len(robot_ids())} in the library" in page
     for name in coupled:
-        with pytest.raises(InputError, match=r"joint 2 \+ joint 3, and a URDF bounds each joint"):
+        with pytest.raises(InputError, match=r"joint 2 \+ joint 3, but a URDF"):
             robot(name).to_urdf()
     with pytest.raises(InputError, match=r"joint limits are not known .*with_limits\(lower="):
         robot("kuka_kr120_r2500_pro").to_urdf()
@@ -171,7 +171,7 @@ def test_the_command_writes_a_file_or_nothing(tmp_path):
     assert "wrote" in run("robots", "kuka_lbr_iiwa14_r820", "--urdf", str(path)).stdout
     assert path.read_text() == robot("kuka_lbr_iiwa14_r820").to_urdf()
     for arguments, said in (
-        (("fanuc_m10ia", "--urdf", str(tmp_path / "x.urdf")), "a URDF bounds each joint alone"),
+        (("fanuc_m10ia", "--urdf", str(tmp_path / "x.urdf")), "only limits of single joints"),
         (("--urdf", str(tmp_path / "x.urdf")), "expected the id of a robot, got none"),
         (("kuka_dkp400", "--urdf", str(tmp_path / "x.urdf")), "got kuka_dkp400"),
         (("kuka_kr60_ha", "--urdf", str(tmp_path / "no" / "x.urdf")), "cannot write"),

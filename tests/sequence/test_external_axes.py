@@ -47,7 +47,7 @@ def test_a_move_takes_as_long_as_the_slowest_of_arm_and_axes(robot):
     # 2 m on the rail at 0.4 m/s and 0.75 m/s^2: speed / acceleration to gain it, once.
     assert move.duration == pytest.approx(2.0 / 0.4 + 0.4 / 0.75)
     within(robot, move, 0.5)
-    with pytest.raises(InputError, match="transfer move: rail of an end is beyond its limits"):
+    with pytest.raises(InputError, match="transfer move: rail is beyond its limits at an end"):
         transfer_move(robot, at(-0.9), at(1.3))
     turned = transfer_move(robot, at(0.0, 3.0), at(0.0, 4.0))
     assert turned.duration == pytest.approx(1.0 / 1.5 + 1.5 / 3.0)

@@ -353,7 +353,7 @@ def test_a_posture_that_cannot_be_left_is_reconsidered(lane, arm):
     assert {int(p.posture[0]) // 4 for p in free.plans} == {0}
     from_there = plan_part(holes, arm, home=folded, cell=cell, retract=0.01, seconds=0.5, **asked)
     assert {int(p.posture[0]) // 4 for p in from_there.plans} == {1}
-    with pytest.raises(NoFeasiblePath, match=r"from home to the start of contour '.*tried as well"):
+    with pytest.raises(NoFeasiblePath, match=r"from home to the start of contour '.*also tried"):
         order_plans(
             [[a] for a in ahead], home=folded, cell=cell, retract=0.01, seconds=0.5,
             more=lambda i: [ahead[i]],

@@ -178,17 +178,17 @@ def test_bad_input_of_the_command_is_one_line(tmp_path, monkeypatch, idle):
     assert "expected a folder, but file is a file" in said("good.toml", "--out", "file")
     assert "expected a folder, but file is a file" in said("good.toml", "--out", "file/deep")
     assert "out/good: expected a folder" in said("good.toml", "--out", "out")
-    assert "processes = 0" in said("good.toml", "--processes", 0)
+    assert "with a scheduler, got 0" in said("good.toml", "--processes", 0)
     both = ("--processes", 1, "--scheduler", "tcp://127.0.0.1:9")
-    assert "none where a scheduler is given" in said("good.toml", *both)
+    assert "none with a scheduler" in said("good.toml", *both)
     monkeypatch.setattr(_cluster, "PATIENCE", 0.5)
     assert "no answer within" in said("good.toml", "--scheduler", "tcp://127.0.0.1:9")
     with Store(tmp_path / "kerfpath-batch" / "batch.sqlite"):
-        assert "another sweep holds this store" in said("good.toml")
+        assert "another sweep uses this store" in said("good.toml")
     with closing(sqlite3.connect(tmp_path / "kerfpath-batch" / "batch.sqlite")) as store:
         store.execute("UPDATE package SET version = '0.0.9'")
         store.commit()
-    assert "a store of kerfpath 0.0.9, this is" in said("good.toml")
+    assert "got one of 0.0.9" in said("good.toml")
 
 
 def test_a_full_disk_under_the_files_is_one_line_and_the_same_command_goes_on(
@@ -243,6 +243,6 @@ def test_workers_of_a_cluster_need_the_job_folder_alone_and_that_they_need(
     def lost(what, done, total):
         (shared / other).unlink()
 
-    with pytest.raises(InputError, match="every worker needs job and files at the same path"):
+    with pytest.raises(InputError, match="needs the job and its files at the same path"):
         batch([shared / other], out, scheduler=scheduler, progress=lost)
     assert not (out / "other").exists()

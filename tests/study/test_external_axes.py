@@ -313,7 +313,7 @@ def test_other_robots_stand_on_the_axes_of_the_job(tmp_path):
     (found,) = contour_speeds(job, part)
     assert found.reached == 1.0
     assert found.fastest > 0
-    with pytest.raises(InputError, match="its accelerations are not known, and no course of rail"):
+    with pytest.raises(InputError, match=r"its accelerations are not known, .* no course of rail"):
         with_robot(job, robot("abb_irb4600_60_205"))
     small = robot("staubli_tx60", acceleration_ratio="iontec_20_to_70kg")
     (out,) = contour_speeds(with_robot(job, small), part)

@@ -307,7 +307,7 @@ def test_ranges_on_the_command_line():
         "yaw_deg": (-5.0, 5.5),
     }
     for text, said in {
-        "x=-1:1": "no variable 'x'; there are x_mm, y_mm",
+        "x=-1:1": "vary: expected one of x_mm, y_mm, z_mm",
         "x_mm=1": "expected x_mm=LOW:HIGH",
         "x_mm=a:b": "expected x_mm=LOW:HIGH",
         "x_mm=2:-2": "with LOW below HIGH",
@@ -317,7 +317,7 @@ def test_ranges_on_the_command_line():
     }.items():
         with pytest.raises(InputError, match=re.escape(said)):
             ranges_of([text])
-    with pytest.raises(InputError, match="x_mm comes twice"):
+    with pytest.raises(InputError, match="x_mm is given twice"):
         ranges_of(["x_mm=0:1", "x_mm=0:2"])
 
 
@@ -398,7 +398,7 @@ def test_the_command_says_why_no_placement_is_feasible(tmp_path):
 
 def test_the_command_refuses_what_it_does_not_know(coarse, tmp_path):
     for given, word in (
-        ("x=0:1", "no variable 'x'"),
+        ("x=0:1", "got 'x'"),
         ("yaw_deg=5:-5", "with LOW below HIGH"),
     ):
         assert_refused(run("layout", coarse, "--vary", given, "--out", tmp_path / "out"), word)

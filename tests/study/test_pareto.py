@@ -207,13 +207,13 @@ def test_what_is_refused(job, studied, tmp_path):
             pareto_of_job(job, **{"store": tmp_path / "s", "processes": 1} | given)
         assert "\n" not in str(caught.value)
 
-    refused("got 'trim'; it has small, large", contour="trim")
+    refused("got 'trim'; its contours: small, large", contour="trim")
     refused("got 'elegance'", criteria=["elegance"])
     refused("'clearance' needs a cell", criteria=["clearance"])
     refused("runs: expected a whole number", runs=0)
     refused("ahead: expected a whole number", ahead=0)
     (tmp_path / "s").write_text("no store")
-    refused("no store of a sweep", runs=1)
+    refused("not the store of a sweep", runs=1)
 
 
 def test_where_no_run_can_have_a_plan_it_says_why(job, tmp_path):
@@ -230,8 +230,8 @@ def test_where_no_run_can_have_a_plan_it_says_why(job, tmp_path):
     ("spoil", "said"),
     [
         (lambda path, entry: path.unlink(), "run kerfpath pareto .* first"),
-        (lambda path, entry: path.write_text("{"), "expected a front as kerfpath writes it"),
-        (lambda path, entry: path.write_text("[]"), "expected a front as kerfpath writes it"),
+        (lambda path, entry: path.write_text("{"), "expected a front written by kerfpath"),
+        (lambda path, entry: path.write_text("[]"), "expected a front written by kerfpath"),
         (
             lambda path, entry: path.write_text(json.dumps(entry | {"kerfpath": "0.0.1"})),
             "written by kerfpath 0.0.1",

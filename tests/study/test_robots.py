@@ -63,7 +63,7 @@ def test_those_that_can_come_first_and_the_others_say_why_not(found):
     assert all(each.binding is None for each in found[2:])
     said = {
         SMALL: "2 of 2 contours; a: no pose at 11 of 11 nodes, at node 0 mostly: unreachable",
-        SILENT: "in reach of every node, but its accelerations are not known",
+        SILENT: "it reaches every node, but its accelerations are not known",
         UNKNOWN: "joint limits are not known: the published description carries",
     }
     assert all(by_id[name].reason.startswith(why) for name, why in said.items())
@@ -121,7 +121,7 @@ def test_accelerations_are_assumed_only_as_asked(folder, tmp_path):
     )
     assert [contour["fastest"] for contour in told] == [c.fastest for c in assumed.contours]
     assert "assumed" not in by_id[STATED].robot.acceleration_source
-    with pytest.raises(InputError, match="'heavy' is not one of nearest, "):
+    with pytest.raises(InputError, match=r"expected one of nearest, .*, got 'heavy'"):
         which_robots(path, acceleration_ratio="heavy", **given)
     with pytest.raises(InputError, match="'abb_irb9' is not in the library"):
         which_robots(path, **(given | {"robots": ["abb_irb9"]}))
@@ -204,5 +204,5 @@ def test_bad_input_of_the_command_is_one_line(folder):
     options = ("--goal", "speed", "--map-points", 0)
     assert "leave out --goal, --map-points" in said("--robots", *options)
     assert "only with --robots" in said("--acceleration-ratio", "nearest")
-    assert "'heavy' is not one of" in said("--robots", "--acceleration-ratio", "heavy")
+    assert ", got 'heavy'" in said("--robots", "--acceleration-ratio", "heavy")
     assert "expected a folder, but file is a file" in said("--robots", "--out", "file")

@@ -33,7 +33,7 @@ def test_a_worker_refuses_a_job_that_has_changed(bracket):
     assert load_job(str(bracket), then) is load_job(str(bracket), then)
     bracket.write_text(bracket.read_text() + "\n# a remark\n")
     load_job.cache_clear()
-    with pytest.raises(UnfitWorker, match="changed, or is another one on this worker"):
+    with pytest.raises(UnfitWorker, match="since the study began, or differs on this worker"):
         load_job(str(bracket), then)
 
 
@@ -45,5 +45,5 @@ def test_a_job_that_is_not_there_is_refused(tmp_path):
 def test_a_worker_without_the_job_is_unfit_and_does_not_fail_the_task(bracket):
     then = digest(bracket)
     (bracket.parent / "bracket.step").unlink()
-    with pytest.raises(UnfitWorker, match=r"bracket\.step.*every worker needs job and files"):
+    with pytest.raises(UnfitWorker, match=r"bracket\.step.*every worker needs the job and"):
         load_job(str(bracket), then)

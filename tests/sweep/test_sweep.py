@@ -164,7 +164,7 @@ def test_a_failing_task_is_kept_with_its_reason_and_does_not_stop_the_rest(tmp_p
         "infinite": ("ValueError", "Out of range float values are not JSON compliant"),
         "object": ("TypeError", "Object of type object is not JSON serializable"),
         "surrogate": ("ValueError", "?"),
-        "killed": ("WorkerDied", "the task took its process with it"),
+        "killed": ("WorkerDied", "the task killed its process"),
         "b": None,
     }
     tasks = [{"what": what} for what in expected]
@@ -233,7 +233,7 @@ def test_after_ctrl_c_the_processes_leave_and_the_results_stay(tmp_path):
 
 
 def test_a_second_sweep_on_a_store_is_refused(tmp_path):
-    said = "store.sqlite: another sweep holds this store"
+    said = "store.sqlite: another sweep uses this store"
     store, other = tmp_path / "store.sqlite", script(tmp_path, numbers(1), REFUSED)
     lines = []
 
@@ -252,9 +252,9 @@ def test_a_second_sweep_on_a_store_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("edit", "said"),
     [
-        ("PRAGMA user_version = 0", "a store of schema 0, this kerfpath writes 1"),
-        ("UPDATE package SET version = '0.0.9'", r"a store of kerfpath 0\.0\.9, this is"),
-        ("PRAGMA application_id = 7", "no store of a sweep"),
+        ("PRAGMA user_version = 0", "expected a store of schema 1, got schema 0"),
+        ("UPDATE package SET version = '0.0.9'", r"a store of kerfpath .*, got one of 0\.0\.9"),
+        ("PRAGMA application_id = 7", "not the store of a sweep"),
     ],
 )
 def test_a_store_of_another_kind_is_refused_and_left_alone(tmp_path, edit, said):
@@ -270,9 +270,9 @@ def test_a_store_of_another_kind_is_refused_and_left_alone(tmp_path, edit, said)
 
 def test_a_file_that_is_no_store_is_refused(tmp_path):
     (tmp_path / "plan.json").write_text("{}" * 1000)
-    with pytest.raises(InputError, match=r"plan\.json: this file is no store of a sweep"):
+    with pytest.raises(InputError, match=r"plan\.json: this file is not the store of a sweep"):
         sweep.run(sweep_tasks.square, numbers(1), store=tmp_path / "plan.json")
-    with pytest.raises(InputError, match="is its folder there"):
+    with pytest.raises(InputError, match="check that its folder exists"):
         sweep.run(sweep_tasks.square, numbers(1), store=tmp_path / "none" / "s")
 
 
@@ -312,8 +312,8 @@ def test_parameters_and_functions_that_cannot_travel_are_refused_before_anything
     assert "parameters[0]" in refused(sweep_tasks.square, [{"x": float("nan")}])
     assert "missing a required argument: 'x'" in refused(sweep_tasks.square, [{}])
     assert "unexpected keyword argument 'y'" in refused(sweep_tasks.square, [{"x": 1, "y": 2}])
-    assert "processes = 0" in refused(sweep_tasks.square, numbers(1), processes=0)
-    assert "none where" in refused(sweep_tasks.square, [], processes=1, scheduler="tcp://a:1")
+    assert "with a scheduler, got 0" in refused(sweep_tasks.square, numbers(1), processes=0)
+    assert "none with" in refused(sweep_tasks.square, [], processes=1, scheduler="tcp://a:1")
     assert not (tmp_path / "s").exists()
 
 

@@ -139,7 +139,7 @@ def test_limits_of_a_description_are_completed_and_replaced(tmp_path):
     assert found.externals[0].name == "track"
     assert (found.lower[6], found.upper[6]) == (0.0, 3.0)
     assert (found.velocity[6], found.acceleration[6]) == (1.5, 2.0)
-    with pytest.raises(InputError, match="track: it turns without end, got upper=; give endless"):
+    with pytest.raises(InputError, match="track: it turns without end, but got upper=; remove it"):
         Robot.from_urdf(path, externals={"rail": given | {"endless": True}})
     alone = Robot.from_urdf(path, externals=None)
     assert alone.joints == 6
@@ -154,9 +154,9 @@ LIMITS = [
     ('<limit lower="0" upper="4" velocity="0" acceleration="1" effort="1"/>', "velocity is 0 m/s"),
     (
         '<limit lower="0" upper="4" velocity="1" acceleration="0" effort="1"/>',
-        r"acceleration is 0 m/s\^2 in arm.urdf, so that it cannot move",
+        r"acceleration is 0 m/s\^2 in arm.urdf, so it cannot move",
     ),
-    ('<limit lower="0" upper="0" velocity="1" acceleration="1" effort="1"/>', "only be at 0 m"),
+    ('<limit lower="0" upper="0" velocity="1" acceleration="1" effort="1"/>', "are both 0 m"),
     ('<limit lower="2" upper="1" velocity="1" acceleration="1" effort="1"/>', "are reversed"),
 ]
 
@@ -209,7 +209,7 @@ def test_a_sliding_joint_in_the_arm_is_refused_as_before(tmp_path):
         Robot.from_urdf(path)
     # A turning joint before the arm is one of it, unless the arm is said to stand on it.
     path, _ = written(tmp_path, [("column", "revolute", FAST)])
-    with pytest.raises(InputError, match="stands on is named as mount"):
+    with pytest.raises(InputError, match="name the link that the arm is mounted on as mount"):
         Robot.from_urdf(path)
     assert Robot.from_urdf(path, mount="column_link").externals[0].name == "column"
 

@@ -154,9 +154,9 @@ def test_accelerations_of_every_joint_are_read_the_smaller_of_both_ways(tmp_path
     [
         ("", "joint 'j1' has no position limits; give lower= and upper= for all 6 joints"),
         ('<limit velocity="1"/>', "joint 'j1' has no position limits"),
-        ('<limit lower="0" upper="0" velocity="1"/>', "may only be at 0 rad"),
+        ('<limit lower="0" upper="0" velocity="1"/>', "has the same lower and upper limit, 0 rad"),
         ('<limit lower="-3" upper="3"/>', "joint 'j1' has no velocity limit; give velocity="),
-        ('<limit lower="-3" upper="3" velocity="0"/>', "the velocity limit 0 rad/s, so that"),
+        ('<limit lower="-3" upper="3" velocity="0"/>', "the velocity limit 0 rad/s, so it"),
     ],
 )
 def test_limits_that_are_missing_or_zero_are_asked_for(tmp_path, limit, message):
@@ -223,7 +223,7 @@ def test_angles_of_few_digits_are_taken_as_meant_only_when_asked(tmp_path, name,
         Robot.from_urdf(path)
     assert monotonic() - begun < 10  # not the minutes of a solver
     said = re.search(
-        r"snap=(\S+) takes them as meant, .* up to (\S+) mm and (\S+) deg; snap=0 keeps",
+        r"snap=(\S+) to round them, .* up to (\S+) mm and (\S+) deg; or snap=0 to keep",
         str(asked.value),
     )
     snap, off, turned = (float(word) for word in said.groups())

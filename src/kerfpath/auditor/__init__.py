@@ -1,4 +1,4 @@
-"""The audit: a re-check of a plan by kinematics that share no code with the planner."""
+"""The audit: check a plan again with kinematics that share no code with the planner."""
 
 import warnings
 
@@ -30,6 +30,8 @@ def __getattr__(name: str) -> object:
     if name != "air_checks":
         raise AttributeError(f"module 'kerfpath.auditor' has no attribute {name!r}")
     warnings.warn(
-        "kerfpath.auditor.air_checks is transfer_checks now", DeprecationWarning, stacklevel=2
+        "kerfpath.auditor.air_checks has been renamed to transfer_checks",
+        DeprecationWarning,
+        stacklevel=2,
     )
     return transfer_checks

@@ -1,4 +1,4 @@
-"""The re-check of a transfer move: joint limits, the time it has, and collisions."""
+"""The checks of a transfer move: joint limits, duration and collisions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["transfer_checks"]
 STEP = np.radians(0.5)
 """rad, or m: largest joint step between two samples of a move."""
 SLACK = 1e-6
-"""Relative slack on the time, and rad or m on joint limits, for rounding."""
+"""Slack for rounding: relative on the time, and rad or m on joint limits."""
 
 
 def transfer_checks(
@@ -37,18 +37,23 @@ def transfer_checks(
     ----------
     robot : Robot
     q : (m, n) rad
-        Corners; endless joints turn as they say.
+        Corners; endless joints turn exactly from one value to the next.
     time : (m,) s
-        When each is reached.
+        Time at which each corner is reached.
     cell : Cell, optional
-        Without one, collisions are not checked.
+        Without a cell, collisions are not checked.
     eta_v, eta_a : float
-        Share of the limits that may be used.
+        Shares of the limits that may be used.
 
     Returns
     -------
     list of Check
-        Their node is the corner that a motion starts from.
+        The node of a check is the corner from which a motion starts.
+
+    Raises
+    ------
+    InputError
+        A shape is wrong, limits are not known, or the cell has other external axes.
     """
     if cell is not None:
         require_axes(cell.chain, robot)
@@ -80,18 +85,18 @@ def transfer_checks(
 
 
 def _least_times(robot: Robot, step: Array, eta_v: float, eta_a: float) -> Array:
-    """Return the least time (m-1,) s of straight motions by |dq| (m-1, n) rad, stop to stop."""
+    """Return the least times (m-1,) s of straight motions by |dq| (m-1, n) rad, stop to stop."""
     velocity, acceleration = robot.speed_limits()
     still = 1e-300
     v = (eta_v * velocity / np.maximum(step, still)).min(axis=1)
     a = (eta_a * acceleration / np.maximum(step, still)).min(axis=1)
-    # Of the motion's own share of the way: it peaks at v, or half way where it never gets there.
+    # Peak speed, as share of the way per second: v, or the speed at half way if v is not reached.
     peak = np.minimum(v, np.sqrt(a))
     return np.asarray(1 / peak + peak / a)
 
 
 def _sample_motions(corners: Array) -> tuple[Array, Ints]:
-    """Return joint vectors (S, n) along the motions, no joint step above `STEP`, and their legs."""
+    """Return joint vectors (S, n) along the motions, at most `STEP` apart, and their motions."""
     samples, legs = [], []
     for k, (one, two) in enumerate(pairwise(corners)):
         count = int(np.ceil(np.abs(two - one).max() / STEP)) + 1

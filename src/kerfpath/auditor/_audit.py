@@ -1,4 +1,4 @@
-"""The checks of a plan: tool against contour, joints against limits, at the nodes and between."""
+"""The checks of a plan: tool against contour, joints against limits, at and between the nodes."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ __all__ = ["audit", "checks"]
 TIP_AT_NODES = 1e-6
 """m: two kinematics in double precision agree far better; a wrong tool or frame is far worse."""
 AXIS_AT_NODES = 1e-5
-"""rad, for the same reason."""
+"""rad: as for the tip."""
 LIMIT_SLACK = 1e-8
-"""rad, or m on a rail: slack on joint positions, for the same reason."""
+"""rad, or m on a rail: slack on joint positions, as for the tip."""
 LENGTH_AGREES = 1e-6
-"""Relative difference of path lengths between a plan's contour and the reference it came from."""
+"""Largest relative difference in length between a plan's contour and its reference."""
 
 FINER = "sample the contour more finely"
-"""What helps where the nodes lie on the path and the way between them does not."""
+"""Advice where the nodes are on the path and the motion between them is not."""
 OFF_THE_PATH = "the target itself is off the path there: put it back, or plan the path meant"
-"""What helps where a node was moved, as by hand."""
+"""Advice where a node was moved, for example by hand."""
 
 
 def audit(
@@ -50,7 +50,10 @@ def audit(
     parts: int = 8,
     cell: Cell | None = None,
 ) -> list[Issue]:
-    """Return what is wrong with a plan; an empty list means that it passes. Arguments: `checks`."""
+    """Return the issues of a plan; an empty list means that it passes.
+
+    The arguments and exceptions are those of `checks`.
+    """
     table = checks(
         plan,
         reference=reference,
@@ -74,32 +77,33 @@ def checks(
     cell: Cell | None = None,
     rounding: Rounding | None = None,
 ) -> list[Check]:
-    """Return the whole table of checks.
+    """Return the full table of checks.
 
     Parameters
     ----------
     plan : Plan
     reference : Contour, optional
-        The path that the plan's contour was sampled from, part frame; with it, the deviation
-        between nodes is measured against the drawing and not against the polyline of the nodes.
+        The path that the plan's contour was sampled from, in the part frame. With it, deviations
+        between nodes are measured from the drawing instead of the polyline of the nodes.
     interpolation : {"linear", "joint"}
         How the controller moves between nodes.
     path_tolerance : float m
         Largest distance of the tool tip from the path between nodes.
     axis_tolerance : float rad
-        Largest angle of the tool axis from the path's between nodes.
+        Largest angle between the tool axis and that of the path between nodes.
     parts : int
-        Into how many parts the way between two nodes is divided.
+        Number of parts into which the motion between two nodes is divided.
     cell : Cell, optional
-        Whose near-miss distances the motion is to keep.
+        Cell whose near-miss distances the motion must keep.
     rounding : Rounding, optional
-        Of a plan that was read from a text: what its digits leave of joints and times. The limits
-        at each node are wider by what they explain, and the rows say by how much.
+        For a plan that was read from a text: rounding errors of its joints and times. The limits
+        at each node are wider by them, and the rows say by how much.
 
     Raises
     ------
     InputError
-        A reference of another length, an unknown interpolation, limits that are not known.
+        The reference has another length, the interpolation is unknown, a tolerance or `parts` is
+        not positive, limits are not known, or the cell has other external axes.
     """
     if interpolation not in ("linear", "joint"):
         raise InputError(f"interpolation: expected linear or joint, got {interpolation!r}")
@@ -114,8 +118,8 @@ def checks(
     path = plan.contour if reference is None else reference
     if abs(path.length - plan.contour.length) > LENGTH_AGREES * path.length:
         raise InputError(
-            f"reference: {path.length:.6f} m long, but the plan's contour was sampled from a path "
-            f"of {plan.contour.length:.6f} m"
+            f"reference: expected a path of {plan.contour.length:.6f} m, as long as the plan's "
+            f"contour, got one of {path.length:.6f} m"
         )
     reached = bound_between_nodes(plan, chain, motion, interpolation)
     tool = chain.forward(plan.q) @ plan.T_flange_tip
@@ -152,7 +156,7 @@ def _between_nodes(
     plan: Plan, motion: Motion, reached: BetweenNodes, path: Contour, path_tolerance: float,
     axis_tolerance: float,
 ) -> list[Check]:  # fmt: skip
-    """Compare points of the path with the motion of the cell between nodes that they fall in."""
+    """Compare points of the path with the motion between the two nodes on either side."""
     s = plan.contour.s - plan.contour.s[0] + path.s[0]
     parts = motion.q.shape[1] - 1
     fine = np.interp(np.arange((len(s) - 1) * parts + 1) / parts, np.arange(len(s)), s)
@@ -278,7 +282,7 @@ def _worst(
     level: Level = "error",
     advice: str = "",
 ) -> Check:
-    """Return the check of the largest of `values`, NaN counting as the worst of all."""
+    """Return the check of the largest of `values`; NaN counts as worst."""
     i = int(np.argmax(np.where(np.isnan(values), np.inf, values)))
     return Check(
         code=code,

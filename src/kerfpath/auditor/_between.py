@@ -1,14 +1,14 @@
-"""What the joints do between the samples of a straight move: bisected until nothing can hide.
+"""Bound the joints between the samples of a straight move, by bisection.
 
 On a straight move J(q) q' = V, the tool's twist per interval. If s is the least singular value of
-J at a sample and J changes by at most L for each radian that the joints turn, then within a step h
-of the interval the joints stay within r of the sample, where L r^2 - s r + |V| h = 0; the least
-singular value stays above s - L r, joint speeds below S = |V| / (s - L r), and their change per
-step below Q h with Q = (L S^2 + |V'|) / (s - L r). Of seven joints one runs evenly, by x per
-interval: V is less by its share x J_x, J is that of the others and changes with it, too, by L x, so
-that V' is at most L x (S + x) more, and (S + x)^2 stands for S^2. A step is divided until what it
-can hide is too small to matter, or cannot reach a limit. Lengths are in m, so that 1 m weighs as
-much as 1 rad.
+J at a sample and J changes by at most L per radian of the joints, then within a step h of the
+interval the joints stay within r of the sample, where L r^2 - s r + |V| h = 0. The least singular
+value stays above s - L r, joint speeds stay below S = |V| / (s - L r), and their change per step
+below Q h with Q = (L S^2 + |V'|) / (s - L r). Of seven joints, one runs evenly by x per interval:
+then V is reduced by its share x J_x, J is the Jacobian of the others and also changes with this
+joint, by L x, so V' grows by at most L x (S + x), and (S + x)^2 replaces S^2. A step is divided
+until the excess that it can hide is negligible or cannot reach a limit. Lengths are in m, so 1 m
+weighs as much as 1 rad.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from kerfpath.plans import Plan
 __all__ = ["HIDDEN_ANGLE", "HIDDEN_SPEED", "BetweenNodes", "bound_between_nodes"]
 
 HIDDEN_ANGLE = 1e-5
-"""rad that a joint may be beyond what its samples show."""
+"""rad: by how much a joint may exceed its samples unnoticed."""
 HIDDEN_SPEED = 1e-2
-"""Share of its limit by which a joint may be faster than at the samples."""
+"""Share of its limit by which a joint may be faster than at the samples unnoticed."""
 BY_FAR = 5.0
-"""Times a speed limit from which on a speed need not be known better."""
+"""Multiple of a speed limit from which on a speed need not be known more exactly."""
 DEEPEST = 14
-"""Times that a part of an interval is halved at most: to a hundred thousandth of it."""
+"""Largest number of halvings of a part of an interval: to about 1e-5 of the interval."""
 MOST = 60
-"""Samples of an interval at most, on the average of a plan, beyond the first and 5000 in all."""
+"""Most samples per interval, averaged over a plan, in addition to the first ones and to 5000."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BetweenNodes:
-    """What joints and their speeds reach between the nodes, found by bisection.
+    """Ranges and speeds of the joints between the nodes, found by bisection.
 
     Parameters
     ----------
@@ -48,9 +48,10 @@ class BetweenNodes:
     speed : (K-1, n) rad
         Largest speed of each joint in each interval, per interval.
     residual : (K-1,)
-        What the joints miss of the straight move at the samples in between, m and rad.
+        Largest error of the straight move at the samples in between, m and rad.
     open : (K-1,) bool
-        Where more may hide than is seen: at a singularity, or where the samples were used up.
+        Whether the joints may exceed their samples: near a singularity, or where the number of
+        samples ran out.
     """
 
     low: Array
@@ -62,7 +63,7 @@ class BetweenNodes:
 
 @dataclass(slots=True)
 class _Steps:
-    """Steps of intervals, by their two ends: interval, f, joints, speeds and singular values."""
+    """Steps: interval, begin, length; joints, speeds and least singular values at both ends."""
 
     k: Ints
     f0: Array
@@ -81,16 +82,17 @@ class _Steps:
 def bound_between_nodes(
     plan: Plan, chain: JointChain, motion: Motion, interpolation: Interpolation
 ) -> BetweenNodes:
-    """Return what the joints reach between the nodes of a plan; `motion` has the first samples.
+    """Return the ranges and speeds of the joints between the nodes of a plan.
 
     Parameters
     ----------
     plan : Plan
     chain : JointChain
-        Of the robot, without the tool.
+        Chain of the robot, without the tool.
     motion : Motion
+        Gives the first samples.
     interpolation : {"linear", "joint"}
-        That of the motion; even joint motions reach nothing that their ends do not.
+        Interpolation of the motion; in even joint motions the ends are the extremes.
     """
     if interpolation == "joint":
         rows = np.vstack([np.eye(plan.q.shape[1]), *(c.row[None] for c in plan.robot.couplings)])
@@ -139,7 +141,7 @@ def bound_between_nodes(
 
 
 class _StraightMoves:
-    """The straight moves of a plan, and when a step of one is small enough."""
+    """The straight moves of a plan, with the test whether a step of one is small enough."""
 
     def __init__(self, plan: Plan, chain: JointChain) -> None:
         self._chain, self._n = chain, len(chain.axes)
@@ -158,11 +160,11 @@ class _StraightMoves:
         self._turned = spun * float(np.sqrt((reach**2 + 1.0).sum()))  # of the Jacobian
         far = _farthest(chain, self._poses[:, :3, 3], plan.q[:, self._n :])
         self._size = rate + slid + spun * far
-        # What the twist changes by per interval: the axis that it is measured about turns with it.
+        # Change of the twist per interval: the axis that it is measured about turns with it.
         still = self._n >= 6
         own = 0.0 if still else (self._turn**2).sum(1)
         self._change = own + spun * rate * (1.0 + reach[0]) + self._turned * self._size
-        if len(chain.externals) > 1:  # the one carries the other's axis along
+        if len(chain.externals) > 1:  # one axis carries the other
             self._change = self._change + 2 * spun * (slid + spun * far)
         self._lipschitz = _lipschitz(reach) * (1.0 if still else 2.0)
         if chain.even is not None:
@@ -199,7 +201,7 @@ class _StraightMoves:
         return np.concatenate([v, self._x[k]], axis=1), least
 
     def settled(self, steps: _Steps) -> Bools:
-        """Say of which steps what they hide is known not to matter."""
+        """Return which steps (S,) can hide nothing that matters."""
         L, own = self._lipschitz, self._own
         s, size = np.maximum(steps.s0, steps.s1), self._size[steps.k]
         s = s - self._turned[steps.k] * steps.h
@@ -222,16 +224,16 @@ class _StraightMoves:
         slow = ((most + faster <= fast) | (faster <= HIDDEN_SPEED * fast)).all(axis=1)
         joined = np.linalg.norm((steps.q1 - steps.q0)[:, own], axis=1) <= r + 1e-6
         safe = known & joined & slow & (inside | (hidden <= HIDDEN_ANGLE))
-        # What breaks a limit by far is seen, and need not be known better.
+        # A limit that is exceeded by far is seen anyway.
         return np.asarray(safe | (most > BY_FAR * fast).any(axis=1))
 
     def fastest(self, steps: _Steps) -> Array:
-        """Return the speeds (S, n) per interval seen in steps; a jump to another branch is one."""
+        """Return the speeds (S, n) per interval seen in steps, jumps to other branches included."""
         ends = np.maximum(np.abs(steps.v0), np.abs(steps.v1))
         return np.asarray(np.maximum(ends, np.abs(steps.q1 - steps.q0) / steps.h[:, None]))
 
     def halved(self, steps: _Steps) -> tuple[_Steps, Array]:
-        """Return the two halves of each step after each other, and what their middles miss."""
+        """Return the two halves of each step, one after the other, and the errors in between."""
         f = steps.f0 + steps.h / 2
         wanted = straight(self._poses[:-1], self._poses[1:], steps.k, f)
         q, missed = follow(self._chain, wanted, (steps.q0 + steps.q1) / 2)
@@ -252,17 +254,17 @@ class _StraightMoves:
 
 
 def _reaches(chain: JointChain) -> Array:
-    """Return how far (m) the tip can be from each joint's axis, (n,)."""
+    """Return the largest distance (n,) m of the tip from each joint axis."""
     links = np.linalg.norm(chain.origins[:, :3, 3], axis=1)
     tip = float(np.linalg.norm(chain.tip[:3, 3]))
     return np.array([links[i + 1 :].sum() + tip for i in range(len(links))])
 
 
 def _lipschitz(reach: Array) -> float:
-    """Return by how much the Jacobian changes at most per radian of the joints, both 2-norms.
+    """Return a bound on the change of the Jacobian per radian of the joints, both in 2-norms.
 
-    Turning joint j moves column i by at most the reach of the outer of the two, and turns its axis
-    where j is the inner one.
+    Turning joint j moves column i by at most the reach of the outer of the two joints, and turns
+    its axis if j is the inner one.
     """
     n = len(reach)
     outer = np.maximum.outer(np.arange(n), np.arange(n))
@@ -271,7 +273,7 @@ def _lipschitz(reach: Array) -> float:
 
 
 def _farthest(chain: JointChain, tips: Array, x: Array) -> float:
-    """Return how fast (m) the tip is at most for each m or radian of an external axis.
+    """Return a bound on the twist of the tip (m and rad) per radian of a rotary external axis.
 
     tips : (K, 3) m; x : (K, E), values of the axes at the nodes.
     """

@@ -1,4 +1,4 @@
-"""What external axes do to a pose that moves in the part, enclosed: as the robot's base sees it."""
+"""Enclosures of a pose that moves with the part, as seen from the robot base on external axes."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ Column = tuple[Jet, Jet, Jet]
 
 
 class CarryingAxes:
-    """The external axes of a robot in the frame of its model's base, all of them at zero."""
+    """The external axes of a robot in the frame of its model's base, with all axes at zero."""
 
     def __init__(self, robot: Robot) -> None:
         numbered = list(enumerate(robot.externals))
         part = [(i, axis) for i, axis in numbered if axis.carries == "part"]
         carriers = [(i, axis) for i, axis in numbered if axis.carries == "robot"]
-        # The innermost axis moves the part first; of those under the robot the outermost is passed
-        # first on the way to its base.
+        # On the way from the part to the base, the part's innermost axis comes first, and the
+        # outermost of the axes under the robot comes before the inner ones.
         self._passed = [_Axis(robot, *each) for each in [*part[::-1], *carriers]]
 
     def moved(self, columns: list[Column], values: list[Jet]) -> list[Column]:
-        """Return axes x, y, z and a point of a frame that goes with the part, in the moved base.
+        """Return axes x, y, z and a point of a frame that moves with the part, in the moved base.
 
         Parameters
         ----------
         columns : four columns of jets
-            x, y, z and the point, where all axes are at zero.
+            x, y, z and the point with all axes at zero.
         values : list of Jet
-            Of the axes, rad or m.
+            Values of the axes, rad or m.
         """
         for axis in self._passed:
             columns = axis.moved(columns, values[axis.number])
@@ -52,7 +52,7 @@ class _Axis:
         self._direction, self._point = seen_from_foot(robot, direction, exact(axis.point))
 
     def moved(self, columns: list[Column], value: Jet) -> list[Column]:
-        """Return axes and point of a frame that the axis at a value moves."""
+        """Return axes and point of a frame moved by this axis to a value."""
         *axes, point = columns
         value = value.scaled(self._sign)
         if not self._turns:
@@ -67,7 +67,7 @@ class _Axis:
     def _turned(self, r: Column, c: Jet, s: Jet) -> Column:
         """Return a vector turned about the direction k by an angle of cosine c and sine s.
 
-        Rodrigues: what is along k stays, and the rest r' goes to c r' + s (k x r).
+        By Rodrigues' formula the part along k stays, and the rest r' becomes c r' + s (k x r).
         """
         k = self._direction
         along = r[0].times(k[0]) + r[1].times(k[1]) + r[2].times(k[2])

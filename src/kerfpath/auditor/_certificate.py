@@ -1,4 +1,4 @@
-"""The bound of a certificate, proved again by enclosures of the audit's own."""
+"""Prove the bound of a certificate again, with the audit's own enclosures."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ __all__ = ["BOUND", "bound_checks", "certified_bound"]
 BOUND = "bound"
 """Code of the check of a bound."""
 LIMIT_TOLERANCE = 1e-9
-"""rad: what a motion may exceed (5) and (6) by."""
+"""rad: by how much a motion may exceed (5) and (6)."""
 EVEN = 1e-6
-"""Relative difference of the intervals of a plan at one speed."""
+"""Largest relative difference between the intervals of a plan at constant speed."""
 MOST_HELD = 16_000_000
-"""Steps whose costs are held, 16 bytes each; of others they are worked out twice."""
+"""Number of steps whose costs are kept, 16 bytes each; other costs are computed twice."""
 Costs = tuple[NDArray[np.int32], NDArray[np.int32], Array]
 LARGEST = 1e12
-"""No level or slope of a potential is larger."""
+"""Largest value or slope of a potential."""
 SAME = 1e-9
-"""Relative: rounding of a cost, a bound and the gap between them."""
+"""Relative rounding error of a cost, a bound and the gap between them."""
 
 
 def bound_checks(plan: Plan) -> list[Check]:
-    """Return the checks of the bound that a plan states, where it has a certificate."""
+    """Return the checks of the bound that a plan states, if it has a certificate."""
     proof = plan.proof
     if proof.certificate is None:
         return []
@@ -66,8 +66,8 @@ def bound_checks(plan: Plan) -> list[Check]:
     rows = [_row(words, claim, true) for words, claim, true in claims]
     gap = (plan.cost - proof.bound) / plan.cost if plan.cost else 0.0
     if proof.gap is None or not abs(proof.gap - gap) <= SAME * max(1.0, size / abs(plan.cost or 1)):
-        rows.append(_row("gap that is not that of cost and bound", 1.0, 0.0))
-    # The row of the worst stands for all; what is no number is none that is kept.
+        rows.append(_row("gap that does not match cost and bound", 1.0, 0.0))
+    # Only the worst row is returned; NaN counts as broken.
     broken = [row for row in rows if not row.ok]
     return [max(broken or rows, key=lambda row: row.value - row.limit)]
 
@@ -85,23 +85,23 @@ def _row(title: str, value: float, limit: float) -> Check:
 
 
 def certified_bound(certificate: Certificate, plan: Plan) -> float:
-    """Return what a certificate proves that every motion along a plan's contour costs at least.
+    """Return the lower bound that a certificate proves for motions along a plan's contour.
 
-    Any motion is meant that keeps (5), (6), the ranges and the couplings at the nodes, at any
-    gamma, in any posture that is allowed and on any turn; a motion that costs more than the plan
-    is known to, so that no more than the plan's cost is returned.
+    The bound holds for every motion that keeps (5), (6), the joint ranges and the couplings at the
+    nodes, at any gamma, in any allowed posture and on any turn. It is never larger than the plan's
+    cost.
 
     Parameters
     ----------
     certificate : Certificate
-        Of which only cells, potentials and multipliers are used.
+        Only its cells, potentials and multipliers are used.
     plan : Plan
 
     Raises
     ------
     InputError
-        The certificate does not fit the plan or leaves motions out; no certificate speaks of such
-        a plan.
+        The certificate does not fit the plan or does not cover all motions, or certificates do not
+        apply to such a plan.
     """
     where, every, change = _asked(plan)
     if not certificate.stages:
@@ -122,7 +122,7 @@ def certified_bound(certificate: Certificate, plan: Plan) -> float:
 
 
 def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
-    """Return where the motions of a plan's task may be, what bounds their steps, and A of (6)."""
+    """Return where the motions of a plan's task may be, the bounds of their steps, and A of (6)."""
     settings, robot = plan.settings, plan.robot
     tau = np.diff(plan.time)
     dt = float(tau.max())
@@ -134,15 +134,15 @@ def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
         (plan.feed is None and dt - tau.min() <= EVEN * dt, "a feed that is not constant"),
     ):
         if not known:
-            raise CertificateRefused(f"nothing is proved with {what}")
+            raise CertificateRefused(f"certificates do not apply to {what}")
     limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
     endless = np.asarray(robot.endless, dtype=bool)
     lower, upper = (np.where(endless, 0.0, end) for end in (limits.lower, limits.upper))
     if not (np.isfinite(lower) & np.isfinite(upper)).all():
         raise CertificateRefused(
-            "nothing is proved with joints without ranges that are not endless"
+            "certificates do not apply to joints that are neither endless nor limited"
         )
-    # The place of an endless joint is known up to whole turns only: its couplings are left out.
+    # The value of an endless joint is known only up to full turns: its couplings are ignored.
     bound = ~np.asarray((limits.rows[:, endless] != 0).any(axis=1))
     where = Reachable(
         robot,
@@ -157,7 +157,9 @@ def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
         limits.row_upper[bound],
     )
     if not ((where.postures >= 0) & (where.postures < POSTURES)).all():
-        raise CertificateRefused("the plan allows postures that are not known")
+        raise CertificateRefused(
+            f"the plan allows unknown postures; expected numbers from 0 to {POSTURES - 1}"
+        )
     most = settings.eta_v * velocity * dt * (1 + 8 * UNIT) + LIMIT_TOLERANCE
     most = np.where(endless, np.minimum(most, np.pi + LIMIT_TOLERANCE), most)
     change = settings.eta_a * acceleration * dt**2 * (1 + EVEN) ** 2 + LIMIT_TOLERANCE
@@ -165,7 +167,7 @@ def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
     most = np.tile(most, (K - 1, 1))
     weights = np.asarray(settings.weights)
     if not (weights >= 0).all():
-        raise CertificateRefused("nothing is proved with weights below zero")
+        raise CertificateRefused("certificates do not apply to negative weights")
     return (
         where,
         Rates(np.arange(K), most, weights, settings.metric, endless, np.zeros((K - 1, n))),
@@ -174,7 +176,7 @@ def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
 
 
 def _require_fit(stage: Stage, K: int, n: int) -> None:
-    """Raise CertificateRefused unless a stage's arrays are of K nodes and n joints."""
+    """Raise CertificateRefused unless the arrays of a stage fit K nodes and n joints."""
     C = len(stage.node)
     shapes = {
         "node": (C,), "posture": (C,), "level": (C,), "index": (C,), "lift": (C, n),
@@ -185,14 +187,15 @@ def _require_fit(stage: Stage, K: int, n: int) -> None:
         if part.shape != shape:
             raise CertificateRefused(f"{name}: expected shape {shape}, got {part.shape}")
         if (part.dtype.kind in "iu") != (name not in ("value", "dual")):
-            raise CertificateRefused(f"{name}: numbers of another kind ({part.dtype})")
+            kind = "real numbers" if name in ("value", "dual") else "integers"
+            raise CertificateRefused(f"{name}: expected {kind}, got {part.dtype}")
     level = stage.level.astype(np.int64)
     for name, most in (("node", K), ("posture", POSTURES), ("level", DEEPEST + 1)):
         part = getattr(stage, name)
         if not ((part >= 0) & (part < most)).all():
             raise CertificateRefused(f"{name}: expected numbers from 0 to {most - 1}")
     if not ((stage.index >= 0) & (stage.index < BASE << level)).all():
-        raise CertificateRefused("index: a cell that is not on the circle")
+        raise CertificateRefused("index: a cell is not on the circle of gamma")
     if (np.diff(stage.node) < 0).any():
         raise CertificateRefused("node: expected cells in the order of nodes")
     for name in ("value", "dual"):
@@ -201,13 +204,13 @@ def _require_fit(stage: Stage, K: int, n: int) -> None:
 
 
 def _rates(stage: Stage, every: Rates, change: Array) -> tuple[Rates, float]:
-    """Return the steps between the nodes of a stage, and what it adds to a whole motion.
+    """Return the steps between the nodes of a stage, and the constant of its multipliers.
 
     Parameters
     ----------
     stage : Stage
     every : Rates
-        Of the steps between all nodes.
+        Steps between all nodes.
     change : (n,) rad
         Bound of (6).
     """
@@ -215,7 +218,7 @@ def _rates(stage: Stage, every: Rates, change: Array) -> tuple[Rates, float]:
     K, n = len(every.nodes), len(every.weights)
     if len(nodes) < 2 or nodes[0] != 0 or nodes[-1] != K - 1:
         raise CertificateRefused("its cells leave out motions at the first node or the last")
-    # Each interval once: the bounds of a step over several are summed.
+    # The bound of a step over several intervals is the sum of theirs.
     velocity = np.add.reduceat(every.velocity, nodes[:-1], axis=0) * (1 + K * UNIT)
     rates = replace(every, nodes=nodes, velocity=velocity, tilt=np.zeros(velocity.shape))
     nu = stage.multipliers
@@ -235,9 +238,9 @@ def _rates(stage: Stage, every: Rates, change: Array) -> tuple[Rates, float]:
 
 
 def _through(rates: Rates, at: Places, stage: Stage) -> Array:
-    """Return what every motion through each place costs at least, (C,); inf where there is none.
+    """Return a lower bound (C,) on the cost of motions through each place; inf where none passes.
 
-    Nothing is left to pay at the last node, so that the potential there is taken as zero.
+    At the last node no cost remains, so the potential is taken as zero there.
     """
     layer, last = rates.layer(at), len(rates.nodes) - 1
     ends = (layer == last)[:, None]
@@ -254,7 +257,7 @@ def _through(rates: Rates, at: Places, stage: Stage) -> Array:
             held += len(a)
             if parts is not None:
                 parts.append((a, b, cost))
-            if held > MOST_HELD:  # this and what follows is worked out again
+            if held > MOST_HELD:  # the costs from here on are computed again
                 parts = None
         kept.append(parts)
     for (both, places), known in zip(reversed(steps), reversed(kept), strict=True):
@@ -265,17 +268,17 @@ def _through(rates: Rates, at: Places, stage: Stage) -> Array:
 
 
 def _costs(rates: Rates, at: Places, value: Array, dual: Array) -> Iterator[Costs]:
-    """Yield the steps between the places of two nodes, and what each costs at least."""
+    """Yield the steps between the places of two nodes, and lower bounds on their costs."""
     for a, b in candidates(rates, at):
         cost = reduced_costs(rates, at, value, dual, a, b)
         yield a.astype(np.int32), b.astype(np.int32), cost
 
 
 def _rounding(rates: Rates, at: Places, value: Array, dual: Array, whole: Array) -> float:
-    """Return what all sums along a motion may be off by.
+    """Return a bound on the rounding error of all sums along a motion.
 
-    A step is a sum of products, by 64 units of all their sizes at most; the sums of K steps are off
-    by K units of theirs.
+    A step is a sum of products, with an error of at most 64 units of their sizes; the sums of K
+    steps have an error of K units of their size.
     """
     n = len(rates.weights)
     joint = 3 * (np.pi + rates.velocity.max() + 2 * at.reach.max(initial=0.0))

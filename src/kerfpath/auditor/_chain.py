@@ -1,6 +1,6 @@
-"""A second kinematics: a generic chain of joint frames, as a robot description states it.
+"""A second kinematics: a generic chain of joint frames, as in a robot description.
 
-Nothing here is shared with the closed form that plans: the audit must not repeat its mistakes.
+It shares no code with the closed form used for planning, so the audit cannot repeat its errors.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ __all__ = ["JointChain", "chain_of"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointChain:
-    """Revolute joints one after the other, each fixed in the frame of the one before.
+    """A chain of revolute joints, each fixed in the frame of the one before.
 
     Parameters
     ----------
-    origins : (n, 4, 4)
-        Pose of each joint frame at angle zero, in the frame of the joint before it, m.
+    origins : (n, 4, 4) m
+        Pose of each joint frame at angle zero, in the frame of the joint before it.
     axes : (n, 3)
         Unit axis of each joint in its own frame.
-    tip : (4, 4)
-        Tip in the frame of the last joint, m.
+    tip : (4, 4) m
+        Tip in the frame of the last joint.
     externals : tuple of ExternalAxis
-        What carries the first joint, and the part against it; their values are the last of q.
+        External axes, which carry the first joint or the part; their values are the last of q.
     even : int, optional
-        The joint that runs evenly from node to node whatever the tool does, as external axes do:
-        of seven that which a pose leaves free.
+        The joint (from 0) that runs evenly from node to node, like external axes: the free joint of
+        a seven-axis arm.
     """
 
     origins: Array
@@ -45,19 +45,19 @@ class JointChain:
     __repr__ = short_repr
 
     def forward(self, q: Array) -> Array:
-        """Return the tip poses (B, 4, 4) of joint vectors q (B, n) rad."""
+        """Return the tip poses (B, 4, 4) m at joint vectors q (B, n) rad, relative to the part."""
         return self._frames(q)[-1]
 
     def joints(self, q: Array) -> list[Array]:
-        """Return the poses (B, 4, 4) of every joint frame, turned, of joint vectors q (B, n)."""
+        """Return the poses (B, 4, 4) m of every turned joint frame at joints q (B, n) rad."""
         return self._frames(q)[:-1]
 
     def links(self, q: Array) -> Array:
-        """Return the poses (B, E+n+1, 4, 4) of what is moved, from the part to the last link.
+        """Return the poses (B, E+n+1, 4, 4) m of all moved frames, from the part to the last link.
 
-        As it stands in the ground, the robot base with every external axis at zero: first what
-        goes with the part, each next carried by one axis less; the ground itself; what the axes
-        that carry the robot carry, to its base; the links. Without external axes base and links.
+        Poses are in the ground frame: the robot base with every external axis at zero. The order
+        is: the part and then each frame carried by one axis fewer; the ground; the frames carried
+        by the axes of the robot, up to its base; the links. Without external axes: base and links.
         """
         steps = self._steps_to_base(q)
         frames = np.stack([*steps, *self.joints(q)], axis=1)
@@ -70,14 +70,14 @@ class JointChain:
 
     @property
     def order(self) -> Ints:
-        """The columns (E+n,) of q in the order in which they move `links`."""
+        """The columns of q (E+n,), in the order in which they move `links`."""
         n = len(self.axes)
         return np.array([*(n + i for i in self._order()), *range(n)], dtype=np.int64)
 
     def jacobian(self, q: Array) -> tuple[Array, Array]:
-        """Return tip poses (B, 4, 4) and geometric Jacobians (B, 6, n): linear over angular.
+        """Return tip poses (B, 4, 4) m and geometric Jacobians (B, 6, n), linear above angular.
 
-        Of the arm's own joints, without the external axes.
+        The Jacobians are those of the arm's own joints, without the external axes.
         """
         *joints, tip = self._frames(q)
         position = tip[:, :3, 3]
@@ -89,9 +89,9 @@ class JointChain:
         return tip, J
 
     def twists(self, q: Array, tip: Array) -> Array:
-        """Return what each external axis moves the tip by (B, 6, E), at tips (B, 3) m of q (B, n).
+        """Return the twist of the tip per m or rad of each external axis, (B, 6, E).
 
-        Linear over angular, against the part, per m or rad.
+        Twists are relative to the part, linear above angular, at tips (B, 3) m of q (B, n).
         """
         steps = self._steps_to_base(q)
         columns = np.zeros((len(q), 6, len(self.externals)))
@@ -109,19 +109,19 @@ class JointChain:
 
     @property
     def passed(self) -> list[ExternalAxis]:
-        """The external axes on the way from the part to the robot's base."""
+        """The external axes in the order from the part to the robot base."""
         return [self.externals[i] for i in self._order()]
 
     def _order(self) -> list[int]:
-        """Return the numbers of the external axes from the part to the robot's base."""
+        """Return the numbers of the external axes from the part to the robot base."""
         numbers = range(len(self.externals))
         part = [i for i in numbers if self.externals[i].carries == "part"]
         return part[::-1] + [i for i in numbers if self.externals[i].carries == "robot"]
 
     def _steps_to_base(self, q: Array) -> list[Array]:
-        """Return where the part is left for the robot's base, (B, 4, 4) before each axis; the base.
+        """Return the poses (B, 4, 4) m before each axis on the way from part to base, and the base.
 
-        An axis that carries the part is passed backwards: seen from it, all else moves.
+        An axis that carries the part is passed backwards: seen from the part, all else moves.
         """
         T, n = np.tile(np.eye(4), (len(q), 1, 1)), len(self.axes)
         steps = [T]
@@ -139,7 +139,7 @@ class JointChain:
         return steps
 
     def _frames(self, q: Array) -> list[Array]:
-        """Return the poses of every joint frame, turned, and of the tip; (B, 4, 4) each."""
+        """Return the poses (B, 4, 4) m of every turned joint frame, and of the tip."""
         frames, T = [], self._steps_to_base(q)[-1]
         for i, (origin, axis) in enumerate(zip(self.origins, self.axes, strict=True)):
             turn = np.zeros((len(q), 4, 4))
@@ -151,9 +151,9 @@ class JointChain:
 
 
 def chain_of(robot: Robot) -> JointChain:
-    """Return the joint chain of a robot: of its description, if it comes from one.
+    """Return the joint chain of a robot, from its description if it has one.
 
-    Otherwise it is built from the lengths and the joint convention alone.
+    Otherwise the chain is built from the lengths and the joint convention.
     """
     if robot.chain is not None:
         given = robot.chain
@@ -183,8 +183,8 @@ def _opw(g: dict[str, float]) -> tuple[Array, Array, Array]:
     """Return origins (6, 4, 4), axes (6, 3) and end (4, 4) of an OPW arm.
 
     Axis 1 is vertical; axes 2 and 3 are parallel to y, at the shoulder (a1, b, c1) and c2 above
-    it; the spherical wrist sits at (a2, 0, c3) from the elbow with axes z, y, z; the flange c4
-    further (Brandstoetter, Angerer and Hofbaur 2014, figure 1).
+    it; the spherical wrist is at (a2, 0, c3) from the elbow with axes z, y, z; the flange is c4
+    further along (Brandstoetter, Angerer and Hofbaur 2014, figure 1).
     """
     y, z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     origins, end = np.tile(np.eye(4), (6, 1, 1)), np.eye(4)
@@ -218,8 +218,8 @@ def _five(g: dict[str, float]) -> tuple[Array, Array, Array]:
 def _srs(g: dict[str, float]) -> tuple[Array, Array, Array]:
     """Return origins (7, 4, 4), axes (7, 3) and end of an arm with spherical shoulder and wrist.
 
-    Upright at zero: all axes pass along one vertical line or are parallel to y, axis 2 at the
-    height c1, axis 4 c2 above it, axis 6 c3 further, the flange c4 over that.
+    At zero it is upright: all axes lie on one vertical line or are parallel to y, with axis 2 at
+    the height c1, axis 4 c2 above it, axis 6 c3 above that, and the flange c4 above axis 6.
     """
     steps = np.tile(np.eye(4), (8, 1, 1))
     steps[:, 2, 3] = 0.0, g["c1"], 0.0, g["c2"], 0.0, g["c3"], 0.0, g["c4"]

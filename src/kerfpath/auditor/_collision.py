@@ -1,7 +1,7 @@
-"""The re-check of a plan in its cell: dense samples of the motion, placed by the second kinematics.
+"""The collision checks: dense samples of the motion, placed by the second kinematics.
 
-Distances come from the same solids as in planning, for there is but one cell; where they stand
-and which joint vectors are looked at owes nothing to the planner and its proofs.
+The solids and their distances are those of the same cell as in planning; the poses of the bodies
+and the choice of joint vectors are independent of the planner and its proofs.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from kerfpath.cell import Cell
 __all__ = ["collision_along", "collisions"]
 
 TOUCHING = -1e-9
-"""m: to touch is not to be clear."""
+"""m: bodies that touch are not clear."""
 
 
 def collisions(cell: Cell, motion: Motion, chain: JointChain) -> list[Check]:
-    """Return the checks of a motion: by how much near-miss distances are missed.
+    """Return the checks of the near-miss distances along a motion.
 
-    One of the pairs that keep that of the cell, one of those with a distance of their own, as
-    nozzle and part. The value is what the nearest pair falls short by, negative where all are
-    farther apart.
+    One check covers the pairs with the near-miss distance of the cell, another the pairs with their
+    own distance, such as nozzle and part. The value is the shortfall of the nearest pair, negative
+    if all are farther apart.
     """
     nodes, samples, _ = motion.q.shape
     node = np.repeat(np.arange(nodes), samples - 1)
@@ -35,9 +35,10 @@ def collisions(cell: Cell, motion: Motion, chain: JointChain) -> list[Check]:
 
 
 def collision_along(cell: Cell, q0: Array, q1: Array, node: Ints, chain: JointChain) -> list[Check]:
-    """Return the same checks of motions from q0 to q1 (S, n) rad, each of a node (S,).
+    """Return the same checks for motions from q0 to q1 (S, n) rad, each with its node (S,).
 
-    They are divided until nothing nearer can hide; where that cannot be said, it is counted.
+    Motions are divided until no pair can come nearer unnoticed; those for which this cannot be
+    shown are counted.
     """
     moves = Moves(cell, chain, q0, q1)
     between, nodes, open_ = moves.in_between(q0, q1, node)
@@ -66,7 +67,7 @@ def _rows(q: Array) -> Array:
 
 
 def _check(cell: Cell, found: tuple[int, int, float], code: str, whose: str, node: Ints) -> Check:
-    """Return the check of what `nearest` found."""
+    """Return the check for a result of `nearest`."""
     row, pair, beyond = found
     (one, two), needed = cell.pair_names[pair], float(cell.required[pair])
     whence = "left by design" if needed < cell.asked[pair] else "asked"

@@ -1,8 +1,8 @@
-"""How fast the joints turn along a course of the tool at every instant: proven bounds.
+"""Proven bounds on joint velocities and accelerations along a course of the tool, at every instant.
 
-The course is smooth pieces, each a closed formula of the time. The solution of the arm's equations
-is enclosed with both its derivatives over short spans of that time, rounding included, and a span
-is divided until what is known of it suffices. Nothing is shared with the kinematics that plans.
+The course consists of smooth pieces, each a closed formula of time. The joints and their first two
+derivatives are enclosed over short spans of time, rounding included, and spans are divided until
+the bounds suffice. No code is shared with the kinematics used for planning.
 """
 
 from __future__ import annotations
@@ -27,36 +27,40 @@ __all__ = ["ENCLOSED", "CoursePieces", "rates_along"]
 ENCLOSED = tuple(POSTURES_OF)
 """Families of arms whose rates can be bounded."""
 AT_ONCE = 1024
-"""Spans enclosed together."""
+"""Number of spans that are enclosed together."""
 TERMS = 16
-"""Of the series of sine and cosine: enough for half a revolution."""
+"""Number of terms of the series of sine and cosine: enough for half a revolution."""
 CUT_OFF = 1e-15
-"""More than what they leave out, and its first two derivatives, up to half a revolution."""
+"""Bound on the remainder of the series and its first two derivatives, up to half a revolution."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CoursePieces:
-    """The tip's pose over time in P smooth pieces.
+    """The pose of the tip over time, in P smooth pieces.
 
-    At t s from the piece's own zero, in the part, the tip is at point + velocity t + acceleration
-    t^2 / 2 + cos(rate t) x + sin(rate t) y, and its frame is `R` turned, in its own axes, by the
-    rotation vector r = turn[0] + turn[1] t + turn[2] t^2 / 2, of less than half a revolution; with
-    two angles about z by r_z, and then by (r_x, r_y, 0) about an axis of `R`.
+    At time t (s) from the zero of the piece, the tip is at point + velocity t + acceleration
+    t^2 / 2 + cos(rate t) x + sin(rate t) y in the part. Its frame is `R` turned, in its own axes,
+    by the rotation vector r = turn[0] + turn[1] t + turn[2] t^2 / 2 of less than half a revolution;
+    with two angles it is turned about z by r_z, and then by (r_x, r_y, 0) about an axis of `R`.
 
     Parameters
     ----------
     begin, end : (P,) s
-        Of each piece, from its own zero.
+        Begin and end of each piece, from its own zero of time.
     R : (P, 3, 3)
+        Orientation of the tip at r = 0.
     turn : (P, 3, 3) rad, rad/s, rad/s^2
+        Coefficients of the rotation vector.
     point : (P, 3, 3) m, m/s, m/s^2
         Point, velocity, acceleration.
     x, y : (P, 3) m
-        Of an arc; zero where there is none.
+        Half-axes of an arc; zero where there is none.
     rate : (P,) rad/s
+        Angular rate of the arc.
     external : (P, 3, E) rad or m, and per s and s^2
         External axes are at external[0] + external[1] t + external[2] t^2 / 2.
     two_angles : bool
+        Whether the frame turns by two angles, see above.
     """
 
     begin: Array
@@ -83,30 +87,30 @@ def rates_along(
     enough: tuple[Array, Array],
     deepest: int = 10,
 ) -> tuple[Array, Array]:
-    """Return bounds on the sizes of velocity and acceleration of every joint over each piece.
+    """Return bounds on the absolute velocity and acceleration of every joint over each piece.
 
     Parameters
     ----------
     robot : Robot
-        Of family "opw" or "ur"; its external axes move the base against the part.
+        A robot of family "opw" or "ur", with or without external axes.
     pieces : CoursePieces
     q : (P, n) rad
-        Joints in the middle of each piece: they say which posture is meant.
+        Joints in the middle of each piece, which select the posture.
     T_base_part, T_flange_tip : (4, 4) m
     enough : two of (n,) rad/s, rad/s^2
-        A piece is not looked at more closely once its bounds are no larger.
+        Values at which the bounds of a piece are good enough.
     deepest : int
-        Times that a piece is halved at most.
+        Largest number of times that a piece is halved.
 
     Returns
     -------
     velocity, acceleration : (P, n) rad/s, rad/s^2
-        Infinite where nothing is proved: next to a singularity, or beyond the reach.
+        Infinite where nothing is proved: close to a singularity, or out of reach.
 
     Raises
     ------
     InputError
-        A robot of another family, or pieces that say the values of other external axes.
+        The robot is of another family, or the pieces have another number of external axes.
     """
     require_closed_form(robot)
     if pieces.external.shape[2] != len(robot.externals):
@@ -120,7 +124,7 @@ def rates_along(
     posture = np.zeros(len(k), dtype=np.int64)
     velocity, acceleration = np.zeros((2, len(middle), robot.joints))
     for depth in range(deepest + 1):
-        # Rounding leaves no gap between the halves.
+        # The halves overlap a little, so that rounding leaves no gap between them.
         joints, none = task.joints(k, middle, half * (1 + 1e-12))
         if depth == 0:
             posture = _nearest(joints, none, q)
@@ -136,7 +140,7 @@ def rates_along(
 
 
 class _Task:
-    """The course of a robot, and what stands before and after it."""
+    """The course of a robot, and the fixed poses before and after it."""
 
     def __init__(
         self, robot: Robot, pieces: CoursePieces, T_base_part: Array, T_flange_tip: Array
@@ -148,7 +152,7 @@ class _Task:
     def joints(self, k: Ints, t: Array, half: Array) -> tuple[list[Jet], Bools]:
         """Return the joints over spans t +- half of pieces k (S,), and where there are none.
 
-        As `joints_of`; external axes come last.
+        They are as in `joints_of`; external axes come last.
         """
         parts = []
         for i in range(0, len(k), AT_ONCE):
@@ -163,7 +167,7 @@ class _Task:
         return [_joined(each) for each in zip(*(joints for joints, _ in parts), strict=True)], none
 
     def _pose(self, k: Ints, time: Jet, values: list[Jet]) -> Pose:
-        """Return the pose of the model's end over times, with external axes at values."""
+        """Return the pose of the model's end over time, with external axes at these values."""
         pieces, before, after = self._pieces, self._before[..., 0], self._after
         turn = [_polynomial(pieces.turn[k, :, i], time) for i in range(3)]
         E = _swung(turn) if pieces.two_angles else _rotation(turn)
@@ -248,7 +252,7 @@ def _series(s: Jet, first: int) -> Jet:
     for k in reversed(range(TERMS)):
         term = exact(1.0) / exact(float(factorial(2 * k + first)))
         out = (out * -s).plus(term)
-    # By the chain rule derivatives of the rest come with those of s.
+    # By the chain rule the derivatives of the remainder contain those of s.
     off = CUT_OFF * np.maximum(1.0, s.rate.magnitude() ** 2 + s.bend.magnitude())
     rest = Interval(-off, off)
     return Jet(

@@ -1,8 +1,8 @@
-"""Whether the cells of a certificate hold every motion, by enclosures of the audit's own.
+"""Check that the cells of a certificate cover every motion, with the audit's own enclosures.
 
-A place is an interval of gamma at a node, in a posture, with every joint on one of its turns. All
-places that a motion may pass are gone through from the coarsest intervals down: a place is a cell
-of the certificate, or has no solution within the ranges, or is divided in two.
+A place is an interval of gamma at a node, in one posture and on one turn of each joint. All places
+that a motion may pass are visited from the coarsest intervals down: a place is a cell of the
+certificate, or has no solution within the ranges, or is divided in two.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ __all__ = ["DEEPEST", "Places", "Reachable", "covered"]
 Linked = Callable[["Places"], Bools]
 TURN = 2 * np.pi
 DEEPEST = 20
-"""The finest level that cells may have, and down to which places are divided."""
+"""The finest level of cells, down to which places are divided."""
 HALF_TURN = np.pi + 1e-9
-"""rad: what every angle is within, up to whole turns, with room for rounding."""
+"""rad: bound on every angle up to full turns, with room for rounding."""
 EDGE = 1e-9
-"""rad: what a motion may leave the ranges by."""
+"""rad: by how much a motion may leave the ranges."""
 ON_TURN = 2e-14
-"""rad: rounding of joints on a turn of theirs, up to ten turns."""
+"""rad: rounding error of joints on a turn, up to ten turns."""
 SAME_PLACE = 1e-9
-"""rad: two enclosures of the same interval have the same middle."""
+"""rad: tolerance within which two enclosures of an interval have the same middle."""
 EVERYWHERE, IN_MIDDLE, SAME = range(3)
-"""Where joints are known that places are wanted for, see `_Wanted`."""
+"""Where the joints of wanted places are known, see `_Wanted`."""
 BEYOND = 6
-"""Levels finer than any cell of a stage down to which an interval must prove to be empty."""
+"""Number of levels below the finest cell of a stage within which an interval must prove empty."""
 MOST_PLACES = 500_000
-"""Places at a time; a certificate that leaves more is refused."""
+"""Number of places at a time; a certificate that leaves more is refused."""
 PLACES_AT_ONCE = 1e5
-"""About so many are gone through together, of as many nodes."""
+"""Approximate number of places that are visited together, which decides the number of nodes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reachable:
-    """Where motions may be: what is needed of a plan's task.
+    """The data of a plan's task that decide where motions may be.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ class Reachable:
         Task frames in the robot base.
     T_flange_tip : (4, 4) m
     postures : (P,) int
-        Those that are allowed.
+        The allowed postures.
     lower, upper : (n,) rad
-        Ranges, of the joints that are not endless.
+        Ranges of the joints that are not endless.
     endless : (n,) bool
     rows : (R, n)
         Couplings of joints that are not endless.
@@ -82,13 +82,14 @@ class Reachable:
 class Places:
     """Intervals of gamma, each in a posture and with every joint on a turn.
 
-    The joints are in q + slope t + [low, high] t^2 / 2 +- radius, |t| <= half, hence within `reach`
-    of q; of endless joints this is so up to whole turns. `turn` counts from the enclosure's centre.
+    The joints are in q + slope t + [low, high] t^2 / 2 +- radius for |t| <= half, and so within
+    `reach` of q; for endless joints this holds up to full turns. `turn` counts from the centre of
+    the enclosure.
 
     Parameters
     ----------
     cell : (C,) int
-        Which cell of the stage it is; -1 for none.
+        Index of the cell of the stage; -1 for none.
     node, level, index, posture : (C,) int
     turn : (C, n) int
     smooth : (C,) bool
@@ -117,7 +118,7 @@ class Places:
         return len(self.node)
 
     def take(self, which: Ints | Bools | slice) -> Places:
-        """Return some of them."""
+        """Return a selection of the places."""
         return Places(*(getattr(self, each.name)[which] for each in fields(self)))
 
 
@@ -125,7 +126,8 @@ class Places:
 class _Wanted:
     """Intervals of one level that motions may pass with joints within `room` of `near` (W, n).
 
-    `known` says where of the interval: everywhere, in its middle, or that the place is the same.
+    `known` says where in the interval this holds: everywhere, in its middle, or that the place is
+    the same.
     """
 
     node: Ints
@@ -143,17 +145,17 @@ def covered(where: Reachable, stage: Stage, before: Places | None, linked: Linke
     ----------
     where : Reachable
     stage : Stage
-        Of arrays that fit.
+        A stage whose arrays fit.
     before : Places or None
-        What it has to cover: what another stage leaves; at nodes that are not in there everything,
-        but for what no step joins to that.
+        The places that the stage must cover, which another stage leaves. At nodes without such
+        places it must cover everything that steps join to them. None: everything.
     linked : callable
-        Which of some places (C,) steps join to others, from the first node to the last.
+        Returns which places (C,) are joined by steps to others, from the first node to the last.
 
     Raises
     ------
     CertificateRefused
-        It does not cover that.
+        The stage does not cover all of these places.
     """
     nodes = np.unique(stage.node).astype(np.int64)
     old = nodes if before is None else np.intersect1d(nodes, before.node)
@@ -178,7 +180,7 @@ def covered(where: Reachable, stage: Stage, before: Places | None, linked: Linke
         parts += _covered(where, stage, rows, new, None, joins)
     found = joined(parts)
     found = found.take(np.argsort(found.cell, kind="stable"))
-    # Up to whole turns every angle is within half a turn.
+    # Up to full turns every angle is within half a turn.
     anywhere = found.reach > HALF_TURN
     for curve in (found.slope, found.low, found.high):
         curve[anywhere] = 0.0
@@ -227,7 +229,7 @@ def _middle(level: int, index: Ints) -> Array:
 
 
 def _everything(where: Reachable, nodes: Ints) -> _Wanted:
-    """Return the whole circle of some nodes in every posture that is allowed."""
+    """Return the full circle of gamma of some nodes in every allowed posture."""
     node, index, posture = (
         grid.ravel() for grid in np.meshgrid(nodes, np.arange(BASE), where.postures, indexing="ij")
     )
@@ -238,7 +240,7 @@ def _everything(where: Reachable, nodes: Ints) -> _Wanted:
 
 
 def _again(places: Places) -> _Wanted:
-    """Return places of another stage, on their own turns alone."""
+    """Return places of another stage, only on their own turns."""
     room, known = np.full(places.q.shape, SAME_PLACE), np.full(len(places), SAME)
     return _Wanted(places.node, places.index, places.posture, places.q, room, known)
 
@@ -246,7 +248,7 @@ def _again(places: Places) -> _Wanted:
 def _halves(places: Places) -> _Wanted:
     """Return both halves of places.
 
-    Where the joints are one smooth function of gamma, its value in the middle says the turn.
+    Where the joints are one smooth function of gamma, its value in the middle gives the turn.
     """
     twice = np.repeat(np.arange(len(places)), 2)
     right = np.arange(len(twice)) % 2
@@ -299,14 +301,14 @@ def _places(where: Reachable, level: int, wanted: _Wanted) -> Places:
     whole = whole.take(_in_range(where, whole))
     if not len(whole):
         return whole
-    # Halves of neighbouring turns meet in the same place.
+    # Halves of neighbouring turns may be the same place.
     code = ((whole.node * (BASE << level) + whole.index) * POSTURES) + whole.posture
     _, once = np.unique(_coded(code, whole.turn), return_index=True)
     return whole.take(once)
 
 
 def _coded(code: Ints, turn: Ints) -> Ints:
-    """Return one number for each row of code (C,) and turn (C, n), the same for the same."""
+    """Return one number for each row of code (C,) and turn (C, n), equal for equal rows."""
     digits = np.zeros(len(code), dtype=np.int64)
     for i in range(turn.shape[1]):
         digits = digits * 64 + turn[:, i] + 32
@@ -316,16 +318,16 @@ def _coded(code: Ints, turn: Ints) -> Ints:
 
 
 def _turns(near: Array, room: Array, center: Array, endless: Bools) -> tuple[Ints, Ints]:
-    """Return rows and turns (T, n) by which center + 2 pi turn is within `room` of `near`.
+    """Return rows (T,) and turns (T, n) for which center + 2 pi turn is within `room` of `near`.
 
-    Endless joints stay as they are.
+    The turn of an endless joint is 0.
     """
     low = np.where(endless, 0, np.ceil((near - room - center) / TURN - 1e-14))
     high = np.where(endless, 0, np.floor((near + room - center) / TURN + 1e-14))
     count = np.maximum(high - low + 1, 0)
     total = count.prod(axis=1)
     if not total.sum() <= MOST_PLACES:
-        raise CertificateRefused(f"it leaves more than {MOST_PLACES} places to look at")
+        raise CertificateRefused(f"it leaves more than {MOST_PLACES} places to check")
     total = total.astype(np.int64)
     row = np.repeat(np.arange(len(total)), total)
     place = np.arange(len(row)) - np.repeat(np.cumsum(total) - total, total)
@@ -354,7 +356,7 @@ def _in_range(where: Reachable, at: Places) -> Bools:
 def _matched(
     where: Reachable, stage: Stage, cells: Ints, places: Places
 ) -> tuple[Places, NDArray[np.bool_]]:
-    """Return the places that are cells of the stage, as such, and which of all places they are."""
+    """Return the places that are cells of the stage, and which of all places they are."""
     listed = np.zeros(len(places), dtype=bool)
     if not len(cells) or not len(places):
         return places.take(np.zeros(0, dtype=np.int64)), listed
@@ -366,7 +368,7 @@ def _matched(
     own = interval(places.node, places.index, places.posture)
     given = interval(*(np.asarray(part[cells], dtype=np.int64)
                        for part in (stage.node, stage.index, stage.posture)))  # fmt: skip
-    # Any place of the interval says where the middle of the joints is, up to whole turns.
+    # Any place of the interval gives the middle of the joints, up to full turns.
     order = np.argsort(own, kind="stable")
     at = order[np.minimum(np.searchsorted(own, given, sorter=order), len(own) - 1)]
     same = own[at] == given
@@ -387,7 +389,7 @@ def _matched(
 
 
 def joined(parts: list[Places]) -> Places:
-    """Return places as one, in their order."""
+    """Return several places as one object, in order."""
     return Places(
         *(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Places))
     )

@@ -1,8 +1,8 @@
-"""Every solution of the inverse kinematics on cells of gamma, enclosed rigorously.
+"""Rigorous enclosures of all inverse kinematics solutions on cells of gamma.
 
-For the lower bound that a plan states on the cost of any motion: what is said here holds for every
-real gamma of a cell, rounding included, without a sample. Nothing is shared with the closed form
-that plans.
+They serve to check the lower bound that a plan states on the cost of any motion. They hold for
+every real gamma of a cell, rounding included, and use no samples. No code is shared with the closed
+form used for planning.
 """
 
 from __future__ import annotations
@@ -33,42 +33,42 @@ __all__ = [
 
 POSTURES = 8
 AT_ONCE = 2048
-"""Cells enclosed together: large against the overhead of an operation, small against the cache."""
+"""Cells that are enclosed together: enough to hide overhead, few enough to fit the cache."""
 WRAPPED = 4e-15
-"""rad: error of an angle less a few turns of the floating-point 2 pi."""
+"""rad: error of subtracting a few turns of the floating-point 2 pi from an angle."""
 CURVED = 2.0
-"""How much farther a curve may go than the joint is known to: else a box says more."""
+"""Factor by which a curve may be wider than a box; beyond it the box is used."""
 ANY = float(np.nextafter(np.pi, 4.0))
-"""rad: radius that holds every angle."""
+"""rad: radius that covers every angle."""
 
 
 class Status(IntEnum):
-    """What is proved of a posture on a cell."""
+    """The kind of enclosure of a posture on a cell."""
 
     NONE = 0
-    """It has no solution anywhere in the cell."""
+    """The posture has no solution anywhere in the cell."""
     SMOOTH = 1
-    """It has one everywhere in the cell, which is smooth."""
+    """It has one smooth solution everywhere in the cell."""
     BOX = 2
     """Its solutions, if any, are in a box."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Enclosure:
-    """The solutions of C cells in each of P postures mu, in the robot's joints (n).
+    """Enclosures of the robot's joints on C cells, in each of P postures mu.
 
-    For all t in [-h, h], up to whole turns, joint i at gamma = m + t is in
-    center + slope t + [low, high] t^2 / 2 +- radius. Where smooth it is one continuous function;
-    in a box slope, low and high are zero, and the radius is just over pi where nothing is known.
+    For all t in [-h, h], up to full turns, joint i at gamma = m + t is in
+    center + slope t + [low, high] t^2 / 2 +- radius. Where smooth it is one continuous function; in
+    a box slope, low and high are zero, and the radius is just over pi where nothing is known.
 
     Parameters
     ----------
     status : (C, P) int
-        Of `Status`; zeros in all that follows where there is no solution.
+        Values of `Status`; all other arrays are zero where there is no solution.
     center : (C, P, n) rad
         In [-pi, pi].
     slope : (C, P, n)
-        Per rad of gamma.
+        Derivative by gamma.
     low, high : (C, P, n) 1/rad
         Bounds of the second derivative.
     radius : (C, P, n) rad
@@ -89,18 +89,18 @@ def enclose(
 ) -> Enclosure:
     """Enclose every joint vector that brings the tip to its task frame, turned by any gamma.
 
-    Together the postures hold every joint vector that reaches a pose exactly, at a singularity
-    those of both postures that meet there and all of a continuum. Matrices whose rotations are
-    not exact are widened to hold the nearest that are.
+    Together the postures contain every joint vector that reaches a pose exactly: at a singularity
+    those of both postures that meet there, and all of a continuum of solutions. Matrices whose
+    rotations are not exact are widened to contain the nearest exact ones.
 
     Parameters
     ----------
     robot : Robot
-        Of family "opw" or "ur", without an external axis; its limits do not matter.
+        A robot of family "opw" or "ur" without external axes; its limits are ignored.
     frames : (K, 4, 4) m
         Task frames in the robot base.
     node : (C,) int
-        The task frame of each cell.
+        Index of the task frame of each cell.
     gamma, half : (C,) rad
         A cell is [gamma - half, gamma + half].
     T_flange_tip : (4, 4) m
@@ -108,13 +108,13 @@ def enclose(
     Raises
     ------
     InputError
-        A robot of another family, or with an external axis.
+        The robot is of another family, or has an external axis.
     """
     require_closed_form(robot)
     if robot.externals:
         raise InputError(
-            f"robot {robot.id!r}: its solutions are enclosed without an external axis only, it "
-            f"has {robot.externals[0].name}; hold it with robot.held(x)"
+            f"robot {robot.id!r}: enclosures need a robot without external axes, but it has "
+            f"{robot.externals[0].name}; use robot.held(x)"
         )
     pieces = []
     before, after = fixed_poses(robot, frames, T_flange_tip)
@@ -135,12 +135,13 @@ def linear_minimum(
     Parameters
     ----------
     slope, low, high, radius : (..., n)
-        Of an `Enclosure`.
+        As in `Enclosure`.
     half : (...) rad
+        Half-width h of each cell.
     z : (..., n)
-        What the joints are weighted with, all on their turn of the enclosure.
+        Weights of the joints, which are all on the turn of the enclosure.
     axis : int
-        The axis of the joints: the last, or the first, by which sums are faster.
+        Array axis of the joints: the last, or the first, where sums are faster.
     """
     run = z * slope
     bend = z * np.where(z >= 0, low, high)
@@ -149,7 +150,7 @@ def linear_minimum(
     steep = np.abs(run.sum(axis)) + unit * np.abs(run).sum(axis)
     curve = bend.sum(axis) - unit * np.abs(bend).sum(axis)
     off = (np.abs(z) * radius).sum(axis) * (1 + unit)
-    # The least of curve t^2 / 2 - steep t on [0, h]: inside, if it turns upwards before h.
+    # Minimum of curve t^2 / 2 - steep t on [0, h]: inside if the parabola turns upwards before h.
     end = (0.5 * curve * half - steep) * half
     inside = (curve > 0) & (steep < curve * half)
     vertex = -0.5 * steep * steep / np.where(inside, curve, 1.0)
@@ -161,16 +162,16 @@ def linear_minimum(
 def require_closed_form(robot: Robot) -> None:
     if robot.kinematics not in POSTURES_OF:
         raise InputError(
-            f"robot {robot.id!r}: its solutions are enclosed for the families "
-            f"{', '.join(POSTURES_OF)} only, it is of {robot.kinematics!r}"
+            f"robot {robot.id!r}: enclosures need a robot of family "
+            f"{' or '.join(POSTURES_OF)}, got {robot.kinematics!r}"
         )
 
 
 def fixed_poses(robot: Robot, frames: Array, T_flange_tip: Array) -> tuple[Interval, Interval]:
-    """Return what stands before and after the turn of the tool, rows first.
+    """Return the fixed poses before and after the rotation of the tool, rows first.
 
-    Task frames in the model's base (3, 4, K), and the wrist point and axes of the model's end in
-    the tip's frame, as columns x, y, z, point (3, 4).
+    They are the task frames in the model's base (3, 4, K), and the axes and the wrist point of the
+    model's end in the tip's frame, as columns x, y, z, point (3, 4).
     """
     before = _product(_foot(robot), _rigid(np.moveaxis(frames, 0, -1)))
     flange = _inverse(_rigid(T_flange_tip[..., None]))
@@ -200,9 +201,9 @@ def _foot(robot: Robot) -> Interval:
 
 
 def _rigid(T: Array) -> Interval:
-    """Return poses (4, 4, ...), rows first, as (3, 4, ...) that hold the nearest exact rotation.
+    """Return poses (4, 4, ...), rows first, as (3, 4, ...) that contain the nearest exact rotation.
 
-    A matrix R is no farther from a rotation, by the norm of Frobenius, than R^T R is from 1.
+    In the Frobenius norm, a matrix R is no farther from a rotation than R^T R is from 1.
     """
     R = exact(T[:3, :3])
     off = np.zeros(T.shape[2:])
@@ -238,7 +239,8 @@ def _product(A: Interval, B: Interval) -> Interval:
 def joints_of(robot: Robot, pose: Pose) -> tuple[list[Jet], Bools]:
     """Return the robot's joints in every posture at poses of its model's end, and where none is.
 
-    The joints are jets that broadcast to (2, 2, 2, C), as in `Postures`, and so is the second.
+    The joints are jets that broadcast to (2, 2, 2, C), as in `Postures`; the second result is a
+    mask of that shape.
     """
     postures = POSTURES_OF[robot.kinematics](robot.geometry, pose)
     joints = [
@@ -284,8 +286,9 @@ def _turned_pose(before: Interval, after: Interval, turn: Jet) -> Pose:
 def _described(q: Jet, smooth: Bools, none: Bools) -> tuple[Array, Array, Array, Array, Array]:
     """Return centre, slope, bounds of the second derivative and radius of one joint (2, 2, 2, C).
 
-    Zeros where there are none, and in a box but for centre and radius. Close to a singularity the
-    second derivative is hardly bounded while the joint is: what is said then is how far it goes.
+    All are zero where there is no solution; in a box all except centre and radius are. Close to a
+    singularity the bounds of the second derivative are useless while those of the joint are not, so
+    a box is returned.
     """
     middle = np.where(smooth, q.at.middle(), q.value.middle())
     box = q.value.radius(middle)

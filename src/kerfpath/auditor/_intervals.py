@@ -1,11 +1,11 @@
 """Intervals of real numbers with outward rounding, as arrays.
 
-An operation on intervals returns one that holds the result of the same operation on any real
-numbers within them (Moore, Kearfott and Cloud, "Introduction to Interval Analysis", 2009). A bound
-that is NaN means that nothing is known: it stays so through every operation but `meet`.
+An operation on intervals returns an interval that contains the result of the same operation on any
+real numbers in them (Moore, Kearfott and Cloud, "Introduction to Interval Analysis", 2009). A bound
+of NaN means not known, and stays NaN in every operation except `meet`.
 
-The basic operations round to nearest (IEEE 754), so that one unit in the last place outwards is
-enough. Of numpy's library, arctangents are taken to be good to four units of their own last place,
+The basic operations round to nearest (IEEE 754), so widening by one unit in the last place is
+enough. numpy's arctangents are assumed to be accurate to four units of their own last place, its
 sines and cosines to four units of the last place of 1.
 """
 
@@ -23,11 +23,11 @@ from kerfpath._repr import short_repr
 __all__ = ["HALF_TURN", "Interval", "exact", "stack"]
 
 UNIT = 2.0**-52
-"""A share of a number that is one to two of its units in the last place."""
+"""Share of a number that is one to two of its units in the last place."""
 TINY = 1e-300
-"""Larger than what underflow can lose."""
+"""Larger than any loss by underflow."""
 LIBRARY = 5 * UNIT
-"""By how much a sine or cosine, and by what share an arctangent may be off: four units and one."""
+"""Error of a sine or cosine, and relative error of an arctangent: four units, and one more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +87,7 @@ class Interval:
         return Interval(np.maximum(out.lo, 0.0), out.hi)
 
     def sqrt(self) -> Interval:
-        """Return the square root of what is not negative; zero where all is negative."""
+        """Return the square root of the part that is not negative; zero if all is negative."""
         out = _outward(np.sqrt(np.maximum(self.lo, 0.0)), np.sqrt(np.maximum(self.hi, 0.0)))
         return Interval(np.maximum(out.lo, 0.0), out.hi)
 
@@ -96,9 +96,10 @@ class Interval:
         return _outward(np.arctan(self.lo), np.arctan(self.hi), LIBRARY)
 
     def cos_sin(self) -> tuple[Interval, Interval]:
-        """Return cosine and sine of angles, rad; all of [-1, 1] where nothing is known.
+        """Return cosine and sine of angles (rad); [-1, 1] where nothing is known.
 
-        By the sum of angles from the middle of each: tight where they are less than a half turn.
+        They use the sum of angles from the middle of each interval, and are tight for intervals of
+        less than half a turn.
         """
         middle = self.middle()
         off = self.radius(middle)
@@ -112,7 +113,7 @@ class Interval:
         return (c * near - s * side).meet(one), (s * near + c * side).meet(one)
 
     def meet(self, other: Interval) -> Interval:
-        """Return what both hold; an end that one of them does not know is that of the other."""
+        """Return the intersection; an end that is unknown in one is taken from the other."""
         return Interval(np.fmax(self.lo, other.lo), np.fmin(self.hi, other.hi))
 
     def middle(self) -> Array:
@@ -120,12 +121,12 @@ class Interval:
         return np.asarray(0.5 * (self.lo + self.hi))
 
     def radius(self, middle: Array) -> Array:
-        """Return how far each reaches from given numbers, at most."""
+        """Return bounds on the distance of each interval's ends from given numbers."""
         off = np.maximum(self.hi - middle, middle - self.lo)
         return np.asarray(off + (UNIT * np.abs(off) + TINY))
 
     def swept(self, half: Array) -> Interval:
-        """Return the products with all of [-half, half]."""
+        """Return the products with the interval [-half, half]."""
         most = half * self.magnitude()
         most = most + (UNIT * most + TINY)
         return Interval(-most, most)
@@ -140,7 +141,7 @@ class Interval:
 
 
 def exact(value: ArrayLike) -> Interval:
-    """Return numbers as intervals of no width."""
+    """Return numbers as intervals of zero width."""
     array = np.asarray(value, dtype=float)
     return Interval(array, array)
 
@@ -156,4 +157,4 @@ def _outward(lo: Array, hi: Array, share: float = UNIT) -> Interval:
 
 
 HALF_TURN = _outward(np.array(np.pi), np.array(np.pi))
-"""Holds pi."""
+"""An interval that contains pi."""

@@ -1,11 +1,10 @@
 """Functions of t in [-h, h], enclosed with their first and second derivatives.
 
-A jet holds value and derivative at t = 0, and value and both derivatives over all of [-h, h]. The
-operations are those of second-order automatic differentiation over intervals; after each, what
-Taylor's formula says from t = 0 narrows what the operation says over [-h, h]. A derivative that
-does not exist or is not bounded, such as that of a square root that may reach zero, is NaN: not
-known. So a known second derivative over [-h, h] is at the same time a proof that the function is
-defined and smooth there.
+A jet has value and derivative at t = 0, and value and both derivatives over all of [-h, h]. The
+operations are second-order automatic differentiation over intervals; after each one, Taylor's
+formula from t = 0 narrows the results over [-h, h]. A derivative that does not exist or is not
+bounded, such as that of a square root that may reach zero, is NaN: not known. A known second
+derivative over [-h, h] therefore also proves that the function is defined and smooth there.
 """
 
 from __future__ import annotations
@@ -31,11 +30,11 @@ class Jet:
     at, slope : Interval
         Value and first derivative at t = 0.
     value, rate, bend : Interval
-        Value, first and second derivative anywhere in [-half, half]. The value holds every one
-        that the function has where it is defined; the derivatives are known only if it is
-        defined everywhere.
+        Value, first and second derivative anywhere in [-half, half]. The value contains every
+        value of the function where it is defined; the derivatives are known only if it is defined
+        everywhere.
     half : array
-        h, not negative.
+        The half-width h, not negative.
     """
 
     at: Interval
@@ -127,7 +126,7 @@ class Jet:
         )
 
     def cos_sin(self) -> tuple[Jet, Jet]:
-        """Return cosine and sine of an angle; between -1 and 1 even where it is not known."""
+        """Return cosine and sine of an angle; they are in [-1, 1] even if the angle is unknown."""
         c0, s0 = self.at.cos_sin()
         c, s = self.value.cos_sin()
         square = self.rate.square()
@@ -156,15 +155,15 @@ def angle_from(middle: Array, half: Array) -> Jet:
 def argument(x: Jet, y: Jet) -> Jet:
     """Return the angle from (1, 0) to (x, y), rad.
 
-    It is continuous where the derivatives are known. Where they are not, its value holds that of
-    every (x, y) up to whole turns.
+    It is continuous where the derivatives are known. Elsewhere its value contains the angle of
+    every (x, y) up to full turns.
     """
     c, s = x.value.middle(), y.value.middle()
     size = np.hypot(c, s)
     fine = np.isfinite(size) & (size > 0)
     size = np.where(fine, size, 1.0)
     c, s = np.where(fine, c / size, 1.0), np.where(fine, s / size, 0.0)
-    # Seen from a direction near by, the angle is small, and turning changes no derivative.
+    # Relative to a nearby direction the angle is small; the turn changes no derivative.
     turned = np.arctan2(s, c)
     base = Interval(turned - ROUNDED, turned + ROUNDED)
     x, y = x.scaled(c) + y.scaled(s), y.scaled(c) - x.scaled(s)
@@ -184,11 +183,11 @@ def argument(x: Jet, y: Jet) -> Jet:
 
 
 ROUNDED = 4e-15
-"""rad: error of an arctangent of two numbers (four units of pi), and of the sum with it."""
+"""rad: error of an arctangent of two numbers (four units of pi) and of a sum with it."""
 
 
 def _small_angle(x: Interval, y: Interval) -> Interval:
-    """Return the angle of (x, y) ahead, where x is positive; else not known."""
+    """Return the angle of (x, y) where x is positive; elsewhere it is not known."""
     ahead = Interval(np.where(x.lo > 0, x.lo, np.nan), np.where(x.lo > 0, x.hi, np.nan))
     return (y / ahead).atan()
 

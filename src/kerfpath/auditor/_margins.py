@@ -1,8 +1,8 @@
-"""The margins of comfort at the nodes, from the lines that the joints turn about alone.
+"""The comfort margins at the nodes, computed only from the joint axes as lines.
 
-Nothing of the arm's lengths or model angles is used: the elbow is an angle between points on axes 2
-and 3 and the wrist, seen along axis 2, of a seven-axis arm between axes
-3 and 5; the shoulder a distance of the wrist from a plane.
+The arm's lengths and model angles are not used. The elbow measure is the angle, seen along axis 2,
+between points on axes 2 and 3 and the wrist; for a seven-axis arm it is the angle between axes 3
+and 5. The shoulder measure is the distance of the wrist from a plane.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from kerfpath.plans import Plan
 __all__ = ["margins"]
 
 ELBOW = 2
-"""The joint, from 0, that is the elbow's."""
+"""The elbow joint, from 0."""
 SLACK = 1e-8
 """rad, m or m^3: rounding of two kinematics in double precision."""
 
 
 def margins(plan: Plan, chain: JointChain, rounding: Rounding | None = None) -> list[Check]:
-    """Return the check of every hard margin that the plan was asked to keep, at its nodes.
+    """Return the check of every hard margin that the plan must keep at its nodes.
 
-    Of a plan that was read from a text, an angle may fall short by what its digits leave of the
-    joints: no joint changes it by more than it turns itself.
+    For a plan that was read from a text, an angle may fall short by the rounding errors of the
+    joints, since no joint changes the angle by more than it turns itself.
     """
     left = np.zeros(len(plan.q)) if rounding is None else rounding.q.sum(axis=1)
     comfort = plan.settings.comfort
@@ -55,7 +55,7 @@ def margins(plan: Plan, chain: JointChain, rounding: Rounding | None = None) -> 
 
 
 def _above_floor(plan: Plan, chain: JointChain) -> list[Check]:
-    """Return the check of the floor that the plan was asked to stay above, if it was."""
+    """Return the check of the floor that the plan must stay above, if there is one."""
     floor = plan.settings.floor
     if floor is None:
         return []
@@ -129,7 +129,7 @@ def _manipulability(plan: Plan, chain: JointChain) -> Array:
     flange, J = chain.jacobian(plan.q)
     if plan.robot.family.free_rotation:
         return np.asarray(np.linalg.svd(J, compute_uv=False).prod(axis=1))
-    # The tool's tip and axis: what turns about the axis does not count.
+    # Only tip and tool axis count: rotation about the axis does not.
     reach = flange[:, :3, :3] @ plan.T_flange_tip[:3, 3]
     linear = J[:, :3] + np.cross(J[:, 3:], reach[:, :, None], axis=1)
     turns = (flange @ plan.T_flange_tip)[:, :3, :2].transpose(0, 2, 1) @ J[:, 3:]

@@ -1,4 +1,4 @@
-"""What the controller does between the nodes of a plan, by its own way of interpolating."""
+"""The motion between the nodes of a plan, as the controller interpolates it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Interpolation", "Motion", "follow", "joint_increments", "motion_of",
 Interpolation = Literal["linear", "joint"]
 
 NEWTON_STEPS = 12
-"""Newton's method doubles its digits each step; a pose not reached by then is not reached."""
+"""Newton's method doubles its digits each step; a pose not reached after these is not reached."""
 
 REACHED = 1e-9
 """Residual (m and rad) below which a pose counts as reached."""
@@ -31,13 +31,13 @@ class Motion:
     Parameters
     ----------
     q : (K-1, m+1, n) rad
-        An external axis last; a rail in m.
+        Joints; external axes come last, a rail in m.
     tip : (K-1, m+1, 3) m
         Tool tip in the robot base.
     axis : (K-1, m+1, 3)
         Tool axis in the robot base.
     residual : (K-1, m+1)
-        What the robot's joints miss of the commanded pose, the larger of m and rad.
+        Error of the commanded pose, the larger of m and rad.
     """
 
     q: Array
@@ -51,7 +51,7 @@ class Motion:
 def joint_increments(plan: Plan) -> Array:
     """Return joint increments (K-1, n) rad; an endless joint goes the short way round (13).
 
-    Half a turn is as long either way; it goes the way that the values go.
+    Half a turn is equally long either way; it goes the way that the values go.
     """
     dq = np.diff(plan.q, axis=0)
     turns = np.round(dq / (2 * np.pi))
@@ -59,12 +59,12 @@ def joint_increments(plan: Plan) -> Array:
 
 
 def motion_of(plan: Plan, chain: JointChain, interpolation: Interpolation, parts: int) -> Motion:
-    """Return the motion between the nodes, `parts` equal parts in time each.
+    """Return the motion between the nodes, each interval divided into `parts` equal times.
 
-    "linear": the tip runs straight and the tool turns evenly about one axis from pose to pose, as
-    linear moves do; the joints follow by inverse kinematics. "joint": the joints run evenly. An
-    external axis runs evenly in both, the straight line being one of the part, as does joint 3 of a
-    seven-axis arm.
+    "linear": from pose to pose the tip moves straight and the tool turns evenly about one axis, as
+    in linear moves; the joints follow by inverse kinematics. "joint": the joints move evenly. In
+    both, external axes and joint 3 of a seven-axis arm move evenly; the line is straight in the
+    part.
     """
     K, dq = len(plan.q), joint_increments(plan)
     f = np.linspace(0.0, 1.0, parts + 1)
@@ -88,9 +88,9 @@ def motion_of(plan: Plan, chain: JointChain, interpolation: Interpolation, parts
 
 
 def straight(start: Array, end: Array, k: Ints, f: Array) -> Array:
-    """Return the poses (B, 4, 4) at shares f (B,) of the linear moves k (B,) from start to end.
+    """Return the poses (B, 4, 4) m at shares f (B,) of the linear moves k (B,) from start to end.
 
-    start, end : (M, 4, 4) m, of each move.
+    start, end : (M, 4, 4) m, the ends of each move.
     """
     R0 = start[:, :3, :3]
     turn = Rotation.from_matrix(R0.transpose(0, 2, 1) @ end[:, :3, :3]).as_rotvec()
@@ -102,10 +102,10 @@ def straight(start: Array, end: Array, k: Ints, f: Array) -> Array:
 
 
 def follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
-    """Solve the tool poses `wanted` (B, 4, 4) by Newton's method from the joints q (B, n).
+    """Solve for the tool poses `wanted` (B, 4, 4) by Newton's method from the joints q (B, n).
 
-    Five joints are asked for tip and tool axis alone; an external axis stays as it is, and so does
-    the joint that runs evenly. Returns the joints and what they miss (B,).
+    A five-axis arm only has to match tip and tool axis. External axes and the joint that runs
+    evenly keep their values. Returns the joints and their errors (B,), m and rad.
     """
     q, n = q.copy(), len(chain.axes)
     residual = np.full(len(q), np.inf)
@@ -127,7 +127,7 @@ def follow(chain: JointChain, wanted: Array, q: Array) -> tuple[Array, Array]:
         if not late.any():
             break
         open_, J, error = open_[late], J[late], error[late]
-        # Damped least squares: at a singularity the step stays bounded and the residual tells.
+        # Damped least squares: at a singularity the step stays bounded, and the residual shows it.
         Jt = J.transpose(0, 2, 1)
         step = np.linalg.solve(Jt @ J + 1e-12 * np.eye(n), Jt @ error[..., None])[..., 0]
         q[open_, :n] += np.clip(step, -0.5, 0.5)

@@ -1,9 +1,9 @@
-"""Where in many poses bodies come nearest to their near-miss distance, at few distance queries.
+"""Find the pose and pair with the least clearance among many poses, with few distance queries.
 
-From one joint vector to another no corner of a body moves farther, seen from the other body of its
-pair, than the sum of |dq_j| times its reach from joint j, and their distance changes by no more.
-So a distance that was found bounds those at all other poses from below, and only where no bound is
-above the least one found does another have to be found: what comes out is exact all the same.
+From one joint vector to another, no corner of a body moves farther, seen from the other body of its
+pair, than the sum of |dq_j| times its reach from joint j, and the distance changes by no more. So
+each distance found gives lower bounds at all other poses, and a distance must be computed only
+where these bounds are not above the least one found. The result is still exact.
 """
 
 from __future__ import annotations
@@ -17,32 +17,33 @@ from kerfpath.cell import Cell
 __all__ = ["nearest"]
 
 SURE = 1e-5
-"""m above the least found from which on a bound rules a pose out; distances are exact to 1e-6 m."""
+"""m above the least value found where a bound rules a pose out; distances are exact to 1e-6 m."""
 NEIGHBOURS = 4
-"""Poses found before that a pose is compared with."""
+"""Number of solved poses that give bounds for another pose."""
 
 
 def nearest(
     cell: Cell, rates: Array, q: Array, frames: Array, wanted: Bools
 ) -> tuple[int, int, float]:
-    """Return a pose, a pair, and how far (m) it is beyond its near-miss distance there: the least.
+    """Return the pose and the pair with the least distance beyond the near-miss distance.
 
     Parameters
     ----------
     cell : Cell
     rates : (P, n) m/rad
-        How far a corner of each pair comes at most as a joint turns, seen from the other body.
+        Largest motion of a corner of each pair per joint, seen from the other body.
     q : (B, n) rad
-    frames : (B, n+1, 4, 4)
-        Of base and links at q.
+    frames : (B, n+1, 4, 4) m
+        Poses of base and links at q.
     wanted : (P,) bool
-        The pairs to look at, one at least.
+        The pairs to check, at least one.
 
     Returns
     -------
     row, pair : int
+        Index of the pose and of the pair.
     beyond : float m
-        NaN where a joint vector is.
+        Distance of the pair less its near-miss distance; NaN if a joint vector is NaN.
     """
     pairs = np.flatnonzero(wanted)
     beyond = cell.scene.cheap(frames)[:, pairs] - cell.required[pairs]
@@ -53,7 +54,7 @@ def nearest(
         looked = False
         for c in np.argsort(beyond.min(axis=0)):
             p, own = pairs[c], beyond[:, c]
-            # Of meshes that overlap the depth is no bound: nothing is ruled out below contact.
+            # The depth of overlapping meshes is no bound: nothing is ruled out below contact.
             clear = max(least, float(-cell.required[p])) + SURE
             open_ = np.flatnonzero(~found[:, c] & (own <= clear))
             if not open_.size:
@@ -74,14 +75,14 @@ def nearest(
 
 
 def _spread(bounds: Array, count: int) -> Ints:
-    """Return places of the least bound first of all, later of so many spread over all of them."""
+    """Return the index of the least bound if `count` is 1, otherwise `count` spread indices."""
     if count == 1:
         return np.array([np.argmin(bounds)])
     return np.unique(np.linspace(0, len(bounds) - 1, min(count, len(bounds))).astype(np.int64))
 
 
 def _bounds(q: Array, beyond: Array, there: Array, rate: Array) -> Array:
-    """Return lower bounds (S,) m at joints `there` (S, n) by what is known at q (F, n) rad."""
+    """Return lower bounds (S,) m at joints `there` (S, n) from values `beyond` at q (F, n) rad."""
     count = min(NEIGHBOURS, len(q))
     moved, at = cKDTree(q * rate).query(there * rate, count, p=1)
     shape = (len(there), count)

@@ -1,4 +1,4 @@
-"""The tool axes that a plan asks for, its tilts included, by the audit's own calculation."""
+"""The tool axes required by a plan, including its tilts, by the audit's own calculation."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["axes_asked_for", "tilt_turns"]
 
 
 def tilt_turns(plan: Plan) -> Array:
-    """Return the turn from the nominal axis to the one asked for at the nodes, (K, 3) rad.
+    """Return the rotations from the nominal axes to the tilted ones at the nodes, (K, 3) rad.
 
-    As `kerfpath.Tilt` tells lead and lean; a rotation vector in the robot base, NaN where the path
-    has no direction across the axis.
+    They are rotation vectors in the robot base, from lead and lean as defined in `kerfpath.Tilt`;
+    NaN where the path has no direction across the axis.
     """
     if not plan.tilt.any():
         return np.zeros((len(plan.q), 3))
@@ -30,10 +30,10 @@ def tilt_turns(plan: Plan) -> Array:
 
 
 def axes_asked_for(nominal: Array, s_nodes: Array, turn_nodes: Array, s: Array) -> Array:
-    """Return the axes (B, 3) asked for at arc lengths s (B,) m, nominal (B, 3) without the tilt.
+    """Return the tilted axes (B, 3) at arc lengths s (B,) m, given the nominal axes (B, 3).
 
-    Between the nodes, at s_nodes (K,) m, the turns turn_nodes (K, 3) rad go evenly from one to the
-    next.
+    Between the nodes, at s_nodes (K,) m, the rotations turn_nodes (K, 3) rad are interpolated
+    linearly.
     """
     turn = np.stack([np.interp(s, s_nodes, part) for part in turn_nodes.T], axis=1)
     return np.asarray(Rotation.from_rotvec(turn).apply(nominal))

@@ -1,16 +1,17 @@
-"""Every posture of an arm along a turn of its tool, as angles enclosed with their derivatives.
+"""Enclosures of the joint angles and their derivatives in every posture, as the tool turns.
 
-From the geometry alone. Both families have a vertical axis 1, a plane that turns with it, and in
-that plane two links whose joints are square to it:
+They follow from the geometry alone. Both families have a vertical axis 1, a plane that turns with
+it, and in that plane two links whose joints are perpendicular to it:
 
-- the wrist point's distance from that plane is fixed, which leaves two values of axis 1 (shoulder);
-- in the plane, two links reach a point by two triangles (elbow), sides and angles by the law of
-  cosines, directions as differences of arguments;
-- what is left is a rotation about two axes that meet, and its mirror image (wrist).
+- the distance of the wrist point from that plane is fixed, which leaves two values of axis 1
+  (shoulder);
+- in the plane, two links reach a point by two triangles (elbow), with angles by the law of cosines
+  and directions as differences of arguments;
+- the rest is a rotation about two axes that meet, and its mirror image (wrist).
 
-Where a square root may be zero two branches meet, and where an argument is that of zero a joint is
-free: there nothing is known of derivatives, and angles that are free are known up to whole turns,
-so that the continuum of solutions at a singularity is held, too.
+Where a square root may be zero, two branches meet; where an argument of zero is taken, a joint is
+free. There the derivatives are not known, and the range of a free angle is a full turn, so the
+continuum of solutions at a singularity is also covered.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ MIRRORED = Interval(np.array([[0.0], [HALF_TURN.lo]]), np.array([[0.0], [HALF_TU
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """Pose of the model's end in the model's base, along a turn of the tool; jets (C,).
+    """Pose of the model's end in the model's base as the tool turns; jets (C,).
 
     Parameters
     ----------
@@ -62,9 +63,9 @@ class Postures:
     Parameters
     ----------
     angles : tuple of 6 Jet
-        Angles, rad; (2, 2, 2, C) by shoulder, elbow, wrist and cell, or what broadcasts to it.
+        Angles, rad, that broadcast to (2, 2, 2, C): shoulder, elbow, wrist and cell.
     none : (2, 2, 2, C) bool
-        Where no pose of the cell has a solution of this posture.
+        Whether no pose of the cell has a solution in this posture.
     """
 
     angles: tuple[Jet, ...]
@@ -74,9 +75,9 @@ class Postures:
 
 
 def _shoulder(pose: Pose, aside: float, side: Array) -> tuple[Jet, Jet, Bools]:
-    """Return axis 1 and how far ahead of it the wrist point is in the plane, `aside` m off it.
+    """Return axis 1, how far the wrist point is ahead of it, and where it is too near to axis 1.
 
-    `side` says where it is ahead (1) and where behind (-1). Third: where it is too near to axis 1.
+    The wrist point is `aside` m off the plane; `side` is 1 where it is ahead and -1 where behind.
     """
     x, y, _ = pose.point
     ahead2 = (x.square() + y.square()).plus(-exact(aside).square())
@@ -87,10 +88,10 @@ def _shoulder(pose: Pose, aside: float, side: Array) -> tuple[Jet, Jet, Bools]:
 def _two_links(
     x: Jet, y: Jet, first: Interval, second: Interval, side: Array
 ) -> tuple[Jet, Jet, Jet, Bools]:
-    """Return the directions of two links that reach (x, y), the bend between, where they cannot.
+    """Return the directions of two links that reach (x, y), their bend, and where they cannot.
 
-    Directions are counted from x to y. The bend from the first to the second has the sine's sign
-    `side`. Lengths (m) may be negative.
+    Directions are counted from x to y. The sine of the bend from the first to the second link has
+    the sign `side`. Lengths (m) may be negative.
     """
     reach2 = x.square() + y.square()
     cosine = reach2.plus(-(first.square() + second.square())).times(
@@ -108,15 +109,15 @@ def _two_links(
 
 
 def _turned(c: Jet, s: Jet, x: Jet, y: Jet) -> tuple[Jet, Jet]:
-    """Return (x, y) in axes that are turned by the angle with cosine c and sine s."""
+    """Return (x, y) in axes turned by the angle with cosine c and sine s."""
     return c * x + s * y, c * y - s * x
 
 
 def _opw(lengths: dict[str, float], pose: Pose) -> Postures:
     """Return the postures of an ortho-parallel arm with a spherical wrist.
 
-    Its upper arm points upwards at zero and turns forward, c2 long; the wrist is c3 along and a2
-    across from the elbow. The wrist turns about z, y, z.
+    The upper arm, of length c2, points upwards at zero and turns forward; the wrist is c3 along and
+    a2 across from the elbow, and turns about z, y, z.
     """
     theta_1, ahead, near = _shoulder(pose, lengths["b"], SHOULDER)
     a2, c3 = exact(lengths["a2"]), exact(lengths["c3"])
@@ -153,14 +154,14 @@ def _opw(lengths: dict[str, float], pose: Pose) -> Postures:
 def _ur(lengths: dict[str, float], pose: Pose) -> Postures:
     """Return the postures of an arm of the Universal Robots type.
 
-    Its links a2 and a3 move in a plane that is d4 aside of axis 1. The wrist point, where axes 5
-    and 6 meet, is d5 below axis 4 where the angles 2 to 4 add up to zero. Axis 5 is in the plane,
-    so that the wrist is a turn out of it and one about axis 6.
+    The links a2 and a3 move in a plane at the distance d4 from axis 1. The wrist point, where axes
+    5 and 6 meet, is d5 below axis 4 if angles 2 to 4 add up to zero. Axis 5 is in the plane, so the
+    wrist is a turn out of the plane and one about axis 6.
     """
     front = np.copysign(1.0, lengths["a2"]) * SHOULDER
     theta_1, ahead, near = _shoulder(pose, -lengths["d4"], front)
     c1, s1 = theta_1.cos_sin()
-    # Outwards is square to the plane: where axis 4 points to.
+    # Outwards is perpendicular to the plane, in the direction of axis 4.
     z_ahead = c1 * pose.z[0] + s1 * pose.z[1]
     x_out, y_out, z_out = (s1 * e[0] - c1 * e[1] for e in (pose.x, pose.y, pose.z))
     sine = (z_ahead.square() + pose.z[2].square()).sqrt()
@@ -181,7 +182,7 @@ def _ur(lengths: dict[str, float], pose: Pose) -> Postures:
 
 
 POSTURES_OF = {"opw": _opw, "ur": _ur}
-"""Postures of each family that has enclosures, from its lengths (m) and the pose."""
+"""The function of each enclosed family that returns its postures from lengths (m) and pose."""
 
 TO_WRIST = {"opw": "c4", "ur": "d6"}
-"""The length (m) from the wrist point to the end, along the end's z-axis."""
+"""Name of the length (m) from the wrist point to the end, along the end's z-axis."""

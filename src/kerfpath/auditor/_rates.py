@@ -1,4 +1,4 @@
-"""The checks of a plan in time: what its joints need of their limits, node by node."""
+"""The checks of joint velocities, accelerations, torques and jerks, node by node."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def rate_checks(plan: Plan, reached: BetweenNodes, rounding: Rounding | None) ->
 def _torques(
     plan: Plan, dq: Array, dt: Array, change: Array, rounding: Rounding | None
 ) -> Iterator[Check]:
-    """Yield the check of the torques that accelerations `change` (K-2, n) rad/s^2 ask for."""
+    """Yield the check of the torques for accelerations `change` (K-2, n) rad/s^2."""
     arm = LagrangeArm.of(plan.robot)
     if arm is None:
         return
@@ -69,7 +69,8 @@ def _jerks(
 ) -> Iterator[Check]:
     """Yield the check of the jerks between accelerations `change` (K-2, n) rad/s^2.
 
-    In a text short intervals turn digits into jerk: where they explain much of it, it warns.
+    In a text with short intervals, rounding appears as jerk; where it explains much of the jerk,
+    the check is only a warning.
     """
     limit = plan.robot.jerk_limit()
     if limit is None or len(change) < 2:
@@ -94,9 +95,9 @@ def _per_joint(
     left: Array | None,
     first: int | None = None,
 ) -> Check:
-    """Check shares (rows, joints) of a limit, wider by what is `left` to digits at each.
+    """Check shares (rows, joints) of a limit, which is widened by rounding errors `left` at each.
 
-    Row 0 belongs to node `first`; default: accelerations begin at node 1.
+    Row 0 belongs to node `first`; default: 0 for K - 1 rows, 1 for the accelerations.
     """
     first = len(plan.q) - 1 - len(share) if first is None else first
     wider = np.zeros(share.shape) if left is None else np.minimum(left, MOST_ROUNDED)

@@ -1,4 +1,4 @@
-"""Whether the tool can back off at both ends of a plan, by the joint chain alone."""
+"""Check that the tool can back off at both ends of a plan, with the joint chain alone."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ __all__ = ["retract_checks"]
 SLACK = 1e-8
 """rad: as for the joints at the nodes."""
 MISSED = 1e-6
-"""m and rad: Newton's method ends far below, where it ends."""
+"""m and rad: largest error of a pose that counts as reached; Newton's method ends far below."""
 OUT_OF_REACH = 2 * np.pi
-"""rad: an excess that stands for no way there, or one through a singularity."""
+"""rad: excess that means that there is no way, or only one through a singularity."""
 PARTS = 10
-"""Pieces that the way back is followed in."""
+"""Number of parts in which the retract is followed."""
 
 
 def retract_checks(plan: Plan, retract: float | None) -> list[Check]:
-    """Return the check of the room at both ends of a plan for a retract, m; None: no check."""
+    """Return the check that a retract (m) is possible at both ends of a plan; None: no check."""
     if retract is None:
         return []
     chain = chain_of(plan.robot)
@@ -65,6 +65,6 @@ def retract_checks(plan: Plan, retract: float | None) -> list[Check]:
 
 
 def _side(chain: JointChain, q: Array) -> Array:
-    """Return on which side (B,) of its singularities an arm of six joints is; 0 of another."""
+    """Return on which side (B,) of its singularities a six-axis arm is; 0 for other arms."""
     _, J = chain.jacobian(q)
     return np.sign(np.linalg.det(J)) if J.shape[1] == J.shape[2] else np.zeros(len(q))

@@ -1,4 +1,4 @@
-"""What the digits of a text add to the rates of a motion: a bounded share that the audit states."""
+"""Rounding errors of a motion that was read from a text, which widen the limits of the audit."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from kerfpath.plans import Plan
 __all__ = ["MOST_ROUNDED", "Rounding", "rounding_of"]
 
 MOST_ROUNDED = 0.05
-"""Share of a limit that digits may explain at most; a text that needs more has too few of them."""
+"""Largest share of a limit that rounding may explain; a text that needs more has too few digits."""
 SINGULAR = 1e-9
-"""Singular values below it, relative to the largest, do not turn digits into joints."""
+"""Singular values below this share of the largest one are ignored."""
 AXES = np.sqrt(5.0)
-"""Most that errors of three angles, two of them about one axis at worst, come to together."""
+"""Factor for the errors of three angles, two of which are about the same axis at worst."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rounding:
-    """How far a motion that was read from a text may be from the one that was written.
+    """Rounding errors of a motion that was read from a text.
 
     Parameters
     ----------
     q : (K, n) rad
-        Of the joints at each node.
+        Error of each joint at each node.
     time : (K-1,)
-        Of the time between nodes, as a share.
+        Relative error of the time between nodes.
     """
 
     q: Array
@@ -39,12 +39,12 @@ class Rounding:
     __repr__ = short_repr
 
     def of_velocity(self, dq: Array, dt: Array) -> Array:
-        """Return the bound (K-1, n) rad/s on joint velocities from increments dq in dt (K-1,) s."""
+        """Return error bounds (K-1, n) rad/s on velocities from increments dq in dt (K-1,) s."""
         steps = self.q[:-1] + self.q[1:]
         return np.asarray((steps + np.abs(dq) * self.time[:, None]) / dt[:, None])
 
     def of_acceleration(self, dq: Array, dt: Array) -> Array:
-        """Return the bound (K-2, n) rad/s^2 on accelerations from increments dq in dt (K-1,) s."""
+        """Return error bounds (K-2, n) rad/s^2 on accelerations; dq and dt (K-1,) s as above."""
         velocity = self.of_velocity(dq, dt)
         mean = ((dt[1:] + dt[:-1]) / 2)[:, None]
         change = np.abs(np.diff(dq / dt[:, None], axis=0))
@@ -53,10 +53,10 @@ class Rounding:
 
 
 def rounding_of(plan: Plan, point: float, angle: float, time: Array, *, jointed: bool) -> Rounding:
-    """Return what digits leave of the joints of a plan that was read from a text.
+    """Return the rounding errors of a plan that was read from a text.
 
-    A pose that is off by its last digits is reached by joints that are off by them through the
-    inverse Jacobian; the bound is that of the worst direction.
+    The rounding of a pose changes the joints by the inverse Jacobian; the bound is that of the
+    worst direction.
 
     Parameters
     ----------
@@ -64,9 +64,9 @@ def rounding_of(plan: Plan, point: float, angle: float, time: Array, *, jointed:
     point, angle : float m, rad
         Half of the last digit of a coordinate and of an angle.
     time : (K-1,)
-        What the digits of speeds leave of the time between nodes, as a share.
+        Relative error of the time between nodes, from the digits of speeds.
     jointed : bool
-        The text says joints, not poses: `angle` is that of a joint.
+        Whether the text has joints instead of poses; then `angle` is that of a joint.
     """
     arm = plan.robot.family.joints
     linear = np.array([unit == "m" for unit in plan.robot.units])
@@ -77,7 +77,7 @@ def rounding_of(plan: Plan, point: float, angle: float, time: Array, *, jointed:
     chain = replace(chain, tip=chain.tip @ plan.T_flange_tip)
     tips, jacobian = chain.jacobian(plan.q)
     inverse = np.linalg.pinv(jacobian, rcond=SINGULAR)
-    # The text says where external axes are, and the arm makes up for those digits, too.
+    # The text has the external axes too, and the arm compensates for their rounding.
     carried = np.abs(inverse @ chain.twists(plan.q, tips[:, :3, 3])) @ own[arm:]
     off = np.sqrt(3.0) * point * np.linalg.norm(inverse[..., :3], axis=-1)
     turned = AXES * angle * np.linalg.norm(inverse[..., 3:], axis=-1)

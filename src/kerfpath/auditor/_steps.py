@@ -1,9 +1,10 @@
-"""What a step of a motion costs at least, with a potential over the places it joins.
+"""Lower bounds on the reduced cost of a step of a motion between two places with a potential.
 
-The cost of a step u of the joints is rho(u) + mu . u with every |u_i| at most v_i. It is at least
-y . u + the least of (rho(u) + (mu - y) . u), for any y; the step from one place to another is the
-difference of their middles, and of what the joints are off them. So much is y . D, and what is off
-is weighed with y and the slopes of the potential at both ends: a bound on each apart.
+The cost of a step u of the joints is rho(u) + mu . u, with every |u_i| at most v_i. For any y it is
+at least y . u plus the minimum of rho(u) + (mu - y) . u. The step from one place to another is the
+difference D of their middles plus the offsets of the joints from the middles. The first part gives
+y . D; the offsets are weighted with y and the slopes of the potential at both ends, and each is
+bounded separately.
 """
 
 from __future__ import annotations
@@ -21,32 +22,32 @@ from kerfpath.auditor._enclosure import linear_minimum
 __all__ = ["Rates", "candidates", "least_value", "linked", "reduced_costs", "steps_on"]
 
 AT_ONCE = 8192
-"""Pairs of places looked at together: their rows stay in the cache."""
+"""Number of pairs of places bounded together, so that their rows stay in the cache."""
 FOUND_AT_ONCE = 1 << 18
-"""Pairs found together, before all joints are compared."""
+"""Number of pairs found together, before all joints are compared."""
 NEAR = 1e-9
-"""rad: for the rounding of differences, far above it."""
+"""rad: allowance for the rounding of differences, far above it."""
 ROUNDED = 1 + 2.0**-46
-"""Factor on a norm for its rounding."""
+"""Factor that covers the rounding of a norm."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rates:
-    """What bounds and prices the steps of a motion, from each of M nodes to the next.
+    """Limits and costs of the steps of a motion, from each of M nodes to the next.
 
-    A step over several intervals is no dearer than all of them together.
+    A step over several intervals costs no more than all of them together.
 
     Parameters
     ----------
     nodes : (M,) int
-        Ascending.
+        Node numbers, ascending.
     velocity : (M-1, n) rad
-        Most that a joint moves in a step.
+        Largest change of each joint in a step.
     weights : (n,) 1/rad
     metric : {"euclid", "manhattan", "chebychev"}
     endless : (n,) bool
     tilt : (M-1, n)
-        mu, what the multipliers of a stage add to the cost of each step.
+        mu: the multipliers of a stage add mu . u to the cost of a step u.
     """
 
     nodes: Ints
@@ -59,20 +60,20 @@ class Rates:
     __repr__ = short_repr
 
     def layer(self, at: Places) -> Ints:
-        """Return which of the nodes each place is at, (C,)."""
+        """Return the index in `nodes` of the node of each place, (C,)."""
         return np.searchsorted(self.nodes, at.node)
 
     def most(self, layer: Ints) -> Array:
-        """Return what joints move at most in the step from some of the nodes, (B, n)."""
+        """Return the largest change of each joint in the step from some nodes, (B, n) rad."""
         return np.asarray(self.velocity[np.minimum(layer, len(self.velocity) - 1)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Curves:
-    """Joints off their middle: slope t + [low, high] t^2 / 2 +- radius, with a potential.
+    """Offsets of joints from their middle, slope t + [low, high] t^2 / 2 +- radius; a potential.
 
-    The joints are on the first axis, (n, B), by which numpy adds several times faster. The
-    potential is the larger of value_m - dual_m . off, m = 0, 1, value (2, B) and dual (2, n, B).
+    The joints are on the first axis, (n, B), where numpy adds several times faster. The potential
+    is the larger of value_m - dual_m . off for m = 0, 1, with value (2, B) and dual (2, n, B).
     """
 
     q: Array
@@ -89,24 +90,24 @@ class _Curves:
 
     @classmethod
     def of(cls, at: Places, value: Array, dual: Array) -> _Curves:
-        """Return those of places (C,) with their potential (C, 2) and (C, 2, n)."""
+        """Return the curves of places (C,) with their potential (C, 2) and (C, 2, n)."""
         joints = (at.q, at.reach, at.slope, at.low, at.high, at.radius, at.half)
         potential = value, dual.transpose(0, 2, 1)
         return cls(*(np.ascontiguousarray(part.T) for part in joints + potential))
 
     def take(self, which: Ints) -> _Curves:
-        """Return some of them."""
+        """Return a selection of the curves."""
         return _Curves(*(getattr(self, each.name).take(which, axis=-1) for each in fields(self)))
 
     def least(self, z: Array) -> Array:
-        """Return the least of z . off, (B,), z (n, B)."""
+        """Return the least value (B,) of z . off, for z (n, B)."""
         return linear_minimum(self.slope, self.low, self.high, self.radius, self.half, z, axis=0)
 
     def least_with(self, y: Array) -> Array:
-        """Return the least of y . off + the potential, (B,), y (n, B).
+        """Return the least value (B,) of y . off plus the potential, for y (n, B).
 
-        The larger of two is at least any mean of both; the best mean of two lines is one of them,
-        or level.
+        The larger of two lines is at least any weighted mean of both; the best mean is one of the
+        lines, or level.
         """
         run = ((y - self.dual) * self.slope).sum(1)
         ends = self.value - np.abs(run) * self.half
@@ -122,15 +123,15 @@ class _Curves:
 
 
 def least_value(at: Places, value: Array, dual: Array) -> Array:
-    """Return the least of the potential at each place, (C,)."""
+    """Return the least value of the potential at each place, (C,)."""
     return _Curves.of(at, value, dual).least_with(np.zeros(at.q.T.shape))
 
 
 def candidates(rates: Rates, at: Places) -> Iterator[tuple[Ints, Ints]]:
-    """Yield the pairs of places at neighbouring nodes that a step may join.
+    """Yield the pairs of places at neighbouring nodes that a step may join, each pair once.
 
-    Of the joint that leaves the fewest, found by sorting; the others are looked at then. Every pair
-    comes once.
+    Pairs are found by sorting the values of the joint that leaves the fewest pairs; then the other
+    joints are compared.
     """
     layer = rates.layer(at)
     wide = at.reach + rates.most(layer) + NEAR
@@ -139,7 +140,7 @@ def candidates(rates: Rates, at: Places) -> Iterator[tuple[Ints, Ints]]:
     step = 2 * size * layer
     best: tuple[float, tuple[Array, ...]] | None = None
     for i in bound:
-        # Both ends of a step as intervals on one line, a stretch of it for every step.
+        # Intervals of both ends of a step on one line, each step on a separate stretch of it.
         q = at.q[:, i]
         pad = 1e-14 * (np.abs(step).max(initial=0.0) + size)
         first = q - wide[:, i] + step - pad, q + wide[:, i] + step + pad
@@ -149,7 +150,7 @@ def candidates(rates: Rates, at: Places) -> Iterator[tuple[Ints, Ints]]:
         number = float(_number(starts[1], *first).sum() + _number(starts[0], *second).sum())
         if best is None or number < best[0]:
             best = number, (*first, *second)
-    if best is None:  # every joint turns without end: all pairs, stretch by stretch
+    if best is None:  # all joints are endless: all pairs, stretch by stretch
         flat = np.full(len(at), size)
         best = 0.0, (step - flat / 2, step + flat / 2, step - 2.5 * size, step - 1.5 * size)
     first_low, first_high, second_low, second_high = best[1]
@@ -166,7 +167,7 @@ def _number(starts: Array, low: Array, high: Array) -> Ints:
 
 
 def _inside(starts: Array, low: Array, high: Array, side: str) -> Iterator[tuple[Ints, Ints]]:
-    """Yield rows and places of all starts in [low, high], or in (low, high] with side "right"."""
+    """Yield rows and places of all starts in [low, high], or in (low, high] if side is "right"."""
     begin = np.searchsorted(starts, low, "left" if side == "left" else "right")
     number = np.maximum(np.searchsorted(starts, high, "right") - begin, 0)
     total = np.cumsum(number)
@@ -198,9 +199,9 @@ def _possible(
 
 
 def steps_on(rates: Rates, at: Places) -> Iterator[tuple[slice, Places]]:
-    """Yield the places of each two neighbouring nodes, and where among all they are.
+    """Yield, for each two neighbouring nodes, the slice of their places and the places.
 
-    Places are in the order of nodes.
+    Places must be in the order of nodes.
     """
     start = np.searchsorted(at.node, rates.nodes)
     ends = [*start[2:], len(at)]
@@ -210,7 +211,7 @@ def steps_on(rates: Rates, at: Places) -> Iterator[tuple[slice, Places]]:
 
 
 def linked(rates: Rates, at: Places) -> Bools:
-    """Return which places (C,) steps join to others, from the first node to the last."""
+    """Return which places (C,) are joined by steps to the first and to the last node."""
     order = np.argsort(at.node, kind="stable")
     at = at.take(order)
     begun, ended = at.node == rates.nodes[0], at.node == rates.nodes[-1]
@@ -227,9 +228,10 @@ def linked(rates: Rates, at: Places) -> Bools:
 
 
 def reduced_costs(rates: Rates, at: Places, value: Array, dual: Array, a: Ints, b: Ints) -> Array:
-    """Return what a step from places a to places b (B,) costs at least, (B,).
+    """Return lower bounds (B,) on the reduced cost of steps from places a to places b (B,).
 
-    With the potential (C, 2) and (C, 2, n) at its end, less that at its beginning; up to rounding.
+    The reduced cost is the cost plus the potential (C, 2) and (C, 2, n) at the end, less that at
+    the beginning; up to rounding.
     """
     curves, layer, least = _Curves.of(at, value, dual), rates.layer(at), np.empty(len(a))
     for i in range(0, len(a), AT_ONCE):
@@ -249,7 +251,7 @@ def _reduced_costs(rates: Rates, here: _Curves, there: _Curves, mu: Array, most:
     at_least = np.full((2, len(here.half)), -np.inf)
 
     def offer(y: Array, cut: int | None = None) -> None:
-        """Take the bound by y for the potential's `cut` at the beginning, that y is; or both."""
+        """Use the bound by y, for the line `cut` of the potential at the start, or for both."""
         apart = np.minimum(y * low, y * high).sum(0) + _least_step(rates, y - mu, u_low, u_high)
         apart += there.least_with(y)
         for m in (0, 1) if cut is None else (cut,):
@@ -266,9 +268,9 @@ def _reduced_costs(rates: Rates, here: _Curves, there: _Curves, mu: Array, most:
 
 
 def _differences(rates: Rates, most: Array, here: _Curves, there: _Curves) -> tuple[Array, Array]:
-    """Return between what the middles of two places differ, (n, B) rad twice.
+    """Return the least and the largest difference of the middles of two places, (n, B) rad each.
 
-    Of endless joints, by every whole turn with which a step joins the places.
+    For endless joints they include every full turn with which a step may join the places.
     """
     off = there.q - here.q
     if not rates.endless.any():
@@ -290,8 +292,8 @@ def _least_step(rates: Rates, z: Array, low: Array, high: Array) -> Array:
     if rates.metric == "manhattan":
         ends = np.minimum(w * np.abs(low) - z * low, w * np.abs(high) - z * high)
         return np.asarray(np.minimum(ends, w * np.abs(nearest) - z * nearest).sum(0))
-    # rho(u) is at least s . u for any s no longer than 1 by the dual norm: z made as short, and the
-    # slope at the nearest of all steps, by which rho(u) is at least rho there.
+    # rho(u) >= s . u for any s of dual norm at most 1: z scaled down to it, and the slope at the
+    # shortest step, by which rho(u) is at least its value there.
     scaled = np.where(w > 0, z / np.where(w > 0, w, 1.0), 0.0)
     euclid = rates.metric == "euclid"
     size = np.sqrt((scaled * scaled).sum(0)) if euclid else np.abs(scaled).sum(0)

@@ -1,9 +1,9 @@
-"""Joint vectors between the samples of a motion at which bodies could be nearer than at those.
+"""Find joint vectors between the samples of a motion at which bodies could be nearer than there.
 
-From one sample to the next no corner of a body comes farther than delta, seen from the other body
-of a pair, and leaves its straight way by no more than M / 8, M bounding its second derivative. So
-the distance of the pair is at least (d0 + d1 - delta) / 2 - M / 8 all along. Where that does not
-clear it, the middle is looked at, too.
+From one sample to the next, no corner of a body moves farther than delta, seen from the other body
+of a pair, and leaves its straight line by at most M / 8, where M bounds its second derivative. So
+the distance of the pair is at least (d0 + d1 - delta) / 2 - M / 8 throughout. If that does not
+prove the pair clear, the middle is checked too.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from kerfpath.cell import Cell
 __all__ = ["Moves"]
 
 HIDDEN = 1e-4
-"""m that bodies may come nearer to each other than at the samples."""
+"""m: by how much bodies may come nearer to each other than at the samples unnoticed."""
 DEEPEST = 10
-"""Times that a step is halved at most."""
+"""Largest number of times that a step is halved."""
 MOST = 8
-"""Joint vectors looked at for each of the first steps, at most, on the average."""
+"""Largest number of joint vectors checked per first step, on average."""
 CURVED = 2.0
-"""Joints on a straight move do not run quite evenly: what that bends is taken as much again."""
+"""Factor on the bend, since joints do not move exactly evenly on a straight move."""
 
 
 class Moves:
-    """The judged pairs of a cell, and how far their bodies come in steps q0 to q1 (B, n).
+    """The judged pairs of a cell, and the motion of their bodies in steps from q0 to q1 (B, n).
 
     Attributes
     ----------
     rates : (P, n) m/rad
-        How far a corner of each pair comes at most as a joint turns, or for each m of a linear
-        axis, seen from the other body; wherever all joints are between values that the steps have.
+        Largest motion of a corner of each pair per rad of a joint or per m of a linear axis, seen
+        from the other body, for joints in the range of the steps.
     """
 
     def __init__(self, cell: Cell, chain: JointChain, q0: Array, q1: Array) -> None:
@@ -55,17 +55,18 @@ class Moves:
         ).reshape(len(pairs), -1)
         self.rates = np.empty(self._reach.shape)
         self.rates[:, self._order] = self._turns * self._reach
-        # Farther apart than any step could bring them, pairs are clear whatever they are.
+        # Pairs that are farther apart than this are clear in every step.
         self._enough = cell.required + self._way(q1 - q0).max(axis=0, initial=0.0)
 
     def in_between(self, q0: Array, q1: Array, node: Ints) -> tuple[Array, Ints, Ints]:
-        """Return the joints (S, n) to be looked at between samples q0 and q1, and their nodes (B,).
+        """Return joints (S, n) to check between samples q0 and q1 of nodes (B,), and their nodes.
 
-        Last the nodes of the steps in which bodies may still come nearer by more than `HIDDEN`.
+        The last result has the nodes of the steps in which bodies may still come nearer by more
+        than `HIDDEN`.
         """
         middle: list[Array] = []
         nodes: list[Ints] = []
-        # Where a step ends, the next begins: each sample is looked at once.
+        # A step begins where the one before ends: each sample is evaluated once.
         samples, place = np.unique(np.vstack([q0, q1]), axis=0, return_inverse=True)
         frames = self._chain.links(samples)
         apart, (at0, at1) = self._apart(frames), place.reshape(2, -1)
@@ -90,19 +91,19 @@ class Moves:
         return found, np.concatenate([np.zeros(0, np.int64), *nodes]), open_
 
     def _apart(self, frames: Array) -> Array:
-        """Return the distances (B, P) m of the pairs, exact up to where no step can hide more."""
+        """Return the distances (B, P) m of the pairs, exact up to where all steps are clear."""
         found = self._cell.scene.distances(frames, self._enough)
         return np.asarray(np.minimum(found, self._enough))
 
     def _way(self, dq: Array) -> Array:
-        """Return how far (B, P) m a corner of each pair can come in steps, seen from the other."""
+        """Return the largest motion (B, P) m of a corner of each pair in steps, as in `rates`."""
         return np.asarray(np.abs(dq) @ self.rates.T)
 
     def _left(self, dq: Array, F0: Array, F1: Array, d0: Array, d1: Array) -> Ints:
-        """Return the steps in which a pair may be nearer than asked without being seen."""
+        """Return the steps in which a pair may be nearer than required without being noticed."""
         required = self._cell.required
         way = self._way(dq)
-        # A step at whose ends the pair is too near already is seen, and not looked at again.
+        # A pair that is too near at an end of the step has been noticed already.
         seen = (d0 <= required) | (d1 <= required)
         rows, pairs = np.nonzero(~((d0 + d1 - way) / 2 > required) & ~seen & (way / 2 > HIDDEN))
         left = np.zeros(len(dq), bool)
@@ -112,7 +113,7 @@ class Moves:
             moved = _relative(F1[at], a, b)[:, :3] - _relative(F0[at], a, b)[:, :3]
             shift = moved[:, :, :3] @ corners.T + moved[:, :, 3:]
             delta = np.sqrt((shift**2).sum(axis=1).max(axis=1))
-            # What a linear joint carries along it bends no way, what it is carried by does.
+            # A linear joint bends no path of what it carries; the joints that carry it do.
             outer, inner = (f.outer(self._joints, self._joints) for f in (np.maximum, np.minimum))
             t = np.abs(dq[at][:, self._order]) * self._turns[p]
             bend = np.einsum("bi,bj,ij->b", t, t, self._reach[p][outer] * ~self._slides[inner])
@@ -128,9 +129,9 @@ def _relative(frames: Array, a: int, b: int) -> Array:
 
 
 def _reach(chain: JointChain, frame: int, corners: Array, most: Array) -> Array:
-    """Return how far (m) a corner in a frame can be from the axis of each joint before it.
+    """Return the largest distance (m) of a corner in a frame from the axis of each joint before it.
 
-    1 of a linear one; the joints no farther from zero than `most` (E+n,), in their order.
+    It is 1 for a linear joint; joints are no farther from zero than `most` (E+n,), in their order.
     """
     base = len(chain.externals)
     far, reach = float(np.linalg.norm(corners, axis=1).max()), np.zeros(base + len(chain.axes))

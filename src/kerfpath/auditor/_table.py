@@ -1,4 +1,4 @@
-"""What an audit says: its table of checks, and the issues among them."""
+"""The result of an audit: the table of checks, and the issues among them."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class Check:
     code : str
         Stable name of the check, such as "tip-at-nodes".
     title : str
-        What is checked, in words.
+        The checked quantity in words.
     value, limit : float
-        Worst value found and what is allowed, in `unit`.
+        Worst value found and allowed value, in `unit`.
     unit : {"m", "rad", "m^3", "s", "share", "count"}
     node : int
-        Where the worst value stands (for a check between nodes: the node before it).
+        Node of the worst value (for a check between nodes: the node before it).
     level : {"error", "warning"}
-        What a failure means.
+        Severity of a failure.
     advice : str
         What to do about a failure.
     """
@@ -50,11 +50,11 @@ class Check:
 
     @property
     def ok(self) -> bool:
-        """True when the value keeps the limit; False for NaN."""
+        """Whether the value keeps the limit; False for NaN."""
         return self.value <= self.limit
 
     def issue(self) -> Issue:
-        """Return the issue that a failure of this check is."""
+        """Return the issue for a failure of this check."""
         message = (
             f"{self.title}: {format_value(self.value, self.unit)} at node {self.node}, "
             f"allowed {format_value(self.limit, self.unit)}"
@@ -66,7 +66,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Issue:
-    """A check that failed: how bad, which, what was found, and at which node."""
+    """A failed check: its severity, its code, what was found, and at which node."""
 
     level: Level
     code: str
@@ -80,7 +80,7 @@ class Issue:
 
 
 def worst_of(tables: Iterable[Iterable[Check]]) -> list[Check]:
-    """Return the worst of each check over several tables; its node is the number of the table."""
+    """Return the worst row of each check over several tables; its node is the table's number."""
     worst: dict[str, Check] = {}
     for number, table in enumerate(tables):
         for check in table:
@@ -91,7 +91,7 @@ def worst_of(tables: Iterable[Iterable[Check]]) -> list[Check]:
 
 
 def format_value(value: float, unit: Unit) -> str:
-    """Say a value for people: mm, degrees, per cent or a number."""
+    """Return a value with its unit for display: mm, degrees, per cent or a number."""
     if unit == "m":
         return f"{value * 1e3:.4g} mm"
     if unit == "rad":

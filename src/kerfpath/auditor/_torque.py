@@ -1,8 +1,8 @@
 """A second dynamics: Lagrange's equations of the joint chain, by its Jacobians.
 
-With the kinetic energy v' M(q) v / 2 of all bodies, M the sum of m Jv' Jv + Jw' I Jw, and their
-potential energy, the torques are M a + (dM/dt) v - d/dq (v' M v / 2) + g. Nothing is shared with
-the recursion that plans.
+With the kinetic energy v' M(q) v / 2 of all bodies, where M is the sum of m Jv' Jv + Jw' I Jw, and
+their potential energy, the torques are M a + (dM/dt) v - d/dq (v' M v / 2) + g. No code is shared
+with the recursion used for planning.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ STEP = 1e-5
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LagrangeArm:
-    """The bodies of an arm and what it carries, each on one of its joint frames.
+    """The bodies of an arm and its load, each on one of its joint frames.
 
     Parameters
     ----------
     chain : JointChain
     frame : (m,) int
-        The joint, 0-based, that each body is on.
+        The joint (from 0) that carries each body.
     mass : (m,) kg
     centre : (m, 3) m
         Centres of mass in the turned joint frames.
     tensor : (m, 3, 3) kg m^2
-        Inertias about them.
+        Inertias about the centres of mass.
     gravity : (3,) m/s^2
     """
 
@@ -55,7 +55,7 @@ class LagrangeArm:
         Raises
         ------
         InputError
-            Its torques are not known.
+            The torques of the robot cannot be computed.
         """
         if robot.torque_limit() is None:
             return None
@@ -75,7 +75,7 @@ class LagrangeArm:
         )
 
     def torque(self, q: Array, v: Array, a: Array) -> Array:
-        """Return the torques (B, n) N m of joints, velocities and accelerations, (B, n) each."""
+        """Return the torques (B, n) N m at joints, velocities and accelerations, (B, n) each."""
         M, g = self.inertia(q)
         ahead, behind = (self.inertia(q + sign * STEP * v)[0] for sign in (1, -1))
         turning = np.einsum("bij,bj->bi", (ahead - behind) / (2 * STEP), v)

@@ -1,4 +1,4 @@
-"""Whether gamma keeps the windows that it is pinned to, from the joints and the path alone."""
+"""Check that gamma keeps its windows, from the joints and the path alone."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from kerfpath.plans import Plan
 __all__ = ["window_checks"]
 
 SLACK = 1e-6
-"""rad: what two kinematics and the digits of the ends of a window leave, and far below a degree."""
+"""rad: allowance for two kinematics and for the digits of a window's ends, far below a degree."""
 ON_IT = 1e-9
-"""m: a node at the end of a stretch, except for rounding, is on it."""
+"""m: a node this close to the end of a stretch is on it."""
 
 
 def window_checks(plan: Plan, tool: Array, *, slack: float = SLACK) -> list[Check]:
-    """Return the check of the windows of gamma, if there are any.
+    """Return the check of the windows of gamma; no check if there are none.
 
     Parameters
     ----------
     plan : Plan
     tool : (K, 4, 4) m
-        Poses of its tool in the base.
+        Poses of the tool in the robot base.
     slack : float rad
-        By how much gamma may be outside: what digits leave of it.
+        By how much gamma may be outside, for rounding.
     """
     windows = plan.settings.gamma_windows
     if not windows:
@@ -57,7 +57,7 @@ def window_checks(plan: Plan, tool: Array, *, slack: float = SLACK) -> list[Chec
 
 
 def _reference(contour: Contour, kind: str) -> Array:
-    """Return the directions (K, 3) that gamma counts from, in the part."""
+    """Return the directions (K, 3) of gamma = 0, in the part."""
     n, step = contour.axes, np.diff(contour.points, axis=0)
     if contour.x is not None:
         return _across(contour.x, n)
@@ -78,6 +78,6 @@ def _reference(contour: Contour, kind: str) -> Array:
 
 
 def _across(v: Array, n: Array) -> Array:
-    """Return v (K, 3) without its part along n, at length one."""
+    """Return the components of v (K, 3) perpendicular to n, scaled to length one."""
     across = v - (v * n).sum(axis=-1, keepdims=True) * n
     return np.asarray(across / np.linalg.norm(across, axis=-1, keepdims=True))

@@ -1,4 +1,4 @@
-"""The Pareto set: plans of one contour of which none is better than another in every criterion."""
+"""The Pareto front: plans of one contour that no other plan found beats in all criteria."""
 
 from kerfpath.front._criteria import CRITERIA as CRITERIA
 from kerfpath.front._criteria import JOINT_CRITERIA as JOINT_CRITERIA

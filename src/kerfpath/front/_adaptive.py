@@ -1,4 +1,4 @@
-"""The adaptive search: the next runs go where the front is sparse."""
+"""The adaptive search: the next runs go to the parts of the front that are sparse."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from kerfpath.search import Metric, ObjectiveKind
 __all__ = ["AdaptiveRuns"]
 
 RANDOM = 4
-"""One run in so many is drawn at random."""
+"""Every fourth run is drawn at random."""
 SPREAD = 0.7
-"""Standard deviation of the logarithm by which weights are varied: factors of 2 are common."""
+"""Standard deviation of the logarithm of the factors on weights: factors of 2 are common."""
 FINEST = 5
-"""Steps by which what is asked for beyond the best of a range nears it, half by half."""
+"""Number of values beyond the best one that are asked for; each halves the distance to it."""
 
 
 class AdaptiveRuns:
     """Proposes runs between the neighbours on the front that are farthest apart.
 
-    Neighbours are taken criterion by criterion. What lies between two of them is asked for by the
-    epsilon constraint (Haimes, Lasdon, Wismer, IEEE Trans. SMC 1, 1971): the better one's value
-    and some of the way to the other's is allowed, by eta, windows or clearance, and the rest
-    is as one of the two was asked for, or minimises what one of the first runs did. Where there is
-    no such bound, as on displacements, the weights go between. Each attempt at a gap halves
-    its claim to the next. Over continuous gamma what only the grid's first runs are exact in may be
-    bettered, too.
+    Neighbours are found for each criterion. A run between two of them uses the epsilon constraint
+    (Haimes, Lasdon, Wismer, IEEE Trans. SMC 1, 1971): eta, windows or clearance bound the criterion
+    to a value between those of the two plans. All else is taken from the run of one of the two, or
+    the objective from one of the first runs. Criteria without such a bound, such as displacements,
+    get weights between those of the two runs. Each attempt at a gap halves its claim to the next
+    run. Over continuous gamma, criteria whose best value on the grid is exact can still be improved
+    beyond it.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class AdaptiveRuns:
         self._proposed = 0
 
     def propose(self, front: Sequence[Solution], scale: Array) -> Subproblem:
-        """Return the next run, from the front (at least one plan) in criteria of a scale (C,)."""
+        """Return the next run, given the front (at least one plan) and the scale (C,)."""
         self._proposed += 1
         if self._proposed % RANDOM:
             claim, gap = max(self._gaps(front, scale), key=lambda claimed: claimed[0])
@@ -59,7 +59,7 @@ class AdaptiveRuns:
         return self._varied(front[int(self._rng.integers(len(front)))].run)
 
     def _gaps(self, front: Sequence[Solution], scale: Array) -> Iterator[tuple[float, Gap]]:
-        """Yield every gap after its claim to the next run."""
+        """Yield the claim of every gap to the next run, and the gap."""
         for c, criterion in enumerate(self._problem.criteria):
             exact = criterion.aimed if self._continuous else criterion.exact_anchor
             ordered = sorted(front, key=lambda solution: (solution.losses[c], solution.number))
@@ -75,10 +75,10 @@ class AdaptiveRuns:
                 yield width / 2.0 ** self._attempts[gap.key], gap
 
     def _between(self, gap: Gap) -> Subproblem:
-        """Return a run whose plan is to lie between two neighbours in a criterion.
+        """Return a run whose plan should lie between two neighbours in a criterion.
 
-        Without a better one: beyond the best, by half of all there is, then a quarter, and so on,
-        and from the half again.
+        Without a better neighbour it asks for a value beyond the best one: by half of that value,
+        then a quarter, and so on, and then from half again.
         """
         attempt = self._attempts[gap.key]
         self._attempts[gap.key] += 1
@@ -100,7 +100,7 @@ class AdaptiveRuns:
         return criterion.bound(run, value, gap, self._problem, rng)
 
     def _mixed(self, a: Subproblem, b: Subproblem) -> Subproblem:
-        """Return a run that takes what it minimises, its etas and each window from either."""
+        """Return a run that takes objective, etas, clearance and each window from either run."""
         aim, v, e, c, *windows = self._rng.integers(2, size=4 + len(a.window)).astype(bool)
         return replace(
             a if aim else b,
@@ -111,7 +111,7 @@ class AdaptiveRuns:
         )
 
     def _varied(self, run: Subproblem) -> Subproblem:
-        """Return a run with other weights, and any objective and metric."""
+        """Return a run with random objective and metric, and randomly varied weights."""
         rng = self._rng
         return replace(
             run,

@@ -1,4 +1,4 @@
-"""The criteria, each an object; `CRITERIA` and `JOINT_CRITERIA` register them by name."""
+"""The criteria of the Pareto front, registered by name in `CRITERIA` and `JOINT_CRITERIA`."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from kerfpath.transfer import least_time
 __all__ = ["CRITERIA", "JOINT_CRITERIA", "criteria_named"]
 
 FAINT = 1e-6
-"""Weight of the other joints where one joint counts: they decide between equals, or as good as."""
+"""Weight of the other joints in a criterion of one joint; they only decide between equals."""
 ROUNDING = 1e-9
-"""Share by which limits are wider than what was found to need them."""
+"""Share by which limits are widened against rounding."""
 TRIES = 8
-"""Windows that are looked at for a pose of every node before a run is spent on one."""
+"""Number of windows tried to find one with a pose of every node before a run uses it."""
 ROOM = 1e-9
-"""rad, by which windows are wider than the motion that they are to hold: rounding."""
+"""rad: by how much windows are wider than the motion that they hold, against rounding."""
 
 
 class PerJoint(Criterion):
-    """A criterion of one joint, or of all: added up over their velocity limits."""
+    """A criterion of one joint, or the sum over all joints, each divided by its velocity limit."""
 
     field: ClassVar[str]
-    """What `kerfpath.plans.Criteria` calls it."""
+    """Its name in `kerfpath.plans.Criteria`."""
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
         values: Array = getattr(plan.criteria, self.field)
@@ -55,7 +55,7 @@ class PerJoint(Criterion):
 
 
 class Displacement(PerJoint):
-    """Total displacement (7); the unbounded run is best in that of all joints."""
+    """Total displacement (7); the unbounded run is best for all joints together."""
 
     field = "displacement"
     exact_anchor = aimed = True
@@ -87,10 +87,10 @@ class Range(PerJoint):
         self, run: Subproblem, value: float, gap: Gap, problem: ParetoProblem,
         rng: np.random.Generator,
     ) -> Subproblem:  # fmt: skip
-        """Return a subproblem with windows that hold the range to a value.
+        """Return a subproblem with windows that bound the range to a value.
 
-        Around the joints' spans in the better plan, inside those of the worse one or, for one
-        joint, anywhere that leaves every node a pose.
+        The windows lie around the joints' spans in the better plan, inside those of the worse one
+        or, for a single joint, anywhere that leaves every node a pose.
         """
         a, b = gap.better, gap.worse
         widths = [np.ptp(solution.spans, axis=1) for solution in (a or b, b)]
@@ -130,9 +130,9 @@ class Range(PerJoint):
     def _elsewhere(
         self, problem: ParetoProblem, width: float, otherwise: float, rng: np.random.Generator
     ) -> float:
-        """Return where a window of the joint begins that holds a pose of every node, if found.
+        """Return the start of a window of the joint with a pose of every node, or `otherwise`.
 
-        At a vertex: so does the span of every path.
+        Only windows that start at a vertex are tried, because the span of every path does.
         """
         graph, endless = problem.graph, bool(problem.robot.endless[self.joint])
         q = graph.q[:, self.joint]
@@ -210,11 +210,11 @@ class Speed(Criterion):
 
 
 class Time(Criterion):
-    """Time from home along the plan and back: straight joint motions, full limits."""
+    """Time from home along the plan and back, with straight joint motions at full limits."""
 
     def require(self, options: PlanOptions, cell: Cell | None, home: ArrayLike | None) -> None:
         if home is None:
-            raise InputError("criteria: 'time' needs home; give it, or leave 'time' out")
+            raise InputError("criteria: 'time' needs a home position; give home=, or remove 'time'")
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
         home = problem.home
@@ -225,23 +225,21 @@ class Time(Criterion):
 
 
 class Clearance(Criterion):
-    """What robot and head keep in the cell beyond the near-miss distance, at the nodes."""
+    """Least clearance of robot and head in the cell at the nodes, beyond the near-miss distance."""
 
     more_is_better = bounded = True
 
     def require(self, options: PlanOptions, cell: Cell | None, home: ArrayLike | None) -> None:
         if cell is None:
-            raise InputError(
-                "criteria: 'clearance' needs a cell; give it, or leave 'clearance' out"
-            )
+            raise InputError("criteria: 'clearance' needs a cell; give one, or remove 'clearance'")
         if not counts_as_clearance(cell).any():
             raise InputError(
-                "criteria: 'clearance' needs a part or fixtures in the cell without near-miss "
-                "distances of their own, and it has none"
+                "criteria: 'clearance' needs a part or a fixture in the cell that uses the general "
+                "near-miss distance; this cell has none"
             )
         if options.comfort is not None and options.comfort.clearance is not None:
             raise InputError(
-                "criteria: 'clearance' is a cost of comfort already; leave one of the two out"
+                "criteria: 'clearance' is already a penalty in comfort; remove one of the two"
             )
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
@@ -259,7 +257,7 @@ class Clearance(Criterion):
 
 
 class LeastMeasure(Criterion):
-    """The least of a measure of `kerfpath.comfort`, which has the same name, at the nodes."""
+    """Least value at the nodes of the measure of `kerfpath.comfort` with the same name."""
 
     more_is_better = True
 
@@ -272,7 +270,7 @@ JOINT_CRITERIA: dict[str, Criterion] = {
     "increment": Increment(name="increment", words="largest increment", unit="s"),
     "range": Range(name="range", words="coordinate range", unit="s"),
 }
-"""Those of one joint J, which `pareto` takes as "displacement_J" and so on."""
+"""Criteria of a single joint J, which `pareto` takes as "displacement_J" and so on."""
 CRITERIA: dict[str, Criterion] = {
     each.name: each
     for each in (
@@ -286,7 +284,7 @@ CRITERIA: dict[str, Criterion] = {
         *(LeastMeasure(name=name, words=name, unit=m.unit) for name, m in MEASURES.items()),
     )
 }
-"""Those of all joints together."""
+"""Criteria of the whole motion."""
 
 
 def criteria_named(
@@ -297,13 +295,13 @@ def criteria_named(
     cell: Cell | None,
     home: ArrayLike | None,
 ) -> tuple[Criterion, ...]:
-    """Return the criteria of these names.
+    """Return the criteria with these names.
 
     Raises
     ------
     InputError
-        An unknown name, a joint that the robot does not have, a name given twice, or none; a
-        clearance without a cell or beside one in `options.comfort`, a time without home.
+        A name is unknown or given twice, there is none, the robot has no such joint, "clearance"
+        has no cell or is also in `options.comfort`, or "time" has no home.
     """
     if isinstance(names, str) or not names or len(set(names)) != len(names):
         raise InputError(f"criteria: expected different names, at least one, got {names!r}")
@@ -322,7 +320,7 @@ def _named(name: str, robot: Robot) -> Criterion:
     if name in CRITERIA:
         return CRITERIA[name]
     raise InputError(
-        f"criteria: expected some of {', '.join(CRITERIA)}, or "
-        f"{', '.join(f'{kind}_J' for kind in JOINT_CRITERIA)} of a joint J from 1 to "
+        f"criteria: expected names from {', '.join(CRITERIA)}, or "
+        f"{', '.join(f'{kind}_J' for kind in JOINT_CRITERIA)} with a joint J from 1 to "
         f"{robot.joints}, got {name!r}"
     )

@@ -1,4 +1,4 @@
-"""The front, how good it is, and the plans of it."""
+"""The Pareto front, measures of its quality, and its plans."""
 
 from __future__ import annotations
 
@@ -21,31 +21,34 @@ __all__ = ["Front", "ParetoSet", "hypervolume"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Front:
-    """Runs of one contour of whose plans none is as good as another in all and better in one.
+    """The Pareto front of one contour: the runs whose plans no other plan dominates.
+
+    A plan dominates another if it is as good in all criteria and better in one.
 
     Parameters
     ----------
     axes : tuple of Criterion
         The criteria; `criteria` are their names.
     numbers : tuple of int
-        Place of each run among all that were tried; by the first criterion, the best first.
+        Number of each run among all that were tried. Rows are sorted by the first criterion, the
+        best first.
     runs : tuple of Subproblem
-        What each plan was asked for.
+        The run of each plan.
     values : (P, C)
         Criteria of each plan, in their units; each plan has passed its audit.
     beaten : (B, C)
-        Those of the plans that others beat.
+        Criteria of the plans that others dominate.
     on_grid : (G, C)
-        Those of the plans that no other on the grid of gamma beats.
+        Criteria of the plans on the grid of gamma that no other plan on the grid dominates.
     ideal, reference : (C,)
-        Best values of the first runs, and a point beyond the worst of them: what criteria are
-        scaled by.
+        Best values of the first runs, and a point beyond their worst values; criteria are scaled
+        between the two.
     tried : int
         Number of runs.
     feasible : int
         Number of runs that had a plan.
     failures : mapping of str to int
-        Why the other runs had none, by count.
+        Number of runs without a plan, for each reason.
     """
 
     axes: tuple[Criterion, ...]
@@ -64,7 +67,7 @@ class Front:
 
     @property
     def criteria(self) -> tuple[str, ...]:
-        """Names of the criteria, as `pareto` takes them."""
+        """Names of the criteria, as in `pareto`."""
         return tuple(axis.name for axis in self.axes)
 
     @property
@@ -79,46 +82,46 @@ class Front:
 
     @property
     def scaled(self) -> Array:
-        """Criteria of each plan (P, C): 0 at the ideal, 1 at the reference, less is better."""
+        """Criteria of each plan (P, C), scaled: 0 at the ideal, 1 at the reference."""
         return freeze((self.values - self.ideal) / (self.reference - self.ideal))
 
     @property
     def hypervolume(self) -> float:
-        """What the set dominates of the criteria better than the reference, scaled.
+        """Volume that the front dominates up to the reference, in scaled criteria.
 
-        It never falls as runs are added; to compare two sets, see `hypervolume`.
+        It never decreases as runs are added. To compare two fronts, use the function `hypervolume`.
         """
         return hypervolume(self.scaled, np.ones(len(self.criteria)))
 
     @property
     def gap(self) -> float:
-        """Largest distance of neighbours in any one criterion, scaled: how well it is covered."""
+        """Largest distance between neighbours in any one scaled criterion."""
         return float(np.diff(np.sort(self.scaled, axis=0), axis=0).max(initial=0.0))
 
     @property
     def left_behind(self) -> Bools:
-        """Which plans of `on_grid` (G,) a plan over continuous gamma beats."""
+        """Whether each plan of `on_grid` is dominated by a plan over continuous gamma, (G,)."""
         here, there = self.values * self.sense, self.on_grid * self.sense
         as_good = (here[:, None] <= there).all(axis=2)
         return np.asarray((as_good & (here[:, None] < there).any(axis=2)).any(axis=0))
 
     @property
     def beyond_the_grid(self) -> str:
-        """What became of the plans of the grid, in words."""
+        """How many plans of the grid are dominated off the grid, in words."""
         return (
-            f"{int(self.left_behind.sum())} of the {len(self.on_grid)} plans of the front that the "
-            "grid of gamma has are beaten off the grid"
+            f"{int(self.left_behind.sum())} of the {len(self.on_grid)} plans of the front on the "
+            "grid of gamma are beaten off the grid"
         )
 
     def coverage(self, other: Front) -> float:
-        """Return the share of another set's plans that some plan here is as good as or better.
+        """Return the share of another front's plans that some plan here equals or dominates.
 
-        The C of Zitzler and Thiele (PPSN V, 1998).
+        This is the measure C of Zitzler and Thiele (PPSN V, 1998).
 
         Raises
         ------
         InputError
-            The other set has other criteria.
+            The other front has other criteria.
         """
         if other.criteria != self.criteria:
             raise InputError(f"coverage: expected criteria {self.criteria}, got {other.criteria}")
@@ -131,20 +134,20 @@ class Front:
         Raises
         ------
         InputError
-            Not one of the set's criteria.
+            The name is not one of `criteria`.
         """
         require_one_of(criterion, "best", self.criteria)
         return int(self.scaled[:, self.criteria.index(criterion)].argmin())
 
     @property
     def balanced_at(self) -> int:
-        """The row of `values` whose worst criterion, scaled, is the least."""
+        """The row of `values` whose worst scaled criterion is the least."""
         return int(self.scaled.max(axis=1).argmin())
 
     def __str__(self) -> str:
-        """Say in a few lines what was tried and found."""
+        """Return a summary of the runs and criteria in a few lines."""
         lines = [
-            f"{len(self.runs)} plans of {self.feasible} feasible runs of {self.tried}; "
+            f"{len(self.runs)} plans from {self.feasible} feasible runs out of {self.tried}; "
             f"hypervolume {self.hypervolume:.4f}, largest gap {self.gap:.3f}"
         ]
         if len(self.left_behind) and any(run.continuous for run in self.runs):
@@ -157,7 +160,7 @@ class Front:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ParetoSet(Front):
-    """A front with its plans.
+    """A Pareto front with its plans.
 
     Parameters
     ----------
@@ -175,26 +178,26 @@ class ParetoSet(Front):
         Raises
         ------
         InputError
-            Not one of the set's criteria.
+            The name is not one of `criteria`.
         """
         return self.plans[self.best_at(criterion)]
 
     @property
     def balanced(self) -> Plan:
-        """The plan whose worst criterion, scaled, is the least."""
+        """The plan whose worst scaled criterion is the least."""
         return self.plans[self.balanced_at]
 
 
 def hypervolume(values: ArrayLike, reference: ArrayLike) -> float:
-    """Return the volume that points (P, C), less being better, dominate up to a reference (C,).
+    """Return the volume that points (P, C) dominate up to a reference (C,), where less is better.
 
-    Exact, by moocore (Guerreiro, Fonseca, Paquete, ACM Comput. Surv. 54(6), 2021). Points that are
-    not better than the reference in every coordinate dominate nothing.
+    It is exact, computed by moocore (Guerreiro, Fonseca, Paquete, ACM Comput. Surv. 54(6), 2021).
+    Points that are not better than the reference in every coordinate count for nothing.
 
     Raises
     ------
     InputError
-        Shapes that do not fit, numbers that are not finite.
+        The shapes do not fit, or a number is not finite.
     """
     reference = floats(reference, "reference", (None,))
     values = floats(values, "values", (None, len(reference)))

@@ -1,4 +1,4 @@
-"""pareto(): many runs of the planner over one graph, and the plans that none of them beats."""
+"""pareto(): run the planner many times over one graph, and keep the plans that none dominates."""
 
 from __future__ import annotations
 
@@ -59,55 +59,58 @@ def pareto(
     progress: Callable[[int], None] | None = None,
     **keywords: Unpack[ParetoKeywords],
 ) -> ParetoSet:
-    """Return plans of which none is as good as another in all criteria and better in one.
+    """Return the Pareto front: plans that no other plan found dominates.
 
-    The designer's collection of section 3.2: the layered graph is built once, and the planner run
-    over it with other objectives, metrics, weights and eta, and with windows on the joints, which
-    are the epsilon constraint for the range (9). Every second run is over continuous gamma, where
-    it is looked for how the plans of the grid can be bettered in one criterion and as good in those
-    that can be held, and then between the neighbours on the front. A plan of the grid is the proved
-    optimum of what its run asked for, one over continuous gamma the best motion found. External
-    axes follow the courses of the plans that `kerfpath.plan` finds on the grid, and leave them over
-    continuous gamma; with any other method they have a grid of their own.
+    This is the designer's collection of plans of section 3.2. The layered graph is built once, and
+    the planner runs over it with different objectives, metrics, weights and eta, and with windows
+    on the joints, which are the epsilon constraint for the range (9). Every second run is over
+    continuous gamma: it first tries to improve a plan of the grid in one criterion while the
+    criteria that can be bounded stay as good, and then searches between neighbours on the front. A
+    plan on the grid is the proved optimum of its run; a plan over continuous gamma is the best
+    motion found. External axes follow the courses of the plans that `kerfpath.plan` finds on the
+    grid, and may leave them over continuous gamma; with any other method they have a grid too.
 
     Parameters
     ----------
     contour, robot, tool, placement, speed, cell
-        As in `kerfpath.plan`; in a cell runs go one after another.
+        As in `kerfpath.plan`; in a cell the runs go one after another.
     options
         As in `kerfpath.plan`, or as keywords gamma_step, frames, tilt, postures, closure, rotation,
-        comfort, method, eta_v and eta_a: the largest share of the velocity and acceleration limits
-        that any run may use. Runs say objective, metric and weights; the speed is constant. Any
-        method but "continuous" keeps all runs on the grid.
+        comfort, method, eta_v and eta_a. eta_v and eta_a are the largest shares of the velocity and
+        acceleration limits that a run may use. Objective, metric and weights belong to the runs;
+        the speed is constant. Any method except "continuous" keeps all runs on the grid.
     criteria : sequence of str
-        Names in `kerfpath.front.CRITERIA`, or in `JOINT_CRITERIA` with a joint from 1, as
+        Names in `kerfpath.front.CRITERIA`, or in `JOINT_CRITERIA` with a joint from 1, such as
         "range_6"; docs/pareto.md says what each measures. "clearance" needs a cell.
     runs : int
-        How often the planner is run.
+        Number of runs of the planner.
     search : {"adaptive", "grid"}
-        Where the front is sparse, or over a plain grid of weights and eta.
+        Search where the front is sparse, or over a plain grid of weights and eta.
     seed : int
-        Of all that is random; the same seed and `ahead` give the same set, whatever `workers`.
+        Seed of the random numbers; the same seed and `ahead` give the same front, whatever
+        `workers` is.
     home : (n,) rad, optional
         Where the arm comes from and goes back to; only "time" needs it.
     graph : LayeredGraph, optional
-        The layered graph of this very task, kept from `kerfpath.planner.layered_graph`.
+        The layered graph of the same task, from `kerfpath.planner.layered_graph`.
     audit : callable, optional
-        Returns what is wrong with a plan; only plans with nothing wrong are kept. Default:
+        Returns the faults of a plan; only plans without faults are kept. Default:
         `kerfpath.audit`, with the cell.
     workers : int, optional
-        Runs at a time, in threads; default: the processor's cores.
+        Number of threads; default: the number of cores.
     ahead : int
-        Runs that may be under way: fewer learn more from each other, more keep more workers busy.
+        Number of runs that may be in progress: fewer runs learn more from each other, more keep
+        more workers busy.
     progress : callable, optional
         Called with the number of runs done since the last call.
 
     Raises
     ------
     NoFeasiblePath
-        No run has a plan that passes its audit; `counts` says why not, by number of runs.
+        No run has a plan that passes its audit; `counts` has the number of runs for each reason.
     InputError
-        Unknown criteria or search, fewer than one run, and what `kerfpath.plan` refuses.
+        The criteria or the search are unknown, there is less than one run, or `kerfpath.plan`
+        refuses an argument.
     """
     asked = with_keywords(
         options,

@@ -1,6 +1,6 @@
-"""One run of the planner: on the grid of gamma, or over continuous gamma in the same windows.
+"""One run of the planner, on the grid of gamma or over continuous gamma in the same windows.
 
-External axes follow the courses of the best plans on the grid; off it they leave them.
+External axes follow the courses of the best plans on the grid, and may leave them off the grid.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = ["follows_courses", "graph_of_runs", "plan_run"]
 
 
 def follows_courses(robot: Robot, options: PlanOptions) -> bool:
-    """Return whether runs on the grid follow courses of what poses leave free, not a grid."""
+    """Return whether runs on the grid use courses of the free joints instead of a grid of them."""
     return bool(robot.free.size) and options.method == "continuous"
 
 
@@ -41,9 +41,9 @@ def graph_of_runs(
     cell: Cell | None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
-    """Return the layered graph that all runs of a set have in common.
+    """Return the layered graph that all runs of a front share.
 
-    Arguments as in `kerfpath.plan`; the options are those of the set, not of a run.
+    Arguments are as in `kerfpath.plan`; the options are those of the front, not of one run.
 
     Raises
     ------
@@ -78,10 +78,11 @@ def plan_run(
 ) -> Plan:
     """Return the plan of a run.
 
-    On the grid its windows leave out vertices; over continuous gamma they are ranges of the joints,
-    too, so that nothing between the samples leaves them, and where they leave a node nothing, a
-    course of the external axes is looked for within them. Its shares of the limits are then what it
-    is held to; the plan says those of the options, which bound what else moves, and its proof.
+    On the grid, windows remove vertices. Over continuous gamma they also become joint limits, so
+    that the motion between samples stays in them; where they leave a node without a vertex, a
+    course of the external axes is searched within them. A plan over continuous gamma keeps the
+    run's shares of the limits, but states those of `options`, which apply to other moves and to its
+    proof.
 
     Parameters
     ----------
@@ -89,14 +90,15 @@ def plan_run(
     contour, robot, tool, placement, speed, cell, phase
         As in `kerfpath.plan`.
     options : PlanOptions
-        Of which the run changes some.
+        Options of the front; the run replaces some of them.
     graph : LayeredGraph
-        That of the contour, with all of its vertices.
+        The graph of the contour with all its vertices.
 
     Raises
     ------
     NoFeasiblePath
-        As `kerfpath.plan`; over continuous gamma none was found, or a window cannot be a range.
+        As `kerfpath.plan`; over continuous gamma also where no motion is found, or a window cannot
+        become a joint limit.
     InputError
         As `kerfpath.plan`.
     """
@@ -119,11 +121,11 @@ def plan_run(
 
 
 def _require_ranges(options: PlanOptions, windowed: list[int]) -> None:
-    """Raise NoFeasiblePath where windows cannot be ranges of joints, as else more would change."""
+    """Raise NoFeasiblePath where turning windows into joint limits would change other terms too."""
     why = ""
     comfort = options.comfort
     if comfort is not None and comfort.limits is not None and comfort.limits.cost:
-        why = "the limits of joints cost something close to it, which a window would narrow"
+        why = "comfort has a penalty close to joint limits, which a window would move"
     elif options.rotation is not None and np.isfinite(options.rotation[windowed]).any():
         why = "the rotation of a joint with a window is limited"
     if why:
@@ -133,9 +135,9 @@ def _require_ranges(options: PlanOptions, windowed: list[int]) -> None:
 def _narrowed(
     robot: Robot, graph: LayeredGraph, window: Array, windowed: list[int], options: PlanOptions
 ) -> tuple[Robot, LayeredGraph]:
-    """Return the robot whose joints end where their windows do, and the graph on its turns.
+    """Return the robot with joint limits at the windows, and the graph on the turns within them.
 
-    Where a margin is kept from limits, they lie beyond the windows by so much.
+    Where a margin is kept from limits, the limits lie beyond the windows by that margin.
     """
     band = None if options.comfort is None else options.comfort.limits
     margin = 0.0 if band is None else band.margin
@@ -156,6 +158,6 @@ def _narrowed(
 
 
 def _widened(made: Plan, robot: Robot) -> Plan:
-    """Return the plan of a robot with narrowed joints as one of the robot itself."""
+    """Return a plan of the robot with narrowed limits as a plan of the original robot."""
     q, turn = on_turns(robot, made.q)
     return replace(made, robot=robot, q=q, turn=turn)

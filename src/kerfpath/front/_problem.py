@@ -1,4 +1,4 @@
-"""The multi-objective problem: a contour on its graph, the criteria, and the runs that solve it."""
+"""The multi-objective problem: a contour on its graph, the criteria, and how runs are solved."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from kerfpath.search import Relaxations
 __all__ = ["Criterion", "Evaluation", "Gap", "ParetoProblem", "Solution"]
 
 DIGITS = 12
-"""Of a criterion that count."""
+"""Significant digits of a criterion."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Criterion:
-    """A criterion that plans are compared by; every one is a class of `kerfpath.front._criteria`.
+    """A criterion for comparing plans; the subclasses are in `kerfpath.front._criteria`.
 
     Parameters
     ----------
     name : str
-        As `pareto` takes it.
+        Name in `pareto`.
     words : str
-        As a reader calls it.
+        Name in pages and tables.
     unit : str
     joint : int, optional
-        The joint that it measures, 0-based; None: all joints together.
+        The joint that it measures, from 0; None: all joints together.
     """
 
     name: str
@@ -54,11 +54,11 @@ class Criterion:
 
     more_is_better: ClassVar[bool] = False
     exact_anchor: ClassVar[bool] = False
-    """Whether the plan of the first runs that is best in it is the best on the graph."""
+    """Whether the best of the first runs in this criterion is the best on the graph."""
     bounded: ClassVar[bool] = False
-    """Whether `bound` and `hold` can hold a run to a value of it."""
+    """Whether `bound` and `hold` can bound a run to a value of this criterion."""
     aimed: ClassVar[bool] = False
-    """Whether its anchor minimises it, and nothing else but to decide between equals."""
+    """Whether its anchor minimises exactly this criterion; other terms only break ties."""
 
     __repr__ = short_repr
 
@@ -68,39 +68,40 @@ class Criterion:
         return -1.0 if self.more_is_better else 1.0
 
     def require(self, options: PlanOptions, cell: Cell | None, home: ArrayLike | None) -> None:
-        """Raise InputError where something is missing that it is measured with."""
+        """Raise InputError where something that the criterion needs is missing."""
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
-        """Return its value of a plan, in its unit."""
+        """Return the value of the criterion for a plan, in its unit."""
         raise NotImplementedError  # every quantity has its own
 
     def anchor(self, problem: ParetoProblem) -> Subproblem | None:
-        """Return the subproblem that is to find its best value, or to come near; None for none."""
+        """Return the subproblem that should find its best value or come near it, or None."""
         return None
 
     def bound(
         self, run: Subproblem, value: float, gap: Gap, problem: ParetoProblem,
         rng: np.random.Generator,
     ) -> Subproblem:  # fmt: skip
-        """Return a subproblem with the epsilon constraint that it be as good as a value."""
+        """Return a subproblem with the epsilon constraint that bounds the criterion to a value."""
         raise NotImplementedError  # asked of none that is not `bounded`
 
     def hold(
         self, run: Subproblem, value: float, spans: Array, problem: ParetoProblem
     ) -> Subproblem:
-        """Return a subproblem held to be as good in it as a plan; as it is where none can be.
+        """Return a subproblem bounded to be as good in this criterion as a plan.
 
-        The plan has the value, and its joints the spans (n, 2); it keeps what is held.
+        The plan has this value and joint spans (n, 2) rad, and keeps the bound itself. The
+        subproblem is unchanged where the criterion cannot be bounded.
         """
         return run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evaluation:
-    """What the search knows of a plan: its losses (C,), and the spans (n, 2) of its joints.
+    """The data of a plan that the search uses: losses (C,) and joint spans (n, 2).
 
-    Losses are criteria with signs by which less is better; spans the lowest and highest values in
-    rad, endless joints unrolled.
+    Losses are the criteria with signs such that less is better. Spans are the lowest and highest
+    joint values in rad; endless joints are not wrapped.
     """
 
     losses: Array
@@ -111,7 +112,7 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solution(Evaluation):
-    """The evaluation of a run that has a plan, its number among all runs, and its subproblem."""
+    """The evaluation of a run that has a plan, its number among all runs and its subproblem."""
 
     number: int
     run: Subproblem
@@ -119,7 +120,7 @@ class Solution(Evaluation):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Gap:
-    """Two solutions that are neighbours on the front in a criterion; `better` None: beyond all."""
+    """Two neighbours on the front in a criterion; `better` is None beyond the best solution."""
 
     criterion: int
     better: Solution | None
@@ -129,14 +130,14 @@ class Gap:
 
     @property
     def key(self) -> tuple[int, int, int]:
-        """What distinguishes gaps, whatever the front is by then."""
+        """Key of the gap, which does not depend on the rest of the front."""
         better, worse = self.better, self.worse
         return (self.criterion, *((-1, -1) if better is None else (better.number, worse.number)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParetoProblem:
-    """A contour to plan on one layered graph, and what its plans are compared by.
+    """A contour to plan on one layered graph, and the criteria that compare its plans.
 
     Parameters
     ----------
@@ -146,7 +147,7 @@ class ParetoProblem:
     home : (n,) rad, optional
         Where the arm comes from and goes back to.
     audit : callable, optional
-        Returns what is wrong with a plan; default: `kerfpath.audit`, with the cell.
+        Returns the faults of a plan; default: `kerfpath.audit`, with the cell.
     """
 
     contour: Contour
@@ -168,19 +169,19 @@ class ParetoProblem:
 
     @cached_property
     def dt(self) -> float:
-        """Time from node to node, s."""
+        """Time from node to node (s)."""
         return node_interval(self.contour, self.speed)
 
     @cached_property
     def unbounded(self) -> Subproblem:
-        """The first run: all that the limits allow and no window."""
+        """The first run: the full limits and no window."""
         velocity, _ = self.robot.speed_limits()
         weights = freeze(1 / (velocity * self.dt))
         return Subproblem.unbounded(weights, self.options.eta_v, self.options.eta_a)
 
     @cached_property
     def least(self) -> Relaxations:
-        """The least shares of the limits and the least node interval that have a path."""
+        """The least shares of the limits and the least node interval for which there is a path."""
         eta_v, eta_a = self.options.eta_v, self.options.eta_a
         return relaxations(
             self.contour, self.robot, self.graph, self.speed, eta_v=eta_v, eta_a=eta_a
@@ -193,17 +194,17 @@ class ParetoProblem:
 
     @property
     def continuous(self) -> bool:
-        """Whether there are runs over continuous gamma, too."""
+        """Whether there are also runs over continuous gamma."""
         return self.options.method == "continuous" and self.robot.family.free_rotation
 
     @property
     def free_joints(self) -> int:
-        """How many joints, the first ones, have no course on the grid that a window would cut."""
+        """Number of leading joints that windows may narrow: those that follow no given course."""
         along = follows_courses(self.robot, self.options)
         return self.robot.family.joints if along else self.robot.joints
 
     def as_good(self, solution: Solution) -> Subproblem:
-        """Return a run held to be as good as a plan in all criteria that can be held."""
+        """Return a run bounded to be as good as a plan in all criteria that can be bounded."""
         aim = self._aim or solution.run
         run = replace(
             self.unbounded, objective=aim.objective, metric=aim.metric, weights=aim.weights
@@ -214,9 +215,10 @@ class ParetoProblem:
 
     @cached_property
     def _aim(self) -> Subproblem | None:
-        """The run that minimises the one criterion that cannot be held, if there is but one.
+        """The run that minimises the only criterion that cannot be bounded, if there is just one.
 
-        If there is none, that of the first that a run minimises; None: each its own.
+        If there is none, the run for the first criterion that a run can minimise. None means that
+        each solution keeps the objective of its own run.
         """
         free = [criterion for criterion in self.criteria if not criterion.bounded]
         if len(free) > 1:
@@ -225,12 +227,12 @@ class ParetoProblem:
         return (aimed[0].anchor(self) or self.unbounded) if aimed else None
 
     def solve(self, run: Subproblem, *, first: bool = False) -> Plan | str:
-        """Return the plan of a run, which has passed its audit, or in a few words why not.
+        """Return the plan of a run, if it passes its audit; otherwise the reason in a few words.
 
         Raises
         ------
         NoFeasiblePath
-            The `first` run, which has all that is allowed, has no path, so that none can have one.
+            The `first` run, which has the full limits, has no path, so no other run can have one.
         """
         try:
             made = plan_run(
@@ -247,9 +249,9 @@ class ParetoProblem:
         except NoFeasiblePath as broken:
             if first:
                 said = (
-                    f"{broken}; no run can have a plan: this one had all that is allowed. Runs "
-                    "stand on the grid of the rotation: where kerfpath plan finds a motion by "
-                    "refining it, choose a finer gamma_step_deg or a lower speed here"
+                    f"{broken}; this run had the full limits, so no run can have a plan. Runs use "
+                    "the grid of the rotation: if kerfpath plan finds a motion by refinement, "
+                    "choose a finer gamma_step_deg or a lower speed here"
                 )
                 raise broken.with_message(said) from None
             counts = broken.counts
@@ -262,10 +264,10 @@ class ParetoProblem:
         return f"audit: {getattr(wrong[0], 'code', wrong[0])}" if wrong else made
 
     def evaluate(self, made: Plan) -> Evaluation:
-        """Return what the search knows of a plan.
+        """Return the losses and joint spans of a plan.
 
-        Criteria to so many digits that the same motion found twice, its sums rounded otherwise, is
-        one.
+        Criteria are rounded to `DIGITS` digits, so that a motion found twice with different
+        rounding errors counts once.
         """
         values = [each.sense * each.value(made, self) for each in self.criteria]
         q = made.q[0] + np.vstack([np.zeros(made.q.shape[1]), np.cumsum(made.increments, axis=0)])

@@ -1,4 +1,4 @@
-"""The search for the front: which run comes next, what came of the others, and the front of it."""
+"""The search for the front: propose runs, collect their results, and build the front."""
 
 from __future__ import annotations
 
@@ -22,30 +22,31 @@ __all__ = ["AHEAD", "FrontSearch", "SearchKind", "whole_number"]
 SearchKind = Literal["adaptive", "grid"]
 
 AHEAD = 8
-"""Runs that may be under way: a run depends on what came of those so far before it, on no clock."""
+"""Number of runs in progress. A run depends on the results this far before it, not on timing."""
 LEAST_ROOM = 0.1
-"""Share of an ideal value by which the reference is beyond the worst, at least."""
+"""Least distance of the reference beyond the worst value, as a share of the ideal value."""
 TINY = 1e-9
-"""Of whatever unit: where an ideal value is zero."""
+"""Least distance, in the criterion's unit, where the ideal value is zero."""
 
 
 class FrontSearch:
-    """Proposes one run after the other, and collects what comes of them in the same order.
+    """Proposes one run after the other, and collects their results in the same order.
 
     Parameters
     ----------
     problem : ParetoProblem
     runs : int
-        How many there are to be.
+        Number of runs.
     search : {"adaptive", "grid"}
+        As in `kerfpath.pareto`.
     seed : int
     ahead : int
-        How many may be under way.
+        Number of runs that may be in progress.
 
     Raises
     ------
     InputError
-        An unknown search, fewer than one run, or none under way.
+        The search is unknown, or `runs` or `ahead` is less than one.
     """
 
     def __init__(
@@ -60,10 +61,10 @@ class FrontSearch:
         self._failures: Counter[str] = Counter()
 
     def _proposed(self) -> Iterator[Subproblem]:
-        """Yield the runs: the first, those for the best of each criterion, and then the search.
+        """Yield the first run, the runs for the best of each criterion, and those of the search.
 
-        Where gamma is continuous, all of it on the grid and off it in turn: what the grid finds in
-        little time says where to look.
+        Where gamma is continuous, runs alternate between on the grid and off it: the fast runs on
+        the grid show where to search.
         """
         problem, rng = self._problem, np.random.default_rng(self._seed)
         yield problem.unbounded
@@ -86,7 +87,7 @@ class FrontSearch:
                 yield replace(run, continuous=True)
 
     def _held(self) -> Subproblem | None:
-        """Return the run that is to beat a plan of the grid which none has beaten or tried to."""
+        """Return a run that tries to beat a plan of the grid on the front, once for each plan."""
         for solution in _front(self._found):
             if not solution.run.continuous and solution.number not in self._tried:
                 self._tried.add(solution.number)
@@ -94,11 +95,11 @@ class FrontSearch:
         return None
 
     def run(self, submit: Callable[[int, Subproblem], Callable[[], Evaluation | str]]) -> Front:
-        """Do all runs, up to `ahead` of them under way, and return the front.
+        """Do all runs, up to `ahead` of them in progress, and return the front.
 
-        `submit` begins a run, by its number, and returns how to wait for what comes of it: the
-        evaluation of its plan, or why there is none. The first is waited for alone, as all else
-        hangs on it.
+        `submit` starts a run with a number and returns a function that waits for its result: the
+        evaluation of its plan, or why there is none. The first run is waited for alone, because all
+        others depend on it.
 
         Raises
         ------
@@ -123,10 +124,10 @@ class FrontSearch:
         return self._result()
 
     def _box(self) -> tuple[Array, Array]:
-        """Return the ideal and the reference (C,) that the first runs leave, less being better.
+        """Return the ideal and the reference (C,) of the first runs, where less is better.
 
-        The reference is beyond their worst by as much as that is from the ideal, and by a share
-        of it at least. Later runs do not move them, so that hypervolumes are comparable.
+        The reference is as far beyond the worst value as the worst value is from the ideal, and at
+        least a share of the ideal. Later runs do not move it, so hypervolumes are comparable.
         """
         some = [each for each in self._found if each.number < self._beginning] or self._found[:1]
         values = np.array([each.losses for each in some])
@@ -173,7 +174,7 @@ class FrontSearch:
 
 
 def _front(found: list[Solution]) -> list[Solution]:
-    """Return those that none dominates, of equal ones the first."""
+    """Return the solutions that no other dominates; of equal ones, the first."""
     if not found:
         return []
     kept = moocore.is_nondominated(np.array([each.losses for each in found]))
@@ -181,7 +182,7 @@ def _front(found: list[Solution]) -> list[Solution]:
 
 
 def whole_number(value: int, name: str) -> int:
-    """Return a number that counts; raise InputError where it is none, or less than one."""
+    """Return a whole number; raise InputError where it is not one, or less than 1."""
     if not isinstance(value, int) or value < 1:
         raise InputError(f"{name}: expected a whole number, at least 1, got {value!r}")
     return value

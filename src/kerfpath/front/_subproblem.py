@@ -1,4 +1,4 @@
-"""Subproblems: what one run of the planner is asked for, and the plain grid of them."""
+"""Subproblems: the settings of one run of the planner, and a plain grid of such settings."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from kerfpath.search import Metric, ObjectiveKind
 __all__ = ["Subproblem", "SubproblemData", "counts_as_clearance", "grid", "is_in_window"]
 
 LEVELS = (0.25, 4.0)
-"""Multiples of the weight of one joint at a time, in the grid."""
+"""Factors on the weight of one joint at a time, in the grid."""
 SHARES = (1.0, 0.9, 0.8)
-"""Multiples of eta in the grid."""
+"""Factors on eta in the grid."""
 
 
 class SubproblemData(TypedDict):
-    """A subproblem as JSON holds it; null where a joint has no window.
+    """A subproblem as JSON data; the window of a joint is null where it has none.
 
-    On the grid of gamma where it does not say that it is `continuous`.
+    A missing `continuous` means a run on the grid of gamma.
     """
 
     objective: ObjectiveKind
@@ -43,7 +43,7 @@ class SubproblemData(TypedDict):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Subproblem:
-    """What one run of the planner minimises, and what it has to keep (the epsilon constraints).
+    """The objective and the epsilon constraints of one run of the planner.
 
     Parameters
     ----------
@@ -52,12 +52,12 @@ class Subproblem:
     weights : (n,) 1/rad
         Weights of the joint-space distance.
     window : (n, 2) rad
-        Between what each joint has to stay (modulo 2 pi where it is endless), infinite where it is
-        free.
+        Range that each joint must stay in (modulo 2 pi where it is endless); infinite where the
+        joint has no window.
     clearance : float m
-        What robot and head are to keep from what stands around beyond the near-miss distance.
+        Clearance of robot and head from all other bodies, beyond the near-miss distance.
     continuous : bool
-        Whether gamma is continuous, and not on its grid.
+        Whether gamma is continuous instead of on its grid.
     """
 
     objective: ObjectiveKind
@@ -73,7 +73,7 @@ class Subproblem:
 
     @classmethod
     def unbounded(cls, weights: Array, eta_v: float, eta_a: float) -> Subproblem:
-        """Return that of the least displacement, with the whole limits and no window."""
+        """Return the subproblem of least displacement with the full limits and no window."""
         return cls(
             objective="sum",
             metric="manhattan",
@@ -84,7 +84,7 @@ class Subproblem:
         )
 
     def applied_to(self, options: PlanOptions) -> PlanOptions:
-        """Return the options with what this subproblem says in their place."""
+        """Return the options with the settings of this subproblem."""
         return replace(
             options,
             method="continuous" if self.continuous else "exact",
@@ -96,7 +96,7 @@ class Subproblem:
         )
 
     def graph(self, graph: LayeredGraph, endless: Bools) -> LayeredGraph:
-        """Return the layered graph without the vertices outside the window, counted by joint."""
+        """Return the layered graph without the vertices outside the windows, counted by joint."""
         outside = {}
         for joint in self.windowed(endless):
             low, high = self.window[joint]
@@ -105,7 +105,7 @@ class Subproblem:
         return graph.without(outside) if outside else graph
 
     def windowed(self, endless: Bools) -> list[int]:
-        """Return the joints whose window says something: less than a turn where one is endless."""
+        """Return the joints with an effective window: finite, and below a turn where endless."""
         width = np.diff(self.window)[:, 0]
         said = np.isfinite(width) & ~(endless & (width >= 2 * np.pi))
         return [int(joint) for joint in np.flatnonzero(said)]
@@ -119,11 +119,11 @@ class Subproblem:
         return replace(cell, near_miss_of={**cell.near_miss_of, **asked})
 
     def quicker(self, factor: float) -> Subproblem:
-        """Return the subproblem whose plans keep the limits at `factor` times the speed, too."""
+        """Return the subproblem whose plans also keep the limits at `factor` times the speed."""
         return replace(self, eta_v=self.eta_v / factor, eta_a=self.eta_a / factor**2)
 
     def to_data(self) -> SubproblemData:
-        """Return it as JSON holds it; `from_data` reads the very same back."""
+        """Return the subproblem as JSON data, from which `from_data` restores it exactly."""
         data: SubproblemData = {
             "objective": self.objective,
             "metric": self.metric,
@@ -156,7 +156,7 @@ class Subproblem:
 def grid(first: Subproblem, rng: np.random.Generator) -> Iterator[Subproblem]:
     """Yield a plain grid over objective, metric, weights and eta, in random order.
 
-    Then the same again with other levels, between those before.
+    Then yield it again with levels closer to those of the first run, and so on.
     """
     n = len(first.weights)
     kinds = list(product(get_args(ObjectiveKind), get_args(Metric), SHARES, SHARES, range(2 * n)))
@@ -184,10 +184,10 @@ def is_in_window(q: Array, low: float, width: float, *, endless: bool) -> Bools:
 
 
 def counts_as_clearance(cell: Cell) -> Bools:
-    """Return which judged pairs (P,) count: robot or head with what stands around.
+    """Return which judged pairs (P,) count: robot or head against other bodies of the cell.
 
-    Pairs with a near-miss distance of their own, as nozzle and part, work near each other by
-    design, and links may be near each other whatever the arm does.
+    Pairs with their own near-miss distance, such as nozzle and part, are close by design, and links
+    may be close to each other whatever the arm does.
     """
     moving = np.array([cell.bodies[b].kind in ("robot", "head") for b in cell.pairs.ravel()])
     one, two = moving.reshape(-1, 2).T

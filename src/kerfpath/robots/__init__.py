@@ -1,4 +1,4 @@
-"""Robots: their kinematics in closed form, their limits, and the library of known models."""
+"""Robots: closed-form kinematics, limits, and the library of known models."""
 
 from kerfpath.robots._axis_three import level as level
 from kerfpath.robots._axis_three import with_axis_3 as with_axis_3

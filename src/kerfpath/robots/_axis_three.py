@@ -1,10 +1,10 @@
 """The meaning of a controller's axis 3: the elbow, or the upper arm from the horizontal.
 
-A parallel rod from the foot of an arm (IRB 2400, 4400) holds its upper arm as it was while axis 2
-moves, and every FANUC pendant shows J3 so: then axis 3 is joint 2 and joint 3 of the serial model
-together, and its limits bound both. No description says which. For an arm read from one it is that
-of a robot of the library with the same lengths, or it is given; otherwise it is not known, and
-languages that say axis 3 refuse the arm.
+In an arm with a parallel rod (IRB 2400, 4400) the upper arm keeps its orientation while axis 2
+moves, and every FANUC pendant shows J3 this way: axis 3 then combines joints 2 and 3 of the serial
+model, and its limits bound both. A robot description does not say which convention applies. For an
+arm read from a description, axis 3 is taken from a library robot with the same lengths, or it is
+given by the user. Otherwise it is unknown, and languages that contain axis 3 refuse the arm.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ COUNTED = {
     "Universal Robots": ("serial",),
     "Yaskawa": ("serial",),
 }
-"""How a maker's controllers count axis 3 of arms of six axes; of other makers nothing is known."""
+"""How each maker's controllers count axis 3 of six-axis arms; unknown for other makers."""
 UPWARDS = ("FANUC",)
-"""Makers whose axis 3 grows as the upper arm lifts; the others' as it falls."""
+"""Makers whose axis 3 increases as the upper arm lifts; for all others it increases as it falls."""
 ALIKE = 0.002
-"""m: lengths nearer than this are the same. Published ones are rounded by up to 0.5 mm; models
-that differ do so by 5 mm and more."""
+"""m: lengths that differ by less than this are the same. Published lengths are rounded by up to
+0.5 mm; the lengths of different models differ by 5 mm or more."""
 ARM = ("a1", "a2", "b", "c2", "c3")
-"""The lengths from axis 1 to the wrist: foot and flange may be described elsewhere."""
+"""The lengths from axis 1 to the wrist; descriptions may place foot and flange differently."""
 
 
 def level(robot: Manipulator) -> tuple[Array, float]:
-    """Return row (n,) and shift rad of axis 3 from the horizontal: row @ q + shift.
+    """Return row (n,) and shift (rad) of axis 3 counted from the horizontal: row @ q + shift.
 
-    As the robot's maker counts it, zero where the upper arm lies level.
+    The sign is that of the robot's maker; the value is zero where the upper arm is horizontal.
     """
     row = np.zeros(robot.joints)
     row[1:3] = robot.sign[1:3]
@@ -56,22 +56,22 @@ def level(robot: Manipulator) -> tuple[Array, float]:
 
 
 def with_axis_3(robot: A, axis_3: str = "", limits: ArrayLike | None = None) -> A:
-    """Return the robot with axis 3 as given, or else as the library knows it.
+    """Return the robot with axis 3 as given, or otherwise as in the library.
 
     Parameters
     ----------
     robot : Robot
-        As described, with nothing known of its axis 3.
+        A robot from a description, its axis 3 not known.
     axis_3 : {"", "serial", "horizontal"}
-        What it measures; "" looks for arms of the same maker and lengths in the library.
+        What axis 3 measures; "" looks for arms of the same maker and lengths in the library.
     limits : (2,) rad, optional
-        Of an axis that is "horizontal", as the controller shows them.
+        Limits of a "horizontal" axis 3, as the controller shows them.
 
     Raises
     ------
     InputError
-        Limits missing, needless, or that leave the arm no room; what its maker's controllers do
-        not do, or the library knows otherwise of an arm with these lengths.
+        The limits are missing, not needed, or outside the range of joints 2 and 3; or `axis_3`
+        contradicts the maker's controllers or a library robot with the same lengths.
     """
     if axis_3:
         return _given(robot, axis_3, limits)
@@ -81,9 +81,9 @@ def with_axis_3(robot: A, axis_3: str = "", limits: ArrayLike | None = None) -> 
 
 
 def _look_up_axis_3(robot: A) -> A:
-    """Return the robot with what the library knows of axis 3 of an arm with its lengths.
+    """Return the robot with axis 3 of the library arms that have the same lengths.
 
-    Unchanged where no arm of its maker has them, or where those that have them do not agree.
+    The robot is unchanged where no arm of its maker has these lengths, or where they disagree.
     """
     twins = [
         twin
@@ -97,23 +97,25 @@ def _look_up_axis_3(robot: A) -> A:
     names = ", ".join(twin.id for twin in twins)
     counted = twins[0].axis_3
     bounds = [_carried_over(c, twin, robot) for twin in twins for c in twin.couplings]
-    notes = [f"Axis 3 of the controller is {counted}, as the arm has the lengths of {names}."]
+    notes = [
+        f"Axis 3 of the controller is taken as {counted}: the arm has the same lengths as {names}."
+    ]
     turned = float(np.degrees(_wrap_offsets(robot.offset[5] - twins[0].offset[5])))
     if round(turned, 3):
         notes.append(
-            f"Its tip is turned by {turned:.3f} deg about axis 6 against the flange of "
-            f"{twins[0].id}: programs take the tip's frame for the controller's flange."
+            f"The tip is rotated by {turned:.3f} deg about axis 6 relative to the flange of "
+            f"{twins[0].id}: programs use the tip frame as the controller's flange."
         )
     return replace(robot, axis_3=counted, couplings=_tightest(bounds), notes=(*robot.notes, *notes))
 
 
 def _given(robot: A, axis_3: str, limits: ArrayLike | None) -> A:
-    """Return the robot with axis 3 as given, unless something known contradicts it."""
+    """Return the robot with axis 3 as given; raise InputError where known data contradict it."""
     counted = COUNTED.get(robot.manufacturer, ("serial", "horizontal"))
     if axis_3 not in counted:
         raise InputError(
-            f"axis_3: expected {' or '.join(map(repr, counted))}, as controllers by "
-            f"{robot.manufacturer or 'any maker'} count, got {axis_3!r}"
+            f"axis_3: expected {' or '.join(map(repr, counted))}, the convention of controllers by "
+            f"{robot.manufacturer or 'any maker'}, got {axis_3!r}"
         )
     found = _look_up_axis_3(robot)
     if found.axis_3 not in ("", axis_3):
@@ -129,28 +131,28 @@ def _given(robot: A, axis_3: str, limits: ArrayLike | None) -> A:
         return replace(robot, axis_3=axis_3)
     if robot.kinematics != "opw":
         raise InputError(
-            f'axis_3: expected "serial", as an arm of family {robot.kinematics!r} has no upper arm '
-            "between axes 3 and 4 that a rod could hold, got 'horizontal'"
+            f'axis_3: expected "serial", because an arm of family {robot.kinematics!r} has no '
+            "upper arm between axes 3 and 4 that a parallel rod could hold, got 'horizontal'"
         )
     low, high = floats(limits, "axis_3_limits", (2,))
     row, shift = level(robot)
     one = Coupling(
         row=row, lower=low - shift, upper=high - shift,
-        note="axis 3 of the controller counts from the horizontal, and these are its limits",
+        note="limits of the controller's axis 3, which is counted from the horizontal",
     )  # fmt: skip
     if robot.lower is not None and robot.upper is not None:
         ends = np.where(row > 0, [robot.lower, robot.upper], [robot.upper, robot.lower]) @ row
         if ends[1] <= one.lower or ends[0] >= one.upper:
             shown = np.degrees(ends + shift).round(2).tolist()
             raise InputError(
-                f"axis_3_limits=: {np.degrees([low, high]).round(2).tolist()} deg lie outside the "
-                f"range of axis 3 that the limits of joints 2 and 3 leave, {shown} deg"
+                f"axis_3_limits=: {np.degrees([low, high]).round(2).tolist()} deg is outside the "
+                f"range of axis 3 that the limits of joints 2 and 3 allow, {shown} deg"
             )
     return replace(robot, axis_3=axis_3, couplings=(one,))
 
 
 def _carried_over(coupling: Coupling, twin: Manipulator, robot: Manipulator) -> Coupling:
-    """Return a bound of a twin in the joints of a robot, which may count them otherwise."""
+    """Return a bound of a twin in terms of the joints of a robot with another sign and offset."""
     row = coupling.row * twin.sign * robot.sign
     shift = float(coupling.row @ (twin.sign * _wrap_offsets(twin.offset - robot.offset)))
     return Coupling(
@@ -159,7 +161,7 @@ def _carried_over(coupling: Coupling, twin: Manipulator, robot: Manipulator) -> 
 
 
 def _tightest(bounds: list[Coupling]) -> tuple[Coupling, ...]:
-    """Return one bound for each row: where several arms have the same lengths, the narrowest."""
+    """Return one bound for each row: the narrowest of those of all arms with the same lengths."""
     rows: dict[bytes, Coupling] = {}
     for one in bounds:
         other = rows.get(one.row.tobytes(), one)
@@ -170,6 +172,6 @@ def _tightest(bounds: list[Coupling]) -> tuple[Coupling, ...]:
 
 
 def _wrap_offsets(angle: ArrayLike) -> Array:
-    """Return angles within half a turn: a description has its zero there of what is meant."""
+    """Return angles wrapped to half a turn: the zero of a description is at most that far off."""
     angle = np.asarray(angle, dtype=float)
     return np.asarray(angle - 2 * np.pi * np.round(angle / (2 * np.pi)))

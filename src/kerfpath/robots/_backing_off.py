@@ -1,4 +1,4 @@
-"""Whether the tool can go straight back along its axis, as before and after a cut."""
+"""Check whether the tool can back off along its axis, as it does before and after a cut."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ __all__ = ["can_back_off"]
 def can_back_off(
     robot: Robot, q: Array, posture: Ints, tool: Array, retract: float, margin: float = 0.0
 ) -> Bools:
-    """Return of which joints (B,) the tool can back off along its axis within the joint limits.
+    """Return from which joint vectors (B,) the tool can back off within the joint limits.
 
-    The posture is kept, and no joint goes more than half a turn; an external axis stays.
+    The tool moves straight along its axis. The posture is kept, no joint moves more than half a
+    turn, and external axes do not move.
 
     Parameters
     ----------
@@ -25,8 +26,9 @@ def can_back_off(
     tool : (4, 4) m
         T_flange_tip.
     retract : float m
+        How far the tool backs off.
     margin : float rad
-        Kept from every limit there.
+        Distance kept from every joint limit in the backed-off pose.
     """
     arm, q = robot.alone(), q[:, : robot.family.joints]
     T = arm.forward(q) @ tool

@@ -1,4 +1,4 @@
-"""What weighs on the joints of an arm, and what its motors bear."""
+"""Jerk and torque limits of an arm, its inertia and its load."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Burden"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Burden:
-    """What `Robot` says of jerks, torques and masses; of external axes none is known."""
+    """The jerk, torque and mass data of a `Robot`, for the joints of the arm only."""
 
     jerk: Array | None = None
     torque: Array | None = None
@@ -29,7 +29,7 @@ class Burden:
     __repr__ = short_repr
 
     def cast_burden(self, joints: int) -> None:
-        """Cast and check all of it for an arm of so many joints, as `__post_init__` does."""
+        """Cast and check the fields for an arm with this number of joints; for `__post_init__`."""
         _set = object.__setattr__
         if self.jerk is not None:
             jerk = floats(self.jerk, "jerk", (joints,), infinite=True)

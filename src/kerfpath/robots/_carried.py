@@ -1,7 +1,7 @@
-"""An arm on external axes as one chain: from the part that they carry to the flange.
+"""An arm with its external axes as one chain, from the part to the flange.
 
-What a joint moves is moved against all that comes before it in the chain, so that distances and
-motions of bodies need to know no more of rails and tables than of the joints of an arm.
+Each joint moves all frames after it relative to all frames before it. Code that computes distances
+and motions of bodies can therefore treat rails and tables like the joints of an arm.
 """
 
 from __future__ import annotations
@@ -19,25 +19,27 @@ from kerfpath.urdf import KinematicChain
 __all__ = ["CarriedChain"]
 
 BEYOND = 1e-6
-"""m: rounding of a linear axis that stands at the end of its travel."""
+"""m: rounding error of a linear axis at the end of its travel."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CarriedChain(KinematicChain):
-    """The joints of an arm after its external axes; q has the arm's first, as a robot's.
+    """The chain of the external axes and, after them, the joints of the arm.
 
-    Frame 0 goes with the part. Each frame after it is carried by one axis less of those that carry
-    the part, to frame `still`, the ground; each after that by one more of those that carry the
-    robot, to frame `base`; the links follow. Poses are in the ground: the robot base with every
-    axis at zero, where all frames up to `base` are one.
+    In q, as in that of a robot, the joints of the arm come first. Frame 0 moves with the part. Up
+    to frame `still`, the ground, each frame is carried by one axis fewer of those that carry the
+    part; from there to frame `base` each is carried by one axis more of those that carry the robot;
+    the links of the arm follow. Poses are in the ground frame: the robot base with every external
+    axis at zero, where all frames up to `base` coincide.
 
     Parameters
     ----------
     origins, axes, end
-        Of the arm, as in `KinematicChain`.
+        Chain of the arm, as in `KinematicChain`.
     externals : tuple of ExternalAxis
     travel : (E, 2) rad or m
-        Least and largest value of each. Bounds on motions hold for linear ones within it.
+        Least and largest value of each external axis. Bounds on motions hold for linear axes
+        within their travel.
     """
 
     externals: tuple[ExternalAxis, ...]
@@ -52,17 +54,17 @@ class CarriedChain(KinematicChain):
 
     @property
     def joints(self) -> int:
-        """Joints of arm and external axes together."""
+        """Number of joints of arm and external axes together."""
         return len(self.axes) + len(self.externals)
 
     @property
     def still(self) -> int:
-        """The frame of the ground."""
+        """Index of the ground frame."""
         return sum(axis.carries == "part" for axis in self.externals)
 
     @property
     def base(self) -> int:
-        """The frame of the robot's base."""
+        """Index of the frame of the robot base."""
         return len(self.externals)
 
     @property
@@ -78,12 +80,12 @@ class CarriedChain(KinematicChain):
         return np.array([*linear, *(False for _ in self.axes)], dtype=np.bool_)
 
     def frame_on(self, name: str) -> int:
-        """Return the frame that an external axis carries, and no axis that it carries itself.
+        """Return the frame directly on an external axis, before any axis that it carries.
 
         Raises
         ------
         InputError
-            No axis of that name.
+            There is no axis of that name.
         """
         names = [axis.name for axis in self.externals]
         if name not in names:
@@ -94,19 +96,19 @@ class CarriedChain(KinematicChain):
         return place if place < self.still else place + 1
 
     def say(self, place: int) -> str:
-        """Return what a joint of the chain is called in messages."""
+        """Return the name of a joint of the chain in messages."""
         if place < self.base:
             return self.externals[self._passed()[place]].name
         return f"joint {place - self.base + 1}"
 
     def moves_with(self, frame: int) -> str:
-        """Return what a frame moves with, in words: the last axis that carries it, or a joint."""
+        """Return the name of the axis or joint that moves a frame directly, or "ground"."""
         if frame == self.still:
             return "ground"
         return self.say(frame if frame < self.still else frame - 1)
 
     def spread(self, share: Array) -> Array:
-        """Return joints (B, n) at shares (B, n), 0 to 1, of whole turns, linear ones of travel."""
+        """Return joints (B, n) at shares (B, n), 0 to 1, of a full turn or of a linear travel."""
         q, n = KinematicChain.spread(self, share), len(self.axes)
         linear = [axis.kind == "linear" for axis in self.externals]
         low, high = self.travel.T
@@ -114,14 +116,14 @@ class CarriedChain(KinematicChain):
         return q
 
     def bounded(self, q: Array) -> Bools:
-        """Return at which of q (B, n) all linear axes are in their travel: bounds hold there."""
+        """Return whether all linear axes of q (B, n) are in their travel, so that bounds hold."""
         x, linear = q[:, len(self.axes) :], [axis.kind == "linear" for axis in self.externals]
         low, high = self.travel.T
         inside = (x >= low - BEYOND) & (x <= high + BEYOND)
         return np.asarray(inside[:, linear].all(axis=1))
 
     def frames(self, q: Array) -> Array:
-        """Return the poses (B, n+1, 4, 4) in the ground of all frames at q (B, n) rad or m."""
+        """Return poses (B, n + 1, 4, 4) m of all frames in the ground at q (B, n) rad or m."""
         n, passed, still = len(self.axes), self._passed(), self.still
         stands = []
         for frame in range(self.base + 1):
@@ -133,10 +135,10 @@ class CarriedChain(KinematicChain):
         return np.concatenate([np.stack(stands[:-1], axis=1), stands[-1][:, None] @ arm], axis=1)
 
     def reach(self, frame: int, points: Array) -> Array:
-        """Return bounds (n,) m on the distance of any of points (c, 3) from each rotary axis.
+        """Return bounds (n,) m on the distance of points (c, 3) m in a frame from each rotary axis.
 
-        In the order of the chain, at every q of the travel; 1 for linear axes, 0 for joints that do
-        not move the frame.
+        The bounds are in the order of the chain and hold at every q within the travel. They are 1
+        for linear axes and 0 for joints that do not move the frame.
         """
         arms, passed = np.zeros(self.joints), self._passed()
         if frame > self.base:
@@ -145,7 +147,7 @@ class CarriedChain(KinematicChain):
         else:
             centre = (points.min(axis=0) + points.max(axis=0)) / 2
             ball = float(np.linalg.norm(points - centre, axis=1).max())
-        # A ball that holds the points wherever the axes passed so far have taken them.
+        # The ball contains the points at all positions of the axes passed so far.
         for place in range(min(frame, self.base) - 1, -1, -1):
             axis = self.externals[passed[place]]
             if axis.kind == "linear":
@@ -161,7 +163,7 @@ class CarriedChain(KinematicChain):
 
     @property
     def sway(self) -> float:
-        """How far (m) the axes may carry what stands by the base at most, beside turning it."""
+        """Bound (m) on how far the axes move the origin of the robot base relative to the part."""
         return sum(
             float(np.abs(travel).max())
             if axis.kind == "linear"

@@ -1,4 +1,4 @@
-"""The joint chain of a robot: from its description, or from the lengths of its family's model."""
+"""The joint chain of a robot, from its description or from the model of its family."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ X, Y, Z = np.eye(3)
 
 
 def chain_of(robot: Manipulator) -> KinematicChain:
-    """Return the joint frames of a robot; their end is its flange.
+    """Return the joint chain of a robot, which ends at its flange.
 
-    With external axes they begin at what these carry, see `CarriedChain`.
+    With external axes it is a `CarriedChain`, which begins at the part.
 
     Raises
     ------
     InputError
-        The robot has no description, and its family no model that says where its joints are; of
-        one with external axes, limits that are not known.
+        The robot has no description and its family has no model with joint frames; or it has
+        external axes and its joint limits are not known.
     """
     arm = arm_chain(robot)
     if not robot.externals:
@@ -42,17 +42,18 @@ def chain_of(robot: Manipulator) -> KinematicChain:
 
 
 def arm_chain(robot: Manipulator) -> KinematicChain:
-    """Return the joint frames of the arm alone; raises as `chain_of`."""
+    """Return the joint chain of the arm alone; raises as `chain_of`."""
     return model_chain(robot) if robot.chain is None else robot.chain
 
 
 def require_axes(chain: KinematicChain, robot: Manipulator) -> None:
-    """Require that a cell's chain has the external axes of a robot, and all their travel.
+    """Require that the chain of a cell has the external axes of a robot and all their travel.
 
     Raises
     ------
     InputError
-        Other axes; or less travel, within which alone bounds on motions hold.
+        The external axes differ, or the chain covers less travel: bounds on motions hold within
+        its travel only.
     """
     own = chain if isinstance(chain, CarriedChain) else None
     axes = () if own is None else own.externals
@@ -71,15 +72,24 @@ def require_axes(chain: KinematicChain, robot: Manipulator) -> None:
         limits, arm = robot.joint_limits(), len(own.axes)
         beyond = (limits.lower[arm:] < own.travel[:, 0]) | (limits.upper[arm:] > own.travel[:, 1])
         if (beyond & ~robot.endless[arm:]).any():
-            raise InputError("cell: it was built with less travel of the external axes than asked")
+            raise InputError(
+                "cell: it was built with less travel of the external axes than the robot has; "
+                "build it again for this robot"
+            )
 
 
 def model_chain(robot: Manipulator) -> KinematicChain:
-    """Return the joint frames of the model of its family, whatever its description says."""
+    """Return the joint chain of the family's model, ignoring the robot's description.
+
+    Raises
+    ------
+    InputError
+        The family has no model with joint frames.
+    """
     if robot.kinematics not in _MODELS:
         raise InputError(
-            f"robot {robot.id!r}: only its description says where the joints of an "
-            f"{robot.family.words} are; read it with Robot.from_urdf"
+            f"robot {robot.id!r}: the joint frames of its family ({robot.family.words}) are known "
+            "only from a robot description (URDF); read it with Robot.from_urdf"
         )
     model = _MODELS[robot.kinematics](robot.geometry)
     # q_model = sign q - offset: a frame at angle zero is turned back by the offset.
@@ -96,8 +106,8 @@ def model_chain(robot: Manipulator) -> KinematicChain:
 def _opw(g: Mapping[str, float]) -> KinematicChain:
     """Return the chain of an OPW arm (Brandstoetter, Angerer and Hofbaur 2014, figure 1).
 
-    Shoulder at (a1, b, c1), elbow c2 above it, wrist centre at (a2, 0, c3) from the elbow, flange
-    c4 further.
+    The shoulder is at (a1, b, c1), the elbow c2 above it, the wrist centre at (a2, 0, c3) from the
+    elbow, and the flange c4 further along.
     """
     origins, end = np.tile(np.eye(4), (6, 1, 1)), np.eye(4)
     origins[1, :3, 3] = g["a1"], g["b"], g["c1"]
@@ -114,7 +124,7 @@ def _five(g: Mapping[str, float]) -> KinematicChain:
 
 
 def _ur(g: Mapping[str, float]) -> KinematicChain:
-    """Return the chain of a UR arm: its Denavit-Hartenberg frames, alpha = 90, 0, 0, 90, -90, 0."""
+    """Return the chain of a UR arm in DH frames, alpha = 90, 0, 0, 90, -90, 0 deg."""
     d = (g["d1"], 0.0, 0.0, g["d4"], g["d5"], g["d6"])
     a = (0.0, g["a2"], g["a3"], 0.0, 0.0, 0.0)
     after = turns(X, np.radians([90.0, 0.0, 0.0, 90.0, -90.0, 0.0]))
@@ -125,7 +135,7 @@ def _ur(g: Mapping[str, float]) -> KinematicChain:
 
 
 def _srs(g: Mapping[str, float]) -> KinematicChain:
-    """Return the chain of an S-R-S arm: upright at zero, its axes z, y, z, y, z, y, z."""
+    """Return the chain of an S-R-S arm, upright at zero, with axes z, y, z, y, z, y, z."""
     origins, end = np.tile(np.eye(4), (7, 1, 1)), np.eye(4)
     origins[[1, 3, 5], 2, 3] = g["c1"], g["c2"], g["c3"]
     end[2, 3] = g["c4"]

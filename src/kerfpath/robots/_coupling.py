@@ -1,4 +1,4 @@
-"""Bounds on several joints at once, as parallel rods and controllers impose them."""
+"""Bounds on combinations of joints, which parallel rods and controllers impose."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from kerfpath.errors import InputError
 __all__ = ["AXIS_3", "Coupling"]
 
 AXIS_3 = ("", "serial", "horizontal")
-"""What axis 3 of a controller may measure, "" where that is not known: see `Robot`."""
+"""What axis 3 of a controller can measure; "" means not known, see `Robot`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Coupling:
-    """A linear bound on several joints at once: lower <= row @ q <= upper.
+    """A linear bound on a combination of joints: lower <= row @ q <= upper.
 
     Parameters
     ----------
@@ -28,6 +28,11 @@ class Coupling:
         Bounds of the combination.
     note : str
         Where the bound comes from.
+
+    Raises
+    ------
+    InputError
+        The lower bound is not below the upper one.
     """
 
     row: Array
@@ -47,7 +52,7 @@ class Coupling:
 
     @property
     def name(self) -> str:
-        """Say the combination in words, such as "joint 2 + joint 3"."""
+        """The combination in words, such as "joint 2 + joint 3"."""
         words = ""
         for i, c in enumerate(self.row):
             if c:

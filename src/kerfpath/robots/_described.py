@@ -1,4 +1,4 @@
-"""A robot from its description: family and model from the geometry, limits as they are written."""
+"""Build a robot from its description: family and model from the geometry, limits as written."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["build_robot", "read_description"]
 A = TypeVar("A", bound=Manipulator)
 
 SNAPS = (5e-6, 5e-5, 5e-4, 5e-3)
-"""rad: by how much angles of five, four, three and two digits after the point may be rounded."""
+"""rad: the rounding errors of angles written with five, four, three and two decimals."""
 POSES = 256
 
 
@@ -37,13 +37,13 @@ def read_description(
     packages: Mapping[str, str | Path] | None,
     meshes: bool,
 ) -> Description:
-    """Return the description of an arm, its angles as they are written, or within snap as meant.
+    """Return the description of an arm, its angles as written or, within snap, rounded to 15 deg.
 
     Raises
     ------
     InputError
-        As `read_urdf`; without snap, an arm that is of no family with a closed form as it is
-        written, but is of one with its angles rounded: the message says what that moves.
+        As `read_urdf`. Also without snap where the arm as written belongs to no family with a
+        closed form, but does with its angles rounded: the message says how far that moves the tip.
     """
     found = read_urdf(
         path,
@@ -67,12 +67,12 @@ def read_description(
     least = next(snap for snap, chain in meant.items() if _alike(chain, whole))
     off, turned = _moved(found, whole)
     raise InputError(
-        f"{found.path} ({found.base} to {found.tip}): as it is written the arm is of no family "
-        f"with a closed form, with its angles rounded to 15 deg it is: snap={least:g} takes them "
-        f"as meant, which moves the tip by up to {off * 1e3:.2g} mm and "
+        f"{found.path} ({found.base} to {found.tip}): the arm as written belongs to no family "
+        "with a closed form, but it does with its angles rounded to 15 deg. Use "
+        f"snap={least:g} to round them, which moves the tip by up to {off * 1e3:.2g} mm and "
         f"{np.degrees(turned):.2g} deg"
         + (
-            "; snap=0 keeps what is written, as a general arm, whose solver may need minutes to "
+            "; or snap=0 to keep the angles as a general arm, whose solver may need minutes to "
             "prepare"
             if len(found.joints) == 6
             else ""
@@ -110,12 +110,12 @@ def build_robot(
     torque: ArrayLike | None = None,
     endless: ArrayLike | None = None,
 ) -> A:
-    """Return the robot of a description; limits given (rad, s, N m) come before those written.
+    """Return the robot of a description; given limits (rad, s, N m) replace those written there.
 
     Raises
     ------
     InputError
-        The chain is of no family; a limit that is missing, or zero, and is not given; as
+        The chain belongs to no family; a limit is missing or zero there and is not given; and as
         `with_axis_3`.
     """
     where = f"{description.path} ({description.base} to {description.tip})"
@@ -125,7 +125,7 @@ def build_robot(
         raise InputError(f"{where}: {error}") from None
     continuous = np.array([joint.kind == "continuous" for joint in description.joints])
     left_out = ", ".join(description.left_out)
-    outside = [f"Links on joints outside the chain are left out: {left_out}."] if left_out else []
+    outside = [f"Links on joints outside the chain are ignored: {left_out}."] if left_out else []
     low, high = _ranges(description, lower, upper, endless)
     source = "given by the user"
     if acceleration is None and (acceleration := _acceleration(description)) is not None:
@@ -164,7 +164,7 @@ def _ranges(
     upper: ArrayLike | None,
     endless: ArrayLike | None,
 ) -> tuple[Array, Array]:
-    """Return lower and upper limits; an endless joint, which has none, gets one turn."""
+    """Return lower and upper limits; an endless joint has none and gets one turn."""
     n = len(description.joints)
     free = np.zeros(n, bool) if endless is None else np.asarray(endless, bool)
     low, high = -np.pi * np.ones(n), np.pi * np.ones(n)
@@ -177,7 +177,7 @@ def _ranges(
             raise _lacks(
                 description,
                 joint.name,
-                f"may only be at {joint.lower:g} rad, so that it cannot move",
+                f"has the same lower and upper limit, {joint.lower:g} rad, so it cannot move",
                 "lower= and upper=",
             )
         low[i], high[i] = joint.lower or 0.0, joint.upper or 0.0
@@ -188,14 +188,14 @@ def _ranges(
 
 
 def _acceleration(description: Description) -> Array | None:
-    """Return the accelerations (n,) that are written, as URDF 1.2 can; None unless all are."""
+    """Return the accelerations (n,) written there (URDF 1.2); None unless all joints have one."""
     found = [joint.acceleration for joint in description.joints]
     _require_positive(description, found, "acceleration", "rad/s^2")
     return None if None in found else np.array(found, dtype=float)
 
 
 def _jerk(description: Description) -> Array | None:
-    """Return the jerks (n,) that are written, as URDF 1.2 can, infinity for other joints."""
+    """Return the jerks (n,) written there (URDF 1.2), infinity for joints without one."""
     found = [joint.jerk for joint in description.joints]
     _require_positive(description, found, "jerk", "rad/s^3")
     written = np.array([np.inf if jerk is None else jerk for jerk in found])
@@ -203,7 +203,7 @@ def _jerk(description: Description) -> Array | None:
 
 
 def _torque(description: Description) -> Array | None:
-    """Return the efforts (n,) that are written; None unless all are."""
+    """Return the efforts (n,) written there; None unless all joints have one."""
     found = [joint.effort for joint in description.joints]
     return None if None in found else np.array(found, dtype=float)
 
@@ -211,10 +211,10 @@ def _torque(description: Description) -> Array | None:
 def _require_positive(
     description: Description, found: list[float | None], name: str, unit: str
 ) -> None:
-    """Raise InputError where a limit of a kind that is written lets a joint not move."""
+    """Raise InputError where a written limit of one kind is zero or negative."""
     for joint, value in zip(description.joints, found, strict=True):
         if value is not None and value <= 0:
-            what = f"has the {name} limit {value:g} {unit}, so that it cannot move"
+            what = f"has the {name} limit {value:g} {unit}, so it cannot move"
             raise _lacks(description, joint.name, what, f"{name}=")
 
 
@@ -223,7 +223,7 @@ def _velocity(description: Description) -> Array:
         if joint.velocity is None:
             raise _lacks(description, joint.name, "has no velocity limit", "velocity=")
         if joint.velocity <= 0:
-            what = f"has the velocity limit {joint.velocity:g} rad/s, so that it cannot move"
+            what = f"has the velocity limit {joint.velocity:g} rad/s, so it cannot move"
             raise _lacks(description, joint.name, what, "velocity=")
     return np.array([joint.velocity for joint in description.joints], dtype=float)
 

@@ -1,4 +1,4 @@
-"""What is proved of the joints while gamma runs over a cell, and the frames it is proved from."""
+"""Proven bounds on the joints over a cell of gamma, and the frames that they are computed from."""
 
 from __future__ import annotations
 
@@ -15,32 +15,33 @@ from kerfpath.kernels import enclosure
 __all__ = ["Enclosure", "ball_frames", "require_cells"]
 
 ROUNDING = 4.0 * 2.0**-52
-"""Error of a sum of four products, as a share of the sum of their sizes; twice what it can be."""
+"""Error of a sum of four products as a share of the sum of their sizes; twice the true bound."""
 MORE = 1.0 + 1e-12
-"""Factor on a radius for its own rounding."""
+"""Factor on a radius that covers its own rounding."""
 GRAM = 2e-15
-"""Rounding in the norm of R^T R - 1, 3 x 3: 9 entries of 3 products of numbers up to 1."""
+"""Rounding error of the norm of R^T R - 1, 3 x 3: 9 entries of 3 products of numbers up to 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Enclosure:
-    """Where the joints of each posture may be on cells of gamma, proved, rounding included.
+    """Proven bounds on the joints of each posture over cells of gamma, rounding included.
 
-    On cell c, gamma = m + t with |t| <= h, every solution of posture p has each joint i, modulo
-    whole turns, within `radius` of center + slope t + [low, high] t^2 / 2. A solution is a joint
-    vector whose flange pose is the task's: where the rotation matrices that were given are
-    orthogonal to an error only, for any rotation within that error. Limits are ignored.
+    On cell c, where gamma = m + t and |t| <= h, joint i of every solution of posture p lies, modulo
+    full turns, within `radius` of center + slope t + [low, high] t^2 / 2. A solution is a joint
+    vector whose flange pose is that of the task. Where the given rotation matrices are not exactly
+    orthogonal, the bounds hold for every rotation within that error. Limits are ignored.
 
     Parameters
     ----------
     status : (C, P) uint8
-        `NONE` (0): the posture has no solution anywhere on the cell. `SMOOTH` (1): one solution
-        for each t, and it moves continuously. `BOX` (2): slopes and curvatures are zero, and the
-        radius holds whatever solutions there are; pi where an angle is free.
+        `NONE` (0): the posture has no solution anywhere on the cell. `SMOOTH` (1): it has one
+        solution for each t, which moves continuously. `BOX` (2): slopes and curvatures are zero,
+        and the radius covers all solutions that exist; it is pi where an angle is free.
     center : (C, P, n) rad
-        In (-pi, pi].
-    slope, low, high, radius : (C, P, n)
-        rad/rad, rad/rad^2 twice, and rad.
+        Value at t = 0, in (-pi, pi].
+    slope : (C, P, n) rad/rad
+    low, high : (C, P, n) rad/rad^2
+    radius : (C, P, n) rad
     """
 
     status: NDArray[np.uint8]
@@ -54,30 +55,33 @@ class Enclosure:
 
 
 def require_cells(frames: int, node: Ints, gamma: Array, half: Array) -> None:
-    """Raise InputError unless each cell is of one of the frames and has a middle and a width."""
+    """Raise InputError unless each cell has a valid frame, middle and half-width (0 to 1 rad)."""
     if not node.shape == gamma.shape == half.shape == (len(node),):
         raise InputError(
-            f"enclose: expected node, gamma and half of one length, got {node.shape}, "
-            f"{gamma.shape}, {half.shape}"
+            "enclose: expected node, gamma and half of the same length, got shapes "
+            f"{node.shape}, {gamma.shape}, {half.shape}"
         )
     bad = np.flatnonzero(~((node >= 0) & (node < frames)))
     if bad.size:
-        raise InputError(f"enclose: cell {bad[0]} is of frame {node[bad[0]]}, of {frames} frames")
+        raise InputError(
+            f"enclose: expected frames from 0 to {frames - 1}, got frame {node[bad[0]]} for cell "
+            f"{bad[0]}"
+        )
     bad = np.flatnonzero(~(np.isfinite(gamma) & (half >= 0.0) & (half <= 1.0)))
     if bad.size:
         i = int(bad[0])
         raise InputError(
-            f"enclose: expected cells of a half-width from 0 to 1 rad, but cell {i} is "
-            f"{gamma[i]:g} +- {half[i]:g}"
+            f"enclose: expected cells with a half-width from 0 to 1 rad, got {gamma[i]:g} +- "
+            f"{half[i]:g} rad for cell {i}"
         )
 
 
 def ball_frames(
     H: Array, T_flange_tip: Array, T_base_foot: Array, T_end_flange: Array, wrist: float
 ) -> enclosure.Frames:
-    """Return task frames H (K, 4, 4) and the tool as the kernels take them, with their errors.
+    """Return task frames H (K, 4, 4) and the tool in the form of the kernels, with error radii.
 
-    `wrist` is how far the wrist centre is behind the model's end, m.
+    `wrist` is the distance (m) of the wrist centre behind the end of the model.
     """
     base = _rigid(H)
     if not np.array_equal(T_base_foot, np.eye(4)):
@@ -98,10 +102,10 @@ def ball_frames(
 
 
 def _rigid(T: Array) -> tuple[Array, Array]:
-    """Return poses (..., 4, 4) and radii that hold those with the nearest rotation.
+    """Return poses (..., 4, 4) and radii that enclose the poses with the nearest rotation.
 
-    A singular value s of R has |s - 1| <= |s^2 - 1|, which the norm of R^T R - 1 bounds; so has its
-    inverse, down to s = 0.62.
+    A singular value s of R has |s - 1| <= |s^2 - 1|, which the norm of R^T R - 1 bounds; the same
+    holds for the inverse, down to s = 0.62.
     """
     R = T[..., :3, :3]
     gram = np.swapaxes(R, -1, -2) @ R - np.eye(3)
@@ -122,7 +126,7 @@ def _inverse(T: tuple[Array, Array]) -> tuple[Array, Array]:
 
 
 def _product(a: tuple[Array, Array], b: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Return the product of matrices known to a radius."""
+    """Return the product of two matrices and its radius; each is given as (matrix, radius)."""
     (A, rA), (B, rB) = a, b
     size = np.abs(A) @ np.abs(B)
     radius = np.abs(A) @ rB + rA @ (np.abs(B) + rB) + ROUNDING * size

@@ -1,4 +1,4 @@
-"""External axes: rails under the robot, tables under the part; up to three, one on the other."""
+"""External axes: rails that carry the robot and positioners that carry the part, up to three."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ __all__ = [
 ]
 
 MOST_EXTERNAL = 3
-"""External axes that a robot may have."""
+"""Largest number of external axes of a robot."""
 
 
 class Travel(TypedDict):
-    """Range and limits of an external axis: rad, rad/s, rad/s^2; m, m/s, m/s^2 of a linear one."""
+    """Range and limits of an external axis, in rad and s; in m and s for a linear axis."""
 
     lower: float
     upper: float
@@ -40,31 +40,34 @@ class Travel(TypedDict):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ExternalAxis:
-    """A joint that moves the robot's base or the part; its value is one of the last columns of q.
+    """A joint that moves the robot base or the part; its value is one of the last columns of q.
 
-    It is described where every external axis is at zero. Of axes that carry the same thing the
-    first one named carries the others: a tilt comes before the table that it tilts. Its limits are
-    among the last of the robot's `lower`, `upper`, `velocity`, `acceleration` and `endless`.
+    Direction and point are given with every external axis at zero. Of several axes that carry the
+    robot, or several that carry the part, the first carries the others: a tilt axis comes before
+    the table that it tilts. The limits of the axis are among the last entries of the robot's
+    `lower`, `upper`, `velocity`, `acceleration` and `endless`.
 
     Parameters
     ----------
     name : str
-        What messages, reports and programs call it.
+        Name in messages, reports and programs.
     kind : {"linear", "rotary"}
     carries : {"robot", "part"}
+        What the axis moves.
     axis : (3,)
-        Direction in the robot base, any length but zero; a rotary axis turns right-handed about it.
+        Direction in the robot base, of any length except zero; a rotary axis turns right-handed
+        about it.
     point : (3,) m
-        Where the axis of a rotary one passes, in the robot base.
+        A point on the axis of rotation, in the robot base; for a rotary axis.
     step : float m or rad, optional
-        Largest step of its samples where the exact search takes it on a grid.
+        Largest step between samples of the axis where the exact search takes it on a grid.
     joint : str
-        The joint of the robot's description that it is; "" where it comes from none.
+        Name of the joint in the robot's description; "" where it comes from no description.
 
     Raises
     ------
     InputError
-        A direction of length zero, a step that is not positive.
+        The direction has length zero, or the step is not positive.
     """
 
     name: str
@@ -92,11 +95,11 @@ class ExternalAxis:
 
     @property
     def unit(self) -> Literal["m", "rad"]:
-        """Unit of its values."""
+        """Unit of the axis value."""
         return "m" if self.kind == "linear" else "rad"
 
     def require_range(self, lower: float, upper: float) -> None:
-        """Raise InputError where the ends of its range are reversed; they may be the same."""
+        """Raise InputError where the ends of the range are reversed; they may be equal."""
         if not lower <= upper:
             raise InputError(
                 f"{self.name}: its limits are reversed, lower {lower:g} {self.unit} is above upper "
@@ -104,7 +107,10 @@ class ExternalAxis:
             )
 
     def motion(self, x: Array) -> Array:
-        """Return how far it has moved what it carries, (..., 4, 4) m, at values x (...,)."""
+        """Return the motion (..., 4, 4) m of what the axis carries, from zero to values x (...,).
+
+        The motion is in the robot base; x is in m or rad.
+        """
         x = np.asarray(x, dtype=float)
         T = np.zeros((*x.shape, 4, 4))
         T[..., range(4), range(4)] = 1.0
@@ -120,16 +126,18 @@ class ExternalAxis:
 def samples_of(
     name: str, step: float | None, lower: float, upper: float, *, endless: bool, key: str = "step="
 ) -> Array:
-    """Return samples of a coordinate, at most a step apart, both ends of the range among them.
+    """Return samples of a coordinate, at most a step apart and including both ends of the range.
+
+    The samples of an endless coordinate cover one turn, (-pi, pi].
 
     Raises
     ------
     InputError
-        There is no step; `key` says how to give it.
+        There is no step; the message names `key`, which gives it.
     """
     if step is None:
         raise InputError(
-            f"{name}: the exact search takes its values on a grid and needs their step; "
+            f"{name}: the exact search samples it on a grid and needs a step; "
             f'give {key}, or choose method "continuous"'
         )
     if endless:
@@ -142,13 +150,13 @@ def samples_of(
 def require_distinct_axes(
     robot: str, axes: Sequence[ExternalAxis], redundant: bool = False
 ) -> None:
-    """Raise InputError for too many external axes of a robot, or two of one name.
+    """Raise InputError for too many external axes of a robot, or two with the same name.
 
-    Of a `redundant` arm, whose elbow is free, too, there may be one less.
+    A `redundant` arm, whose elbow is also free, may have one less.
     """
     names = [axis.name for axis in axes]
     if len(names) > (most := MOST_EXTERNAL - redundant):
-        why = ", as the elbow of the arm is free, too" if redundant else ""
+        why = ", because the elbow of the arm is also free" if redundant else ""
         raise InputError(
             f"robot {robot!r}: expected at most {most} external axes{why}, got "
             f"{len(names)}: {', '.join(names)}"
@@ -159,7 +167,7 @@ def require_distinct_axes(
 
 
 def carried(axes: Sequence[ExternalAxis], x: Array, what: Literal["robot", "part"]) -> Array:
-    """Return where the axes at x (..., E) have taken robot or part from zero, (..., 4, 4) m."""
+    """Return the motion (..., 4, 4) m of robot or part from zero, with the axes at x (..., E)."""
     x = np.asarray(x, dtype=float)
     T = np.broadcast_to(np.eye(4), (*x.shape[:-1], 4, 4))
     for i, axis in enumerate(axes):
@@ -169,8 +177,8 @@ def carried(axes: Sequence[ExternalAxis], x: Array, what: Literal["robot", "part
 
 
 def base_in_part(axes: Sequence[ExternalAxis], x: Array) -> Array:
-    """Return where the robot's base stands against the part, (..., 4, 4) m, at x (..., E).
+    """Return the motion (..., 4, 4) m of the robot base relative to the part, axes at x (..., E).
 
-    In the robot base at zero: what matters is how the one moves against the other.
+    It is expressed in the robot base at zero of all axes, where it is the identity.
     """
     return np.asarray(np.linalg.inv(carried(axes, x, "part")) @ carried(axes, x, "robot"))

@@ -1,4 +1,4 @@
-"""Kinematic families: what a robot's geometry is made of, and the kernels that solve it."""
+"""Kinematic families: the lengths that define a robot's geometry, and the kernels that solve it."""
 
 from __future__ import annotations
 
@@ -20,54 +20,56 @@ __all__ = ["FAMILIES", "Family", "posture_name", "postures_named"]
 EIGHT = tuple(
     "/".join(words) for words in product(("front", "rear"), ("up", "down"), ("plus", "minus"))
 )
-"""Postures by shoulder, elbow and wrist: mu = 4 shoulder + 2 elbow + wrist."""
+"""Names of postures by shoulder, elbow and wrist: mu = 4 shoulder + 2 elbow + wrist."""
 MORE = tuple(
     "/".join(words) for words in product(("front", "rear"), ("up", "down"), ("third", "fourth"))
 )
-"""What an offset tool may add to them on a five-axis arm, an offset wrist on any, mu = 8 and on."""
+"""Names of further postures, mu >= 8: of five-axis arms with an offset tool, of offset wrists."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Family:
-    """One kind of arm with a closed form of its own.
+    """A kinematic family: arms that share one model and one solver.
 
     Parameters
     ----------
     name : str
-        As `Robot.kinematics` says it.
+        Value of `Robot.kinematics`.
     words : str
-        What it is, in words.
+        Description for messages.
     joints : int
+        Number of joints of the arm.
     lengths : tuple of str
         The lengths (m) that a geometry must have.
     postures : tuple of str
         Name of every posture mu.
     model : callable
-        Makes what the kernels take from the lengths, `sign` and `offset`; without lengths, from
-        `chain`, the robot's joint frames, in their place.
+        Makes the kernels' model from the lengths, `sign` and `offset`; in a family without lengths
+        from `chain`, the robot's joint frames, `sign` and `offset`.
     forward_all, inverse_all : callable
         (model, q (B, n), out_T (B, 4, 4)) and (model, T (B, 4, 4), out_q (B, P, n), out_reach
         (B, P)), between joints and the model's own base and end frames. Where a joint is `given`,
         its angles (B,) are the third argument of the inverse.
     inverse_nodes : callable, optional
-        As `kernels.kinematics.inverse_nodes`, where a family has it in one piece.
+        As `kernels.kinematics.inverse_nodes`, where the family has such a kernel.
     follow_all : callable, optional
         (model, T (B, 4, 4), q (B, n)): brings each q onto its pose along its own branch, or makes
-        it NaN. Of a family where several branches have one posture.
+        it NaN; for a family where several branches share a posture.
     enclose_all : callable, optional
-        As `kernels.enclosure.enclose_all`, where a family has proven bounds.
+        As `kernels.enclosure.enclose_all`, where the family has proven bounds.
     wrist : str
-        The length by which its wrist centre is behind the end; "" without `enclose_all`.
+        Name of the length by which the wrist centre is behind the end; "" without `enclose_all`.
     flips : int, optional
-        The joint that is mirrored about its offset where the wrist is turned over, from posture
-        2 i to 2 i + 1 or back, while all others turn by a constant; None where there is none.
+        The joint (from 0) that is mirrored about its offset when the wrist flips from posture 2 i
+        to 2 i + 1 or back, while all others turn by a constant; None where there is none.
     poses_at_once : int
-        Poses solved per piece of work: large against the overhead, small against the memory.
+        Number of poses solved in one call: large enough to hide overhead, small enough for memory.
     given : int, optional
-        The joint, from 0, that a pose leaves free: the inverse finds the others where it stands.
+        The joint (from 0) that a pose leaves free: the inverse takes its value and returns the
+        other joints.
     free_rotation : bool
-        Whether a tool tip and a tool axis leave the rotation about that axis free. If not, a
-        layer has one sample of gamma, and poses ask for the tip and the axis alone.
+        Whether the rotation about the tool axis is free for a given tip and axis. If not, a layer
+        has one sample of gamma, and poses define only the tip and the axis.
     """
 
     name: str
@@ -164,19 +166,20 @@ FAMILIES = {
 
 
 def posture_name(posture: int) -> str:
-    """Return a posture in words: shoulder, elbow, wrist, as in "front/up/plus" (every family's)."""
+    """Return the name of a posture by shoulder, elbow and wrist, such as "front/up/plus"."""
     return (*EIGHT, *MORE)[posture]
 
 
 def postures_named(words: str, kinematics: str) -> tuple[int, ...]:
-    """Return the postures of a family of arms (`Robot.kinematics`) that fit some words.
+    """Return the postures of a family (`Robot.kinematics`) whose names contain all given words.
 
-    "front/up" fits 0 and 1, "rear" fits 4 to 7, and whatever the family has beyond these eight.
+    "front/up" matches 0 and 1, "rear" matches 4 to 7; both also match postures from 8 on where the
+    family has them.
 
     Raises
     ------
     InputError
-        Words that fit no posture of the family: an unknown one, two that exclude each other.
+        No posture of the family matches: a word is unknown, or two words exclude each other.
     """
     wanted = {word for word in words.split("/") if word}
     named = [set(name.split("/")) for name in FAMILIES[kinematics].postures]

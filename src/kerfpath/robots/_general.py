@@ -1,8 +1,9 @@
-"""Any six-axis arm, from its joint frames alone: axes as the solver wants them, and the check.
+"""General six-axis arms: their axes in the form that the solver needs, and a check of the solver.
 
-The solver is ssik, of the optional group "general". Any point of a joint axis may stand for it, but
-ssik 8.2 places the frames of two parallel axes wrongly unless their points lie square to them: here
-they do, and whether it solves an arm is tried before it is used.
+The solver is ssik, of the optional group "general". A joint axis may be given by any of its points,
+but ssik 8.2 places the frames of two parallel axes wrongly unless the line between their points is
+perpendicular to them. The points are chosen so here, and the solver is tested on each arm before it
+is used.
 """
 
 from __future__ import annotations
@@ -22,37 +23,38 @@ __all__ = ["follow_all", "forward_all", "inverse_all", "model", "require_solver"
 
 PARALLEL = 1e-9
 TRIED = 24
-"""Random joint vectors that the solver must find again."""
+"""Number of random joint vectors that the solver must recover from their poses."""
 FOUND = 1e-6
-"""rad: how near."""
+"""rad: largest error of a recovered joint vector."""
 
 follow_all, forward_all = general.follow_all, general.forward_all
 
 
 def require_solver() -> None:
-    """Raise InputError unless the solver is installed."""
+    """Raise InputError unless the solver for general arms is installed."""
     require_extra("general", "a six-axis arm of no other family")
 
 
 def model(*, chain: KinematicChain | None, sign: Array, offset: Array) -> general.GeneralArm:
-    """Return the axes of a chain at angle zero.
+    """Return the axes of a chain at zero joint angles.
 
     Raises
     ------
     InputError
-        No chain, not of six joints, or a joint convention beside the chain's.
+        There is no chain, it does not have six joints, or a sign or an offset is given.
     """
     if chain is None or len(chain.axes) != 6:
         raise InputError("a robot of family 'general' needs the chain of its six joints: chain=")
     if (sign != 1).any() or offset.any():
         raise InputError(
-            "a robot of family 'general' turns its joints as its chain does: no sign, no offset"
+            "a robot of family 'general' uses the joint convention of its chain: remove sign= and "
+            "offset="
         )
     T = chain.frames(np.zeros((1, 6)))[0, 1:]
     along = np.einsum("nij,nj->ni", T[:, :3, :3], chain.axes)
     place = T[:, :3, 3].copy()
     for i in range(1, 6):
-        # The foot on axis i of the line square to it and to the axis before.
+        # Move the point to the foot of the common perpendicular of axes i - 1 and i.
         normal = np.cross(along[i - 1], along[i])
         gap = place[i - 1] - place[i]
         if np.linalg.norm(normal) > PARALLEL:
@@ -62,7 +64,9 @@ def model(*, chain: KinematicChain | None, sign: Array, offset: Array) -> genera
 
 
 def inverse_all(arm: general.GeneralArm, T: Array, out_q: Array, out_reach: Bools) -> None:
-    """Fill all solutions (B, 16, 6) of tip poses (B, 4, 4), each within `EXACT` of its pose.
+    """Fill out_q (B, 16, 6) rad and out_reach (B, 16) with all solutions of tip poses (B, 4, 4) m.
+
+    Each solution reaches its pose within `kernels.general.EXACT`.
 
     Raises
     ------
@@ -85,7 +89,7 @@ _preparing = Lock()
 
 
 def _prepared(arm: general.GeneralArm) -> SsikArm:
-    """Return the arm as the solver has it; what it prepares is made once and tried."""
+    """Return the arm as prepared by the solver, once for each arm, and tested."""
     key = b"".join(part.tobytes() for part in arm)
     with _preparing:
         if key not in _ready:
@@ -100,7 +104,7 @@ def _prepared(arm: general.GeneralArm) -> SsikArm:
 
 
 def _end(arm: general.GeneralArm) -> Array:
-    """Return an end at zero whose origin and z-axis are the sixth joint's: no length behind it."""
+    """Return an end frame at zero on axis 6: its z-axis is the joint axis, its origin on it."""
     z = arm.along[5]
     x = np.eye(3)[np.argmin(np.abs(z))]
     x = x - (x @ z) * z
@@ -111,7 +115,7 @@ def _end(arm: general.GeneralArm) -> Array:
 
 
 def _require_solved(arm: general.GeneralArm, ready: SsikArm) -> None:
-    """Raise InputError unless joint vectors of all kinds are found again from their poses."""
+    """Raise InputError unless the solver recovers random joint vectors from their poses."""
     want = np.random.default_rng(1986).uniform(-np.pi, np.pi, (TRIED, 6))
     T, q = np.empty((TRIED, 4, 4)), np.empty((TRIED, general.POSTURES, 6))
     reach = np.empty(q.shape[:2], np.bool_)
@@ -121,6 +125,6 @@ def _require_solved(arm: general.GeneralArm, ready: SsikArm) -> None:
     missed = int((np.where(reach, apart, np.inf).min(axis=1) > FOUND).sum())
     if missed:
         raise InputError(
-            f"the solver ssik does not solve this arm: of {TRIED} joint vectors it did not find "
-            f"{missed} again from their poses, so that nothing can be planned with it"
+            f"the solver ssik does not solve this arm: it did not recover {missed} of {TRIED} "
+            "joint vectors from their poses, so nothing can be planned with this arm"
         )

@@ -1,4 +1,4 @@
-"""An external axis of which something is known: by a description, or by the library."""
+"""External axes from a robot description or the library, whose limits may be partly known."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from kerfpath.urdf import Description
 __all__ = ["Given", "KnownAxis", "described_axes", "require_known"]
 
 _LIMITS = {"lower": "", "upper": "", "velocity": "/s", "acceleration": "/s^2"}
-"""What bounds an axis, and what follows the unit of its values there."""
+"""Limits of an axis, and the suffix that each adds to the unit of the axis value."""
 
 
 class Given(TypedDict, total=False):
-    """What is said of an external axis in place of what is known, or beside it; as in `Travel`."""
+    """Values of an external axis that replace or complete the known ones; units as in `Travel`."""
 
     name: str
     lower: float
@@ -34,19 +34,19 @@ class Given(TypedDict, total=False):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class KnownAxis:
-    """An external axis with those of its limits that are known.
+    """An external axis and its limits, as far as they are known.
 
     Parameters
     ----------
     axis : ExternalAxis
     lower, upper : float m or rad, or None
-        Its range; None where it is not known.
+        Range of the axis; None where it is not known.
     velocity : float m/s or rad/s, or None
     acceleration : float m/s^2 or rad/s^2, or None
     endless : bool
-        Whether it turns without end; then its range does not apply.
+        Whether the axis turns without end; then its range does not apply.
     source : str
-        Who says so, for messages.
+        Where the limits come from, for messages.
     """
 
     axis: ExternalAxis
@@ -60,7 +60,7 @@ class KnownAxis:
     __repr__ = short_repr
 
     def placed(self, T: Array) -> KnownAxis:
-        """Return it where what it belongs to stands at T (4, 4), m."""
+        """Return the axis moved with its product from the robot base to pose T (4, 4) m."""
         T = as_pose(T, "place")
         axis = replace(
             self.axis,
@@ -80,13 +80,13 @@ class KnownAxis:
         endless: bool | None = None,
         step: float | None = None,
     ) -> tuple[ExternalAxis, Travel]:
-        """Return the axis and its travel: what is given, else what is known.
+        """Return the axis and its travel; given values (m, rad, s) replace the known ones.
 
         Raises
         ------
         InputError
-            A limit that is neither, or by what is known does not let it move; a range of an axis
-            that turns without end.
+            A limit is neither given nor known, or the known one does not let the axis move; or a
+            range is given for an axis that turns without end.
         """
         axis = replace(self.axis, name=name or self.axis.name, step=step)
         given = {"lower": lower, "upper": upper, "velocity": velocity, "acceleration": acceleration}
@@ -95,7 +95,8 @@ class KnownAxis:
             for key in ("lower", "upper"):
                 if given[key] is not None:
                     raise InputError(
-                        f"{axis.name}: it turns without end, got {key}=; give endless=False, too"
+                        f"{axis.name}: it turns without end, but got {key}=; remove it, or give "
+                        "endless=False too"
                     )
             given |= {"lower": -np.pi, "upper": np.pi}
         values: dict[str, float] = {}
@@ -107,15 +108,15 @@ class KnownAxis:
             if value is None and per and not known > 0:
                 what = f"its {key} is {known:g} {axis.unit}{per} in {self.source}"
                 raise InputError(
-                    f"{axis.name}: {what}, so that it cannot move; give {key}= ({axis.unit}{per})"
+                    f"{axis.name}: {what}, so it cannot move; give {key}= ({axis.unit}{per})"
                 )
             values[key] = known if value is None else value
         if values["lower"] == values["upper"] and (
             given["lower"] is None or given["upper"] is None
         ):
             raise InputError(
-                f"{axis.name}: it may only be at {values['lower']:g} {axis.unit} in {self.source}, "
-                f"so that it cannot move; give lower= and upper= ({axis.unit})"
+                f"{axis.name}: its lower and upper limit are both {values['lower']:g} {axis.unit} "
+                f"in {self.source}, so it cannot move; give lower= and upper= ({axis.unit})"
             )
         return axis, {
             "lower": values["lower"],
@@ -127,7 +128,7 @@ class KnownAxis:
 
 
 def described_axes(description: Description) -> tuple[KnownAxis, ...]:
-    """Return the external axes of a description, in its base, with the limits written there."""
+    """Return the external axes of a description in its base, with the limits written there."""
     return tuple(
         KnownAxis(
             axis=ExternalAxis(
@@ -151,7 +152,7 @@ def described_axes(description: Description) -> tuple[KnownAxis, ...]:
 
 
 def require_known(given: Mapping[str, Given], known: Iterable[KnownAxis], what: str) -> None:
-    """Raise InputError where something is given of an axis that is not there."""
+    """Raise InputError where `given` names an axis that is not among the known ones."""
     names = [each.axis.name for each in known]
     for name in given:
         if name not in names:

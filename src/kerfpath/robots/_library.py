@@ -1,4 +1,4 @@
-"""The robots that kerfpath knows, one TOML file each, with their sources and warnings."""
+"""The library of robots, one TOML file each, with their sources and notes."""
 
 from __future__ import annotations
 
@@ -25,26 +25,39 @@ _HERE = files("kerfpath.robots")
 
 @cache
 def robot_ids() -> tuple[str, ...]:
-    """Return the ids of all robots of the library, sorted."""
+    """Return the ids of all robots in the library, sorted."""
     names = (f.name for f in (_HERE / "library").iterdir())
     return tuple(sorted(n.removesuffix(".toml") for n in names if n.endswith(".toml")))
 
 
 @cache
 def acceleration_ratios() -> dict[str, tuple[float, ...]]:
-    """Return the named ratios of acceleration to velocity, 1/s, joints 1 to 6.
+    """Return the named ratios of acceleration to velocity, 1/s, for joints 1 to 6.
 
-    Stand-ins for robots whose maker publishes no accelerations; see the file for their source.
+    They serve for robots whose maker publishes no accelerations; the file gives their source.
     """
     text = (_HERE / "acceleration_ratios.toml").read_text(encoding="utf-8")
     return {name: tuple(values) for name, values in tomllib.loads(text).items()}
 
 
 def read_robot(kind: type[A], name: str, acceleration_ratio: str | None = None) -> A:
-    """Return a robot of the library by its id, see `kerfpath.robots.robot`."""
+    """Return a robot of the library by its id, as an instance of `kind`.
+
+    Parameters
+    ----------
+    kind : type
+        `Robot`, or a base of it.
+    name, acceleration_ratio
+        As in `kerfpath.robots.robot`.
+
+    Raises
+    ------
+    InputError
+        As `kerfpath.robots.robot`.
+    """
     if name not in robot_ids():
         raise InputError(
-            f"robot {name!r} is not in the library of {len(robot_ids())}; "
+            f"robot {name!r} is not in the library of {len(robot_ids())} robots; "
             f"{nearest(name, robot_ids())}; 'kerfpath robots' lists all"
         )
     data = tomllib.loads((_HERE / "library" / f"{name}.toml").read_text(encoding="utf-8"))
@@ -86,15 +99,18 @@ def read_robot(kind: type[A], name: str, acceleration_ratio: str | None = None) 
     ratios = acceleration_ratios()
     if acceleration_ratio not in ratios:
         raise InputError(
-            f"acceleration_ratio: {acceleration_ratio!r} is not one of {', '.join(ratios)}"
+            f"acceleration_ratio: expected one of {', '.join(ratios)}, got {acceleration_ratio!r}"
         )
     if (n := len(ratios[acceleration_ratio])) != found.joints:
         raise InputError(
-            f"acceleration_ratio: {acceleration_ratio!r} is for {n} joints, and {name!r} has "
+            f"acceleration_ratio: {acceleration_ratio!r} is for {n} joints, but robot {name!r} has "
             f"{found.joints}; give its accelerations with robot.with_limits(acceleration=...)"
         )
     if found.velocity is None:
-        raise InputError(f"robot {name!r}: its speeds are not known, so no ratio can apply to them")
+        raise InputError(
+            f"robot {name!r}: its joint velocities are not known, so acceleration_ratio cannot be "
+            "applied"
+        )
     return replace(
         found,
         acceleration=np.multiply(ratios[acceleration_ratio], found.velocity),
@@ -107,6 +123,6 @@ def _radians(values: list[float] | None) -> Array | None:
 
 
 def nearest(name: str, known: tuple[str, ...]) -> str:
-    """Say which of the names that are known are most like one."""
+    """Return the known names most similar to `name`, in words for messages."""
     near = get_close_matches(name, known, n=3, cutoff=0.4)
-    return f"nearest: {', '.join(near)}" if near else "nothing there is called like it"
+    return f"nearest: {', '.join(near)}" if near else "no id there is similar"

@@ -25,7 +25,7 @@ __all__ = ["Limited"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Limited(Burden):
-    """The data of a manipulator as `Robot` describes them, and what limits it."""
+    """The data of a manipulator and its limits; see `Robot` for the fields."""
 
     id: str
     geometry: dict[str, float]
@@ -78,8 +78,8 @@ class Limited(Burden):
         _set = object.__setattr__
         if self.kinematics not in FAMILIES:
             raise InputError(
-                f"robot {self.id!r}: kinematics {self.kinematics!r} is none of "
-                f"{', '.join(FAMILIES)}"
+                f"robot {self.id!r}: kinematics: expected one of {', '.join(FAMILIES)}, got "
+                f"{self.kinematics!r}"
             )
         n, arm, lengths = self.joints, self.family.joints, self.family.lengths
         if self.axis_3 not in AXIS_3:
@@ -97,7 +97,9 @@ class Limited(Burden):
         require_distinct_axes(self.id, self.externals, self.family.given is not None)
         if self.elbow_step is not None:
             if self.family.given is None:
-                raise InputError(f"robot {self.id!r}: no joint of it is free; remove elbow_step")
+                raise InputError(
+                    f"robot {self.id!r}: poses leave no joint of this arm free; remove elbow_step"
+                )
             _set(self, "elbow_step", scalar(self.elbow_step, "elbow_step", unit="rad", above=0.0))
         for coupling in self.couplings:
             floats(coupling.row, "coupling row", (n,))
@@ -112,57 +114,60 @@ class Limited(Burden):
 
     @property
     def family(self) -> Family:
-        """The kind of arm."""
+        """The kinematic family of the arm."""
         return FAMILIES[self.kinematics]
 
     @property
     def joints(self) -> int:
-        """Number of joints, n, with the external axes."""
+        """Number of joints n, external axes included."""
         return self.family.joints + len(self.externals)
 
     @property
     def free(self) -> Ints:
-        """Columns of q that a pose leaves free: the family's `given` joint, the external axes."""
+        """Columns of q that a pose leaves free: the family's `given` joint and external axes."""
         n, given = self.family.joints, self.family.given
         return np.array([*(() if given is None else (given,)), *range(n, self.joints)], np.int64)
 
     @property
     def free_names(self) -> str:
-        """What messages call the columns of `free`."""
+        """Names of the columns of `free` in messages."""
         return ", ".join(self.joint_names[i] for i in self.free)
 
     def require_no_free_joint(self, what: str) -> None:
-        """Raise InputError where poses leave a joint of the arm free, of what does not know it."""
+        """Raise InputError where poses leave a joint of the arm free, which `what` cannot handle.
+
+        `what` is the name of the feature in the message.
+        """
         if self.family.given is not None:
             name = self.joint_names[self.family.given]
             raise InputError(
-                f"{what} does not know arms of seven axes: poses leave {name} of robot "
+                f"{what} does not support seven-axis arms: poses leave {name} of robot "
                 f"{self.id!r} free"
             )
 
     @property
     def solved(self) -> Ints:
-        """Columns of q that follow from the pose, where those of `free` are known."""
+        """Columns of q that follow from the pose and the columns of `free`."""
         return np.setdiff1d(np.arange(self.joints), self.free)
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Unit of each joint: rad, m of a linear external axis."""
+        """Unit of each joint: rad, or m for a linear external axis."""
         return ("rad",) * self.family.joints + tuple(axis.unit for axis in self.externals)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """What messages call each joint: "joint 1" and so on, an external axis by its name."""
+        """Name of each joint in messages: "joint 1" and so on, or the external axis's name."""
         arm = tuple(f"joint {i + 1}" for i in range(self.family.joints))
         return arm + tuple(axis.name for axis in self.externals)
 
     @property
     def postures(self) -> int:
-        """Number of postures, P: mu runs from 0 to P - 1."""
+        """Number of postures P: mu runs from 0 to P - 1."""
         return len(self.family.postures)
 
     def joint_limits(self) -> turns.JointLimits:
-        """Return the position limits as the kernels take them.
+        """Return the position limits (rad, or m for a linear axis) in the form of the kernels.
 
         Raises
         ------
@@ -182,7 +187,7 @@ class Limited(Burden):
         )
 
     def turn_limits(self) -> turns.JointLimits:
-        """Return the limits that distinguish turns of solutions: a `given` joint is on its own.
+        """Return the limits that select the turns of solutions; columns of `free` count as endless.
 
         Raises
         ------
@@ -194,12 +199,14 @@ class Limited(Burden):
         return limits._replace(endless=endless)
 
     def speed_limits(self) -> tuple[Array, Array]:
-        """Return joint velocity (6,) rad/s and acceleration (6,) rad/s^2.
+        """Return the joint velocities (n,) rad/s and accelerations (n,) rad/s^2.
+
+        Those of a linear external axis are in m/s and m/s^2.
 
         Raises
         ------
         InputError
-            One of them is not known; says how to give it.
+            One of them is not known; the message says how to give it.
         """
         velocity = self.velocity_limits()
         if self.acceleration is None:
@@ -209,7 +216,7 @@ class Limited(Burden):
         return velocity, self.acceleration
 
     def velocity_limits(self) -> Array:
-        """Return the joint velocities (n,) rad/s.
+        """Return the joint velocities (n,) rad/s, or m/s for a linear external axis.
 
         Raises
         ------
@@ -221,24 +228,24 @@ class Limited(Burden):
         return self.velocity
 
     def torque_limit(self) -> TorqueLimit | None:
-        """Return what limits the torques; None where no load is given.
+        """Return the torque limit; None where no load is given.
 
         Raises
         ------
         InputError
             A load is given, but no robot description with a positive definite inertia of every
-            link, or no torque limits; or there is an external axis, or a seventh one.
+            link, or no torque limits; or the robot has an external axis or seven axes.
         """
         if self.load is None:
             return None
-        why = self.inertia_missing or "only a description (URDF) says what its links weigh"
+        why = self.inertia_missing or "the masses of its links come only from a description (URDF)"
         if self.externals:
             names = " and ".join(axis.name for axis in self.externals)
-            why = f"what {names} does to them is not known"
+            why = f"the effect of {names} on them is not known"
         elif self.free.size:
-            why = f"of an arm whose {self.free_names} is free limits on them are not kept yet"
+            why = f"torque limits of an arm whose {self.free_names} is free are not supported yet"
         if self.chain is None or self.inertia is None or self.free.size:
-            raise InputError(f"robot {self.id!r}: its torques are not known: {why}")
+            raise InputError(f"robot {self.id!r}: its torques cannot be computed: {why}")
         if self.torque is None:
             raise self._lacks("joint torques", "torque=")
         inertia = self.load.on(self.inertia, self.chain.end)
@@ -246,38 +253,38 @@ class Limited(Burden):
         return TorqueLimit(bound=self.torque, dynamics=dynamics)
 
     def jerk_limit(self) -> JerkLimit | None:
-        """Return what limits the jerks, nothing that of an external axis; None where none does."""
+        """Return the jerk limit, infinite for external axes; None where no jerks are known."""
         if self.jerk is None:
             return None
         free = np.full(self.joints - len(self.jerk), np.inf)
         return JerkLimit(bound=np.append(self.jerk, free))
 
     def bounds(self) -> tuple[Reason, ...]:
-        """Return the reasons for poses beyond a limit: low and high of each joint and coupling."""
+        """Return the loss reasons for limits: low and high of each arm joint and coupling."""
         names = [*self.joint_names[: self.family.joints], *(c.name for c in self.couplings)]
         return tuple(Reason(end, name) for name in names for end in (Loss.LOW, Loss.HIGH))
 
     def reasons(self) -> tuple[Reason, ...]:
-        """Return what each reason code of a dropped pose means, by code."""
+        """Return the meaning of each reason code of a dropped pose; the code is the index."""
         first = Reason(Loss.ADMITTED), Reason(Loss.UNREACHABLE)
         return (*first, *self.bounds(), Reason(Loss.UNWANTED))
 
     def require_few_turns(self) -> None:
-        """Raise InputError where the limits leave more turns than the kernels have room for.
+        """Require that the limits allow no more combinations of turns than the kernels can hold.
 
         Raises
         ------
         InputError
-            Limits that are not known, or that leave more: some would be lost.
+            The limits are not known, or they allow more combinations, of which some would be lost.
         """
         n, limits = self.family.joints, self.turn_limits()
         span = (limits.upper - limits.lower)[:n] / (2 * np.pi)
         number = np.where(limits.endless[:n], 1.0, np.floor(span) + 1).prod()
         if number > turns.MOST_TURNS:
             raise InputError(
-                f"robot {self.id!r}: its limits leave {number:g} combinations of turns, at most "
-                f"{turns.MOST_TURNS} are distinguished; call joints that turn without end endless, "
-                "or narrow their limits"
+                f"robot {self.id!r}: expected limits that allow at most {turns.MOST_TURNS} "
+                f"combinations of turns, got {number:g}; mark joints that turn without end as "
+                "endless, or narrow their limits"
             )
 
     def _require_order(self) -> None:
@@ -291,7 +298,7 @@ class Limited(Burden):
         if reversed_.size:
             i = int(reversed_[0])
             raise InputError(
-                f"robot {self.id!r}: limits of joint {i + 1} are reversed, lower "
+                f"robot {self.id!r}: the limits of joint {i + 1} are reversed: lower "
                 f"{np.degrees(self.lower[i]):g} deg is not below upper "
                 f"{np.degrees(self.upper[i]):g} deg"
             )
@@ -305,5 +312,5 @@ class Limited(Burden):
 
 
 def _for_each(value: ArrayLike, joints: int) -> ArrayLike:
-    """Return one number as that number for each joint; anything longer as it is."""
+    """Return a scalar repeated for each joint; any other array as it is."""
     return np.full(joints, value) if np.ndim(value) == 0 else value

@@ -1,4 +1,4 @@
-"""How low the joints of an arm are."""
+"""Height of the lowest joint of an arm."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from kerfpath.urdf import KinematicChain
 __all__ = ["lowest_joint"]
 
 FIRST = 3
-"""The elbow is at axis 3; what comes before is as high as the robot stands."""
+"""The first axis that counts, the elbow; the height of axes 1 and 2 does not depend on q."""
 AT_ONCE = 10_000
-"""Joint vectors whose rows are held at once: they stay in the cache."""
+"""Number of joint vectors processed at once, so that their data stay in the cache."""
 
 
 def lowest_joint(robot: Robot, q: Array) -> Array:
-    """Return the height (B,) m over the robot base of the lowest of elbow, wrist and flange.
+    """Return the height (B,) m of the lowest of elbow, wrist and flange at q (B, n) rad.
 
-    Of joint vectors q (B, n) rad: by the middles of the joints from axis 3 on, and of the flange;
-    over the base as it stands with every external axis at zero.
+    Heights are those of the origins of the joints from axis 3 on and of the flange, in the robot
+    base with every external axis at zero.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def lowest_joint(robot: Robot, q: Array) -> Array:
 
 
 def _lowest(chain: KinematicChain, robot: Robot, q: Array) -> Array:
-    # The third row of the pose of each frame in turn: its last entry is the height.
+    # Third row of the pose of one frame after the other; its last entry is the height.
     row = np.array(carried(robot.externals, q[:, robot.family.joints :], "robot")[:, 2])
     lowest = np.full(len(q), np.inf)
     for i, axis in enumerate(chain.axes):

@@ -1,4 +1,4 @@
-"""A manipulator: its closed-form kinematics in bulk."""
+"""A manipulator: kinematics of many joint vectors or poses at once."""
 
 from __future__ import annotations
 
@@ -21,12 +21,18 @@ __all__ = ["Manipulator"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Manipulator(Limited):
-    """A manipulator as `Robot` describes it, without the ways to read or change one."""
+    """The kinematics of a `Robot`, without the methods that read or change one."""
 
     def forward(self, q: ArrayLike) -> Array:
-        """Return the flange poses (..., 4, 4) in the robot base of joint vectors q (..., n) rad.
+        """Return the flange poses (..., 4, 4) m in the robot base at joint vectors q (..., n) rad.
 
-        The base is that at zero of the external axes, and the part's place at zero, too.
+        With external axes, poses are relative to the part: expressed in the robot base with all
+        external axes at zero, as if the part did not move.
+
+        Raises
+        ------
+        InputError
+            q has a wrong shape, or is not finite.
         """
         q = np.asarray(q, dtype=float)
         rows = floats(q.reshape(-1, q.shape[-1]) if q.ndim else q, "q", (None, self.joints))
@@ -49,7 +55,7 @@ class Manipulator(Limited):
         T : (4, 4) or (B, 4, 4)
             Flange poses, m.
         given : float or (B,) rad, optional
-            Of a seven-axis arm, and of no other: where joint 3 stands.
+            Value of joint 3 of a seven-axis arm; not allowed for other arms.
         within_limits : bool
             True: all postures, all turns inside the joint limits. False: all postures, joints in
             (-pi, pi], limits ignored.
@@ -57,7 +63,8 @@ class Manipulator(Limited):
         Raises
         ------
         InputError
-            A wrong shape, or limits that are not known.
+            A wrong shape; `given` missing or not allowed; limits that are not known or leave too
+            many turns; a robot with external axes (use `held`).
         """
         poses = np.asarray(T, dtype=float)
         poses = floats(poses[None] if poses.ndim == 2 else poses, "T", (None, 4, 4))
@@ -74,11 +81,16 @@ class Manipulator(Limited):
         return solutions_within(q, reach, self.turn_limits())
 
     def inverse_all(self, T: Array, given: Array | None = None) -> tuple[Array, Bools]:
-        """Return every posture of flange poses T (B, 4, 4), limits ignored, as bare arrays.
+        """Return the solutions of every posture for flange poses T (B, 4, 4) m, limits ignored.
 
-        q (B, P, n) in (-pi, pi], and reach (B, P): which of its rows are solutions. A family
-        without free rotation brings the flange's origin and z-axis there; one with a `given` joint
-        takes its angles (B,) rad.
+        Returns q (B, P, n) in (-pi, pi] and reach (B, P), which says which rows are solutions. A
+        family without free rotation matches only the flange's origin and z-axis; one with a `given`
+        joint needs its angles (B,) rad.
+
+        Raises
+        ------
+        InputError
+            `given` is missing or not allowed, or the robot has external axes.
         """
         self._require_given(given)
         if not self.family.free_rotation:
@@ -93,8 +105,8 @@ class Manipulator(Limited):
     def follow(self, T: Array, q: Array, posture: Ints) -> Array:
         """Return the joints (B, n) that bring the flange to T (B, 4, 4) on the branch of each q.
 
-        Each on the turn nearest to its q (B, n), whose postures (B,) are given; NaN where the
-        branch does not reach. A `given` joint stays where it is.
+        Each joint is on the turn nearest to q (B, n), whose postures (B,) are given; rows are NaN
+        where the branch does not reach the pose. A `given` joint keeps its value.
         """
         if self.family.follow_all is None:
             solved, reach = self.inverse_all(T, self.given_of(q))
@@ -106,9 +118,10 @@ class Manipulator(Limited):
         return found
 
     def nearest(self, T: Array, q: Array) -> Array:
-        """Return the joints (B, n) that bring the flange to T (B, 4, 4), next to each of q (B, n).
+        """Return the joints (B, n) rad nearest to q (B, n) that bring the flange to T (B, 4, 4).
 
-        Of any posture, each joint on the turn nearest to its q; NaN where there are none.
+        They may be of any posture, with each joint on the turn nearest to q; rows are NaN where
+        there is no solution.
         """
         if self.family.follow_all is not None:
             return self.follow(T, q, np.zeros(len(T), dtype=np.int64))
@@ -121,10 +134,15 @@ class Manipulator(Limited):
     def inverse_nodes(
         self, H: Array, gamma: Array, T_flange_tip: Array, given: Array | None = None
     ) -> tuple[Array, Bools]:
-        """Return every posture of task frames H (K, 4, 4) turned by each gamma (m,), with tool.
+        """Return the solutions of every posture for task frames H (K, 4, 4) m at each gamma (m,).
 
-        q (K, m, P, n) in (-pi, pi] and reach (K, m, P); frames in the robot base, limits ignored. A
-        family with a `given` joint takes its angles (K,) rad.
+        Returns q (K, m, P, n) in (-pi, pi] and reach (K, m, P). Frames are in the robot base, gamma
+        is in rad, and limits are ignored. A family with a `given` joint needs its angles (K,) rad.
+
+        Raises
+        ------
+        InputError
+            `given` is missing or not allowed, or the robot has external axes.
         """
         self._require_alone()
         T_tip_flange = np.linalg.inv(T_flange_tip)
@@ -147,11 +165,11 @@ class Manipulator(Limited):
 
     @property
     def flip(self) -> tuple[int, float] | None:
-        """The joint, 0-based, and the angle, rad, about which turning the wrist over mirrors it.
+        """The joint (from 0) that a wrist flip mirrors, and the angle (rad) about which it does.
 
-        The posture changes from 2 i to 2 i + 1 or back, and every other joint by a constant: a
-        motion and the one with the wrist turned over have increments of the same size. None where
-        a wrist is not spherical.
+        The posture changes from 2 i to 2 i + 1 or back, and every other joint changes by a
+        constant, so a motion and its flipped copy have increments of the same size. None where the
+        wrist is not spherical.
         """
         joint = self.family.flips
         if joint is None:
@@ -161,35 +179,35 @@ class Manipulator(Limited):
 
     @property
     def encloses(self) -> bool:
-        """Whether `enclose` proves where its joints are: a closed form, no external axis."""
+        """Whether `enclose` works: the family has proven bounds and there is no external axis."""
         return self.family.enclose_all is not None and not self.externals
 
     def enclose(
         self, frames: Array, node: Ints, gamma: Array, half: Array, T_flange_tip: Array
     ) -> Enclosure:
-        """Return where the joints of every posture may be on cells of gamma, proved.
+        """Return proven bounds on the joints of every posture over cells of gamma.
 
         Parameters
         ----------
         frames : (K, 4, 4) m
             Task frames in the robot base.
         node : (C,) int
-            Which of them each cell is of.
+            Index of the frame of each cell.
         gamma, half : (C,) rad
-            Middle and half-width of each cell, the latter at most 1.
+            Middle and half-width of each cell; half-widths are at most 1.
         T_flange_tip : (4, 4) m
             The tool.
 
         Raises
         ------
         InputError
-            A family without proven bounds, or an external axis, see `encloses`; cells of frames
-            that are not there, or with a half-width that is not a number from 0 to 1.
+            The family has no proven bounds or there is an external axis, see `encloses`; an index
+            of a frame is out of range, or a half-width is not a number from 0 to 1.
         """
         self._require_alone()
         if self.family.enclose_all is None:
             raise InputError(
-                f"robot {self.id!r}: no proven bounds are known for {self.family.words}"
+                f"robot {self.id!r}: its family ({self.family.words}) has no proven bounds"
             )
         require_cells(len(frames), node, gamma, half)
         if len(node) < len(frames):
@@ -203,21 +221,21 @@ class Manipulator(Limited):
         return Enclosure(**{k: freeze(a) for k, a in curves._asdict().items()})
 
     def arm(self) -> Any:
-        """Return the geometry as the family's kernels take it."""
+        """Return the geometry in the form of the family's kernels."""
         lengths = {k: float(self.geometry[k]) for k in self.family.lengths}
         if not lengths:
             return self.family.model(chain=self.chain, sign=self.sign, offset=self.offset)
         return self.family.model(**lengths, sign=self.sign, offset=self.offset)
 
     def _model_poses(self, T: Array) -> Array:
-        """Return flange poses (B, 4, 4) as poses of the model's end in its own base."""
+        """Return flange poses (B, 4, 4) as poses of the model's end in the model's base."""
         self._require_alone()
         if self._placed:
             T = np.linalg.inv(self.T_base_foot) @ T @ np.linalg.inv(self.T_end_flange)
         return np.array(T, order="C")
 
     def given_of(self, q: Array) -> Array | None:
-        """Return the angles (B,) of the joint that the inverse takes of q (B, n), if it does."""
+        """Return the `given` angles (B,) rad in q (B, n); None where no joint is `given`."""
         i = self.family.given
         return None if i is None else np.ascontiguousarray(q[:, i])
 
@@ -230,8 +248,8 @@ class Manipulator(Limited):
         if self.externals:
             names = ", ".join(axis.name for axis in self.externals)
             raise InputError(
-                f"inverse: with {names} a pose has solutions without end; ask "
-                "robot.held(x).inverse(T), x the values of the external axes"
+                f"inverse: with {names} a pose has infinitely many solutions; use "
+                "robot.held(x).inverse(T), where x are the values of the external axes"
             )
 
     def _require_given(self, given: Array | None) -> None:
@@ -239,8 +257,10 @@ class Manipulator(Limited):
         i = self.family.given
         if i is not None and given is None:
             raise InputError(
-                f"inverse: of {self.family.words} a pose has solutions without end; give where "
-                f"joint {i + 1} stands, as in robot.inverse(T, given=0.0)"
+                f"inverse: a pose has infinitely many solutions ({self.family.words}); give the "
+                f"value of joint {i + 1} (rad), as in robot.inverse(T, given=0.0)"
             )
         if i is None and given is not None:
-            raise InputError(f"inverse: given: {self.family.words} leaves no joint free; remove it")
+            raise InputError(
+                f"inverse: given=: poses leave no joint free ({self.family.words}); remove it"
+            )

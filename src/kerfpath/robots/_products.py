@@ -1,4 +1,4 @@
-"""The rails and positioners that kerfpath knows, one TOML file each, with their sources."""
+"""The library of rails and positioners, one TOML file each, with their sources."""
 
 from __future__ import annotations
 
@@ -34,10 +34,13 @@ class ExternalProduct:
     id, manufacturer, model : str
     payload : float kg
     axes : tuple of KnownAxis
-        In its own frame, z up: a rail runs along x; of a positioner the origin is on its floor,
-        and its tilt turns about x. Each carries the next. What no source says is None.
+        Axes in the product's own frame, z up; each carries the next. A rail runs along x; a
+        positioner has its origin on the floor and its tilt axis along x. Limits that no source
+        gives are None.
     notes : tuple of str
+        Remarks for the user.
     sources : mapping of str to str
+        Where the data come from.
     """
 
     id: str
@@ -52,7 +55,7 @@ class ExternalProduct:
 
     @property
     def axis_ids(self) -> tuple[str, ...]:
-        """What a job calls its axes: "kuka_dkp400.tilt"; the only one of a product by its id."""
+        """Names of the axes in a job, such as "kuka_dkp400.tilt"; a single axis has the id."""
         if len(self.axes) == 1:
             return (self.id,)
         return tuple(f"{self.id}.{known.axis.name}" for known in self.axes)
@@ -60,7 +63,7 @@ class ExternalProduct:
 
 @cache
 def external_ids() -> tuple[str, ...]:
-    """Return the ids of all rails and positioners of the library, sorted."""
+    """Return the ids of all rails and positioners in the library, sorted."""
     names = (f.name for f in _HERE.iterdir())
     return tuple(sorted(n.removesuffix(".toml") for n in names if n.endswith(".toml")))
 
@@ -76,11 +79,11 @@ def external(name: str) -> ExternalProduct:
     Raises
     ------
     InputError
-        An unknown one; the message names the nearest.
+        The id is unknown; the message names the nearest ones.
     """
     if name not in external_ids():
         raise InputError(
-            f"rail or positioner {name!r} is not in the library of {len(external_ids())}; "
+            f"{name!r} is not in the library of {len(external_ids())} rails and positioners; "
             f"{nearest(name, external_ids())}; 'kerfpath robots' lists all"
         )
     data = tomllib.loads((_HERE / f"{name}.toml").read_text(encoding="utf-8"))
@@ -120,7 +123,7 @@ def external(name: str) -> ExternalProduct:
 
 @cache
 def external_axes() -> dict[str, KnownAxis]:
-    """Return every axis of the library by what a job calls it."""
+    """Return every external axis of the library by its name in a job."""
     products = [external(name) for name in external_ids()]
     return {
         name: known

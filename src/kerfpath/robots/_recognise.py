@@ -1,9 +1,9 @@
-"""Recognise the family of an arm by the lines that its joints turn about.
+"""Recognise the kinematic family of an arm from its joint axes.
 
-The joint axes at angle zero suffice: the model is laid into them, its lengths are measured between
-them, and its angles at that pose become the joint offsets. The model is then compared with the
-chain of the description at random joint angles. An arm that is of no family with a closed form is
-"general", and its chain is its model.
+The joint axes at angle zero suffice: they give the lengths of the model, and the model's angles at
+that pose become the joint offsets. The model is then compared with the chain of the description at
+random joint angles. An arm that belongs to no family with a closed form is "general", and its chain
+is its model.
 """
 
 from __future__ import annotations
@@ -24,33 +24,35 @@ from kerfpath.urdf import KinematicChain
 __all__ = ["EXACT", "in_closed_form", "recognise"]
 
 EXACT = 1e-9
-"""m, and entries of a rotation: how far a model may be from the description it stands for."""
+"""m and rotation entries: largest difference between a model and its description."""
 NEARLY = 1e-3
-"""m, and sine: how far lines may miss each other for a family to be tried at all."""
+"""m and sine: largest distance or angle between axes for a family to be tried."""
 NONE = 1e-12
-"""Below this a transform is the identity: rounding has left it."""
+"""A transform that differs from the identity by less than this rounding error is the identity."""
 ROUNDED = 1e-4
-"""A model no further off than this is meant, and the description's angles have few digits."""
+"""Difference up to which a family is assumed to be meant and the description to be rounded."""
 POSES = 64
+"""Number of random poses at which model and description are compared."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Lines:
     """The joint axes of an arm at angle zero, in the frame of its foot.
 
-    The foot stands on axis 1, nearest to the base origin, z along axis 1 and up, x near that of
-    the base.
+    The foot is the point of axis 1 nearest to the base origin, with z along axis 1 and up, and x
+    near that of the base.
     """
 
     foot: Array
-    """(4, 4) in the base, m."""
+    """(4, 4) m: the foot frame in the base."""
     place: Array
     """(n, 3) m: a point of each axis."""
     along: Array
     """(n, 3): direction of each axis."""
     tip: Array
-    """(4, 4) m."""
+    """(4, 4) m: the tip frame in the foot frame."""
     sign_1: float
+    """-1 where joint 1 turns about -z of the foot frame, otherwise +1."""
 
     def meet(self, i: int, j: int) -> Array:
         """Return the point (3,) of axis i nearest to axis j."""
@@ -63,7 +65,7 @@ class _Lines:
         return float(np.linalg.norm(np.cross(point - self.place[i], self.along[i])))
 
     def misfit(self, parallel: Sequence[int], square: Sequence[int]) -> str:
-        """Return in words the first joint i that is not parallel, or square, to joint i + 1."""
+        """Say which axes i and i + 1 are not parallel, or not square, as given; "" if all are."""
         for i in parallel:
             if float(np.linalg.norm(np.cross(*self.along[i : i + 2]))) > NEARLY:
                 return f"axes {i + 1} and {i + 2} are not parallel"
@@ -74,7 +76,7 @@ class _Lines:
 
 
 def in_closed_form(chain: KinematicChain) -> bool:
-    """Return whether a chain is of a family with a closed form that descriptions are read as."""
+    """Return whether a chain matches a closed-form family that descriptions can be read as."""
     lines = _lines(chain)
     return any(
         not isinstance(derived := derive(lines), str)
@@ -90,18 +92,19 @@ def recognise(chain: KinematicChain, *, as_written: bool = False) -> Manipulator
     ----------
     chain : KinematicChain
     as_written : bool
-        Take for a general arm what misses a closed form by few digits.
+        Take a six-axis arm that misses a closed form only by rounding as a general arm.
 
     Raises
     ------
     InputError
-        Neither six nor seven joints; a closed form that few digits miss; no solver for the others,
-        or an arm of seven axes without a spherical shoulder and wrist.
+        The chain has neither six nor seven joints; it misses a closed form only by rounding; the
+        solver of general arms is not installed; or it is a seven-axis arm without a spherical
+        shoulder and wrist.
     """
     n = len(chain.axes)
     if n not in DERIVED:
         raise InputError(
-            f"expected 6 or 7 joints between base and tip, got {n}: such arms are not recognised "
+            f"expected 6 or 7 joints between base and tip, got {n}: other arms are not recognised "
             "from descriptions"
         )
     lines, misfits = _lines(chain), []
@@ -109,24 +112,24 @@ def recognise(chain: KinematicChain, *, as_written: bool = False) -> Manipulator
         derived = derive(lines)
         words = FAMILIES[name].words
         if isinstance(derived, str):
-            misfits.append(f"not an {words}, as {derived}")
+            misfits.append(f"not an {words}, because {derived}")
             continue
         model = _fit_end(name, lines, *derived)
         miss = _miss(chain, model)
         if miss <= EXACT:
             return model
-        misfits.append(f"not an {words}, which it misses by {miss:.1e} (m and rad)")
+        misfits.append(f"not an {words}, from which it differs by {miss:.1e} (m and rad)")
         if miss > ROUNDED or (as_written and n == 6):
             continue
         raise InputError(
-            f"nearly an {words}, but {miss:.1e} off (m and rad, allowed {EXACT:g}); write its "
-            "axes and lengths with more digits"
-            + (", or take the arm as it is written with snap=0" if n == 6 else "")
+            f"nearly an {words}, but it differs by {miss:.1e} (m and rad, at most {EXACT:g} is "
+            "allowed); write its axes and lengths with more digits"
+            + (", or read the arm as written with snap=0" if n == 6 else "")
         )
     if n == 7:
         raise InputError(
-            f"{'; '.join(misfits)}: no other arms of seven axes are planned; where the first joint "
-            "carries the arm, the link that the arm stands on is named as mount"
+            f"{'; '.join(misfits)}: other seven-axis arms are not supported. If the first joint is "
+            "an external axis, name the link that the arm is mounted on as mount"
         )
     try:
         require_solver()
@@ -158,14 +161,14 @@ def _lines(chain: KinematicChain) -> _Lines:
 def _opw(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
     """Return lengths, signs and model angles at zero, or why the axes are not those of an OPW arm.
 
-    Directions are chosen such that a1, c3 and c4 are not negative; c2 never is.
+    Directions are chosen so that a1, c3 and c4 are not negative; c2 never is.
     """
     if misfit := at.misfit(parallel=(1,), square=(0, 2, 3, 4)):
         return misfit
     wrist = at.meet(4, 3)
     off = max(at.distance(wrist, 3), at.distance(wrist, 5))
     if off > NEARLY:
-        return f"axes 4, 5 and 6 do not meet in a point, by {off * 1e3:.3g} mm"
+        return f"axes 4, 5 and 6 miss a common point by {off * 1e3:.3g} mm"
     z = np.array([0.0, 0.0, 1.0])
     y, sign_2 = _turned(at.along[1], lambda y: float(at.place[1] @ np.cross(y, z)))
     x = np.cross(y, z)
@@ -199,8 +202,8 @@ def _opw(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
 def _ur(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
     """Return lengths, signs and model angles at zero, or why the axes are not those of a UR.
 
-    Directions are chosen such that d4, d5 and d6 are not negative; a2 and a3 always are, as the
-    maker has them.
+    Directions are chosen so that d4, d5 and d6 are not negative; a2 and a3 always are negative, as
+    in the maker's tables.
     """
     if misfit := at.misfit(parallel=(1, 2), square=(0, 3, 4)):
         return misfit
@@ -211,7 +214,7 @@ def _ur(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
     apart = (abs(x @ at.place[1]), at.distance(fourth, 3), at.distance(fifth, 5))
     for (i, j), off in zip(((1, 2), (4, 5), (5, 6)), apart, strict=True):
         if off > NEARLY:
-            return f"axes {i} and {j} do not meet, by {off * 1e3:.3g} mm"
+            return f"axes {i} and {j} miss each other by {off * 1e3:.3g} mm"
     flat = np.array([x, z])
     upper, fore = np.diff(at.place[1:4] @ flat.T, axis=0)
     e5, sign_5 = _turned(at.along[4], lambda e: float(e @ (fifth - fourth)))
@@ -235,7 +238,7 @@ def _ur(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
 def _srs(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
     """Return lengths, signs and model angles at zero, or why the axes are not those of S-R-S.
 
-    Directions are chosen such that c2, c3 and c4 are not negative.
+    Directions are chosen so that c2, c3 and c4 are not negative.
     """
     if misfit := at.misfit(parallel=(), square=range(6)):
         return misfit
@@ -243,7 +246,7 @@ def _srs(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
     for centre, i in zip(centres, (1, 3, 5), strict=True):
         off = max(at.distance(centre, i - 1), at.distance(centre, i + 1))
         if off > NEARLY:
-            return f"axes {i}, {i + 1} and {i + 2} do not meet in a point, by {off * 1e3:.3g} mm"
+            return f"axes {i}, {i + 1} and {i + 2} miss a common point by {off * 1e3:.3g} mm"
     steps = np.diff([*centres, at.tip[:3, 3]], axis=0)
     z, y = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
     signs, zero, lengths = [at.sign_1], [], [centres[0][2]]
@@ -251,7 +254,7 @@ def _srs(at: _Lines) -> tuple[dict[str, float], list[float], list[float]] | str:
         before_y, before_z = y, z
         y, sign_y = _turned(at.along[i], partial(_along, before_y))
         z, sign_z = _turned(at.along[i + 1], partial(_along, step), partial(_along, before_z))
-        # What turns about z takes the y of before to this one, what turns about y the z.
+        # The turn about z takes the previous y to this y; the turn about y takes z to z.
         zero.append(np.arctan2(before_z @ np.cross(before_y, y), before_y @ y))
         zero.append(np.arctan2(y @ np.cross(before_z, z), before_z @ z))
         signs += [sign_y, sign_z]
@@ -265,9 +268,10 @@ def _along(one: Array, other: Array) -> float:
 
 
 def _turned(direction: Array, *wanted: Callable[[Array], float]) -> tuple[Array, float]:
-    """Return a direction or its opposite, and which: whatever makes `wanted` of it positive.
+    """Return a direction or its opposite, and the sign, so that `wanted` of it is positive.
 
-    The first of the functions that is not zero decides; after them, the larger x and then y.
+    The first of the functions that is not zero decides; if all are zero, then y, x or z, the first
+    of them that is not zero, is made positive.
     """
     values = [*(want(direction) for want in wanted), *direction[[1, 0, 2]]]
     sign = 1.0 if next(value for value in values if abs(value) > NEARLY) > 0 else -1.0
@@ -277,7 +281,7 @@ def _turned(direction: Array, *wanted: Callable[[Array], float]) -> tuple[Array,
 def _fit_end(
     family: str, at: _Lines, lengths: dict[str, float], signs: list[float], zero: list[float]
 ) -> Manipulator:
-    """Return the model with the last joint and the end turned onto the tip."""
+    """Return the model with the last joint's offset and the end frame fitted to the tip."""
     model = Manipulator(
         id="",
         kinematics=family,
@@ -303,7 +307,7 @@ def _miss(chain: KinematicChain, model: Manipulator) -> float:
 
 
 def _round(value: float) -> float:
-    """Return the number without the last digits, which only rounding has written."""
+    """Return the number without its last digits, which are only rounding."""
     return round(value, 13) + 0.0
 
 
@@ -312,4 +316,4 @@ def _tidy(T: Array) -> Array:
 
 
 DERIVED = {6: (("opw", _opw), ("ur", _ur)), 7: (("srs", _srs),)}
-"""By number of joints the families with a closed form, and what lays each into lines of an arm."""
+"""For each number of joints, the closed-form families and the function that fits each to axes."""

@@ -1,4 +1,4 @@
-"""A robot: an arm as the library or a description has it, alone or with external axes."""
+"""A robot: an arm from the library or a description, alone or with external axes."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ NOTHING_GIVEN: Mapping[str, Given] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Robot(Manipulator):
-    """An arm of one of the families, its limits and where they come from.
+    """An arm of one of the kinematic families, its limits and where they come from.
 
-    Joint vectors follow the robot's own description (its URDF where `frames` says so), in its
-    order; poses are of the flange in the robot base, z along the last axis and out of the flange.
-    Of a seven-axis arm a pose leaves joint 3 free, as it does external axes; plans choose it.
+    Joint vectors have the order and zeros of the robot's own description (its URDF where `frames`
+    says so). Poses are those of the flange in the robot base, with z along the last axis and out of
+    the flange. A pose leaves joint 3 of a seven-axis arm free, like external axes; plans choose it.
 
     Parameters
     ----------
@@ -46,19 +46,17 @@ class Robot(Manipulator):
     kinematics : {"opw", "ur", "five", "srs", "general"}
         The family, see `kerfpath.robots.FAMILIES`.
     geometry : mapping
-        Its lengths, m: a1, a2, b, c1, c2, c3, c4 (Brandstoetter, Angerer and Hofbaur 2014; of a
-        five-axis arm c4 is that of the head's flange at q5 = 0, along the forearm), or
-        d1, a2, a3, d4, d5, d6 (Denavit and Hartenberg's, as Universal Robots publishes them);
-        c1, c2, c3, c4 from foot to shoulder, elbow, wrist and flange of a seven-axis arm; of a
-        general arm none, its `chain` says all.
-    sign : (n,)
-        +1 or -1, and
-    offset : (n,) rad
-        with q_model = sign * q - offset.
+        Lengths, m. "opw" and "five": a1, a2, b, c1, c2, c3, c4 (Brandstoetter, Angerer and Hofbaur
+        2014; for a five-axis arm c4 runs along the forearm to the head's flange at q5 = 0). "ur":
+        d1, a2, a3, d4, d5, d6 (Denavit-Hartenberg, as Universal Robots publishes them). "srs": c1,
+        c2, c3, c4 from foot to shoulder, elbow, wrist and flange. "general": none, see `chain`.
+    sign : (arm joints,)
+        +1 or -1: q_model = sign * q - offset.
+    offset : (arm joints,) rad
     T_base_foot, T_end_flange : (4, 4) m
-        Where the model stands in the robot base, and the flange in the model's own end frame.
+        Pose of the model in the robot base, and of the flange in the model's own end frame.
     lower, upper : (n,) rad or None
-        Joint limits; None when they are not known, and then nothing is planned.
+        Joint limits; None when they are not known, and then nothing can be planned.
     velocity : (n,) rad/s or None
         Largest joint speeds.
     acceleration : (n,) rad/s^2 or None
@@ -66,36 +64,36 @@ class Robot(Manipulator):
     jerk : (arm joints,) rad/s^3 or None
         Largest joint jerks; plans keep them where they are known.
     torque : (arm joints,) N m or None
-        Largest joint torques; plans keep them where there is a load.
+        Largest joint torques; plans keep them where a load is given.
     endless : (n,) bool
         Joints that turn without end; their limits do not apply.
     couplings : tuple of Coupling
         Bounds on combinations of joints.
     axis_3 : {"", "serial", "horizontal"}
         What axis 3 of the controller measures: joint 3, or the upper arm from the horizontal; ""
-        where it is not known, and then no program that says axis 3 is written.
-    chain : Chain, optional
-        The joint frames of the description that the robot comes from: the audit's kinematics.
-    bodies : tuple of Body
+        means not known, and then no program that contains axis 3 is written.
+    chain : KinematicChain, optional
+        The joint frames of the robot's description; the audit uses them as its kinematics.
+    bodies : tuple of LinkBody
         Collision bodies of that description.
     inertia : ChainInertia, optional
-        What the joints of that description carry, and
+        Masses and inertias that the joints of that description carry.
     inertia_missing : str
-        why it is not known.
+        Why the inertia is not known; empty where it is.
     load : Load, optional
-        What the flange carries; with it torques are known and limited, see `with_load`.
+        Load on the flange; with it torques are computed and limited, see `with_load`.
     gravity : (3,) m/s^2
-        In the robot base; default: that of a robot that stands upright.
+        Gravity in the robot base; default: an upright robot.
     externals : tuple of ExternalAxis
-        Rails and positioners: joints more, the last of q and of the limits. See `on_rail`.
+        Rails and positioners; they are the last columns of q and of the limits. See `on_rail`.
     elbow_step : float rad, optional
-        Of a seven-axis arm: the largest step of the samples of joint 3 where the exact search takes
+        For a seven-axis arm: largest step between samples of joint 3 where the exact search takes
         it on a grid, see `with_elbow_step`.
 
     Raises
     ------
     InputError
-        Limits reversed, a speed that is not positive, a length missing, an unknown family.
+        Limits are reversed, a speed is not positive, a length is missing, or the family is unknown.
     """
 
     @classmethod
@@ -118,28 +116,30 @@ class Robot(Manipulator):
     ) -> Robot:
         """Return the robot of a description, its family recognised from the joint axes.
 
-        The model that is derived has been compared with the description: 1e-9 m and rad.
+        The derived model agrees with the description to 1e-9 m and rad.
 
         Parameters
         ----------
         path, base, tip, mount, part, packages, meshes, snap
-            As in `kerfpath.urdf.read_urdf`. Poses of the robot are of link `tip` in link `base`,
-            with all external axes at zero, those before `mount` and under `part`. Without snap, an
-            arm that has a family by its angles rounded is refused; 0 keeps it.
+            As in `kerfpath.urdf.read_urdf`. Poses of the robot are those of link `tip` in link
+            `base` with all external axes, before `mount` and under `part`, at zero. Without snap,
+            an arm that fits a family only with rounded angles is refused; 0 keeps its angles.
         externals : mapping of joint to Given
-            Of external axes: lower, upper, velocity, acceleration (m, rad, s), endless, instead of
-            what is written there, name instead of the joint's, and step. None: the arm alone.
+            Values of external axes that replace those of the description: lower, upper, velocity,
+            acceleration (m, rad, s), endless, name; and step. None: read the arm alone.
         manufacturer, axis_3, axis_3_limits : str, str, (2,) rad
-            Whose controller moves it; what its axis 3 measures and, if "horizontal", its limits as
-            shown there; default: as a robot of the library with the same lengths has it.
+            Maker of the controller; what its axis 3 measures; and, if "horizontal", the limits that
+            it shows. Default: as a robot of the library with the same lengths.
         **limits : (n,) rad, rad/s, rad/s^2, rad/s^3, N m
-            lower, upper, velocity, acceleration, jerk, torque, endless: instead of what is written
-            there; few descriptions state accelerations and jerks. Continuous joints are endless.
+            lower, upper, velocity, acceleration, jerk, torque, endless replace those of the
+            description; few descriptions give accelerations and jerks. Continuous joints are
+            endless.
 
         Raises
         ------
         InputError
-            A bad description; a chain of no family; limits that are missing or zero, and not given.
+            The description is faulty, its chain belongs to no family, or a limit is missing or zero
+            and not given.
         """
         description = read_description(
             path,
@@ -165,16 +165,17 @@ class Robot(Manipulator):
         return arm._with_known(described_axes(description), externals, f"{description.path}")
 
     def to_urdf(self) -> str:
-        """Return a description (URDF) of its joints, limits and external axes, without bodies.
+        """Return a description (URDF) of the joints, limits and external axes, without bodies.
 
-        Links are base_link, link_1 and so on, and tool0, the flange; with external axes ground, on
-        which base_link stands, each axis's carriage, and part: `from_urdf` reads it with tip
-        "tool0", mount "base_link" and, where an axis carries the part, part "part".
+        Links are base_link, link_1 and so on, and tool0, the flange. With external axes there are
+        also ground, the root link, a carriage for each axis, and part. `from_urdf` reads
+        it with tip "tool0", mount "base_link" and, where an axis carries the part, part "part".
 
         Raises
         ------
         InputError
-            Couplings, which a URDF cannot say; limits or velocities that are not known.
+            The robot has couplings, which a URDF cannot express, or its limits or velocities are
+            not known.
         """
         return urdf_of(self)
 
@@ -205,18 +206,18 @@ class Robot(Manipulator):
         return replace(self, **changes)  # type: ignore[arg-type]  # cast by __post_init__
 
     def with_load(self, load: Load, *, gravity: ArrayLike = STANDARD_GRAVITY) -> Robot:
-        """Return this robot with a load on its flange, so that its torques are known and limited.
+        """Return this robot with a load on its flange, so that its torques are limited.
 
         Parameters
         ----------
         load : Load
         gravity : (3,) m/s^2
-            In the robot base.
+            Gravity in the robot base.
 
         Raises
         ------
         InputError
-            What the links weigh or what torques the joints bear is not known, see `torque_limit`.
+            The inertia of the links or the torque limits are not known, see `torque_limit`.
         """
         loaded = replace(self, load=load, gravity=gravity)  # type: ignore[arg-type]  # is cast
         loaded.torque_limit()
@@ -225,19 +226,20 @@ class Robot(Manipulator):
     def with_elbow_step(self, step: float) -> Robot:
         """Return this robot with joint 3 sampled in steps of at most `step` rad on a grid.
 
-        Methods "exact", "paper" and "known" need it of a seven-axis arm.
+        Methods "exact", "paper" and "known" need it for a seven-axis arm.
 
         Raises
         ------
         InputError
-            An arm whose poses leave no joint free; a step that is not positive.
+            Poses leave no joint of the arm free, or the step is not positive.
         """
         return replace(self, elbow_step=step)
 
     def on_rail(self, direction: ArrayLike, **travel: Unpack[Travel]) -> Robot:
         """Return this robot with its base on a rail along `direction` (3,).
 
-        Keywords lower, upper, velocity, acceleration (m, m/s, m/s^2), step, name ("rail").
+        Keywords: lower, upper, velocity, acceleration (m, m/s, m/s^2), step (m), name ("rail").
+        Raises as `with_external`.
         """
         axis = ExternalAxis(
             name=travel.get("name", "rail"),
@@ -251,8 +253,9 @@ class Robot(Manipulator):
     def with_positioner(self, axis: ArrayLike, point: ArrayLike, **travel: Unpack[Travel]) -> Robot:
         """Return this robot with a part that turns about `axis` (3,) through `point` (3,) m.
 
-        Keywords lower, upper, velocity, acceleration (rad, rad/s, rad/s^2), endless, step, name
-        ("positioner"). Of a turn-tilt positioner the tilt comes first.
+        Keywords: lower, upper, velocity, acceleration (rad, rad/s, rad/s^2), endless, step (rad),
+        name ("positioner"). Add the tilt axis of a turn-tilt positioner first. Raises as
+        `with_external`.
         """
         turned = ExternalAxis(
             name=travel.get("name", "positioner"),
@@ -265,13 +268,15 @@ class Robot(Manipulator):
         return self.with_external(turned, **travel)
 
     def with_external(self, axis: ExternalAxis, **travel: Unpack[Travel]) -> Robot:
-        """Return this robot with one more external axis, carried by those of its side before it.
+        """Return this robot with one more external axis; `travel` gives its range and limits.
+
+        The axis is carried by those added before it that carry the same thing, robot or part.
 
         Raises
         ------
         InputError
-            Limits of the arm that are not known; more than three such axes, or two of one name; an
-            endless axis that is linear.
+            Limits of the arm are not known; the robot would have more than three external axes, or
+            two of the same name; or a linear axis is endless.
         """
         endless = travel.get("endless", False)
         if endless and axis.kind == "linear":
@@ -296,17 +301,17 @@ class Robot(Manipulator):
         Parameters
         ----------
         product : ExternalProduct
-            As `kerfpath.external` has it.
+            From `kerfpath.external`.
         place : (4, 4) m
-            Where it stands in the robot base, with all external axes at zero.
+            Pose of the product in the robot base, with all external axes at zero.
         given : mapping of axis to Given
-            What the library does not know, or knows otherwise: lower, upper, velocity, acceleration
-            (m, rad, s), endless; name, step.
+            Values that complete or replace those of the library: lower, upper, velocity,
+            acceleration (m, rad, s), endless, name, step.
 
         Raises
         ------
         InputError
-            A limit that is neither known nor given; an axis that it does not have; as
+            A limit is neither known nor given; the product does not have a named axis; and as
             `with_external`.
         """
         placed = [known.placed(np.asarray(place)) for known in product.axes]
@@ -315,7 +320,7 @@ class Robot(Manipulator):
     def _with_known(
         self, known: Sequence[KnownAxis], given: Mapping[str, Given], what: str
     ) -> Robot:
-        """Return this robot with external axes of which something is known, and more is given."""
+        """Return this robot with known external axes, completed by the given values."""
         require_known(given, known, what)
         more = [each.completed(**given.get(each.axis.name, {})) for each in known]
         require_distinct_axes(self.id, [*self.externals, *(axis for axis, _ in more)])
@@ -325,7 +330,7 @@ class Robot(Manipulator):
         return robot
 
     def alone(self) -> Robot:
-        """Return the arm without its external axes, standing where it does at zero."""
+        """Return the arm without its external axes, placed as with all of them at zero."""
         if not self.externals:
             return self
         n = self.family.joints
@@ -342,17 +347,17 @@ class Robot(Manipulator):
         )
 
     def held(self, x: ArrayLike) -> Robot:
-        """Return the arm alone, standing against the part as with its external axes at x (E,).
+        """Return the arm alone, placed relative to the part as with its external axes at x.
 
         Parameters
         ----------
-        x : (E,) rad; m of a linear axis
-            One number will do where there is one axis.
+        x : (E,) rad, or m for a linear axis
+            Values of the external axes; a single number where there is one axis.
 
         Raises
         ------
         InputError
-            It has no external axis, or another number of them.
+            The robot has no external axis, or another number of them.
         """
         if not self.externals:
             raise InputError(f"robot {self.id!r}: it has no external axis to be held")
@@ -361,9 +366,9 @@ class Robot(Manipulator):
         if chain is not None:
             origins = np.concatenate([T @ chain.origins[:1], chain.origins[1:]])
             chain = replace(chain, origins=origins)
-        # A family without lengths has the chain for its model: that has been moved already.
+        # A family without lengths uses the chain as its model, which has been moved already.
         foot = T @ self.T_base_foot if self.family.lengths else self.T_base_foot
-        # Seen from the part; what carries the robot turns the arm in gravity as it does.
+        # Gravity as seen from the part: only the axes that carry the part turn it.
         part = np.array([axis.carries == "part" for axis in self.externals])
         gravity = base_in_part(self.externals, np.where(part, at, 0.0))[:3, :3] @ self.gravity
         return replace(self.alone(), T_base_foot=foot, chain=chain, gravity=gravity)
@@ -382,7 +387,8 @@ def robot(name: str, *, acceleration_ratio: str | None = None) -> Robot:
     Raises
     ------
     InputError
-        An unknown robot or ratio; the message names the nearest ones.
+        The robot or the ratio is unknown (the message names the nearest robots), the ratio is for
+        another number of joints, or the robot's velocities are not known.
     """
     return read_robot(Robot, name, acceleration_ratio)
 

@@ -1,4 +1,4 @@
-"""Solutions of the inverse kinematics: the postures and turns of each pose in one table."""
+"""Solutions of the inverse kinematics: postures and turns of many poses in one table."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Solutions:
     q : (N, n) rad
         Joint vectors.
     pose : (N,) int
-        Which of the B poses each row solves, increasing.
+        Index of the pose that each row solves, in increasing order.
     posture : (N,) int
         Posture mu of each row; see `Family.postures`.
     turn : (N, n) int
-        How many turns of 2 pi each joint is away from (-pi, pi].
+        Number of turns of 2 pi that each joint is away from (-pi, pi].
     """
 
     q: Array
@@ -41,7 +41,7 @@ class Solutions:
 
 
 def all_solutions(q: Array, reach: Bools) -> Solutions:
-    """Return the rows of q (B, P, n) that `reach` (B, P) has for solutions, limits ignored."""
+    """Return the rows of q (B, P, n) that `reach` (B, P) marks as solutions, limits ignored."""
     pose, posture = np.nonzero(reach)
     found = q[reach]
     turn = np.zeros(found.shape, dtype=np.int64)
@@ -49,7 +49,7 @@ def all_solutions(q: Array, reach: Bools) -> Solutions:
 
 
 def solutions_within(q: Array, reach: Bools, limits: turns.JointLimits) -> Solutions:
-    """Return every turn within the limits of the rows of q (B, P, n) that `reach` (B, P) has."""
+    """Return all turns within the limits of the rows of q (B, P, n) that `reach` (B, P) marks."""
     B, P, n = q.shape
     q, reach = q[:, None], reach[:, None]  # one node a pose, one sample of gamma
     count, reason = np.empty(B, np.int64), np.empty(reach.shape, np.uint8)

@@ -1,8 +1,8 @@
-"""ssik, the solver of six-axis arms without a closed form here: in this process or in another.
+"""Interface to ssik, the solver of general six-axis arms, in this process or in another.
 
-It holds the interpreter lock while it solves, so that many poses go to a process of their own:
-this file run as a program, which needs nothing of kerfpath. What is taken of ssik beside its public
-classes are the two functions behind the programs that `ssik build` writes, five times faster than
+ssik holds the interpreter lock while it solves, so many poses are solved in a separate process:
+this file run as a program, which imports nothing of kerfpath. Besides the public classes of ssik it
+uses the two functions behind the programs that `ssik build` writes; they are five times faster than
 `Manipulator.solve`.
 """
 
@@ -22,22 +22,22 @@ Array = NDArray[np.float64]
 
 GENERAL = "ikgeo.general_6r"
 A_PROCESS = 4000
-"""Poses worth a process: some two seconds of work against half a second to start it."""
+"""Poses for which a process pays off: about 2 s of work against 0.5 s to start it."""
 
 
 class SsikArm(NamedTuple):
-    """An arm as ssik takes it: its joint frames at angle zero, and an elimination done once."""
+    """An arm in the form of ssik: joint frames at angle zero, and an elimination computed once."""
 
     trafos: Array
     """(7, 4, 4): each joint frame in the one before it, and the end in the last."""
     axes: Array
-    """(6, 3)"""
+    """(6, 3): direction of each joint axis in its frame."""
     elimination: Any
-    """Of an arm without intersecting or parallel axes that would spare it."""
+    """The prepared elimination, for arms without intersecting or parallel axes; otherwise None."""
 
 
 def prepare(trafos: Array, axes: Array) -> SsikArm:
-    """Prepare an arm: seconds to minutes of algebra, which ssik keeps in the user's cache."""
+    """Prepare an arm: algebra of seconds to minutes, which ssik keeps in the user's cache."""
     from ssik import Manipulator
     from ssik._native import native_available, rr_native_geometry
 

@@ -1,4 +1,4 @@
-"""A robot as a description (URDF): its joints, their limits, and the external axes around them."""
+"""Write a robot as a description (URDF): its joints, limits and external axes."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from kerfpath.urdf import Joint, urdf_text
 __all__ = ["joint_identifiers", "urdf_of"]
 
 GROUND, BASE, FLANGE, PART = "ground", "base_link", "tool0", "part"
-"""Links: where the base stands at zero of all axes; the base; the flange; what carries the part."""
+"""Names of links: the base at zero of all external axes; the base; the flange; the part."""
 REMARK = (
-    "Lengths in m, angles in rad, from kerfpath. An effort of 0 is not known. tool0 is the flange."
+    "Lengths in m, angles in rad, from kerfpath. An effort of 0 means not known. tool0 is the "
+    "flange."
 )
 
 
 def joint_identifiers(robot: Manipulator) -> list[str]:
-    """Return what descriptions and ROS trajectories call the joints, in the order of q.
+    """Return the joint names in descriptions and ROS trajectories, in the order of q.
 
-    joint_1 and so on, and external axes by their names, made identifiers.
+    They are joint_1 and so on; external axes have their own names, made into identifiers.
     """
     arm = [f"joint_{i}" for i in range(1, robot.family.joints + 1)]
     return [*arm, *identifiers((axis.name for axis in robot.externals), taken=arm)]
@@ -36,8 +37,9 @@ def urdf_of(robot: Manipulator) -> str:
     if robot.couplings:
         said = " and ".join(coupling.name for coupling in robot.couplings)
         raise InputError(
-            f"robot {robot.id!r}: its limits bound {said}, and a URDF bounds each joint alone; "
-            "dataclasses.replace(robot, couplings=()).to_urdf() writes it without that bound"
+            f"robot {robot.id!r}: its limits include a bound on {said}, but a URDF has only limits "
+            "of single joints; dataclasses.replace(robot, couplings=()).to_urdf() writes it "
+            "without that bound"
         )
     chain = arm_chain(robot)
     joints, foot, at = _carriers(robot, "robot")
@@ -55,9 +57,9 @@ def urdf_of(robot: Manipulator) -> str:
 
 
 def _carriers(robot: Manipulator, what: Literal["robot", "part"]) -> tuple[list[Joint], str, Array]:
-    """Return the axes that carry robot or part, the last link and where (3,) m its frame is.
+    """Return the axes that carry robot or part, the last link, and the place (3,) m of its frame.
 
-    Frames of axes lie on them, along those of the robot base.
+    The frame of each axis has its origin on the axis and is parallel to the robot base.
     """
     joints: list[Joint] = []
     link, at = GROUND, np.zeros(3)
@@ -69,7 +71,7 @@ def _carriers(robot: Manipulator, what: Literal["robot", "part"]) -> tuple[list[
 
 
 def _moving(robot: Manipulator, i: int, parent: str, origin: Array, axis: Array) -> Joint:
-    """Return a joint of the robot, by its column of q, with the limits that are known."""
+    """Return the joint of a column of q, with the limits that are known."""
     n, endless, limits = robot.family.joints, bool(robot.endless[i]), robot.joint_limits()
     name, kind = joint_identifiers(robot)[i], "continuous" if endless else "revolute"
     if robot.units[i] == "m":
@@ -94,7 +96,7 @@ def _moving(robot: Manipulator, i: int, parent: str, origin: Array, axis: Array)
 
 
 def _fixed(parent: str, child: str, origin: Array) -> Joint:
-    """Return a joint that does not move; its name is none that an axis may have."""
+    """Return a fixed joint; its name contains a character that no axis name has."""
     limits = dict.fromkeys(("lower", "upper", "velocity", "acceleration", "jerk", "effort"))
     return Joint(
         name=f"{parent}-{child}",

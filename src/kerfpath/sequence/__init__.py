@@ -1,4 +1,4 @@
-"""A part of many contours: their order, the start of each, and the transfer moves."""
+"""A part with many contours: their order, the start of each, and the transfer moves."""
 
 from kerfpath.sequence._inner import inner_first as inner_first
 from kerfpath.sequence._order import Order as Order

@@ -1,4 +1,4 @@
-"""Which candidates the tool can go down to and leave, and further ones where those do not do."""
+"""Select the candidates that the tool can approach and leave, and plan more where none is left."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from kerfpath.transfer import End, back_off, explain_collision
 __all__ = ["MorePlans", "more_reachable", "reachable", "unused_postures"]
 
 BACK_BY = (0.0, 0.1, 0.4, 0.7, 1.0)
-"""Shares of the retract between which the joints are taken to run straight."""
+"""Shares of the retract between which the joints are assumed to move linearly."""
 
 
 def unused_postures(made: Sequence[Plan], wanted: Sequence[int] | None) -> list[int]:
-    """Return the postures (default: all) that none of a contour's plans begins or ends in."""
+    """Return the wanted postures (None: all) in which no plan of a contour begins or ends."""
     used = {int(p) for one in made for p in one.posture[[0, -1]]}
     every = range(made[0].robot.postures) if wanted is None else wanted
     return [int(p) for p in every if p not in used]
 
 
 class MorePlans:
-    """Further plans of contours, each asked for once, and how many came."""
+    """Further plans of contours, requested once for each contour, and how many were found."""
 
     def __init__(self, every: list[list[Plan]], more: Callable[[int], Sequence[Plan]]) -> None:
         self._every, self._more = every, more
         self._got: dict[int, int] = {}
 
     def of(self, contour: int) -> range:
-        """Ask for further plans of a contour, once; return the numbers of its new candidates."""
+        """Request further plans of a contour, once; return the numbers of the new candidates."""
         made = self._every[contour]
         first = len(made)
         if contour not in self._got:
@@ -42,7 +42,7 @@ class MorePlans:
         return range(first, len(made))
 
     def mentioned_in(self, broken: NoFeasiblePath) -> NoFeasiblePath:
-        """Return a failure that says, too, which further plans have been tried."""
+        """Return the failure with the further plans that were tried added to its message."""
         tried = [
             f"{self._every[i][0].name!r} in {count} other postures"
             for i, count in self._got.items()
@@ -50,13 +50,13 @@ class MorePlans:
         ]
         if not tried:
             return broken
-        return broken.with_message(f"{broken}; tried as well: {', '.join(tried)}")
+        return broken.with_message(f"{broken}; also tried: {', '.join(tried)}")
 
 
 def reachable(
     every: Sequence[Sequence[Plan]], cell: Cell | None, retract: float, further: MorePlans
 ) -> list[tuple[int, int]]:
-    """Return contour and candidate of each plan that the tool can go down to and leave again."""
+    """Return (contour, candidate) of each plan that the tool can approach and leave."""
     places: list[tuple[int, int]] = []
     for i, made in enumerate(every):
         broken, found = _reachable(made, range(len(made)), cell, retract)
@@ -72,14 +72,14 @@ def more_reachable(
     every: Sequence[Sequence[Plan]], cell: Cell | None, retract: float, further: MorePlans,
     contours: Sequence[int],
 ) -> list[tuple[int, int]]:  # fmt: skip
-    """Return contour and candidate of the further plans of contours that the tool can reach."""
+    """Return (contour, candidate) of each further plan that the tool can approach and leave."""
     return [(i, c) for i in contours for c in _reachable(every[i], further.of(i), cell, retract)[1]]
 
 
 def _reachable(
     made: Sequence[Plan], which: range, cell: Cell | None, retract: float
 ) -> tuple[NoFeasiblePath | None, list[int]]:
-    """Return those candidates that the tool can go down to and leave, and why not the first."""
+    """Return the first failure and the candidates that the tool can approach and leave."""
     broken, found = None, []
     for c in which:
         try:
@@ -91,7 +91,7 @@ def _reachable(
 
 
 def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
-    """Raise NoFeasiblePath where the tool cannot go down to a cut or back from it."""
+    """Raise NoFeasiblePath where the tool cannot approach a cut or back off from it."""
     ends: tuple[tuple[End, int], ...] = (("start", 0), ("end", len(made.q) - 1))
     for end, node in ends:
         try:

@@ -1,4 +1,4 @@
-"""Which contours lie inside which: what is cut out must not fall before its holes are cut."""
+"""Find contours that lie inside others: a piece must not fall out before its holes are cut."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from kerfpath.contour import Contour
 __all__ = ["inner_first"]
 
 COMMON = 0.1
-"""Length of a mean of unit vectors from which on they have a direction in common."""
+"""Length of the mean tool axis from which on the axes have a common direction."""
 
 
 def inner_first(contours: Sequence[Contour]) -> list[tuple[int, int]]:
-    """Return the pairs (i, j) of contours of which i lies inside the closed contour j.
+    """Return the pairs (i, j) of contours where i lies inside the closed contour j.
 
-    Seen along the mean tool axis of j; both must lie on one side of the part, their mean axes less
-    than 90 deg apart. Open contours hold nothing: ask for the loops of the drawing, before their
-    leads. Neither does a loop around a tube, whose axes have no common direction.
+    The contours are seen along the mean tool axis of j. Both must be on the same side of the part:
+    their mean axes differ by less than 90 deg. Open contours contain nothing, so pass the loops of
+    the drawing without their leads. A loop around a tube, whose axes have no common direction,
+    contains nothing either.
     """
     pairs = []
     for j, outer in enumerate(contours):
@@ -35,14 +36,14 @@ def inner_first(contours: Sequence[Contour]) -> list[tuple[int, int]]:
         for i, inner in enumerate(contours):
             faces = i != j and float(inner.axes.mean(axis=0) @ n) > 0
             at = inner.points @ plane
-            # For most the first point is enough: they lie far beside.
+            # The first point is enough for most contours, which are far outside.
             if faces and _inside(ring, at[:1])[0] and _inside(ring, at).all():
                 pairs.append((i, j))
     return pairs
 
 
 def _inside(ring: Array, points: Array) -> Bools:
-    """Say which points (B, 2) lie inside a ring (K, 2): a ray to the right crosses it oddly."""
+    """Return which points (B, 2) are inside a ring (K, 2), by the parity of ray crossings."""
     a, b = ring[:-1], ring[1:]
     above = a[:, 1] > points[:, None, 1], b[:, 1] > points[:, None, 1]
     rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])

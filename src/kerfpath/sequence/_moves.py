@@ -1,4 +1,4 @@
-"""Transfer moves between candidates: the least time of each, and those planned so far."""
+"""Transfer moves between candidates: least times, and the moves planned so far."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from kerfpath.transfer import TransferMove, back_off, least_time, transfer_move
 __all__ = ["HOME", "PATIENCE", "MoveTimes"]
 
 PATIENCE = 12
-"""Searches that may end without a way; each takes all its seconds."""
+"""Number of searches for a way that may fail; each failed search takes its full time limit."""
 LOCKED_AFTER = 2
-"""An end that no way was found from so often, and none ever, is taken for one that has none."""
+"""Number of failures after which an end is locked, if no move from or to it was ever found."""
 HOME = -1
-"""In place of a candidate."""
+"""Number that means home instead of a candidate."""
 
 
 class MoveTimes:
-    """Times of the moves between candidates: least ones, and those that have been planned.
+    """Times of the transfer moves between candidates: a lower bound until a move is planned.
 
     Attributes
     ----------
     failed : dict of (int, int) to NoFeasiblePath
-        The moves, from candidate to candidate, for which no way was found, and why.
+        The moves (from candidate, to candidate) for which no way was found, and why.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class MoveTimes:
 
     @property
     def home(self) -> Array | None:
-        """Where the robot comes from and goes back to, (n,) rad."""
+        """Home position of the robot, (n,) rad; None where there is none."""
         return self._home
 
     @home.setter
@@ -71,9 +71,9 @@ class MoveTimes:
         self.last = self._least(self._ends, everywhere)
 
     def extended(self, plans: Sequence[Plan], group: Ints) -> MoveTimes:
-        """Return the moves between these candidates, which go on from those here; so does `failed`.
+        """Return the moves between more candidates, the first of which are those of this object.
 
-        What is known stays known.
+        Planned moves and `failed` are shared with this object.
         """
         more = MoveTimes(plans, group, self._cell, self._retract, self._seconds, self._air_speed)
         C = len(self._plans)
@@ -85,19 +85,19 @@ class MoveTimes:
         return more
 
     def forbid(self, pairs: Bools) -> None:
-        """Let no candidate follow another where pairs (C, C) says so."""
+        """Forbid that candidate j follows candidate i where pairs[i, j] of (C, C) is true."""
         self.between[pairs] = np.inf
 
     def look_at(self, candidates: Ints) -> bool:
-        """Plan the moves of an order that have not been planned; True where one takes longer.
+        """Plan the unplanned moves of an order; return whether one takes longer than assumed.
 
-        A move that no way is found for may not be made; nor may any other from or to an end that
-        failed twice, to or from where it was tried, and was never reached.
+        A move without a way is forbidden. So are all other moves from or to an end for which
+        `LOCKED_AFTER` moves failed and none was found.
 
         Raises
         ------
         NoFeasiblePath
-            Home is not clear (proved).
+            An end of a move, such as home, is not clear (proved).
         """
         changed = False
         for leg in self._legs(candidates):
@@ -121,20 +121,21 @@ class MoveTimes:
             changed |= bool(took > times[at] + 1e-9)
             times[at] = took
             if not np.isfinite(took):
-                return True  # another order avoids it: what else this one asks for can wait
+                return True  # another order avoids this move, so the other moves can wait
         return changed
 
     def why_no_order(self, none: NoFeasiblePath | None) -> NoFeasiblePath:
-        """Return a failure that names the moves without a way, and what is in the way of the first.
+        """Return a failure that names the first move without a way, its obstacle, and the others.
 
-        `none` is why no order is left without them; None where patience has ended.
+        `none` says why no order is left without these moves; None means that the search ended after
+        `PATIENCE` failures.
         """
         if not self.failed:
             assert none is not None
             return none
         leg, broken = next(iter(self.failed.items()))
         others = len(self.failed) - 1
-        also = f"; nor {others} more move{'s' * (others > 1)}" if others else ""
+        also = f"; no way for {others} more move{'s' * (others > 1)}" if others else ""
         return NoFeasiblePath(
             f"{self.between_which(leg)}: {broken}{also}, and "
             + ("no order is left without them" if none else "the search has ended"),
@@ -143,7 +144,7 @@ class MoveTimes:
         )
 
     def between_which(self, leg: tuple[int, int]) -> str:
-        """Say from where to where a move goes: contours, and the postures there."""
+        """Return the ends of a move in words: the contours, and the postures there."""
         words = []
         for candidate, end, node in ((leg[0], "end", -1), (leg[1], "start", 0)):
             if candidate == HOME:
@@ -155,7 +156,7 @@ class MoveTimes:
         return f"from {words[0]} to {words[1]}"
 
     def _shut(self, leg: tuple[int, int]) -> None:
-        """Take an end for locked that has failed often enough and never been left or reached."""
+        """Forbid all moves of an end whose moves have failed often enough and never succeeded."""
         for side, candidate in enumerate(leg):
             often = sum(failed[side] == candidate for failed in self.failed)
             ever = any(made[side] == candidate for made in self._moves)
@@ -167,14 +168,14 @@ class MoveTimes:
                 self.between[:, candidate] = self.first[candidate] = np.inf
 
     def _place(self, leg: tuple[int, int]) -> tuple[Array, int]:
-        """Return the row of times that a move stands in, and where."""
+        """Return the array that holds the time of a move, and the index in it."""
         a, b = leg
         return (
             (self.first, b) if a == HOME else (self.last, a) if b == HOME else (self.between[a], b)
         )
 
     def unrolled(self, candidates: Ints) -> tuple[tuple[Plan, ...], tuple[TransferMove, ...]]:
-        """Return the plans and moves of an order, endless joints going on from one to the next."""
+        """Return the plans and moves of an order, with endless joints not wrapped between them."""
         legs = self._legs(candidates)
         here = self._ends[candidates[0]] if self._home is None else self._home
         plans, moves, shift = [], [], np.zeros_like(here)

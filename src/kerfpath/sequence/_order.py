@@ -1,8 +1,8 @@
-"""The order of cutting: a travelling-salesman problem over groups of candidates.
+"""The order of cutting: a generalised travelling-salesman problem over groups of candidates.
 
-Each group (a contour) has candidates (a start, a direction, a posture), of which one is taken. What
-is minimised is the time of the candidates taken and of the moves between them; the solver (CP-SAT
-of OR-tools) proves its order best, or says how far from it.
+Each group (a contour) has candidates (a start, a direction, a posture), of which one is chosen. The
+objective is the time of the chosen candidates and of the moves between them. The solver (CP-SAT of
+OR-tools) proves that its order is best, or gives a bound.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 __all__ = ["Order", "best_order"]
 
 TICK = 1e-4
-"""s: the solver counts in whole ticks."""
+"""s: resolution of times in the solver."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,11 +31,11 @@ class Order:
     Parameters
     ----------
     candidates : (G,) int
-        The candidate taken of each group, in the order of cutting.
+        The chosen candidate of each group, in the order of cutting.
     duration : float s
-        Of those candidates and the moves between them.
+        Time of those candidates and of the moves between them.
     at_least : float s
-        No order takes less; the same as `duration` where it is proved best.
+        Lower bound: no order takes less. Equal to `duration` where the order is proved best.
     """
 
     candidates: Ints
@@ -46,7 +46,7 @@ class Order:
 
     @property
     def optimal(self) -> bool:
-        """Whether no order is shorter by more than the solver's tick for each move."""
+        """Whether the order is proved best within the solver's resolution for each move."""
         return self.duration - self.at_least <= 2 * TICK * (len(self.candidates) + 1)
 
 
@@ -60,30 +60,31 @@ def best_order(
     before: Sequence[tuple[int, int]] = (),
     seconds: float = 10.0,
 ) -> Order:
-    """Return the order of least time in which one candidate of every group is done.
+    """Return the order of least time that visits one candidate of every group.
 
     Parameters
     ----------
     group : (C,) int
-        Group of each candidate, 0 to G - 1, each with one candidate at least.
+        Group of each candidate, 0 to G - 1; every group has at least one candidate.
     own : (C,) s
-        Time that each candidate takes itself.
+        Time of each candidate itself.
     between : (C, C) s
-        Time from the end of one to the start of another; infinite where that may not follow.
+        Time from the end of candidate i to the start of candidate j; infinite where j may not
+        follow i.
     first, last : (C,) s, optional
-        Time to reach each as the first, and to come home from each as the last; default 0,
-        infinite where that may not be.
+        Time to reach each candidate as the first, and to return home from it as the last; infinite
+        where that is not allowed. Default: 0.
     before : sequence of (g, h)
-        Group g is done before group h.
-    seconds : float
-        How long the solver may take.
+        Group g comes before group h.
+    seconds : float s
+        Time limit of the solver.
 
     Raises
     ------
     NoFeasiblePath
-        No order keeps all of that (proved), or none was found in time.
+        No order satisfies all of this (proved), or none was found in time.
     InputError
-        Shapes that do not fit, a group without candidates, `before` of a group that is not there.
+        The shapes do not fit, a group has no candidates, or `before` has an unknown group.
     """
     g = integers(group, "group", (None,))
     C, G = len(g), int(g.max(initial=-1)) + 1
@@ -127,7 +128,7 @@ def _solve(
     for h in range(G):
         members = np.flatnonzero(group == h).tolist()
         model.add(sum(without[i] for i in members) == len(members) - 1)
-    # What waits for all others is last because only it may go home; the rest need their places.
+    # A group that comes after all others is last since only it may go home; others need a place.
     last = (earlier.sum(axis=0) == G - 1) & ~earlier.diagonal()
     waiting = [(g, h) for g, h in before if not last[h]]
     if waiting:
@@ -142,16 +143,21 @@ def _solve(
     model.minimize(sum(round(time[ends] / TICK) * way for ends, way in taken.items()))
     solver = cp_model.CpSolver()
     solver.parameters.max_time_in_seconds = seconds
-    solver.parameters.num_workers = 1  # the same answer each time
+    solver.parameters.num_workers = 1  # reproducible
     solver.parameters.random_seed = 1
-    # Cuts of the circuit prove a plain tour about ten times sooner; with places they only cost.
+    # Circuit cuts prove a plain tour about ten times faster; with places they only cost time.
     solver.parameters.linearization_level = 1 if waiting else 2
     status = solver.solve(model)
     if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
         proved = status == cp_model.INFEASIBLE
-        why = "contradict each other" if proved else f"were not met within {seconds:g} s"
+        why = (
+            "its constraints (which contour may follow or must come before another) contradict "
+            "each other"
+            if proved
+            else f"none that keeps the constraints was found within {seconds:g} s"
+        )
         raise NoFeasiblePath(
-            f"no order of cutting: what may follow what, and what comes first, {why}",
+            f"no order of cutting: {why}",
             proved=proved,
             node=-1,
         )
@@ -172,7 +178,10 @@ def _solve(
 def _times(
     group: Ints, own: Array, move: Array, enter: Array, leave: Array, earlier: Bools
 ) -> Array:
-    """Return the time (C + 1, C + 1) of going on to each and cutting it; 0 is home, inf forbids."""
+    """Return times (C + 1, C + 1) of the move to each candidate and its cut; 0 is home.
+
+    Infinity means not allowed.
+    """
     time = np.full((len(group) + 1, len(group) + 1), np.inf)
     same = group[:, None] == group
     time[1:, 1:] = np.where(same | earlier[group[None], group[:, None]], np.inf, move + own)

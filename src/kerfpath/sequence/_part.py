@@ -1,4 +1,4 @@
-"""A whole part: a plan for every contour, their order, and the transfer moves between."""
+"""A whole part: a plan for every contour, their order, and the transfer moves between them."""
 
 from __future__ import annotations
 
@@ -50,18 +50,18 @@ class PartPlan:
     Parameters
     ----------
     plans : tuple of Plan
-        In the order of cutting; endless joints unrolled from contour to contour.
+        Plans in the order of cutting; endless joints are not wrapped from contour to contour.
     moves : tuple of TransferMove
-        One between each plan and the next, from backed off to backed off; with a home one before
-        the first and one behind the last, too.
+        One move between each plan and the next, from backed off to backed off. With a home
+        position there is also one before the first plan and one after the last.
     order : Order
-        What has been proved about the order.
+        The order and what is proved about it.
     chosen : tuple of (int, int)
-        Which contour each plan is of, and which of its candidates.
+        Contour and candidate of each plan, by number.
     retract, approach_speed : float m, m/s
-        How far the tool backs off before and after each contour, and how fast.
+        How far and how fast the tool backs off before and after each contour.
     pierce_time : float s
-        Of each contour.
+        Time to pierce at each contour.
     """
 
     plans: tuple[Plan, ...]
@@ -76,28 +76,28 @@ class PartPlan:
 
     @property
     def cutting_time(self) -> float:
-        """Time on the contours, s."""
+        """Time on the contours (s)."""
         return float(sum(p.time[-1] - p.time[0] for p in self.plans))
 
     @property
     def air_time(self) -> float:
-        """Time of the transfer moves, approach and retract included, s."""
+        """Time of the transfer moves (s), including approaches and retracts."""
         down_and_up = 2 * len(self.plans) * self.retract / self.approach_speed
         return sum(move.duration for move in self.moves) + down_and_up
 
     @property
     def piercing_time(self) -> float:
-        """Time that the beam takes to go through, s."""
+        """Time for piercing at all contours (s)."""
         return len(self.plans) * self.pierce_time
 
     @property
     def cycle_time(self) -> float:
-        """All of it, s."""
+        """Time for cutting, transfer moves and piercing together (s)."""
         return self.cutting_time + self.air_time + self.piercing_time
 
 
 class OrderKeywords(TypedDict, total=False):
-    """The keywords of `order_plans` that say what is asked of the order and of the moves."""
+    """The keywords of `order_plans` for the order and the moves."""
 
     home: ArrayLike | None
     cell: Cell | None
@@ -126,29 +126,30 @@ def plan_part(
     progress: Callable[[int], None] | None = None,
     **keywords: Unpack[PartKeywords],
 ) -> PartPlan:
-    """Return plans for all contours of a part, cut in the order that takes the least time.
+    """Plan all contours of a part and return them in the order that takes the least time.
 
-    Every candidate is planned; then as `order_plans`. Where that finds no way to or from a contour,
-    the first of its candidates is planned in every other of the `postures`, too. What is chosen is
-    certified.
+    Every candidate is planned, and the plans are ordered by `order_plans`. Where no way to or from
+    a contour is found, its first candidate is also planned in each of the other `postures`. Only
+    the chosen plans are certified.
 
     Parameters
     ----------
     contours : sequence of Contour, or of sequences of Contour
-        Candidates of each: other starts, directions, leads.
+        The contours, or the candidates of each: other starts, directions, leads.
     robot, tool, placement, options
-        As in `kerfpath.plan`, for every contour; so are its keywords.
+        As in `kerfpath.plan`, for every contour, as are its other keywords.
     speed : float m/s, or one for each contour
     progress : callable, optional
         Called with the number of candidates planned since the last call.
     home, cell, before, heat_spacing, given_order, retract, approach_speed, air_speed, pierce_time,
     seconds
-        As in `order_plans`; the plans are clear in the cell, too.
+        As in `order_plans`; the plans are also clear in the cell.
 
     Raises
     ------
     NoFeasiblePath
-        A contour none of whose candidates has a plan; no order; no way between two contours.
+        No candidate of a contour has a plan, there is no order, or there is no way between two
+        contours.
     InputError
         As `kerfpath.plan` and `order_plans`.
     """
@@ -156,14 +157,14 @@ def plan_part(
     speeds = list(speed) if isinstance(speed, Sequence) else [speed] * len(groups)
     if not groups or not all(groups) or len(speeds) != len(groups):
         raise InputError(
-            "plan_part: expected one contour at least, candidates for each, and one speed or one "
-            f"for each; got {len(groups)} contours and {len(speeds)} speeds"
+            "plan_part: expected at least one contour, candidates for each contour, and one speed "
+            f"or one per contour; got {len(groups)} contours and {len(speeds)} speeds"
         )
     of_order = keywords.keys() & OrderKeywords.__annotations__.keys()
     order = cast(OrderKeywords, {k: v for k, v in keywords.items() if k in of_order})
     rest = {k: v for k, v in keywords.items() if k not in of_order}
     asked = with_keywords(options, rest, PartKeywords)
-    wanted = replace(asked, certify=None)  # of all candidates one is chosen first
+    wanted = replace(asked, certify=None)  # only the chosen candidates are certified
 
     def planned(i: int, contour: Contour, options: PlanOptions) -> Plan:
         return plan(
@@ -201,25 +202,33 @@ def order_candidates(
     progress: Callable[[int, int, int], None] = lambda contour, done, total: None,
     **order: Unpack[OrderKeywords],
 ) -> PartPlan:
-    """Order candidates as `order_plans`, and plan contours in other postures where it asks for it.
+    """Order candidates by `order_plans`, and plan contours in other postures where needed.
 
     Parameters
     ----------
     tried : sequence of lists
-        What was made of the candidates of each contour, a plan each; what is made in other
-        postures is added to it.
+        The planned candidates of each contour; candidates in other postures are appended.
     plan_of : callable
-        Returns the plan of one of them.
+        Returns the plan of a candidate.
     in_posture : callable
-        Plans a contour in one posture, by their numbers; returns None, or raises NoFeasiblePath,
-        where it cannot be cut so.
+        Plans a contour in one posture, both given by number; returns None or raises NoFeasiblePath
+        where that is not possible.
     postures : sequence of sequences of int, or None
-        Those that each contour may be cut in; None: all.
+        Postures that each contour may be cut in; None: all.
     progress : callable
         Called with the number of a contour, how many other postures of it are done, and how many
         there are.
     order
         The other keywords of `order_plans`.
+
+    Returns
+    -------
+    PartPlan
+
+    Raises
+    ------
+    NoFeasiblePath, InputError
+        As `order_plans`.
     """
 
     def more(i: int) -> list[Plan]:
@@ -250,46 +259,47 @@ def order_plans(
     seconds: float = 10.0,
     more: Callable[[int], Sequence[Plan]] = lambda contour: (),
 ) -> PartPlan:
-    """Return one plan of each contour's candidates, in the order that takes the least time.
+    """Return one plan for each contour, chosen from its candidates, in the order of least time.
 
-    Order, candidates and moves between them are chosen together. A move is first taken to be
-    straight, which no way around beats; those that the best order uses are then planned in the
-    cell, until it uses none that has not been. A move that no way is found for is not made. Where
-    no order is left without it, the contours that it joins are asked for `more` plans, once.
+    Order, candidates and moves are chosen together. Each move is first assumed to be straight,
+    which no way around beats. The moves of the best order are then planned in the cell, until all
+    moves of the best order are planned. A move for which no way is found is not used. Where no
+    order is left without it, `more` plans of the two contours are requested, once.
 
     Parameters
     ----------
     candidates : sequence of sequences of Plan
-        Those of each contour; all of one robot.
+        Candidates of each contour, all of one robot.
     home : (n,) rad, optional
         Where the robot comes from and goes back to.
     cell : Cell, optional
-        Moves, and backing off before and after each contour, are clear in it.
+        Cell in which moves, approaches and retracts are clear.
     before : sequence of (i, j)
         Contour i is cut before contour j; see `inner_first`.
     heat_spacing : float m
-        Contours nearer to each other than this are not cut one right after the other.
+        Contours nearer to each other than this are not cut directly one after the other.
     given_order : bool
         Keep the order of `candidates`; `before` must agree with it.
     retract, approach_speed : float m, m/s
         How far and how fast the tool backs off along its axis.
     air_speed : float
-        Share of the full speed of the moves between contours: they take their least time by it.
+        Share of the full speed of transfer moves; their least time is divided by it.
     pierce_time : float s
+        Time to pierce at each contour.
     seconds : float s
-        How long the solver of the order, and each search for a way around, may take; searches
-        that find none end after `longest_search(seconds)` in all.
+        Time limit of the order solver, and of each search for a way around; searches without a
+        result end after `longest_search(seconds)` in total.
     more : callable, optional
-        Given the number of a contour, further plans of it, in other postures: its candidates from
-        then on, numbered after the others.
+        Returns further plans of a contour, given its number, in other postures. They become
+        candidates of the contour and are numbered after the others.
 
     Raises
     ------
     NoFeasiblePath
-        No candidate of a contour that the tool can reach and leave; no order; no way between two,
-        which are named, with what is in the way and what was tried.
+        No candidate of a contour can be approached and left; there is no order; or there is no way
+        between two contours: the message names them, what is in the way and what was tried.
     InputError
-        Lengths or times that are not positive.
+        A length, speed or time is out of range.
     """
     retract = scalar(retract, "retract", unit="m", above=0.0)
     approach_speed = scalar(approach_speed, "approach_speed", unit="m/s", above=0.0)
@@ -338,9 +348,9 @@ def order_plans(
 
 
 def longest_search(seconds: float) -> float:
-    """Return how long searches for ways around that find none may take in all, s.
+    """Return the total time (s) that searches for ways around may take without a result.
 
-    Before other postures are asked for, and once more with them.
+    It covers the searches before and after other postures are planned.
     """
     return 2 * PATIENCE * seconds
 
@@ -348,7 +358,7 @@ def longest_search(seconds: float) -> float:
 def _settle_order(
     air: MoveTimes, group: Ints, own: Array, before: Sequence[tuple[int, int]], seconds: float
 ) -> Order | NoFeasiblePath:
-    """Return the best order whose moves all have a way, or why none is found."""
+    """Return the best order in which every move has a way, or why none is found."""
     failed = len(air.failed)
     while len(air.failed) - failed < PATIENCE:
         try:
@@ -364,14 +374,17 @@ def _settle_order(
 
 
 def _too_warm(contours: Sequence[Contour], spacing: float) -> Bools:
-    """Say which contours (G, G) are nearer to each other than `spacing` (m)."""
+    """Return which contours (G, G) are nearer to each other than `spacing` (m)."""
     if spacing <= 0:
         return np.zeros((len(contours), len(contours)), bool)
     return distances_between(contours) < spacing
 
 
 def distances_between(contours: Sequence[Contour]) -> Array:
-    """Return how far apart the nodes of each two contours are, (G, G) m; infinite of one alone."""
+    """Return the least distance between the nodes of each two contours, (G, G) m.
+
+    The diagonal is infinite.
+    """
     apart = np.full((len(contours), len(contours)), np.inf)
     trees = [cKDTree(contour.points) for contour in contours]
     for i, j in combinations(range(len(contours)), 2):

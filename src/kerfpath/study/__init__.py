@@ -1,4 +1,4 @@
-"""Studies of a job, many tasks each: on the cores of this machine or on a cluster."""
+"""Studies of a job, each of many tasks that run on the cores of this machine or on a cluster."""
 
 from kerfpath.study._batch import BatchResult as BatchResult
 from kerfpath.study._batch import batch as batch

@@ -1,4 +1,4 @@
-"""A batch: many jobs planned, audited and written, each a task of its own."""
+"""A batch: plan, audit and write many jobs, each as a separate task."""
 
 from __future__ import annotations
 
@@ -34,35 +34,35 @@ from kerfpath.sweep import Result, Sweep
 __all__ = ["STORE", "BatchResult", "batch"]
 
 STORE = "batch.sqlite"
-"""Name of the store in the folder of a batch."""
+"""Name of the store file in the folder of a batch."""
 PAGE = "report.html"
-"""The file of a run that is mostly a library, which need not be kept with each."""
+"""The report of a run; it is mostly a script library, which is not stored with each result."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatchResult:
-    """What came of one job of a batch.
+    """The result of one job of a batch.
 
     Parameters
     ----------
     job, folder : Path
-        The job file, and where the files of its run are.
+        The job file, and the folder with the files of its run.
     passed : bool
-        Every contour has a plan that passes its audit, the moves too, and the program that the
-        job asks for is written.
+        Whether every contour has a plan that passes its audit, the transfer moves pass too, and
+        the program that the job asks for is written.
     contours, kept : int
-        How many contours there are, and how many of them have a plan that passes its audit; 0
-        where the job is refused.
+        Number of contours, and number of those with a plan that passes its audit; 0 where the job
+        is refused.
     cutting_time : float s, optional
-        Of all contours; None unless each has a plan.
+        Cutting time of all contours; None unless each has a plan.
     program : str
-        The program's file in the folder; empty without one.
+        Name of the program file in the folder; empty where there is none.
     reason : str
-        Why it has not passed; empty where it has.
+        Why the job has not passed; empty where it has.
     notes : tuple of str
-        What the reader of the files must know, as `kerfpath plan` says it.
-    seconds : float
-        Time that reading, planning and auditing took, s.
+        Notes on the files, as `kerfpath plan` prints them.
+    seconds : float s
+        Time for reading, planning and auditing.
     """
 
     job: Path
@@ -87,31 +87,31 @@ def batch(
     processes: int | None = None,
     progress: Progress = no_progress,
 ) -> list[BatchResult]:
-    """Plan, audit and write many jobs, as `kerfpath plan` does each; one that fails stops no other.
+    """Plan, audit and write many jobs as `kerfpath plan` does; a failing job does not stop others.
 
-    Results are kept in `out` as they come: the same call again plans only what is new or has
-    changed, and writes files that are missing or differ. Files are written here, so that workers
-    need the job files alone.
+    Results are stored in `out` as they come: a second call plans only jobs that are new or have
+    changed, and writes files that are missing or differ. Files are written by this process, so
+    workers need only the job files.
 
     Parameters
     ----------
     jobs : sequence of path
-        Job files, at the same place on every worker.
+        Job files, at the same path on every worker.
     out : path
-        Folder for a folder per job, named as its file, and for the store.
+        Folder for the store and for one folder per job, named after the job file.
     scheduler, processes, progress
         As in `kerfpath.sweep.run`.
 
     Returns
     -------
-    list of Planned
+    list of BatchResult
         In the order of `jobs`.
 
     Raises
     ------
     InputError
-        No jobs; two that would share a folder; a file where a folder should be; a job that changes
-        meanwhile; and as `kerfpath.sweep.run`.
+        There are no jobs; two would share a folder; a file is where a folder should be; a job
+        changes during the batch; and as `kerfpath.sweep.run`.
     """
     out = Path(out)
     paths = [Path(job) for job in jobs]
@@ -137,17 +137,17 @@ def _folders(paths: Sequence[Path], out: Path) -> list[Path]:
     Raises
     ------
     InputError
-        No jobs, two of one name, something else where a folder should be.
+        There are no jobs, two have the same name, or a file is where a folder should be.
     """
     if not paths:
-        raise InputError("no jobs: a batch needs one job file at least")
+        raise InputError("no jobs: a batch needs at least one job file")
     first: dict[str, Path] = {}
     for path in paths:
         other = first.setdefault(path.stem.casefold(), path)
         if other is not path:
             raise InputError(
-                f"{other} and {path} would both be written to {out / path.stem}; rename one, or "
-                "plan it in a batch with another --out"
+                f"{other} and {path} would both be written to {out / path.stem}; rename one of "
+                "them, or plan it in a batch with another --out"
             )
     folders = [out / path.stem for path in paths]
     for folder in folders:
@@ -156,7 +156,7 @@ def _folders(paths: Sequence[Path], out: Path) -> list[Path]:
 
 
 def _submit(tasks: Sweep, path: Path) -> tuple[ProgramOptions, str] | InputError:
-    """Hand in a job; return its program's options and its key, or what is wrong with it."""
+    """Submit a job; return its program options and the key of its task, or the error in it."""
     try:
         key = tasks.submit(path=str(path.resolve()), digest_then=digest(path))
         return read_job(path).program, key
@@ -165,7 +165,7 @@ def _submit(tasks: Sweep, path: Path) -> tuple[ProgramOptions, str] | InputError
 
 
 class PlannedData(TypedDict):
-    """What came of a job, as JSON holds it: most of a `BatchResult`, and its files, packed."""
+    """The result of a job as JSON data: most fields of a `BatchResult`, and its packed files."""
 
     passed: bool
     contours: int
@@ -178,12 +178,12 @@ class PlannedData(TypedDict):
 
 
 def plan_job(*, path: str, digest_then: str) -> PlannedData:
-    """Plan and audit a job: the task of a batch.
+    """Plan and audit a job; this is the task of a batch.
 
     Raises
     ------
     InputError
-        As `run_job`, and a language that the robot does not speak.
+        As `run_job`; also where the program's language does not fit the robot.
     """
     found = load_job(path, digest_then)
     require_language(found.job)
@@ -206,7 +206,7 @@ def plan_job(*, path: str, digest_then: str) -> PlannedData:
 
 
 def _reason(outcome: JobResult, texts: FileTexts) -> str:
-    """Say why a run has not passed: the first reason, and how many more there are."""
+    """Return the first reason why a run has not passed, and how many more there are."""
     reasons = [
         f"{cut.name}: {cut.failure or issue}"
         for cut in outcome.cuts
@@ -222,7 +222,7 @@ def _reason(outcome: JobResult, texts: FileTexts) -> str:
 
 
 def _pack(files: dict[str, str]) -> str:
-    """Return files as text of a fifth of their size."""
+    """Return files as compressed text, a fifth of their size."""
     lean = {name: without_library(t) if name == PAGE else t for name, t in files.items()}
     return base64.b64encode(zlib.compress(json.dumps(lean).encode())).decode()
 
@@ -233,7 +233,7 @@ def _unpack(packed: str) -> dict[str, str]:
 
 
 def _written(job: Path, folder: Path, options: ProgramOptions, result: Result) -> BatchResult:
-    """Write those files of a result that are not there as they are, and return what to tell."""
+    """Write the files of a result that are missing or differ, and return the result."""
     if result.failure is not None:
         reason = result.failure.reason
         return BatchResult(

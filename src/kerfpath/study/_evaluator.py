@@ -1,6 +1,6 @@
-"""What the robot of a job can do of contours where they lie: poses, clear poses, fastest speeds.
+"""Evaluate the robot of a job on its contours: reachable nodes, clear poses and fastest speeds.
 
-Both studies that change a job ask this, one with another robot, one with other placements.
+Both studies that change a job use this: one changes the robot, the other the placement.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from kerfpath.planner import (
 __all__ = ["EVERY", "Evaluator", "SampledContour", "out_of_reach", "sample_contours"]
 
 EVERY = 8
-"""Nodes from one that is looked at for a clear pose to the next."""
+"""Spacing, in nodes, of the nodes that are checked for a clear pose."""
 TRIED = 8
-"""Poses of a node asked at once for a clear one."""
+"""Number of poses of a node that are checked at once for a clear one."""
 STEPS = (np.radians(90.0), np.radians(15.0))
-"""Steps of gamma that are tried before the job's own: most nodes are reached at the first."""
+"""rad: steps of gamma tried before that of the job; most nodes are reached with the first."""
 MOST_POSES = 2_000_000
-"""Poses of nodes that are looked at together."""
+"""Number of poses that are solved together at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SampledContour:
-    """A contour of a job as its nodes, and its asked speed in m/s."""
+    """The nodes of a contour of a job, and the speed (m/s) that the job asks for."""
 
     name: str
     nodes: Contour
@@ -51,14 +51,15 @@ class SampledContour:
 
     @property
     def interval(self) -> float:
-        """Time from node to node at the speed asked for, s."""
+        """Time from node to node (s) at the speed asked for."""
         return node_interval(self.nodes, self.speed if self.nodes.time is None else None)
 
     def stretch(self, first: int, last: int, frames: FrameKind, *, timed: bool) -> SampledContour:
-        """Return some of its nodes, each step to take as long as a step of the contour does.
+        """Return the stretch from node `first` to node `last`, all steps taking the same time.
 
-        With `timed` as long as one takes at the speed asked for; else its steps count as long as
-        the longest of the contour, so that its speeds are those of the contour.
+        With `timed`, each step takes the interval of the contour at the speed asked for. Otherwise
+        each step has the length of the contour's longest step, so that speeds found for the stretch
+        are comparable to those of the contour.
         """
         run = self.nodes.part(first, last, frames)
         run = replace(run, time=None, speed_share=np.ones(len(run)))
@@ -69,18 +70,18 @@ class SampledContour:
 
 
 def sample_contours(job: Job, part: Part, *, as_asked: bool = False) -> tuple[SampledContour, ...]:
-    """Return the contours of a job, sampled at one speed each, or as their speeds are asked for.
+    """Return the sampled contours of a job, each at one speed, or with `as_asked` at its speeds.
 
     Raises
     ------
     InputError
-        Windows of gamma, which these studies do not keep.
+        A contour has windows of gamma, which these studies do not support.
     """
     for number, contour in enumerate(job.contours):
         if contour.windows:
             raise InputError(
-                f"{job.path}: contour.{number}.gamma_windows: this study does not keep windows of "
-                "gamma; remove them in a copy of the job for it"
+                f"{job.path}: contour.{number}.gamma_windows: this study does not support windows "
+                "of gamma; remove them in a copy of the job"
             )
     return tuple(
         SampledContour(
@@ -94,7 +95,7 @@ def sample_contours(job: Job, part: Part, *, as_asked: bool = False) -> tuple[Sa
 
 @dataclass(kw_only=True, eq=False)
 class Evaluator:
-    """Finds what the robot of a job can do, by searches on the job's grid without penalties."""
+    """Evaluates the robot of a job by searches on the job's grid, without penalties."""
 
     job: Job
     part: Part
@@ -107,21 +108,21 @@ class Evaluator:
 
     @cached_property
     def cell(self) -> Cell | None:
-        """The cell of the job.
+        """The cell of the job; None where it has none.
 
         Raises
         ------
         InputError
-            A cell that cannot be.
+            The cell is not valid.
         """
         return cell_of_job(self.job, self.part)
 
     def graph(self, nodes: Contour, only: Ints | None = None) -> LayeredGraph:
-        """Return the layered graph of nodes: margins are kept, penalties play no part."""
+        """Return the layered graph of nodes with margins but without penalties."""
         return self.job.graph(nodes, self.job.options.without_penalties, only=only)
 
     def blocked(self, graph: LayeredGraph, step: int = 1) -> Iterator[int]:
-        """Yield, of every `step`-th layer, those without a clear pose."""
+        """Yield the layers without a clear pose among every `step`-th layer."""
         if self.cell is None:
             return
         checker = CollisionChecker(self.cell, graph.q)
@@ -143,13 +144,13 @@ class Evaluator:
     ) -> FastestSpeed:
         """Return the fastest constant speed on the grid or off it, clear in the cell.
 
-        Without a graph external axes begin from the gentlest course. Off the grid one that is
-        `enough`, m/s, may be returned although there are faster ones.
+        Without a graph, external axes start from the gentlest course. Off the grid, a speed of
+        `enough` (m/s) or more may be returned although faster ones exist.
 
         Raises
         ------
         NoFeasiblePath
-            No speed has a path on the grid.
+            There is no path on the grid at any speed.
         """
         return fastest_along(
             self.job, nodes, self.cell, refine=off_grid, graph=graph, enough=enough
@@ -157,7 +158,7 @@ class Evaluator:
 
 
 def out_of_reach(job: Job, nodes: Contour, options: PlanOptions) -> Ints:
-    """Return the nodes without a pose, external axes at any place of a coarse grid of them."""
+    """Return the nodes without a pose, with external axes sampled on a coarse grid."""
     places = places_of(job, nodes)
     left = np.arange(len(nodes))
     for step in (*(step for step in STEPS if step > options.gamma_step), options.gamma_step):

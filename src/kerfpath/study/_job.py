@@ -1,4 +1,4 @@
-"""The job that the tasks of a study are about: found by every worker, and the very same one."""
+"""The job of a study: loaded by every worker, and checked to be the same everywhere."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["LoadedJob", "digest", "load_job"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LoadedJob:
-    """A job, and its part as read."""
+    """A job and its part, read from the drawing."""
 
     job: Job
     part: Part
@@ -28,12 +28,12 @@ class LoadedJob:
 
 
 def digest(path: Path) -> str:
-    """Return the hash of a job file and of every file that it names.
+    """Return the SHA-256 hash of a job file and of every file that it names.
 
     Raises
     ------
     InputError
-        As `read_job`; a file that cannot be read.
+        As `read_job`; also where a file cannot be read.
     """
     job = read_job(path)
     whole = hashlib.sha256()
@@ -55,7 +55,7 @@ def _files(job: Job) -> Iterator[Path]:
 
 
 def _texts(value: object) -> Iterator[str]:
-    """Yield the text in a tree of plain data, in order."""
+    """Yield all texts in a tree of plain data, in order."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, list | dict):
@@ -65,28 +65,30 @@ def _texts(value: object) -> Iterator[str]:
 
 @lru_cache(maxsize=2)
 def load_job(path: str, digest_then: str) -> LoadedJob:
-    """Return a job and its part, kept for the next task of a worker.
+    """Return a job and its part, cached for the next task of a worker.
 
     Parameters
     ----------
     path : str
-        The job file, which every worker has at the same place.
+        The job file, at the same path on every worker.
     digest_then : str
-        What `digest` said of it where the study began.
+        The `digest` of the job where the study was started.
 
     Raises
     ------
     UnfitWorker
-        The files here are not those, or not here.
+        The files on this worker differ or are missing.
     """
     try:
         here = digest(Path(path))
     except InputError as error:
-        raise UnfitWorker(f"{error}; every worker needs job and files at the same path") from None
+        raise UnfitWorker(
+            f"{error}; every worker needs the job and its files at the same path"
+        ) from None
     if here != digest_then:
         raise UnfitWorker(
-            f"{path}: this job or a file that it names has changed, or is another one on this "
-            "worker; start the study again"
+            f"{path}: this job or a file that it names has changed since the study began, or "
+            "differs on this worker; start the study again"
         )
     job = read_job(path)
     return LoadedJob(job=job, part=job.read_part())

@@ -1,4 +1,4 @@
-"""The Pareto set of a contour of a job, every run a task of a sweep."""
+"""The Pareto front of a contour of a job; every run is a task of a sweep."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ __all__ = ["JobFront", "pareto_of_job", "problem_of_job"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JobFront:
-    """The front of a contour of a job.
+    """The Pareto front of a contour of a job.
 
     Parameters
     ----------
@@ -47,8 +47,9 @@ class JobFront:
     digest : str
         Hash of the job and its files.
     contour : str
+        Name of the contour.
     others : tuple of str
-        The other contours of the job.
+        Names of the other contours of the job.
     front : Front
     """
 
@@ -75,26 +76,27 @@ def pareto_of_job(
     processes: int | None = None,
     progress: Progress = no_progress,
 ) -> JobFront:
-    """Return the front of a contour; what is in the store already is not done again.
+    """Return the Pareto front of a contour; runs that are in the store are not repeated.
 
     Parameters
     ----------
     job_file : Path
     store : Path
-        Of the sweep, see `kerfpath.sweep.run`.
+        Store of the sweep, see `kerfpath.sweep.run`.
     contour : str, optional
-        Name; default: the longest.
+        Name of the contour; default: the longest.
     criteria, runs, search, seed, ahead
-        As in `kerfpath.pareto`; "time" starts from home_deg of the job's [sequence].
+        As in `kerfpath.pareto`; "time" starts from home_deg in [sequence] of the job.
     scheduler, processes, progress
         As in `kerfpath.sweep.run`.
 
     Raises
     ------
     NoFeasiblePath
-        No run has a plan; says why not.
+        No run has a plan; the message says why.
     InputError
-        As `read_job`, `kerfpath.pareto` and `kerfpath.sweep.run`; a contour that is not in the job.
+        As `read_job`, `kerfpath.pareto` and `kerfpath.sweep.run`; also where the job has no such
+        contour.
     """
     whole = digest(job_file)
     here = str(job_file.resolve())
@@ -127,7 +129,7 @@ def pareto_of_job(
 
 
 class SolvedData(TypedDict, total=False):
-    """What a run came to, as JSON holds it: `why` it has no plan, or the evaluation of its plan."""
+    """The result of a run as JSON data: `why` it has no plan, or the evaluation of its plan."""
 
     why: str
     losses: list[float]
@@ -143,12 +145,12 @@ def solve(
     run: SubproblemData,
     first: bool,
 ) -> SolvedData:
-    """Do one run: a task of a sweep.
+    """Do one run; this is the task of a sweep.
 
     Raises
     ------
     NoFeasiblePath
-        The `first` run, which has all that is allowed, has no path.
+        The `first` run, which has the full limits, has no path.
     """
     problem = _problem(job, digest, contour, tuple(criteria))
     made = problem.solve(Subproblem.from_data(run), first=first)
@@ -174,7 +176,7 @@ def _evaluation(result: Result) -> Evaluation | str:
 
 @lru_cache(maxsize=2)
 def _problem(path: str, digest_then: str, contour: str, criteria: tuple[str, ...]) -> ParetoProblem:
-    """Return what the runs of a contour have in common, kept for the next task of a worker."""
+    """Return the problem that the runs of a contour share, cached for the next task of a worker."""
     known = load_job(path, digest_then)
     cell = cell_of_job(known.job, known.part)
     return problem_of_job(known.job, known.part, contour, criteria, cell)
@@ -183,24 +185,24 @@ def _problem(path: str, digest_then: str, contour: str, criteria: tuple[str, ...
 def problem_of_job(
     job: Job, part: Part, contour: str, criteria: Sequence[str], cell: Cell | None
 ) -> ParetoProblem:
-    """Return what the runs of a contour of a job have in common.
+    """Return the problem that the runs of a contour of a job share.
 
     Parameters
     ----------
     job : Job
     part : Part
-        Its drawing.
+        The part of the job.
     contour : str
-        Name of one of its contours.
+        Name of a contour of the job.
     criteria : sequence of str
         As in `kerfpath.pareto`.
     cell : Cell or None
-        That of the job.
+        The cell of the job.
 
     Raises
     ------
     InputError
-        Criteria that are none, or for which something is missing.
+        A criterion is unknown, or something that it needs is missing.
     NoFeasiblePath
         No course of the external axes leads to a plan.
     """
@@ -241,13 +243,13 @@ def _faults(job: Job, drawn: Contour, made: Plan, cell: Cell | None) -> list[Che
 
 
 def _named_contour(known: LoadedJob, contour: str | None) -> tuple[str, tuple[str, ...]]:
-    """Return the name of the contour, the longest if none is named, and those of the others."""
+    """Return the name of the contour (default: the longest) and the names of the others."""
     tasks = {task.name: task for task in known.job.tasks(known.part)}
     if contour is None:
         contour = max(tasks, key=lambda name: tasks[name].drawn(known.part).length)
     elif contour not in tasks:
         raise InputError(
-            f"{known.job.path}: expected the name of a contour of the job, got {contour!r}; it has "
-            f"{', '.join(tasks)}"
+            f"{known.job.path}: expected the name of a contour of the job, got {contour!r}; its "
+            f"contours: {', '.join(tasks)}"
         )
     return contour, tuple(name for name in tasks if name != contour)

@@ -1,4 +1,4 @@
-"""What the study of a contour leaves: pareto.json and pareto.html; and the plan picked there."""
+"""Write the Pareto front of a contour to pareto.json and pareto.html, and plan a picked run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from kerfpath.study._pareto import JobFront
 __all__ = ["Pick", "axes_of", "plan_picked", "read_pick", "write_pareto"]
 
 SCHEMA = 1
-"""Counts the ways in which pareto.json was written."""
+"""Version of the format of pareto.json."""
 
 
 def write_pareto(found: JobFront, folder: Path) -> list[Path]:
@@ -72,13 +72,13 @@ def _entries(found: JobFront) -> dict[str, object]:
 
 
 def marks(front: Front) -> dict[str, int]:
-    """Return the numbers of the plans that are best in a criterion, and of the balanced one."""
+    """Return the number of the best plan in each criterion, and of the balanced plan."""
     best = {name: front.numbers[front.best_at(name)] for name in front.criteria}
     return best | {"balanced": front.numbers[front.balanced_at]}
 
 
 def axes_of(front: Front) -> list[FrontAxis]:
-    """Return the criteria of a front as they are shown to people."""
+    """Return the criteria of a front in the form that pages show."""
     return [
         FrontAxis(name=axis.name, words=axis.words, unit=axis.unit, sense=axis.sense)
         for axis in front.axes
@@ -124,31 +124,31 @@ def _page(found: JobFront, folder: Path) -> str:
 
 
 def _note(*, off_grid: bool) -> str:
-    """Say what is known of the plans."""
+    """Return the note on what is proved of the plans."""
     known = (
-        "A plan over continuous rotation is the best motion that was found for its run, one on the "
-        "grid the proved optimum there; none is certified before it is picked; "
+        "A plan over continuous rotation is the best motion found for its run; a plan on the grid "
+        "is the proved optimum on that grid. No plan is certified before it is picked."
         if off_grid
-        else "Every plan is the proved optimum of its run on the grid of the rotation, and is not "
-        "refined: off the grid others may be better or faster; "
+        else "Every plan is the proved optimum of its run on the grid of the rotation and is not "
+        "refined: off the grid there may be better or faster plans."
     )
-    return f"{known}the set is a sample of the front."
+    return f"{known} The set is a sample of the front."
 
 
 def _courses_note(job: Job) -> list[str]:
-    """Say along what plans of the grid are proved, where external axes have courses."""
+    """Return the note on the courses of external axes along which plans are proved, if any."""
     if not follows_courses(job.robot, job.options):
         return []
     names = ", ".join(axis.name for axis in job.robot.externals)
     return [
-        f"On the grid {names} have the courses of the plans that kerfpath plan finds: an optimum "
-        "there is one along these, and nothing is proved of other courses. Over continuous "
-        "rotation plans leave them."
+        f"On the grid {names} follow the courses of the plans that kerfpath plan finds. An optimum "
+        "is proved along these courses only, not for other courses. Over continuous rotation plans "
+        "may leave them."
     ]
 
 
 def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:
-    """Return what a run asks for, in words."""
+    """Return the settings of a run as rows of name and value in words."""
     each = run.weights * robot.speed_limits()[0]
     relative = each / np.exp(np.log(each).mean())
     rows = [
@@ -169,7 +169,7 @@ def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pick:
-    """A plan of a front: whose it is, its number, and what its run asked for."""
+    """A plan of a front: its contour, its number, and the settings of its run."""
 
     contour: str
     number: int
@@ -179,12 +179,15 @@ class Pick:
 
 
 def read_pick(folder: Path, job_file: Path, which: str) -> Pick:
-    """Return a plan of the front in a folder: by number, "balanced", or a criterion it is best in.
+    """Return a plan of the front in a folder, by number, "balanced" or the name of a criterion.
+
+    The name of a criterion stands for the plan that is best in it.
 
     Raises
     ------
     InputError
-        No front there, one of another version or of another state of the job, no such plan.
+        The folder has no front, the front is from another version or another state of the job, or
+        it has no such plan.
     """
     path = folder / "pareto.json"
     again = f"run kerfpath pareto {job_file} --out {folder} first"
@@ -196,14 +199,16 @@ def read_pick(folder: Path, job_file: Path, which: str) -> Pick:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); {again}") from None
     except (ValueError, KeyError, TypeError):
-        raise InputError(f"{path}: expected a front as kerfpath writes it; {again}") from None
+        raise InputError(f"{path}: expected a front written by kerfpath; {again}") from None
     if (schema, version) != (SCHEMA, __version__):
         raise InputError(
-            f"{path}: written by kerfpath {version}, this is {__version__}; {again}, into another "
-            "folder"
+            f"{path}: written by kerfpath {version}, but this is {__version__}; {again}, with "
+            "another folder"
         )
     if whole != digest(job_file):
-        raise InputError(f"{path}: the job or a file that it names has changed since; {again}")
+        raise InputError(
+            f"{path}: the job or a file that it names has changed since this front; {again}"
+        )
     number = int(which) if which.isdecimal() else named.get(which)
     if number not in plans:
         known = ", ".join(map(str, sorted(plans)))
@@ -216,9 +221,9 @@ def read_pick(folder: Path, job_file: Path, which: str) -> Pick:
 def plan_picked(
     job_file: Path, pick: Pick, *, refine: bool, progress: Progress = no_progress
 ) -> tuple[Part, JobResult]:
-    """Return what comes of the whole job with the contour planned as picked; its part, too.
+    """Return the part of the job and the result of the whole job with one contour as picked.
 
-    With `refine`, the plan is moved off the grid of gamma from there; its criteria then differ.
+    With `refine`, the picked plan is refined off the grid of gamma; its criteria then differ.
     """
     known = load_job(str(job_file.resolve()), digest(job_file))
     prepared = prepare(known.job, known.part)

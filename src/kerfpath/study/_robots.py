@@ -1,4 +1,4 @@
-"""Which robots of the library can cut the part of a job where it lies, and how fast."""
+"""Find the robots of the library that can cut the part of a job where it is, and how fast."""
 
 from __future__ import annotations
 
@@ -31,26 +31,28 @@ from kerfpath.sweep import Sweep
 __all__ = ["NEAREST", "ContourSpeed", "RobotSpeed", "contour_speeds", "which_robots", "with_robot"]
 
 NEAREST = "nearest"
-"""In place of a ratio: of each robot the one that the library calls its nearest."""
+"""Value of `acceleration_ratio` that takes for each robot the ratio that the library recommends."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContourSpeed:
-    """What a robot can do of one contour.
+    """Reach and fastest speed of a robot on one contour.
 
     Parameters
     ----------
     name : str
+        Name of the contour.
     asked : float m/s
-        What the job asks for.
+        Speed that the job asks for.
     reached : float
-        Share of its nodes that have a pose.
+        Share of the nodes that have a pose.
     fastest : float m/s, optional
-        The fastest constant speed on the job's grid; None where there is none, or another contour
-        is out of reach.
+        The fastest constant speed on the job's grid; None where there is none, or where another
+        contour is out of reach.
     joint : int, optional
-        Which binds, from 1.
+        The joint that limits the speed, from 1.
     limit : {"velocity", "acceleration"}, optional
+        The limit of that joint that is reached.
     reason : str
         Why there is no speed; empty otherwise.
     """
@@ -67,22 +69,22 @@ class ContourSpeed:
 
     @property
     def margin(self) -> float | None:
-        """The fastest speed as a multiple of what is asked."""
+        """The fastest speed as a multiple of the speed asked for."""
         return None if self.fastest is None else self.fastest / self.asked
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotSpeed:
-    """What a robot can do of a job.
+    """Reach and fastest speeds of a robot on a job.
 
     Parameters
     ----------
     robot : Robot
-        With the limits that were used.
+        The robot with the limits that were used.
     own : bool
-        It is the job's own, with the limits that the job gives.
+        Whether it is the job's own robot, with the limits that the job gives.
     contours : tuple of ContourSpeed
-        Of the whole job; empty where the robot was refused before.
+        All contours of the job; empty where the robot was refused.
     reason : str
         Why not every contour has a speed; empty otherwise.
     """
@@ -103,7 +105,7 @@ class RobotSpeed:
 
     @property
     def reached(self) -> float:
-        """Share of the nodes that have a pose, of the contour that is reached least."""
+        """Least share of nodes that have a pose, over all contours."""
         return min((contour.reached for contour in self.contours), default=0.0)
 
 
@@ -117,35 +119,34 @@ def which_robots(
     acceleration_ratio: str | None = None,
     progress: Progress = no_progress,
 ) -> list[RobotSpeed]:
-    """Return what each robot can do of a job, the fastest first; each is a task of its own.
+    """Return reach and speeds of each robot on a job, the fastest first; each robot is one task.
 
-    Robot base, head and part stay where the job has them. The job's own robot is evaluated with its
-    limits as the job gives them, all others with those of the library and the endless axes that
-    are so there.
+    Robot base, head and part stay where the job has them. The job's own robot is evaluated with the
+    limits that the job gives, all others with the limits and endless axes of the library.
 
     Parameters
     ----------
     job_file : path
-        At the same place on every worker.
+        The job file, at the same path on every worker.
     store, scheduler, processes, progress
         As in `kerfpath.sweep.run`.
     robots : sequence of str, optional
-        Ids of the library; default: all of it. The job's own robot is there in any case.
+        Ids of library robots; default: all. The job's own robot is always included.
     acceleration_ratio : str, optional
-        Of robots whose maker publishes no accelerations, assume them by this ratio to the speeds
-        (one of `kerfpath.robots.acceleration_ratios()`), or by `NEAREST`. Default: the ratio
-        that the job names, if it does; otherwise these robots are refused.
+        Ratio of acceleration to velocity that is assumed for robots whose maker publishes no
+        accelerations: one of `kerfpath.robots.acceleration_ratios()`, or `NEAREST`. Default: the
+        ratio in the job, if there is one; otherwise these robots are refused.
 
     Raises
     ------
     InputError
-        As `read_job` and `kerfpath.sweep.run`; an unknown robot or ratio.
+        As `read_job` and `kerfpath.sweep.run`; also for an unknown robot or ratio.
     """
     path = Path(job_file)
     job, known = read_job(path), (NEAREST, *acceleration_ratios())
     if acceleration_ratio is not None and acceleration_ratio not in known:
         raise InputError(
-            f"acceleration_ratio: {acceleration_ratio!r} is not one of {', '.join(known)}"
+            f"acceleration_ratio: expected one of {', '.join(known)}, got {acceleration_ratio!r}"
         )
     ratio = acceleration_ratio or job.source["robot"].get("acceleration_ratio")
     names = [name for name in robots or robot_ids() if name != job.robot.id]
@@ -169,7 +170,7 @@ def which_robots(
 
 
 def _reason(contours: Sequence[ContourSpeed]) -> str:
-    """Say why not every contour has a speed: of the worst one, and how many there are."""
+    """Return why not every contour has a speed: the worst contour's reason, and how many fail."""
     bad = [contour for contour in contours if contour.reason]
     if not bad:
         return ""
@@ -179,9 +180,10 @@ def _reason(contours: Sequence[ContourSpeed]) -> str:
 
 
 def _ratio_of(candidate: Robot, ratio: str | None) -> str | None:
-    """Return by which ratio accelerations are assumed; None where they are known, or not at all.
+    """Return the ratio for assumed accelerations; None where accelerations are known.
 
-    Nor for an arm whose elbow is free, which the list refuses: ratios are those of six joints.
+    Also None where the velocities are not known, or for an arm with a free elbow, which the list
+    refuses: ratios are for six joints.
     """
     if candidate.acceleration is not None or candidate.velocity is None or candidate.free.size:
         return None
@@ -198,7 +200,7 @@ def _order(found: RobotSpeed) -> tuple[float, float, str]:
 def evaluate_robot(
     *, path: str, digest_then: str, name: str | None, ratio: str | None
 ) -> list[dict[str, object]]:
-    """Return what a robot of the library, or the job's own, can do of a job: a task of a sweep."""
+    """Return the contour speeds of a library robot or the job's own; the task of the sweep."""
     found = load_job(path, digest_then)
     job = found.job
     if name is not None:
@@ -210,29 +212,29 @@ def evaluate_robot(
 
 
 def with_robot(job: Job, candidate: Robot) -> Job:
-    """Return a job with another robot in its place, for `contour_speeds`.
+    """Return a job with its robot replaced by another, for `contour_speeds`.
 
-    Its external axes stay where they are, the base of the robot on those that carry it.
+    The external axes stay where they are, and the new robot is mounted on those that carry one.
 
     Raises
     ------
     InputError
-        A posture that its family has not; a cell that asks for the links of a description; a job
-        with a load or jerk limits.
+        The family of the robot lacks the job's posture; the cell uses the links of the job's
+        description; the job has a load or jerk limits; or one of the arms has seven axes.
     """
     for each in (job.robot, candidate):
         each.require_no_free_joint("a list of robots")
     if job.robot.load is not None or job.robot.jerk is not None:
         raise InputError(
-            "its limits on torque and jerk are not known: remove mass_kg and jerk_deg_s3 to "
-            "compare robots without them"
+            "its torque and jerk limits are not known: remove mass_kg and jerk_deg_s3 to compare "
+            "robots without them"
         )
     words = job.source.get("plan", {}).get("posture")
     postures = None if words is None else postures_named(words, candidate.kinematics)
     if job.cell is not None and job.cell.links == "description":
         raise InputError(
-            'its links are not known, as links = "description" in [cell] describes the job\'s own '
-            'robot alone; write links = "capsules", which stand for those of any'
+            'its links are not known: links = "description" in [cell] applies only to the job\'s '
+            'own robot; write links = "capsules", which fit any robot'
         )
     candidate = _on_axes_of(job.robot, candidate)
     return replace(job, robot=candidate, options=replace(job.options, postures=postures))
@@ -244,14 +246,14 @@ def _on_axes_of(own: Robot, candidate: Robot) -> Robot:
     Raises
     ------
     InputError
-        Its accelerations are not known: then nothing is known of how it moves with the axes.
+        Its accelerations are not known; without them there are no courses of external axes.
     """
     if own.externals and candidate.acceleration is None:
         names = ", ".join(axis.name for axis in own.externals)
         raise InputError(
-            f"its accelerations are not known, and no course of {names} without them: give "
-            "--acceleration-ratio, or acceleration_ratio in [robot], to assume a typical ratio "
-            "to the speeds"
+            f"its accelerations are not known, and without them there is no course of {names}; "
+            "give --acceleration-ratio, or acceleration_ratio in [robot], to assume a typical "
+            "ratio to the speeds"
         )
     velocity, acceleration = own.speed_limits() if own.externals else ((), ())
     limits = own.joint_limits()
@@ -268,21 +270,21 @@ def _on_axes_of(own: Robot, candidate: Robot) -> Robot:
 
 
 def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
-    """Return what the job's robot can do of each contour, with part and robot where the job says.
+    """Return reach and fastest speed of the job's robot on each contour, placed as in the job.
 
-    Reach is that of all poses on the job's grid, margins of [comfort] kept. Only where every node
-    of every contour has a pose, and in a cell every `EVERY`-th a clear one, are speeds looked for:
-    exact on that grid, clear in the cell. External axes are at any place of a coarse grid of them
-    for the reach, and speeds are along the gentlest course of theirs, unless the job's method takes
-    them on a grid.
+    Reach counts all poses on the job's grid that keep the margins of [comfort]. Speeds are searched
+    only where every node of every contour has a pose and, in a cell, every `EVERY`-th node a clear
+    one. They are exact on that grid and clear in the cell. External axes are sampled on a coarse
+    grid for the reach, and follow their gentlest course for the speeds, unless the job's method
+    takes them on a grid.
 
     Raises
     ------
     InputError
-        Limits that are not known, a cell that cannot be.
+        Limits are not known, or the cell is not valid.
     """
     evaluator = Evaluator(job=job, part=part)
-    _ = evaluator.cell  # what is wrong with it is said first
+    _ = evaluator.cell  # report errors of the cell first
     contours = sample_contours(job, part)
     if follows_courses(job.robot, job.options):
         return _along_courses(evaluator, contours)
@@ -298,7 +300,7 @@ def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
         return found
     if job.robot.acceleration is None:
         raise InputError(
-            "in reach of every node, but its accelerations are not known: give "
+            "it reaches every node, but its accelerations are not known: give "
             "--acceleration-ratio, or acceleration_ratio in [robot], to assume a typical ratio "
             "to the speeds"
         )
@@ -308,7 +310,7 @@ def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
 
 
 def _along_courses(evaluator: Evaluator, contours: Sequence[SampledContour]) -> list[ContourSpeed]:
-    """Return what a robot can do of each contour along the gentlest course of external axes."""
+    """Return reach and speed on each contour along the gentlest course of the external axes."""
     job = evaluator.job
     names = ", ".join(axis.name for axis in job.robot.externals)
     found = [
@@ -330,7 +332,7 @@ def _along_courses(evaluator: Evaluator, contours: Sequence[SampledContour]) -> 
 def _with_speed(
     evaluator: Evaluator, contour: SampledContour, graph: LayeredGraph | None, known: ContourSpeed
 ) -> ContourSpeed:
-    """Return what is known of a contour with its fastest speed, or why there is none."""
+    """Return a contour's result completed by its fastest speed, or by why there is none."""
     try:
         best = evaluator.fastest(contour.nodes, graph)
     except NoFeasiblePath as broken:
@@ -339,14 +341,14 @@ def _with_speed(
 
 
 def _share_reached(contour: SampledContour, graph: LayeredGraph) -> ContourSpeed:
-    """Return which share of the nodes has a pose, and what forbids the first that has none."""
+    """Return the share of nodes that have a pose, and what rules out the first that has none."""
     empty = np.flatnonzero(np.diff(graph.start) == 0)
     first = f"at node {empty[0]} mostly: {graph.main_loss(int(empty[0]))}" if empty.size else ""
     return _reached(contour, empty, first)
 
 
 def _reached(contour: SampledContour, empty: Ints, why: str) -> ContourSpeed:
-    """Return which share of the nodes has a pose, given those that have none, and why they have."""
+    """Return the share of nodes that have a pose, given the ones that have none and why."""
     nodes = len(contour.nodes)
     return ContourSpeed(
         name=contour.name,

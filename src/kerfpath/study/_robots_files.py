@@ -1,4 +1,4 @@
-"""What `which_robots` leaves on disk: robots.json and robots.html."""
+"""Write the results of `which_robots` to robots.json and robots.html."""
 
 from __future__ import annotations
 
@@ -31,21 +31,23 @@ ROBOT_COLUMNS = (
     ("Margin", ""),
     ("Fastest", "m/min"),
     ("Accelerations", ""),
-    ("Contour that binds, or why not", ""),
+    ("Limiting contour, or reason", ""),
 )
+"""Head and unit of each column of the table of robots."""
 ROBOT_WORDS = (0, 5, 6)
+"""Columns of that table that hold text."""
 ROBOT_NOTES = (
-    "Margin: the fastest constant speed, exact on the job's grid (and along one course of external "
-    "axes, where the job has them), over the speed asked for, of the "
-    f"contour where that is least; from 1 on the robot does the job as it asks; {FINER}.",
-    "Robot base, head and part stay where the job has them. The payload is stated, not checked: no "
-    "job says what its head weighs.",
+    "Margin: the fastest constant speed divided by the speed asked for, of the contour where this "
+    "ratio is least. Speeds are exact on the job's grid (and along one course of external axes, "
+    f"where the job has them). From a margin of 1 on the robot does the job as asked; {FINER}.",
+    "Robot base, head and part stay where the job has them. The payload is listed but not checked, "
+    "because the job does not state the weight of the head.",
 )
-"""What a reader of the table must know."""
+"""Notes below the table of robots."""
 
 
 def robots_entry(found: Sequence[RobotSpeed]) -> list[dict[str, object]]:
-    """Return what was found as plain data, units in the names."""
+    """Return the results as plain data, with units in the names."""
     return [_entry(each) for each in found]
 
 
@@ -90,17 +92,17 @@ def write_robots(
     found: Sequence[RobotSpeed],
     folder: str | os.PathLike[str],
 ) -> list[Path]:
-    """Write robots.json and robots.html into a folder that is there.
+    """Write robots.json and robots.html into an existing folder.
 
     Raises
     ------
     InputError
-        As `read_job`; a file that cannot be written.
+        As `read_job`; also where there are no robots, or a file cannot be written.
     """
     job = read_job(job_file)
     whole = {"version": __version__, "job": job.source, "robots": robots_entry(found)}
     if not found:
-        raise InputError("no robots to write of")
+        raise InputError("no robots to write: the list of results is empty")
     able = sum(each.binding is not None for each in found)
     page = render_table(
         f"Robots for {job.part_file.stem.replace('_', ' ')}",
@@ -118,7 +120,7 @@ def write_robots(
 
 
 def robot_rows(found: Sequence[RobotSpeed]) -> list[list[str]]:
-    """Return a row for each robot, as `ROBOT_COLUMNS` say."""
+    """Return a row for each robot, with the columns of `ROBOT_COLUMNS`."""
     return [_row(each) for each in found]
 
 

@@ -1,4 +1,4 @@
-"""Many tasks at once: each done exactly once and kept, on local processes or a Dask cluster."""
+"""Sweeps: many tasks, each done exactly once and stored, on local processes or a Dask cluster."""
 
 from kerfpath.progress import Progress
 from kerfpath.sweep._run import Result, Sweep, run

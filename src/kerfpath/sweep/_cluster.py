@@ -1,4 +1,4 @@
-"""Tasks on the workers of a Dask cluster."""
+"""Run tasks on the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from kerfpath.sweep._task import Failure, Task, TaskOutcome, attempt
 __all__ = ["on_cluster"]
 
 AHEAD = 4096
-"""Number of tasks at the scheduler at a time: more than workers, few for its memory."""
+"""Number of tasks at the scheduler at a time: more than there are workers, but easy on memory."""
 
 GROUP = "task-"
-"""Prefix of the keys of tasks: Dask takes them for one group, which it keeps in a queue.
+"""Prefix of the keys of tasks: with it Dask treats them as one group and keeps them in a queue.
 
-Without it each task would be a group of its own, which the scheduler never forgets."""
+Without it each task would be a separate group, which the scheduler never forgets."""
 
 PATIENCE = 10.0
-"""Longest wait for a scheduler, and then for its first worker, s."""
+"""s: longest wait for a scheduler, and then for its first worker."""
 
 
 def on_cluster(
     function: Callable[..., Any], waiting: deque[Task], address: str
 ) -> Generator[list[TaskOutcome], None, None]:
-    """Do the waiting tasks and yield outcomes as they come, none where nothing is waiting.
+    """Do the waiting tasks and yield outcomes as they come; an empty list if nothing is waiting.
 
-    The generator never ends; closing it takes the rest back from the scheduler. Dask gives the
-    tasks of a lost worker to the others; a task that has lost several workers has failed (Dask's
+    The generator never ends; closing it cancels the remaining tasks at the scheduler. Dask gives
+    the tasks of a lost worker to the others; a task that kills several workers has failed (Dask's
     `allowed-failures`).
 
     Raises
     ------
     InputError
-        Where Dask is not installed, the scheduler is not there or goes away, or a worker has
-        another version of kerfpath.
+        Dask is not installed, the scheduler does not answer or is lost, or a worker has another
+        version of kerfpath.
     """
     require_extra("cluster", "a scheduler")
     import distributed
@@ -48,8 +48,8 @@ def on_cluster(
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(
-            f"scheduler {address}: no answer within {PATIENCE:g} s; is `dask scheduler` running "
-            f"there, and the address right?"
+            f"scheduler {address}: no answer within {PATIENCE:g} s; check the address, and that "
+            "`dask scheduler` is running there"
         ) from error
     try:
         with client:
@@ -58,19 +58,19 @@ def on_cluster(
     except (distributed.CancelledError, OSError, RuntimeError) as error:
         # Closing a client that has lost its scheduler may end in a RuntimeError of Dask's own.
         raise InputError(
-            f"scheduler {address}: lost on the way; the results so far are kept: run the same "
-            f"sweep again"
+            f"scheduler {address}: the connection was lost; the results so far are stored: run the "
+            "same sweep again"
         ) from error
 
 
 def _check(client: Any, address: str) -> None:
-    """Require at least one worker, and the same version of kerfpath on all."""
+    """Require at least one worker, and this version of kerfpath on all workers."""
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError as error:
         raise InputError(
-            f"scheduler {address}: no worker within {PATIENCE:g} s; start some: dask worker "
-            f"{address} --nthreads 1"
+            f"scheduler {address}: no worker within {PATIENCE:g} s; start workers with: dask "
+            f"worker {address} --nthreads 1"
         ) from error
     found = client.run(version, "kerfpath", on_error="return")
     others = [f"{worker} has {v}" for worker, v in sorted(found.items()) if v != __version__]
@@ -110,7 +110,7 @@ def _failure_of(distributed: Any, future: Any) -> TaskOutcome:
     """Return the failure of a task that kills its workers; raise any other error."""
     error = future.exception()
     if isinstance(error, distributed.KilledWorker):
-        failure = Failure(kind="WorkerDied", message="the task took several workers with it")
+        failure = Failure(kind="WorkerDied", message="the task killed several workers")
         key = future.key.removeprefix(GROUP)
         return TaskOutcome(key=key, value=None, failure=failure, seconds=0.0)
     if isinstance(error, InputError | distributed.CancelledError):

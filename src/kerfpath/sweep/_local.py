@@ -1,4 +1,4 @@
-"""Tasks on processes of this machine."""
+"""Run tasks on processes of this machine."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from kerfpath.sweep._task import Failure, Task, TaskOutcome, attempt
 __all__ = ["on_processes"]
 
 AHEAD = 8
-"""Number of tasks handed out per process: enough that none is idle, few to lose."""
+"""Tasks handed out per process: enough to keep it busy, few enough to lose little."""
 
 CHECKED_EVERY = 0.1
-"""s: how often a wait for tasks may be left."""
+"""s: how often a wait for tasks checks whether to stop."""
 
 ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
@@ -34,16 +34,16 @@ ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NU
 def on_processes(
     function: Callable[..., Any], waiting: deque[Task], processes: int
 ) -> Generator[list[TaskOutcome], None, None]:
-    """Do the waiting tasks and yield outcomes as they come, none where nothing is waiting.
+    """Do the waiting tasks and yield outcomes as they come; an empty list if nothing is waiting.
 
-    The generator never ends; closing it stops the processes at once. When a process dies, the task
-    that killed it is not known: those handed out are tried again one by one, and a task during
+    The generator never ends; closing it stops the processes at once. When a process dies, it is not
+    known which task killed it: the tasks handed out are tried again one by one, and a task during
     which the process dies again has failed.
 
     Raises
     ------
     InputError
-        Where the processes do not come up, or cannot import the function.
+        The processes do not start, or cannot import the function.
     """
     call = pickle.dumps(function)
     while True:
@@ -53,16 +53,16 @@ def on_processes(
         suspects = deque((yield from _run_pool(call, waiting, processes, processes * AHEAD)))
         while suspects:
             for task in (yield from _run_pool(call, suspects, 1, 1, lasting=False)):
-                failure = Failure(kind="WorkerDied", message="the task took its process with it")
+                failure = Failure(kind="WorkerDied", message="the task killed its process")
                 yield [TaskOutcome(key=task.key, value=None, failure=failure, seconds=0.0)]
 
 
 def _run_pool(
     call: bytes, waiting: deque[Task], processes: int, ahead: int, *, lasting: bool = True
 ) -> Generator[list[TaskOutcome], None, list[Task]]:
-    """Do the waiting tasks; return, at the first death of a process, the tasks that it interrupted.
+    """Do the waiting tasks; when a process dies, return the tasks that were interrupted.
 
-    A lasting pool stays when nothing is waiting, and yields no outcomes.
+    A lasting pool stays alive when nothing is waiting, and yields empty lists.
     """
     context = get_context("spawn")
     ours, theirs = context.Pipe()
@@ -100,8 +100,8 @@ def _run_pool(
             del flying[future]
         if not ours.poll():
             raise InputError(
-                "the processes of the sweep do not come up; a script that calls a sweep has to do "
-                "so under `if __name__ == '__main__':`"
+                "the processes of the sweep do not start; a script has to call a sweep under "
+                "`if __name__ == '__main__':`"
             )
         return list(flying.values())
     finally:
@@ -114,7 +114,7 @@ def _run_pool(
 
 @contextmanager
 def _interrupt_blocked() -> Iterator[None]:
-    """Start processes with Ctrl-C blocked, until they ignore it by themselves."""
+    """Block Ctrl-C while processes start; they ignore it from then on."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -126,20 +126,20 @@ def _interrupt_blocked() -> Iterator[None]:
 
 
 def _set_up(link: Connection, call: bytes) -> None:
-    """Set up a process: one thread, Ctrl-C ignored, and an end as soon as the sweep ends.
+    """Set up a process: use one thread, ignore Ctrl-C, and end as soon as the sweep ends.
 
-    Imports of the function happen here, not in the first task.
+    The function is imported here instead of in the first task.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ.update(ONE_THREAD)
     Thread(target=_leave_with, args=(link,), daemon=True).start()
-    with suppress(OSError):  # a sweep that was killed meanwhile hears nothing
+    with suppress(OSError):  # the sweep may have been killed meanwhile
         link.send(None)
     with suppress(ImportError, AttributeError):  # the task reports it
         pickle.loads(call)
 
 
 def _leave_with(link: Connection) -> None:
-    """End this process when the other end of `link` closes: after close() or a kill."""
+    """End this process when the other end of `link` closes, by close() or because it was killed."""
     link.poll(None)
     os._exit(1)

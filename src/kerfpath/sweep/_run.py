@@ -1,4 +1,4 @@
-"""A sweep: tasks whose results are not in the store are done, and their results kept."""
+"""A sweep: do the tasks whose results are not in the store, and store their results."""
 
 from __future__ import annotations
 
@@ -28,12 +28,13 @@ class Result:
     Parameters
     ----------
     parameters : dict
-        As JSON gives them back.
+        Parameters of the task, as read back from JSON.
     value : JSON data
-        What the function returned; None where it failed.
+        Return value of the function; None where it failed.
     failure : Failure or None
-    seconds : float
-        The time that the call took, s.
+        Why the task has no value.
+    seconds : float s
+        Time that the call took.
     """
 
     parameters: dict[str, Any]
@@ -45,11 +46,11 @@ class Result:
 
 
 class Sweep:
-    """Calls of one function, submitted one by one, with results kept as they come.
+    """Calls of one function, submitted one by one, whose results are stored as they come.
 
-    A sweep is a context manager, for searches whose next task depends on results; `run` takes all
+    A sweep is a context manager for searches whose next task depends on results; `run` takes all
     tasks at once. Results in the store are not computed again. Workers start with the first task
-    that is new.
+    that is not in the store.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ class Sweep:
         Called with "tasks", the number of tasks done, and the number of all; see
         `kerfpath.progress`.
     total : int, optional
-        Number of tasks that there will be; default: the number submitted so far.
+        Total number of tasks, for the progress; default: the number submitted so far.
 
     Raises
     ------
@@ -79,7 +80,7 @@ class Sweep:
     ) -> None:
         if processes is not None and (scheduler is not None or processes < 1):
             raise InputError(
-                f"processes = {processes}: expected at least 1, and none where a scheduler is given"
+                f"processes: expected at least 1, and none with a scheduler, got {processes}"
             )
         self._function, self._name = function, name_of(function)
         self._waiting: deque[Task] = deque()
@@ -100,7 +101,7 @@ class Sweep:
         Raises
         ------
         InputError
-            Where the parameters are no plain JSON data, or not those of the function.
+            The parameters are not plain JSON data, or not those of the function.
         """
         return self._hand_in(task_of(self._function, parameters, "parameters"))
 
@@ -113,7 +114,13 @@ class Sweep:
         return task.key
 
     def result(self, key: str) -> Result:
-        """Wait for the result of a task and return it."""
+        """Wait for the result of a task, given its key, and return it.
+
+        Raises
+        ------
+        InputError
+            As `run`.
+        """
         if not self._begun:
             self._begun = True
             self._report()
@@ -158,25 +165,26 @@ def run(
     processes: int | None = None,
     progress: Progress = no_progress,
 ) -> list[Result]:
-    """Call a function with each of many parameters, exactly once each, and keep the results.
+    """Call a function with each of many parameters, exactly once each, and store the results.
 
-    What the store holds already is not done again, so that the same call goes on after Ctrl-C,
-    `kill -9` or a full disk; only tasks that were under way are lost. A task that fails is kept
-    with its reason, is not tried again, and does not stop the others.
+    Results in the store are not computed again, so the same call continues after Ctrl-C, `kill -9`
+    or a full disk; only tasks in progress are lost. A task that fails is stored with its reason, is
+    not tried again, and does not stop the others.
 
     Parameters
     ----------
     function : callable
-        From the top level of a module, and pure: the same parameters, the same value, which is
-        plain JSON data without inf and NaN. An edit of it goes unnoticed: take another store.
+        A pure function at the top level of a module: the same parameters give the same value, which
+        is plain JSON data without inf and NaN. A change of its code is not noticed: use another
+        store.
     parameters : iterable of mapping
-        The keyword arguments of each task, plain JSON data; those that come twice are done once.
+        The keyword arguments of each task, as plain JSON data; duplicates are done once.
     store : path
-        An SQLite file, made if it is not there; one sweep at a time.
+        An SQLite file, created if it does not exist; it is used by one sweep at a time.
     scheduler : str, optional
-        Address of a Dask scheduler, as "tcp://10.0.0.1:8786", whose workers do the tasks.
+        Address of a Dask scheduler whose workers do the tasks, such as "tcp://10.0.0.1:8786".
     processes : int, optional
-        How many local processes of one thread do them; as many as there are cores if not given.
+        Number of local processes, with one thread each; default: the number of cores.
     progress : Progress, optional
         Called with "tasks", the number of tasks done, and the number of all; see
         `kerfpath.progress`.
@@ -189,8 +197,8 @@ def run(
     Raises
     ------
     InputError
-        Bad parameters; a store that is in use, from another version, unreadable or full; a
-        scheduler that cannot be reached or whose workers have another version of kerfpath.
+        The parameters are not valid; the store is in use, from another version, unreadable or full;
+        the scheduler cannot be reached, or its workers have another version of kerfpath.
     """
     asked = [task_of(function, p, f"parameters[{i}]") for i, p in enumerate(parameters)]
     with Sweep(

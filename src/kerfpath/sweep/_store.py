@@ -1,4 +1,4 @@
-"""The store of results: one SQLite file, held by one sweep at a time."""
+"""The store of results: one SQLite file, used by one sweep at a time."""
 
 from __future__ import annotations
 
@@ -31,28 +31,28 @@ COMMIT;
 """
 
 REASONS = {
-    sqlite3.SQLITE_BUSY: "another sweep holds this store: wait for its end, or name another store",
-    sqlite3.SQLITE_FULL: "the disk is full; the results so far are kept: make room and run the "
-    "same sweep again",
-    sqlite3.SQLITE_IOERR: "cannot be read or written: is the disk full, or does it fail?",
-    sqlite3.SQLITE_NOTADB: "this file is no store of a sweep: name another",
-    sqlite3.SQLITE_CANTOPEN: "cannot be opened: is its folder there, and may you write in it?",
-    sqlite3.SQLITE_READONLY: "may not be written to: change that, or name another store",
+    sqlite3.SQLITE_BUSY: "another sweep uses this store: wait until it ends, or name another store",
+    sqlite3.SQLITE_FULL: "the disk is full; the results so far are stored: free some space and run "
+    "the same sweep again",
+    sqlite3.SQLITE_IOERR: "cannot be read or written: check whether the disk is full or faulty",
+    sqlite3.SQLITE_NOTADB: "this file is not the store of a sweep: name another file",
+    sqlite3.SQLITE_CANTOPEN: "cannot be opened: check that its folder exists and is writable",
+    sqlite3.SQLITE_READONLY: "is read-only: make it writable, or name another store",
 }
 
 
 class Store:
     """The results of sweeps, in the order in which they came; a context manager.
 
-    It holds SQLite's own lock while it is open, which the system takes from a process that dies.
-    The write-ahead log keeps every result that was added through `kill -9`; a power cut may cost
-    the last ones, never the file.
+    An open store holds SQLite's own lock, which the system releases when the process dies. The
+    write-ahead log keeps every added result even after `kill -9`; a power cut may lose the last
+    results, but never damages the file.
 
     Raises
     ------
     InputError
-        Where the file is held by another sweep, is from another version of kerfpath or of the
-        store, or cannot be read or written; from every method.
+        The file is used by another sweep, is from another version of kerfpath or of the store, or
+        cannot be read or written. Every method may raise it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -74,15 +74,16 @@ class Store:
             self._base.executescript(TABLES)
         if self._number("PRAGMA application_id") != APPLICATION:
             raise InputError(f"{self._path}: {REASONS[sqlite3.SQLITE_NOTADB]}")
-        again = "name another store, and the sweep is done again"
+        again = "name another store to run the sweep again"
         if (schema := self._number("PRAGMA user_version")) != SCHEMA:
             raise InputError(
-                f"{self._path}: a store of schema {schema}, this kerfpath writes {SCHEMA}: {again}"
+                f"{self._path}: expected a store of schema {SCHEMA}, got schema {schema}; {again}"
             )
         (version,) = self._base.execute("SELECT version FROM package").fetchone() or ("unknown",)
         if version != __version__:
             raise InputError(
-                f"{self._path}: a store of kerfpath {version}, this is {__version__}: {again}"
+                f"{self._path}: expected a store of kerfpath {__version__}, got one of {version}; "
+                f"{again}"
             )
         self._base.execute("PRAGMA synchronous = NORMAL")
         self._base.executescript("BEGIN EXCLUSIVE; COMMIT")
@@ -104,7 +105,7 @@ class Store:
             return {key for (key,) in self._base.execute("SELECT key FROM result")}
 
     def add(self, function: str, done: Iterable[tuple[Task, TaskOutcome]]) -> None:
-        """Store outcomes, all or none of them; a key that is there already is an error."""
+        """Store outcomes, all or none of them; a key that exists already is an error."""
         rows = [
             (
                 task.key,
@@ -134,10 +135,10 @@ class Store:
         raise self.damaged(key)
 
     def damaged(self, key: str) -> InputError:
-        """Return the error for a row that is no result."""
+        """Return the error for a row that is not a valid result."""
         return InputError(
-            f"{self._path}: the store is damaged, result {str(key)[:16]!r} is none; name another "
-            "store, and the sweep is done again"
+            f"{self._path}: the store is damaged: result {str(key)[:16]!r} is not valid; name "
+            "another store to run the sweep again"
         )
 
     def __enter__(self) -> Store:

@@ -1,4 +1,4 @@
-"""One task of a sweep: its name in the store, and its one attempt, which never raises."""
+"""A task of a sweep: its key in the store, and the attempt to do it."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ __all__ = [
 ]
 
 SCHEMA = 1
-"""Version of the store; another number is another store."""
+"""Version of the store's format; a store with another number is refused."""
 
 
 class UnfitWorker(InputError):
-    """The worker lacks what a task needs and others have: the sweep ends, nothing is kept."""
+    """The worker lacks something that the task needs: the sweep ends, and no failure is stored."""
 
 
 class Task(NamedTuple):
@@ -50,8 +50,8 @@ class Failure:
     Parameters
     ----------
     kind : str
-        The exception's type: "NoFeasiblePath", "InputError", any other, or "WorkerDied" where the
-        task took its process with it.
+        Type of the exception, such as "NoFeasiblePath" or "InputError"; "WorkerDied" where the task
+        killed its process.
     message : str
     """
 
@@ -62,7 +62,7 @@ class Failure:
 
     @property
     def reason(self) -> str:
-        """The message, after the kind if that is not one of kerfpath's own errors."""
+        """The message; it begins with the kind unless that is one of kerfpath's own errors."""
         own = self.kind in ("InputError", "NoFeasiblePath")
         return self.message if own else f"{self.kind}: {self.message}"
 
@@ -80,25 +80,25 @@ class TaskOutcome:
 
 
 def name_of(function: Callable[..., Any]) -> str:
-    """Return "module:name" of a top-level function; a script has its file's name.
+    """Return "module:name" of a top-level function; the module of a script is its file name.
 
     Raises
     ------
     InputError
-        Where a worker could not import it.
+        A worker could not import the function.
     """
     module, name = getattr(function, "__module__", None), getattr(function, "__qualname__", "")
     home = sys.modules.get(module or "")
     if home is None or getattr(home, name, None) is not function:
         raise InputError(
-            f"a sweep needs a function from the top level of a module, which its workers can "
-            f"import; {function!r} is none: move it there"
+            "a sweep needs a function that workers can import from the top level of a module, got "
+            f"{function!r}; move it there"
         )
     if module == "__main__":
         spec, file = getattr(home, "__spec__", None), getattr(home, "__file__", None)
         if spec is None and file is None:
             raise InputError(
-                f"{name} was typed in, and workers cannot import it: save it in a file"
+                f"{name} was defined interactively, so workers cannot import it: save it in a file"
             )
         module = spec.name if spec else Path(str(file)).stem
     return f"{module}:{name}"
@@ -110,7 +110,7 @@ def task_of(function: Callable[..., Any], parameters: Mapping[str, Any], where: 
     Raises
     ------
     InputError
-        Where the parameters are no JSON, or not those of the function; the message begins with
+        The parameters are not JSON data, or not those of the function; the message begins with
         `where`.
     """
     try:
@@ -131,8 +131,8 @@ def attempt(version: str, function: bytes, task: Task) -> TaskOutcome:
     Raises
     ------
     UnfitWorker
-        Where the worker has another version of kerfpath than `version`, or lacks the function, or
-        the function says so: that is no outcome of the task.
+        The worker has another version of kerfpath than `version` or lacks the function, or the
+        function raises it: this is not an outcome of the task.
     """
     if version != __version__:
         raise UnfitWorker(f"a worker has kerfpath {__version__}, this sweep needs {version}")

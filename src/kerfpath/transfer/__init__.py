@@ -1,4 +1,4 @@
-"""Transfer moves: straight joint motions where they are clear, else around obstacles."""
+"""Transfer moves: straight joint motions where they are clear, otherwise around obstacles."""
 
 from kerfpath.transfer._move import TransferMove as TransferMove
 from kerfpath.transfer._move import least_time as least_time

@@ -1,4 +1,4 @@
-"""A way around obstacles by OMPL's RRT-Connect, and its shortening."""
+"""Find a way around obstacles by OMPL's RRT-Connect, and shorten it."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from kerfpath._extras import require_extra
 __all__ = ["find_way_around"]
 
 SEED = 1
-"""Of the random samples: the same question gives the same way."""
+"""Seed of the random samples: the same arguments give the same way."""
 RANGE = 0.1
-"""Longest branch as a share of the time that the whole range of a joint takes."""
+"""Longest branch of the tree, as a share of the diagonal of the scaled joint ranges."""
 SHORTCUTS = 60
-"""Tries to shorten a way."""
+"""Number of attempts to shorten a way."""
 
 
 def find_way_around(
@@ -35,15 +35,22 @@ def find_way_around(
     Parameters
     ----------
     ends : (2, n) rad
+        First and last joint vector.
     lower, upper : (n,) rad
-        Bounds.
+        Bounds of the joints.
     scale : (n,) s/rad
-        Makes the joints comparable: time to turn by a rad.
+        Scale that makes the joints comparable: time to turn by one rad.
     clear : callable
-        Whether joint vectors (1, n) are clear.
+        Returns whether joint vectors (1, n) are clear.
     passable : callable
-        Whether straight motions through joint vectors (2, n) are.
+        Returns whether the straight motion between joint vectors (2, n) is clear.
     seconds : float s
+        Time limit of the search.
+
+    Raises
+    ------
+    InputError
+        OMPL is not installed.
     """
     require_extra("cells", "ways around obstacles")
     from ompl import base, geometric, util  # loaded where it is needed: half a second
@@ -62,7 +69,7 @@ def find_way_around(
         return np.array([state[0:n] for state in states]) / scale
 
     class Motions(base.MotionValidator):  # type: ignore[misc]  # ompl has no types
-        """OMPL asks here whether a motion is clear."""
+        """The check of motions that OMPL calls."""
 
         def checkMotion(self, one: Any, two: Any) -> bool:  # OMPL's name
             return passable(joints(one, two))

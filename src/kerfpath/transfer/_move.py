@@ -18,7 +18,7 @@ from kerfpath.transfer._near_miss import explain_collision
 __all__ = ["TransferMove", "least_time", "speed_share", "transfer_move"]
 
 SECONDS = 10.0
-"""How long a way around is looked for."""
+"""s: default time limit of the search for a way around."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -28,11 +28,11 @@ class TransferMove:
     Parameters
     ----------
     q : (m, n) rad
-        Corners, both ends included.
+        Corners, including both ends.
     time : (m,) s
-        When each is reached, from 0.
+        Time at which each corner is reached, from 0.
     clear : bool
-        Whether it has been proved clear in a cell; False where there was none to check it in.
+        Whether the move is proved clear in a cell; False where no cell was given.
     """
 
     q: Array
@@ -43,20 +43,26 @@ class TransferMove:
 
     @property
     def duration(self) -> float:
-        """Time it takes, s."""
+        """Duration of the move (s)."""
         return float(self.time[-1])
 
 
 def least_time(dq: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> Array:
-    """Return the times (B,) s of straight joint motions dq (B, n) rad from stop to stop.
+    """Return the least times (B,) s of straight joint motions dq (B, n) rad from stop to stop.
 
-    All joints start and arrive together; with s from 0 to 1 along the motion, the joint that is
-    nearest to a limit bounds the speed v of s and its acceleration a, and it takes 1 / v + v / a,
-    or 2 / sqrt(a) where v is not reached.
+    All joints start and arrive together. Let s run from 0 to 1 along the motion: the joints bound
+    its speed v and its acceleration a, and the motion takes 1 / v + v / a, or 2 / sqrt(a) where v
+    is not reached.
+
+    Parameters
+    ----------
+    dq : (B, n) rad
+    velocity : (n,) rad/s
+    acceleration : (n,) rad/s^2
     """
     step = np.abs(floats(dq, "dq", (None, None)))
     n = step.shape[1]
-    # Time to cross at full speed, and square of the time to gain it all, of the slowest joint.
+    # 1 / v and 1 / a of the slowest joints.
     cross = (step / floats(velocity, "velocity", (n,))).max(axis=1)
     gain = (step / floats(acceleration, "acceleration", (n,))).max(axis=1)
     full = cross**2 >= gain
@@ -65,16 +71,16 @@ def least_time(dq: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> A
 
 
 def speed_share(dq: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike, time: Array) -> Array:
-    """Return the shares (B,) of the full speed at which motions dq (B, n) rad take times (B,) s.
+    """Return the shares (B,) of full velocity at which motions dq (B, n) rad take times (B,) s.
 
-    From stop to stop, the acceleration being the full one: the inverse of `least_time` with that
-    share of the velocities. 1 for a motion that goes nowhere.
+    The motions go from stop to stop with full acceleration, so this is the inverse of `least_time`
+    with that share of the velocities. The share is 1 for a motion of length zero.
     """
     step = np.abs(floats(dq, "dq", (None, None)))
     n = step.shape[1]
     cross = (step / floats(velocity, "velocity", (n,))).max(axis=1)
     gain = (step / floats(acceleration, "acceleration", (n,))).max(axis=1)
-    # Without gaining and losing speed it would take this long; half, where that is all it does.
+    # Time at constant speed without acceleration; half of `time` where speed is never constant.
     even = (time + np.sqrt(np.maximum(time**2 - 4 * gain, 0.0))) / 2
     return np.asarray(np.where(cross > 0, cross / np.maximum(even, 1e-300), 1.0))
 
@@ -89,32 +95,30 @@ def transfer_move(
     eta_a: float = 1.0,
     seconds: float = SECONDS,
 ) -> TransferMove:
-    """Return a move from q0 to q1 (n,) rad, clear in the cell and within the limits.
+    """Return a transfer move from q0 to q1, clear in the cell and within the limits.
 
-    External axes move with the arm, straight from the one value to the other.
-
-    The straight joint motion if it is clear; else a way around it by RRT-Connect, shortened. The
-    same arguments give the same move.
+    The move is the straight joint motion if that is clear; otherwise a way around obstacles by
+    RRT-Connect, shortened. External axes move with the arm. The same arguments give the same move.
 
     Parameters
     ----------
     robot : Robot
-        With all limits known.
+        A robot with known limits.
     q0, q1 : (n,) rad
-        Endless joints turn as the two say: they do not go the short way by themselves.
+        Start and end. Endless joints turn exactly from q0 to q1, not the short way round.
     cell : Cell, optional
-        Without one the straight motion is returned, not `clear`.
+        Without a cell the straight motion is returned, and it is not `clear`.
     eta_v, eta_a : float
-        Share of the limits that may be used.
+        Shares of the velocity and acceleration limits that may be used.
     seconds : float s
-        How long a way around is looked for.
+        Time limit of the search for a way around.
 
     Raises
     ------
     NoFeasiblePath
-        An end that is not clear (proved), or no way found in time (not proved).
+        An end is not clear (proved), or no way was found in time (not proved).
     InputError
-        Limits that are not known, joints beyond them, a cell of other external axes.
+        Limits are not known, an end is beyond them, or the cell has other external axes.
     """
     if cell is not None:
         require_axes(cell.chain, robot)
@@ -133,8 +137,8 @@ def transfer_move(
             )  # fmt: skip
             if found is None:
                 raise NoFeasiblePath(
-                    f"no way through the air found in {seconds:g} s, its ends are clear; straight, "
-                    f"{explain_collision(cell, ends)}",
+                    f"no transfer move found in {seconds:g} s between its clear ends; on the "
+                    f"straight motion, {explain_collision(cell, ends)}",
                     proved=False,
                     node=-1,
                 )
@@ -148,7 +152,7 @@ def transfer_move(
 
 
 def _bounds(robot: Robot, ends: Array) -> tuple[Array, Array]:
-    """Return joint bounds (n,) rad; endless joints have a turn of room beyond either end."""
+    """Return joint bounds (n,) rad; endless joints may go one turn beyond either end."""
     limits = robot.joint_limits()
     low = np.where(robot.endless, ends.min(axis=0) - 2 * np.pi, limits.lower)
     high = np.where(robot.endless, ends.max(axis=0) + 2 * np.pi, limits.upper)
@@ -156,7 +160,7 @@ def _bounds(robot: Robot, ends: Array) -> tuple[Array, Array]:
     if beyond.any():
         joint = int(np.flatnonzero(beyond.any(axis=0))[0])
         name = robot.joint_names[joint]
-        raise InputError(f"transfer move: {name} of an end is beyond its limits")
+        raise InputError(f"transfer move: {name} is beyond its limits at an end of the move")
     return np.minimum(low, ends.min(axis=0)), np.maximum(high, ends.max(axis=0))
 
 

@@ -1,4 +1,4 @@
-"""What a motion that is not clear comes too near to, where and by how much."""
+"""Explain a collision: which bodies a motion brings too close together, where and by how much."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from kerfpath.cell import Cell
 __all__ = ["explain_collision"]
 
 SAMPLES = 65
-"""Poses of a motion that are looked at."""
+"""Number of poses of a motion that are checked."""
 PAIRS = 3
-"""Pairs of bodies that are named."""
+"""Number of pairs of bodies that are named."""
 
 
 def explain_collision(cell: Cell, corners: Array) -> str:
-    """Say which bodies come nearer than allowed on straight motions through corners (m, n) rad.
+    """Return which bodies come nearer than allowed on straight motions through corners (m, n) rad.
 
-    The pair that is too near at most of the poses comes first, each with its deepest place.
+    The pair that is too near at the most poses comes first; each is given with its worst place.
     """
     steps = np.linspace(0, len(corners) - 1, SAMPLES)
     at = np.arange(len(corners))
@@ -39,6 +39,6 @@ def explain_collision(cell: Cell, corners: Array) -> str:
     k, p = (int(i) for i in np.unravel_index(np.argmin(over), over.shape))
     one, two = cell.pair_names[p]
     return (
-        f"{one!r} and {two!r} keep {over[k, p] * 1e3:.3g} mm more than asked where they are "
-        "nearest, too little to prove it between the poses tried"
+        f"{one!r} and {two!r} keep {over[k, p] * 1e3:.3g} mm more than required where they are "
+        "nearest, which is too little to prove clearance between the poses checked"
     )

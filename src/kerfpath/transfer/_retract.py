@@ -1,4 +1,4 @@
-"""Where the tool goes before and after a cut: straight back along its axis."""
+"""Back off along the tool axis before and after a cut."""
 
 from __future__ import annotations
 
@@ -17,24 +17,25 @@ End = Literal["start", "end"]
 
 
 def back_off(plan: Plan, end: End, retract: float) -> Array:
-    """Return the joints (n,) rad after backing off an end of a plan along the tool axis.
+    """Return the joints (n,) rad after backing off along the tool axis from an end of a plan.
 
-    The posture is kept, an endless joint stays on its turn, and external axes stand still, as does
-    joint 3 of a seven-axis arm.
+    The posture is kept, endless joints stay on their turn, and external axes and joint 3 of a
+    seven-axis arm do not move.
 
     Parameters
     ----------
     plan : Plan
     end : {"start", "end"}
     retract : float m
+        How far the tool backs off.
 
     Raises
     ------
     InputError
-        No such pose within the joint limits.
+        There is no such pose within the joint limits.
     """
     node = 0 if end == "start" else len(plan.q) - 1
-    # Where endless joints are after all their turns along the contour.
+    # Endless joints, not wrapped: with all their turns along the contour.
     q = plan.q[0] + plan.increments[:node].sum(axis=0)
     arm, n = plan.robot.alone(), plan.robot.family.joints
     T = arm.forward(q[:n]) @ plan.T_flange_tip
@@ -46,7 +47,7 @@ def back_off(plan: Plan, end: End, retract: float) -> Array:
     # An endless joint is solved within one turn: bring it onto the turn that the contour is on.
     turns = np.round((q - q_found) / (2 * np.pi)) * plan.robot.endless
     q_found = q_found + 2 * np.pi * turns
-    # A straight move leads to no joints that are a turn away, where the limits end before.
+    # A straight move cannot reach joints that are a turn away.
     q_found = q_found[(np.abs(q_found - q) <= np.pi).all(axis=1)]
     if not len(q_found):
         raise InputError(

@@ -94,7 +94,7 @@ def test_a_plan_without_a_bound_claims_none(audited):
     ("change", "words"),
     [
         (raised, "bound above what its certificate proves: "),
-        (lambda data: data.update(gap=0.0), "gap that is not that of cost and bound"),
+        (lambda data: data.update(gap=0.0), "gap that does not match cost and bound"),
         (lambda data: data.update(bound=None), "the plan states no bound"),
         (lambda data: data["certificate"].update(stages=[]), "it has no stage"),
         (lambda data: edited(data, "node", lambda a: a + 1), "node: expected numbers from 0 to"),

@@ -117,7 +117,8 @@ def test_robots_without_masses_are_refused_with_what_to_give(folder):
     path = folder / "job.toml"
     path.write_text(QUICK.replace("[tool]\n", "[tool]\nmass_kg = 0\n"))
     assert_refused(
-        run("check", path), "only a description (URDF) says what its links weigh; give urdf with"
+        run("check", path),
+        "the masses of its links come only from a description (URDF); give urdf with",
     )
     path = job_at(folder, QUICK)
     text = (folder / "arm.urdf").read_text()

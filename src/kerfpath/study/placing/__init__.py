@@ -1,4 +1,4 @@
-"""Where the part, the robot's base and the head are best."""
+"""Search for the best placement of the part, the robot base and the head."""
 
 from kerfpath.study.placing._evaluate import contours_of as contours_of
 from kerfpath.study.placing._evaluate import nodes_of as nodes_of

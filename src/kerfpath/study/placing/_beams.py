@@ -1,4 +1,4 @@
-"""About how fast nodes can be passed over continuous gamma: by beams alone, without refinement."""
+"""Estimate how fast nodes can be cut over continuous gamma, by beams without refinement."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ from kerfpath.search import (
 __all__ = ["Beams"]
 
 EFFORT = Effort(200, (0.5, 0.5))
-"""States of each layer that are kept: on nine placements of two contours of the demo paths were 0
-to 6 % slower than the fastest motion found, and no nearer to it with eight times as many."""
+"""States kept in each layer. On nine placements of two contours of the demo, paths were 0 to 6 %
+slower than the fastest motion found, and eight times as many states did not improve that."""
 LONGER, CLOSE = 1.3, 1.01
-"""Steps up to a speed that is too high, and how close to it the answer is, as multiples."""
+"""Factor between speeds tried until one is too high, and factor by which the answer may be off."""
 HELD = 1e-3
-"""Share by which a path may be slower than the speed that it is to keep."""
+"""Share by which a path may be slower than the speed asked for."""
 MOST_SEARCHES = 10
-"""Searches for a path that is clear at the samples that it is between."""
+"""Number of searches for a path that is clear at the samples next to it."""
 
 
 @dataclass(kw_only=True, eq=False)
 class Beams:
-    """The quickest of the paths that beams find, in a cell clear at the samples they are between.
+    """A search for the fastest path by beams; in a cell it is clear at the samples next to it.
 
     Parameters
     ----------
     graph : LayeredGraph
-        Without an empty layer.
+        A graph without empty layers.
     limits : Limits
     endless : (n,) bool
     checker : CollisionChecker or None
-        Of the vertices of the graph.
+        Checks the vertices of the graph.
     """
 
     graph: LayeredGraph
@@ -59,17 +59,17 @@ class Beams:
         self.cost = np.zeros(len(self.graph.q))
 
     def least_interval(self, held: float, enough: float | None = None) -> float:
-        """Return about the least interval between the nodes, s.
+        """Return an estimate of the least interval between the nodes, s.
 
-        Joints between two samples are interpolated, and no other start is looked at, so motions may
-        be quicker or slower.
+        Joints between two samples are interpolated and no other starts are tried, so true motions
+        may be faster or slower.
 
         Parameters
         ----------
         held : float s
-            An interval that some path keeps.
+            An interval for which there is a path.
         enough : float s, optional
-            An interval that need not be undercut.
+            An interval that is short enough.
         """
         best = held
         if enough is not None and enough < held:
@@ -86,7 +86,7 @@ class Beams:
         return best
 
     def _interval(self, asked: float) -> float:
-        """Return the interval that a path takes that is to keep another; infinite without one."""
+        """Return the interval needed by a path searched for `asked`; infinite without a path."""
         path = self._path(asked)
         if path is None:
             return np.inf

@@ -1,4 +1,4 @@
-"""The task of the study of a layout: what the worst of some placements is worth."""
+"""The task of the layout study: evaluate a placement together with its errors."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ def evaluate_placements(
     prove: bool = False,
     floor: float | None = None,
 ) -> dict[str, object]:
-    """Return the `PlacementValue` of the worst of some placements: a task of a sweep.
+    """Return the `PlacementValue` of the worst of several placements; the task of a sweep.
 
-    They are judged over continuous gamma if the job's method is "continuous", else on its grid.
+    They are evaluated over continuous gamma if the job's method is "continuous", otherwise on its
+    grid.
 
     Parameters
     ----------
@@ -39,18 +40,18 @@ def evaluate_placements(
         As in `load_job`.
     goal : {"speed", "margin", "motion"}
     places : list of mapping
-        Offsets by variable; the first is the nominal placement, others are its errors.
+        Offsets by variable; the first is the nominal placement, the others are its errors.
     stretches : list of (contour, first node, last node)
-        Solved for the bound or the estimate.
+        Stretches that are solved for the bound or the estimate.
     exact : bool
-        Also solve the contours, unless they are infeasible before.
+        Also solve the contours, unless the placement is infeasible before.
     whole : bool
         Solve every contour of the nominal placement to its own optimum.
     prove : bool
-        Over continuous gamma: only prove by the stretches, if that can be, that no motion is faster
-        than the floor.
+        Over continuous gamma: only try to prove by the stretches that no motion is faster than the
+        floor.
     floor : float, optional
-        Values that do not beat it are of no interest.
+        Best value so far; values that do not beat it need not be exact.
     """
     known = load_job(job, digest)
     contours = contours_of(job, digest, goal)
@@ -90,7 +91,7 @@ def evaluate_placements(
 
 
 def _worse(goal: str, one: PlacementValue, two: PlacementValue) -> PlacementValue:
-    """Return what two placements are worth together."""
+    """Return the worse of two placement values."""
     if not two.feasible:
         return two
     bound, estimate = (
@@ -111,7 +112,7 @@ def _worse(goal: str, one: PlacementValue, two: PlacementValue) -> PlacementValu
 
 @lru_cache(maxsize=2)
 def contours_of(job: str, digest: str, goal: str) -> tuple[SampledContour, ...]:
-    """Return the contours of a job, sampled: at one speed each, or for "motion" as asked."""
+    """Return the sampled contours of a job: each at one speed, or for "motion" at its speeds."""
     known = load_job(job, digest)
     return sample_contours(known.job, known.part, as_asked=goal == "motion")
 

@@ -1,15 +1,16 @@
-"""Tests of a placement on the grid, the fast ones first: each but the last gives a proved bound.
+"""Tests of a placement on the grid, the fast ones first; all except the last give a proved bound.
 
-- Reach: the layers of every `EVERY`-th node alone, with all their poses. A node without a pose, or
-  in a cell without a clear one, ends it: every path visits every node.
-- Stretch: a run of nodes on the whole grid, solved exactly. The part of a path on them keeps what
-  the path keeps, so no path is faster than the stretch lets it be, and none is clear where no path
-  along the stretch is. The displacement is bounded by paths over every `EVERY`-th node whose steps
-  keep that many times the velocity limit: by the triangle inequality of the metric they are no
-  longer than the steps between them, on endless axes too, as the short way round is the shortest.
-- Exact: the contours on the job's own grid. Where only the worst contour counts, others are left at
-  a path on every `THIN`-th gamma that is good enough: what a part of the graph allows, all of it
-  does.
+- Reach: the layers of every `EVERY`-th node, with all their poses. A node without a pose, or in a
+  cell without a clear pose, makes the placement infeasible, because every path visits every node.
+- Stretch: some consecutive nodes on the full grid, solved exactly. The part of a path on the
+  stretch keeps the same limits as the path, so no path is faster than the stretch allows, and no
+  path is clear where none along the stretch is. The displacement is bounded by paths over every
+  `EVERY`-th node with steps of up to `EVERY` times the velocity limit. By the triangle inequality
+  of the metric these are no longer than the steps between the nodes; this also holds for endless
+  axes, because the short way round is the shortest.
+- Exact: the contours on the job's own grid. Where only the worst contour counts, the others need
+  only a good enough path on every `THIN`-th sample of gamma: a path on part of the graph is also a
+  path on the full graph.
 """
 
 from __future__ import annotations
@@ -44,17 +45,17 @@ from kerfpath.study.placing._value import (
 __all__ = ["InfeasiblePlacement", "PlacementEvaluator"]
 
 THIN = 4
-"""Steps of gamma between the samples of a path that is good enough."""
+"""Spacing, in steps of gamma, of the samples for a path that is good enough."""
 PER_METRE = 1e-3
-"""What a metre from the base counts between placements that are out of reach alike."""
+"""Weight of the distance from the base (1/m) between placements that are equally out of reach."""
 TOLERATED = 1e-6
-"""Share by which steps over several nodes may exceed the limit: each step has a tolerance."""
+"""Share by which steps over several nodes may exceed the limit, since each step has a tolerance."""
 UNLIMITED = 1e12
 """rad/s^2."""
 
 
 class InfeasiblePlacement(Exception):
-    """A test shows that the placement is infeasible."""
+    """Raised where a test shows that the placement is infeasible."""
 
     def __init__(self, why: Infeasibility) -> None:
         super().__init__(why.reason)
@@ -63,7 +64,7 @@ class InfeasiblePlacement(Exception):
 
 @dataclass(kw_only=True, eq=False)
 class PlacementEvaluator(Evaluator):
-    """One placement, a job moved there, and the tests of it on the grid.
+    """The tests of one placement on the grid; the job is already moved there.
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ class PlacementEvaluator(Evaluator):
     graphs: list[LayeredGraph] = field(default_factory=list)
 
     off_grid: ClassVar[bool] = False
-    """Whether gamma is continuous, and not on its grid."""
+    """Whether gamma is continuous instead of on its grid."""
     last: ClassVar[Stage] = "exact"
     """The test that finds the value."""
 
@@ -91,7 +92,7 @@ class PlacementEvaluator(Evaluator):
         floor: float | None,
         least: float | None,
     ) -> PlacementValue:
-        """Return what this placement is worth; `least` is what another has come down to."""
+        """Return the value of this placement; `least` is the worst value of the others so far."""
         stage: Stage = "reach"
         try:
             self._require_poses()
@@ -110,7 +111,7 @@ class PlacementEvaluator(Evaluator):
 
     @cached_property
     def cell(self) -> Cell | None:
-        """The cell; a part or fixture that would stand in the robot's base is a collision."""
+        """The cell; a part or fixture that overlaps the robot base counts as a collision."""
         try:
             return cell_of_job(self.job, self.part)
         except InputError as overlap:
@@ -118,7 +119,7 @@ class PlacementEvaluator(Evaluator):
             raise InfeasiblePlacement(why) from None
 
     def _require_poses(self) -> None:
-        """Require a pose, and in a cell a clear one, of every `EVERY`-th node."""
+        """Require a pose, or in a cell a clear pose, at every `EVERY`-th node."""
         self.graphs = [
             self.graph(contour.nodes, np.arange(0, len(contour.nodes), EVERY))
             for contour in self.contours
@@ -132,7 +133,7 @@ class PlacementEvaluator(Evaluator):
             self._require_none("collision", blocked, 1.0)
 
     def _require_none(self, status: Status, bad: list[Bools], so_far: float) -> None:
-        """Refuse the placement where any node is bad, and say which is the first."""
+        """Refuse the placement if any node is bad, and name the first bad node."""
         share = 1.0 - float(np.concatenate(bad).mean())
         middle = np.mean([contour.nodes.points.mean(axis=0) for contour in self.contours], axis=0)
         placement = self.job.placement
@@ -146,7 +147,7 @@ class PlacementEvaluator(Evaluator):
                 raise self._why(status, progress, reason, c, EVERY * k, searched=False)
 
     def _bound(self, stretches: Sequence[Sequence[int]]) -> float | None:
-        """Return what no path of this placement can beat, None where nothing is known."""
+        """Return a bound on the value of every path at this placement; None where there is none."""
         values = []
         for c, first, last in stretches:
             contour, frames = self.contours[c], self.job.options.frames
@@ -167,10 +168,10 @@ class PlacementEvaluator(Evaluator):
         graph: LayeredGraph | None,
         enough: float | None = None,
     ) -> tuple[float, ContourValue]:
-        """Return the value of a contour on a graph, alone and with what binds.
+        """Return the value of a contour on a graph, and the same with the limit that is reached.
 
-        Without a graph it is planned as `kerfpath plan` does. Off the grid a speed or margin that
-        is `enough` may be returned although more is possible.
+        Without a graph the contour is planned as `kerfpath plan` does. Off the grid, a speed or
+        margin of `enough` or more may be returned although more is possible.
         """
         known = ContourValue(index=index, name=contour.name, nodes=len(contour.nodes))
         if self.goal == "motion":
@@ -190,7 +191,7 @@ class PlacementEvaluator(Evaluator):
         )
 
     def _unit(self, contour: SampledContour) -> float:
-        """Return the speed of a contour, m/s, that counts as one."""
+        """Return the speed (m/s) of a contour for which the value is one."""
         return contour.speed if self.goal == "margin" else 1 / 60
 
     def _plan_cost(self, contour: SampledContour, graph: LayeredGraph | None) -> float:
@@ -200,7 +201,7 @@ class PlacementEvaluator(Evaluator):
             objective="sum", feed="constant", refine=False, certify=None, between_nodes="reported",
         )  # fmt: skip
         if not contour.nodes.closed:
-            options = replace(options, closure="free")  # a stretch of a loop that closes need not
+            options = replace(options, closure="free")  # a stretch of a closed loop is open
         speed = contour.speed if contour.nodes.time is None else None
         return plan(
             contour.nodes, self.job.robot, tool=self.job.tool, placement=self.job.placement,
@@ -208,7 +209,7 @@ class PlacementEvaluator(Evaluator):
         ).cost  # fmt: skip
 
     def _least_displacement(self, index: int) -> float:
-        """Return a displacement that none along a contour is below, by every `EVERY`-th node."""
+        """Return a lower bound on the displacement along a contour, from every `EVERY`-th node."""
         contour, graph, robot = self.contours[index], self.graphs[index], self.job.robot
         if len(graph.start) < 3:
             return 0.0
@@ -232,10 +233,10 @@ class PlacementEvaluator(Evaluator):
     def _solve(
         self, order: list[int], floor: float | None, least: float | None, *, whole: bool
     ) -> PlacementValue:
-        """Solve the contours until the placement is known, or can no longer beat the floor.
+        """Solve the contours until the value is known, or can no longer beat the floor.
 
-        A speed is that of the slowest contour; displacements add up, and those that are not solved
-        yet count by their bounds.
+        The speed is that of the slowest contour. Displacements add up; contours that are not solved
+        yet count with their bounds.
         """
         motion, solved = self.goal == "motion", dict[int, ContourValue]()
         left = {c: self._least_displacement(c) for c in order} if motion else {}
@@ -257,21 +258,21 @@ class PlacementEvaluator(Evaluator):
     def _known(
         self, bound: float | None, value: float | None, solved: Mapping[int, ContourValue]
     ) -> PlacementValue:
-        """Return what came of the last test, the contours as the job has them."""
+        """Return the result of the last test, with the contours in the order of the job."""
         contours = tuple(solved[c] for c in sorted(solved))
         return PlacementValue(stage=self.last, bound=bound, value=value, contours=contours)
 
     def _solved(
         self, index: int, graph: LayeredGraph, least: float | None
     ) -> tuple[float, ContourValue]:
-        """Return the value of a contour, or `least` where it is at least that."""
+        """Return the value of a contour, or `least` where the value is at least that."""
         enough = None if least is None else self._enough(index, graph, least)
         if least is not None and enough is not None:
             return least, enough
         return self._value(index, self.contours[index], graph)
 
     def _enough(self, index: int, graph: LayeredGraph, least: float) -> ContourValue | None:
-        """Return a value that is reached on a part of the graph, if it is `least` or more."""
+        """Return a value found on a part of the graph, if it is `least` or more."""
         thin = graph.without({Reason(Loss.LEFT_OUT): graph.sample % THIN != 0})
         try:
             value, known = self._value(index, self.contours[index], thin)
@@ -290,7 +291,7 @@ class PlacementEvaluator(Evaluator):
         first: int = 0,
         step: int = 1,
     ) -> InfeasiblePlacement:
-        """Say of a contour without a path why that is, and where it breaks."""
+        """Return why and where a contour has no path."""
         status: Status = "speed"
         if not np.diff(graph.start).all():
             status = "unreachable"

@@ -1,4 +1,4 @@
-"""What the study of a layout leaves: layout.json, layout.html, and placed.toml, the job moved."""
+"""Write the results of the layout study: layout.json, layout.html and the moved job placed.toml."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from kerfpath.study.placing._value import PlacementValue
 __all__ = ["UNITS", "layout_entry", "write_layout"]
 
 SCHEMA = 2
-"""Counts the ways in which layout.json was written."""
+"""Version of the format of layout.json."""
 UNITS = {"speed": "m/min", "margin": "times the speed asked for", "motion": ""}
 OF_CONTOUR = ("value", "at_least", "fastest_m_min", "joint", "limit", "node")
 WHY = ("reason", "contour", "node", "nodes", "progress")
 
 
 def layout_entry(found: Layout) -> LayoutEntry:
-    """Return what layout.json holds: plain data, the same for the same seed."""
+    """Return the content of layout.json as plain data, which is the same for the same seed."""
     best, before = found.best, found.before
     entry = {
         "schema": SCHEMA,
@@ -83,7 +83,7 @@ def _best(found: Layout, best: PlacementTrial) -> dict[str, object]:
 
 
 def _contours(before: PlacementValue, after: PlacementValue | None) -> list[dict[str, object]]:
-    """Return each contour's value in the job's placement and in the best one."""
+    """Return the value of each contour in the job's placement and in the best one."""
     sides = [
         {
             contour.name: {k: v for k in OF_CONTOUR if (v := getattr(contour, k)) is not None}
@@ -134,12 +134,12 @@ def _map(found: Layout) -> dict[str, object] | None:
 
 
 def write_layout(found: Layout, folder: Path) -> list[Path]:
-    """Write layout.json and layout.html into a folder, and placed.toml where one is feasible.
+    """Write layout.json and layout.html, and placed.toml if a placement is feasible.
 
     Raises
     ------
     InputError
-        The folder cannot be made or written to.
+        The folder cannot be created or written to.
     """
     make_folder(folder)
     entry = layout_entry(found)
@@ -156,4 +156,4 @@ def write_layout(found: Layout, folder: Path) -> list[Path]:
 
 def _remark(job: Path, offsets: Mapping[str, float]) -> str:
     moves = ", ".join(f"{name} = {value:g}" for name, value in offsets.items())
-    return f"{job.name} as placed by kerfpath layout: {moves}. Ranges count from here now."
+    return f"{job.name} as placed by kerfpath layout: {moves}. Ranges now count from here."

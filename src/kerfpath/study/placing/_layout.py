@@ -1,4 +1,4 @@
-"""The best placement: a global search on bounds or estimates, then values, the best first."""
+"""Find the best placement: a global search on bounds or estimates, then exact values."""
 
 from __future__ import annotations
 
@@ -34,42 +34,44 @@ __all__ = ["STATUSES", "Layout", "layout", "layout_as"]
 
 ON_GRID: tuple[Stage, ...] = ("reach", "stretch", "exact")
 OFF_GRID: tuple[Stage, ...] = ("reach", "estimate", "proved", "planned")
-"""The tests that decide, in their order."""
+"""The tests that decide, in order."""
 STATUSES = ("feasible", "speed", "collision", "unreachable")
-"""What may become of a placement, the best first."""
+"""The possible statuses of a placement, the best first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Layout:
-    """The best placement of a job, and all that were tried.
+    """The best placement of a job, and all placements that were tried.
 
     Parameters
     ----------
     job : Job
     goal : {"speed", "margin", "motion"}
     off_grid : bool
-        Whether placements are judged over continuous gamma, by plans, or by paths of the grid.
+        Whether placements are evaluated by plans over continuous gamma instead of paths of the
+        grid.
     ranges : mapping of variable to (low, high)
+        Range of each variable, in the unit in its name.
     by_default : bool
-        Whether nobody said what varies.
+        Whether the ranges are the default ones.
     tolerance : mapping of variable to float
-        What each variable may be off, either way; empty where nobody asked.
+        Error of each variable, to either side; empty where no tolerance was given.
     seed, evaluations : int
     tried : tuple of PlacementTrial
         All placements, in order; the first is that of the job.
     evolved : int
-        How many there were before those of the map.
+        Number of placements before those of the map.
     best : PlacementTrial or None
-        The best one, unless none is feasible.
+        The best placement; None if none is feasible.
     before, after : PlacementValue
-        What the job's placement and the best one are worth, contour by contour.
+        Values of the job's placement and of the best one, contour by contour.
     proved : bool
-        Whether it is proved that no other of those tried is better.
+        Whether it is proved that no other placement tried is better.
     open_bound : float or None
-        What the others can come to at best, where it is not proved; over continuous gamma, the best
-        estimate of those that were neither planned nor proved to be no better.
+        Where that is not proved, the best value that the others may have; over continuous gamma,
+        the best estimate of the placements that were neither planned nor proved to be no better.
     numbers : Numbers
-        What the best placement changes in the job.
+        Changes of the job file for the best placement.
     map : PlacementMap or None
     """
 
@@ -95,36 +97,36 @@ class Layout:
 
     @property
     def statuses(self) -> dict[str, int]:
-        """How many placements are feasible, and how many not for which reason."""
+        """Number of placements with each status."""
         found = Counter(trial.result.status for trial in self.tried)
         return {status: found[status] for status in STATUSES if found[status]}
 
     @property
     def stages(self) -> dict[str, int]:
-        """How many placements each test decided."""
+        """Number of placements that each test decided."""
         found = Counter(trial.result.stage for trial in self.tried)
         return {stage: found[stage] for stage in (OFF_GRID if self.off_grid else ON_GRID)}
 
     @property
     def solved(self) -> int:
-        """How many placements were solved exactly on the grid, or planned over continuous gamma."""
+        """Number of placements solved exactly on the grid, or planned over continuous gamma."""
         return sum(t.searched and t.result.stage != "proved" for t in self.tried)
 
     @property
     def estimated(self) -> int:
-        """How many placements are neither planned nor proved to be no better, but estimated."""
+        """Number of placements with only an estimate: neither planned nor proved no better."""
         return sum(is_estimated(trial.result) for trial in self.tried)
 
     @property
     def estimate_error(self) -> tuple[float, float] | None:
-        """The least and the largest share of their estimates that planned placements came to."""
+        """Least and largest ratio of value to estimate over the planned placements."""
         both = [(trial.result.value, trial.result.estimate) for trial in self.tried]
         shares = [value / about for value, about in both if value is not None and about]
         return (min(shares), max(shares)) if shares else None
 
     @property
     def nearest(self) -> PlacementTrial:
-        """The placement that came nearest to being feasible."""
+        """The placement that is nearest to being feasible."""
         return max(
             self.tried,
             key=lambda trial: why.progress if (why := trial.result.infeasibility) else np.inf,
@@ -146,47 +148,46 @@ def layout(
     processes: int | None = None,
     progress: Progress = no_progress,
 ) -> Layout:
-    """Return the best placement that is found in the ranges, never worse than the job's own.
+    """Return the best placement found in the ranges, which is never worse than the job's own.
 
-    Differential evolution (Storn and Price, J. Global Optim. 11, 1997) goes by bounds of what
-    placements are worth; then the exact search takes the placements tried by their bounds, the best
-    first, until the best value is at least the next bound: no other of those tried is better then.
-    Where an exact search shows a stretch that binds and was not in the bound, the bounds are found
-    again with it. The points of the map about the best are tried in the same way. The same seed
-    gives the same answer, whatever the number of processes.
+    Differential evolution (Storn and Price, J. Global Optim. 11, 1997) searches by bounds on the
+    values of placements. Then the placements are solved exactly in the order of their bounds, the
+    best first, until the best value is at least as good as the next bound: then no other placement
+    tried is better. Where an exact search shows a new stretch that limits the value, the bounds are
+    computed again with it. The points of the map around the best placement are evaluated in the
+    same way. The same seed gives the same answer, whatever the number of processes.
 
-    Over continuous gamma, which the job's method asks for by default, values are those of plans,
-    and estimates stand in the place of bounds: placements whose estimates come near the best value
-    are planned, and of the others it is proved, as far as can be, that no motion there is faster,
-    see `Layout.proved` and `Layout.estimated`.
+    Over continuous gamma (the default method of a job), values are those of plans, and estimates
+    replace bounds. Placements whose estimates come near the best value are planned; for the others
+    a proof is tried that no motion there is faster, see `Layout.proved` and `Layout.estimated`.
 
     Parameters
     ----------
     job : path
-        The job file; what is not given here is as its [layout] says.
+        The job file; its [layout] gives everything that is not given here.
     store : path
-        Keeps what was found: the same call goes on where it was stopped.
+        Stores the results: the same call continues where it was stopped.
     goal : {"speed", "margin", "motion"}, optional
-        The fastest speed of the slowest contour; the least share of a fastest speed and the speed
-        asked for; or the total displacement of the best motions, at the speeds asked for.
+        The fastest speed of the slowest contour; the least ratio of the fastest speed to the speed
+        asked for; or the total displacement of the best motions at the speeds asked for.
     ranges : mapping of variable to (low, high), optional
-        What varies; default: the ranges of [layout], or else `DEFAULT_RANGES`.
+        The variables and their ranges; default: the ranges of [layout], or `DEFAULT_RANGES`.
     evaluations : int, optional
-        Placements that are tried.
+        Number of placements that are tried.
     seed : int, optional
     tolerance_mm, tolerance_deg : float, optional
-        By how much each variable may be off: the worst of its two ends counts, one at a time.
+        Error of each variable: the worse of its two ends counts, for one variable at a time.
     map_points : int, optional
-        Points of the map along each of two variables, which are tried, too; 0: no map.
+        Points of the map along each of two variables, which are also tried; 0: no map.
     scheduler, processes
         As in `kerfpath.sweep.run`.
     progress : callable, optional
-        Called with what is being done, how much of it is done, and how much there is.
+        Called with the name of the current stage, how much of it is done, and its total.
 
     Raises
     ------
     InputError
-        As `read_job`, `cell_of_job` and `kerfpath.sweep.run`; numbers out of range.
+        As `read_job`, `cell_of_job` and `kerfpath.sweep.run`; also where a number is out of range.
     """
     path = Path(job).resolve()
     given = _checked(
@@ -219,16 +220,16 @@ def layout_as(
     progress: Progress = no_progress,
     found: Callable[[PlacementTrial], None] = lambda trial: None,
 ) -> Layout:
-    """Return the best placement as `layout` does, asked for by a table in place of the job's.
+    """Return the best placement as `layout` does, with a table instead of [layout] of the job.
 
     Parameters
     ----------
     job, store, ranges, scheduler, processes, progress
         As in `layout`.
     table : LayoutTable
-        All else that `layout` can be asked for.
+        All other settings of `layout`.
     found : callable, optional
-        Called with each placement whenever more is known of it: estimated, planned, proved.
+        Called with each placement whenever it is estimated, planned or proved.
 
     Raises
     ------
@@ -241,10 +242,10 @@ def layout_as(
     at.job.robot.require_no_free_joint("a layout")
     if follows_courses(at.job.robot, at.job.options) and not leaves_grid(at.job):
         raise InputError(
-            "a layout: the bounds of an arm that leaves no rotation free hold on a grid of its "
-            'external axes alone; write method = "exact" in [plan], and the step of each axis'
+            "a layout: for an arm without a free rotation the bounds hold only on a grid of its "
+            'external axes; write method = "exact" in [plan], and the step of each axis'
         )
-    cell_of_job(at.job, at.part)  # what is wrong with it is said once, not by every placement
+    cell_of_job(at.job, at.part)  # report errors of the cell once, not for every placement
     spans = dict(ranges or table.ranges or DEFAULT_RANGES)
     allowed = {"mm": table.tolerance_mm, "deg": table.tolerance_deg}
     tolerance = {name: allowed[name.rpartition("_")[2]] for name in spans}
@@ -266,7 +267,7 @@ def layout_as(
         evolved, drawn = len(search.trials), None
         if table.map_points:
             drawn = search.mapped(search.best or search.trials[0], table.map_points)
-            proved, open_bound = search.climb()  # what the map shows to be better is taken
+            proved, open_bound = search.climb()  # points of the map may be better
         if search.off_grid:
             proved, open_bound = search.settle()
         best = search.best
@@ -297,7 +298,7 @@ def layout_as(
 
 
 def _checked(**given: float | str | None) -> dict[str, float | str]:
-    """Return what is given in place of [layout]; raise InputError where it is out of range."""
+    """Return the given settings that replace [layout]; raise InputError if one is out of range."""
     for name, value in given.items():
         low = 8 if name == "evaluations" else 0
         if isinstance(value, int | float) and not value >= low:

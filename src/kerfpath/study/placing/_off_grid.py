@@ -1,20 +1,20 @@
 """Tests of a placement over continuous gamma: an estimate, the value of plans, and a proof.
 
-- Reach: as on the grid. It holds for plans, too, which begin from the samples of gamma: a node
-  without a pose, or a clear one, at any of them has no plan.
-- Estimate of a speed: the fastest one that beams keep along stretches about nodes that bind, from
-  few samples of gamma, their joints interpolated. A stretch may be cut at least as fast as the
-  whole, but what is found there is neither the fastest nor quite a motion.
-- Estimate of a displacement: the value function, which is interpolated between the samples, knows
-  no accelerations, and leaves closures and limits of rotation out; and a motion is to be found
-  along stretches that could not be cut elsewhere.
-- Proved: no motion passes the nodes about one that binds as fast as at another placement, at any
-  gamma, posture and turn. It says of the placement that it is not better, and nothing else.
-- With external axes all of this is along the course of theirs that promises most, which plans
-  leave: reach is what the search for that course says, as it is what plans begin with, and no
-  estimate refuses a placement for sure. Nothing is proved.
-- Planned: the fastest speed as `kerfpath speed` finds it, or the cost as `kerfpath plan` does. A
-  contour that is known to be as fast as the slowest one is left at that.
+- Reach: as on the grid. This also holds for plans, which start from the samples of gamma: a node
+  without a pose, or without a clear pose, at any of them has no plan.
+- Estimate of a speed: the fastest speed that beams find along stretches around limiting nodes, from
+  few samples of gamma with interpolated joints. A stretch can be cut at least as fast as the
+  full contour, but the path found there is neither the fastest nor exactly a motion.
+- Estimate of a displacement: the value function, which is interpolated between samples and ignores
+  accelerations, closures and limits of rotation. A motion must also be found along the stretches
+  that could not be cut at other placements.
+- Proved: around a limiting node no motion is as fast as at another placement, at any gamma, posture
+  and turn. This proves only that the placement is not better.
+- With external axes all of this applies along their most promising course, which plans may leave.
+  Reach is the result of the search for that course, from which plans start. No estimate refuses a
+  placement for sure, and nothing is proved.
+- Planned: the fastest speed as found by `kerfpath speed`, or the cost as found by `kerfpath plan`.
+  For a contour that is at least as fast as the slowest one, no better value is searched.
 """
 
 from __future__ import annotations
@@ -44,17 +44,17 @@ from kerfpath.study.placing._value import ContourValue, PlacementValue, Stage, S
 __all__ = ["OffGridEvaluator", "leaves_grid"]
 
 STEP = np.radians(5.0)
-"""Least step of gamma of the samples of an estimate."""
+"""rad: least step of gamma between the samples of an estimate."""
 
 
 def leaves_grid(job: Job) -> bool:
-    """Return whether the placements of a job are judged over continuous gamma."""
+    """Return whether the placements of a job are evaluated over continuous gamma."""
     return job.options.method == "continuous" and job.robot.family.free_rotation
 
 
 @dataclass(kw_only=True, eq=False)
 class OffGridEvaluator(PlacementEvaluator):
-    """One placement, a job moved there, and the tests of it over continuous gamma."""
+    """The tests of one placement over continuous gamma; the job is already moved there."""
 
     off_grid: ClassVar[bool] = True
     last: ClassVar[Stage] = "planned"
@@ -64,12 +64,12 @@ class OffGridEvaluator(PlacementEvaluator):
     __repr__ = short_repr
 
     def graph(self, nodes: Contour, only: Ints | None = None) -> LayeredGraph:
-        """Return the layered graph of nodes along the course of external axes, if there are any."""
+        """Return the layered graph of nodes, along the course of the external axes if any."""
         options = self.job.options.without_penalties
         return self.job.graph(nodes, options, only=only, external=self.courses.get(nodes))
 
     def _require_poses(self) -> None:
-        """Require a pose of every `EVERY`-th node, or a course of the external axes."""
+        """Require a pose at every `EVERY`-th node, or a course of the external axes."""
         if not self.job.robot.externals:
             super()._require_poses()
             return
@@ -87,7 +87,7 @@ class OffGridEvaluator(PlacementEvaluator):
             done += len(contour.nodes)
 
     def _course(self, contour: SampledContour) -> Array:
-        """Return the course of the external axes that promises most, for the goal."""
+        """Return the most promising course of the external axes for the goal."""
         job, timed = self.job, self.goal == "motion" and contour.nodes.time is None
         return external_course(
             contour.nodes, job.robot, tool=job.tool, placement=job.placement,
@@ -104,9 +104,9 @@ class OffGridEvaluator(PlacementEvaluator):
         floor: float | None,
         least: float | None,
     ) -> PlacementValue:
-        """Return what this placement is worth: planned where that is asked for, else estimated.
+        """Return the value of this placement: planned if `exact`, otherwise estimated.
 
-        It is not planned where the first stretch proves that it is no better than the floor.
+        It is not planned if the first stretch proves that it is no better than the floor.
         """
         if exact and not whole and floor is not None:
             known = self.disproved(stretches[:1], floor)
@@ -125,7 +125,7 @@ class OffGridEvaluator(PlacementEvaluator):
             return PlacementValue(stage=stage, infeasibility=found.why)
 
     def disproved(self, stretches: Sequence[Sequence[int]], floor: float) -> PlacementValue:
-        """Return the floor as a bound, if a stretch proves that no motion is as fast as that."""
+        """Return the floor as a bound, if a stretch proves that no motion is that fast."""
         if self.goal == "motion":
             return PlacementValue(stage="estimate")
         for c, first, last in stretches:
@@ -134,17 +134,17 @@ class OffGridEvaluator(PlacementEvaluator):
         return PlacementValue(stage="estimate")
 
     def _bound(self, stretches: Sequence[Sequence[int]]) -> float | None:
-        """Return None: nothing is known before it is planned that its value cannot beat."""
+        """Return None: there is no proved bound before the placement is planned."""
         return None
 
     def _least_displacement(self, index: int) -> float:
-        """Return 0: nothing more is proved of a contour before it is planned."""
+        """Return 0: no other bound is proved for a contour before it is planned."""
         return 0.0
 
     def _solved(
         self, index: int, graph: LayeredGraph, least: float | None
     ) -> tuple[float, ContourValue]:
-        """Return the value of a contour, or one that is found to be reached and `least` or more."""
+        """Return the value of a contour, or a value found that is `least` or more."""
         whole = None if self.job.robot.externals else graph  # plans choose their own course
         value, known = self._value(index, self.contours[index], whole, least)
         if least is None or value < least:
@@ -152,7 +152,7 @@ class OffGridEvaluator(PlacementEvaluator):
         return value, ContourValue(index=index, name=known.name, nodes=known.nodes, at_least=value)
 
     def _slowest(self, stretches: Sequence[Sequence[int]]) -> PlacementValue:
-        """Return the estimate by the stretch that is cut the slowest, which the others may end."""
+        """Return the estimate from the slowest stretch; others are cut short at its value."""
         least, slowest = None, None
         for number, (c, first, last) in enumerate(stretches):
             value = self._quickest(c, first, last, least)
@@ -161,7 +161,7 @@ class OffGridEvaluator(PlacementEvaluator):
         return PlacementValue(stage="estimate", estimate=least, slowest=slowest)
 
     def _quickest(self, index: int, first: int, last: int, least: float | None) -> float:
-        """Return about what nodes first to last may be worth; no more than `least` matters."""
+        """Return an estimate for nodes first to last; values above `least` need not be exact."""
         contour, job = self.contours[index], self.job
         nodes, unit = np.arange(first, last + 1), self._unit(contour)
         graph = self._thin_graph(contour, nodes)
@@ -184,7 +184,7 @@ class OffGridEvaluator(PlacementEvaluator):
         return step / interval / unit
 
     def _thin_graph(self, contour: SampledContour, nodes: Ints) -> LayeredGraph:
-        """Return the graph of some nodes on as few samples as do for an estimate."""
+        """Return the graph of some nodes on few samples, enough for an estimate."""
         options = self.job.options.without_penalties
         if options.gamma_step < STEP:
             coarse = replace(options, gamma_step=STEP)
@@ -197,14 +197,14 @@ class OffGridEvaluator(PlacementEvaluator):
     def _displacement(self, stretches: Sequence[Sequence[int]]) -> float:
         """Return the sum of the value functions; stretches must have a motion."""
         comfort, axes = self.job.options.without_penalties.comfort, self.job.robot.externals
-        # Clearance is known on the grid only, and along another course there may be a motion.
+        # Clearance is known only on the grid, and another course may have a motion.
         if not axes and (comfort is None or comfort.clearance is None):
             for c, first, last in stretches:
                 self._require_motion(c, first, last)
         return sum(map(self._value_function, range(len(self.contours))))
 
     def _require_motion(self, index: int, first: int, last: int) -> None:
-        """Refuse the placement where no motion is found along a stretch at the speed asked for."""
+        """Refuse the placement if no motion is found along a stretch at the speed asked for."""
         contour, job = self.contours[index], self.job
         graph = self.graph(contour.nodes, np.arange(first, last + 1))
         run = contour.stretch(first, last, job.options.frames, timed=True)
@@ -221,7 +221,7 @@ class OffGridEvaluator(PlacementEvaluator):
             raise self._infeasible(index, graph, broken, 2.0, first) from None
 
     def _value_function(self, index: int) -> float:
-        """Return the value function of a contour; where it finds no way, neither does the grid."""
+        """Return the value function of a contour; if it is infinite, the grid has no path."""
         contour, robot = self.contours[index], self.job.robot
         graph = self.graph(contour.nodes)
         options = self.job.options.resolve(robot, contour.interval)
@@ -243,7 +243,7 @@ class OffGridEvaluator(PlacementEvaluator):
         value = ContinuousSearch(problem, samples_of(graph)).value
         if value < np.inf:
             return value
-        try:  # which says where it breaks
+        try:  # the grid search reports where the path breaks
             return find_shortest(
                 replace(problem, limits=problem.limits.without_acceleration())
             ).cost
@@ -251,7 +251,7 @@ class OffGridEvaluator(PlacementEvaluator):
             raise self._infeasible(index, graph, broken, 2.0) from None
 
     def _is_closed(self, index: int, first: int, last: int, value: float) -> bool:
-        """Return whether it is proved that nodes first to last pass no motion of such a value."""
+        """Return whether it is proved that no motion of this value passes nodes first to last."""
         job, contour = self.job, self.contours[index]
         options = job.options
         if not job.robot.encloses or options.tilt is not None:

@@ -1,6 +1,6 @@
-"""A placement: offsets of the part, the robot's base or the head, and the job that has them.
+"""Placements: offsets of the part, the robot base or the head, and the job moved by them.
 
-The part is moved alone, or with an external axis that carries it.
+The part is moved alone, or together with an external axis that carries it.
 """
 
 from __future__ import annotations
@@ -35,19 +35,20 @@ __all__ = [
 ]
 
 Numbers = dict[tuple[str | int, ...], list[float]]
-"""What a placement changes in a job file: values by the keys that lead to them."""
+"""Changes of a job file for a placement: new values by their path of keys."""
 
 DEFAULT_RANGES = {"x_mm": (-200.0, 200.0), "y_mm": (-200.0, 200.0), "yaw_deg": (-30.0, 30.0)}
-"""What varies where nobody says."""
+"""The default variables and their ranges."""
 
 
 def ranges_of(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return the ranges that texts as "x_mm=-200:200" say.
+    """Return the ranges given by texts such as "x_mm=-200:200".
 
     Raises
     ------
     InputError
-        An unknown variable, one that comes twice, no numbers, a reversed or empty range.
+        A variable is unknown or given twice, an end is not a number, or a range is reversed or
+        empty.
     """
     found: dict[str, tuple[float, float]] = {}
     for text in texts:
@@ -55,30 +56,30 @@ def ranges_of(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
         low, _, high = span.partition(":")
         name = name.strip()
         if name not in VARIABLES:
-            raise InputError(f"vary: no variable {name!r}; there are {', '.join(VARIABLES)}")
+            raise InputError(f"vary: expected one of {', '.join(VARIABLES)}, got {name!r}")
         try:
             ends = float(low), float(high)
         except ValueError:
             raise InputError(
-                f'vary: expected {name}=LOW:HIGH, as "{name}=-200:200", got {text!r}'
+                f'vary: expected {name}=LOW:HIGH, such as "{name}=-200:200", got {text!r}'
             ) from None
         if not (np.isfinite(ends).all() and ends[0] < ends[1]):
             raise InputError(f"vary: expected {name}=LOW:HIGH with LOW below HIGH, got {text!r}")
         if name in found:
-            raise InputError(f"vary: {name} comes twice; keep one")
+            raise InputError(f"vary: {name} is given twice; keep one")
         found[name] = ends
     return found
 
 
 def middle_of(job: Job, contours: Sequence[Contour]) -> Array:
-    """Return the middle (3,) m, in the base, of the box about all nodes in the part frame."""
+    """Return the middle (3,) m of the box around all nodes in the part frame, in the robot base."""
     points = np.concatenate([nodes.points for nodes in contours])
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     return np.asarray(job.placement[:3, :3] @ middle + job.placement[:3, 3])
 
 
 def motions_of(offsets: Mapping[str, float], middle: Array) -> tuple[Array, Array]:
-    """Return how the part moves in the robot base, and all that does not go with it, (4, 4) m.
+    """Return the motions (4, 4) m of the part, and of all that does not move with it, in the base.
 
     Parameters
     ----------
@@ -90,23 +91,23 @@ def motions_of(offsets: Mapping[str, float], middle: Array) -> tuple[Array, Arra
 
 
 def numbers_of(job: Job, offsets: Mapping[str, float], middle: Array) -> Numbers:
-    """Return what a job file has to say so that everything is where the offsets put it.
+    """Return the changes of a job file that move everything to the given offsets.
 
-    The part is tilted about the base's x, then y, turned about its z, all through `middle`, and
-    then shifted, with the external axis that [layout] says it is moved with and those that this
-    carries; fixtures go with it but for the standing ones, those on other axes, and those on the
-    ground where the part alone is moved on an axis. A robot whose base moves by B, with the axes
-    that carry it, sees all else moved by inv(B). The head turns about the flange's z. Numbers are
-    rounded as a file has them, so that the job of the file is the very one that was evaluated.
-    Offsets of zero change nothing.
+    The part is tilted about the base's x and then y, and turned about its z, all through `middle`;
+    then it is shifted. The external axis named in [layout] moves with it, together with the axes
+    that this one carries. Fixtures also move with the part, except those listed as standing, those
+    on other axes, and those on the ground if the part alone is moved on an axis. If the robot base,
+    with the axes that carry it, moves by B, everything else moves by inv(B) in the base. The head
+    turns about the flange's z. Numbers are rounded as in a file, so that the job in the file is
+    exactly the one that was evaluated. Offsets of zero change nothing.
 
     Parameters
     ----------
     job : Job
     offsets : mapping of variable to float
-        In the units of the variables' names; 0 where one is left out.
+        Offsets in the units of the variables' names; missing ones are 0.
     middle : (3,) m
-        In the robot base.
+        Centre of the rotations of the part, in the robot base.
     """
     unknown = set(offsets) - set(VARIABLES)
     assert not unknown, unknown
@@ -133,7 +134,7 @@ def numbers_of(job: Job, offsets: Mapping[str, float], middle: Array) -> Numbers
 
 
 def _of_axes(job: Job, part: Array, base: Array) -> dict[str, Array]:
-    """Return how each external axis moves in the robot base, (4, 4) m, by its name."""
+    """Return the motion (4, 4) m of each external axis in the robot base, by its name."""
     found, moves = {}, False
     for axis in job.robot.externals:
         if axis.carries == "robot":
@@ -147,7 +148,7 @@ def _of_axes(job: Job, part: Array, base: Array) -> dict[str, Array]:
 def _of_fixture(
     job: Job, name: str, on: str | None, part: Array, base: Array, of_axes: Mapping[str, Array]
 ) -> Array:
-    """Return how a fixture moves in the robot base, (4, 4) m, which may stand on an axis."""
+    """Return the motion (4, 4) m of a fixture, which may be on an axis, in the robot base."""
     carriers = [axis.name for axis in job.robot.externals if axis.carries == "part"]
     alone = job.layout.move == "part"
     if on is not None and on not in carriers:
@@ -160,7 +161,7 @@ def _of_fixture(
 
 
 def _axis_numbers(where: tuple[str | int, ...], axis: ExternalAxis, motion: Array) -> Numbers:
-    """Return the direction of an axis that moves, and a point of it, as a job says them."""
+    """Return the direction and point of a moved axis as values of a job file."""
     numbers: Numbers = {}
     if not np.array_equal(motion[:3, :3], np.eye(3)):
         numbers[*where, "axis"] = [round(float(v), 9) + 0.0 for v in motion[:3, :3] @ axis.axis]
@@ -171,7 +172,7 @@ def _axis_numbers(where: tuple[str | int, ...], axis: ExternalAxis, motion: Arra
 
 
 def _motions(offsets: Mapping[str, float], middle: Array) -> tuple[Array, Array, Array]:
-    """Return how the part moves, how all moves against the base, and how the head turns."""
+    """Return the motion of the part, the motion of everything in the base, and the head's turn."""
 
     def turned(*names: str) -> Array:
         T = np.eye(4)
@@ -191,7 +192,7 @@ def _motions(offsets: Mapping[str, float], middle: Array) -> tuple[Array, Array,
 
 
 def move_job(job: Job, numbers: Numbers) -> Job:
-    """Return the job with other numbers, as if its file had them."""
+    """Return the job with these numbers, as if its file had them."""
 
     def at(*where: str | int) -> Array | None:
         found = numbers.get((*where, "xyz_mm"))
@@ -226,16 +227,16 @@ def _moved_axis(axis: ExternalAxis, numbers: Mapping[str, tuple[float, ...]]) ->
 
 
 def _of(numbers: Numbers, *where: str | int) -> dict[str, tuple[float, ...]]:
-    """Return the new numbers of one table by their keys."""
+    """Return the new numbers of one table, by their keys."""
     return {
         str(keys[-1]): tuple(value) for keys, value in numbers.items() if keys[:-1] == (*where,)
     }
 
 
 def changes_of(job: Job, numbers: Numbers) -> list[tuple[tuple[str | int, ...], object]]:
-    """Return what numbers change in the text of a job: values by their keys; None: it goes.
+    """Return the changes in the text of a job: values by path of keys; None removes a key.
 
-    Numbers of the part are those of its origin, those of the tool stand in place of its head.
+    New numbers of the part are those of its origin; those of the tool replace its head.
     """
     gone: list[tuple[str | int, ...]] = []
     if ("part", "xyz_mm") in numbers:
@@ -246,9 +247,10 @@ def changes_of(job: Job, numbers: Numbers) -> list[tuple[tuple[str | int, ...], 
 
 
 def placed_text(job: Job, numbers: Numbers, folder: Path, remark: str) -> str:
-    """Return the text of the job's file with other numbers, its comments kept, for `folder`.
+    """Return the text of the job file with these numbers, for a file in `folder`.
 
-    Files are named relative to `folder`; `remark` becomes the first comment.
+    Comments are kept, file names are made relative to `folder`, and `remark` becomes the first
+    comment.
     """
     file = tomlkit.parse(job.text)
     for where, value in changes_of(job, numbers):

@@ -1,4 +1,4 @@
-"""What of the contours the robot can reach at a placement: quick enough to follow a hand."""
+"""Compute the nodes in reach at a placement, fast enough for interactive dragging."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ __all__ = ["Placement", "placement_of"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Placement:
-    """Other places of a job's part, robot base and head, and what is in reach there.
+    """Placements of a job's part, robot base and head, and the reach at them.
 
     Parameters
     ----------
     job : Job
     requests : tuple of CutRequest
-        Its contours.
+        The contours of the job.
     middle : (3,) m
-        Through which the part turns, in the robot base.
+        Centre of the rotations of the part, in the robot base.
     """
 
     job: Job
@@ -40,18 +40,18 @@ class Placement:
     __repr__ = short_repr
 
     def numbers(self, offsets: Mapping[str, float]) -> Numbers:
-        """Return what a job file has to say, as `numbers_of`."""
+        """Return the changes of the job file, as `numbers_of`."""
         return numbers_of(self.job, offsets, self.middle)
 
     def motions(self, offsets: Mapping[str, float]) -> tuple[Array, Array]:
-        """Return how the part and the rest move in the robot base, as `motions_of`."""
+        """Return the motions of the part and of the rest, as `motions_of`."""
         return motions_of(offsets, self.middle)
 
     def out_of_reach(self, offsets: Mapping[str, float]) -> list[Ints]:
-        """Return of each contour the nodes that the robot reaches at no gamma and posture.
+        """Return, for each contour, the nodes that the robot reaches at no gamma and posture.
 
-        Gamma is sampled as the job has it, within its windows, external axes on a coarse grid;
-        margins of joints and postures of the job are kept. The cell is not looked at.
+        Gamma is sampled as in the job, within its windows, and external axes on a coarse grid. The
+        job's postures and joint margins are kept. Collisions are not checked.
         """
         moved = move_job(self.job, self.numbers(offsets))
         return [
@@ -61,7 +61,7 @@ class Placement:
 
 
 def placement_of(prepared: PreparedJob) -> Placement:
-    """Return the place of a job whose drawing has been read."""
+    """Return the `Placement` object of a prepared job."""
     nodes = [request.candidates[0].nodes for request in prepared.contours]
     return Placement(
         job=prepared.job,

@@ -1,8 +1,8 @@
-"""The search for the best placement: bounds guide it on the grid, and exact searches end it.
+"""The search for the best placement: on the grid, bounds guide it and exact searches decide.
 
-Over continuous gamma estimates guide it, and plans end it: placements whose estimate is nearly as
-good as the best are planned, too, where nearly is by what estimates have fallen short of plans. Of
-the others it is proved in the end, where that can be, that they are no better.
+Over continuous gamma, estimates guide it and plans decide. Placements whose estimate is nearly as
+good as the best value are planned too; the margin is the largest error of the estimates so far.
+Finally, a proof is tried for each of the other placements that it is no better.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from kerfpath.sweep import Sweep
 __all__ = ["LEAST_EXACT", "MOST_EXACT", "PlacementMap", "PlacementSearch", "PlacementTrial"]
 
 PER_VARIABLE = 4
-"""Placements of a generation for each variable."""
+"""Placements in a generation for each variable."""
 AT_ONCE = 4
-"""Placements that are solved exactly at once, however many processes there are."""
+"""Placements that are solved exactly at once, whatever the number of processes."""
 PROVED_AT_ONCE = 16
-"""Placements that are proved to be no better at once; where none of them is, none is any more."""
+"""Placements in one batch of proofs; the proofs end after a batch without success."""
 MOST_EXACT = 0.25
 """Share of the evaluations that may be solved exactly."""
 LEAST_EXACT = 16
-"""Exact searches that there may be at least."""
+"""Number of exact searches that is always allowed."""
 HALF = 24
-"""Nodes to each side of a node that binds, which make a stretch with it."""
+"""Number of nodes on each side of a limiting node that form a stretch with it."""
 EASE = 0.05
-"""Share by which estimates are taken to fall short of plans, or else the most seen so far."""
+"""Initial error assumed for estimates, as a share; a larger error replaces it when it is seen."""
 CLOSE = 1.3
-"""Contours up to this much faster than the slowest give stretches, too."""
+"""Factor on the slowest speed up to which other contours also give stretches."""
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -48,13 +48,13 @@ class PlacementTrial:
     Parameters
     ----------
     offsets : mapping of variable to float
-        In the units of the variables' names.
+        Offsets in the units of the variables' names.
     result : PlacementValue
-        What is known of it.
+        The result so far.
     stretches : int
-        How many stretches its bound, or estimate, was found with; -1 before there is one.
+        Number of stretches behind its bound or estimate; -1 before there is one.
     searched : bool
-        Whether its value was searched for, exactly on the grid, or by plans.
+        Whether its value was computed, exactly on the grid or by plans.
     """
 
     offsets: Mapping[str, float]
@@ -67,14 +67,14 @@ class PlacementTrial:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlacementMap:
-    """Bounds or estimates over the first two variables, the others as in the best placement.
+    """Bounds or estimates over the first two variables; the others are as in the best placement.
 
     Parameters
     ----------
     x, y : (m,)
-        Values of the first variable and of the second; `y` is empty where there is only one.
+        Values of the first and the second variable; `y` is empty if there is only one variable.
     trials : tuple of PlacementTrial
-        Row by row of y.
+        The placements, row by row of y.
     """
 
     x: Array
@@ -86,7 +86,7 @@ class PlacementMap:
 
 @dataclass(kw_only=True, eq=False)
 class PlacementSearch:
-    """The placements tried, and what is asked of them next."""
+    """The state of the search: the placements tried, and the steps that evaluate more of them."""
 
     sweep: Sweep
     task: Mapping[str, str]
@@ -117,7 +117,7 @@ class PlacementSearch:
         return None if self.best is None else self.best.result.value
 
     def first(self) -> PlacementValue:
-        """Evaluate the job's own placement, whole."""
+        """Evaluate the job's own placement with all contours."""
         self.progress("the job's own placement", 0, 1)
         trial = self._trial(np.zeros(len(self.ranges)))
         trial.searched, trial.stretches, trial.result = True, 0, self.whole(trial)
@@ -127,7 +127,7 @@ class PlacementSearch:
         return trial.result
 
     def whole(self, trial: PlacementTrial) -> PlacementValue:
-        """Return what a placement is worth, every contour solved to its own optimum."""
+        """Return the value of a placement with every contour solved to its own optimum."""
         return self._evaluated([trial.offsets], exact=True, whole=True)[0]
 
     def evolve(self, evaluations: int, seed: int) -> None:
@@ -157,7 +157,7 @@ class PlacementSearch:
 
         energies(points.T)
         if self.best is None:
-            self.climb(until_found=True)  # bounds need a placement that shows what binds
+            self.climb(until_found=True)  # bounds need a placement that shows the limiting nodes
             self._refresh(self.trials)
         begun = 0
         differential_evolution(
@@ -176,8 +176,8 @@ class PlacementSearch:
     def climb(self, *, until_found: bool = False) -> tuple[bool, float | None]:
         """Solve placements, the best bound or estimate first, until none can beat the best.
 
-        Returns whether that was so, or what the others could still come to: by estimates that is no
-        proof, see `settle`.
+        Returns whether that point was reached, and otherwise the best value that the others may
+        have. With estimates this is no proof, see `settle`.
         """
         while True:
             open_ = [t for t in self.trials if not t.searched and self._may_win(t)]
@@ -207,10 +207,10 @@ class PlacementSearch:
             self.progress(what, self.exact, max(self.exact, min(left, self.most)))
 
     def settle(self) -> tuple[bool, float | None]:
-        """Prove of the placements that were not planned that none is better, as far as can be.
+        """Try to prove that none of the placements that were not planned is better.
 
-        The worst estimate first, until nothing more is proved. Returns whether that is proved of
-        all, or the best estimate of the others. It can be proved of speeds and margins alone.
+        The worst estimates come first, until a batch proves nothing. Returns whether all are
+        proved, and the best estimate of the others. Only speeds and margins can be proved.
         """
         left = [trial for trial in self.trials if is_estimated(trial.result)]
         some = [trial for trial in left if trial.result.slowest is not None]
@@ -226,7 +226,7 @@ class PlacementSearch:
         return not left, best
 
     def _prove(self, trials: Sequence[PlacementTrial]) -> bool:
-        """Prove that placements are no better than the best; return whether that is so of any."""
+        """Try to prove that placements are no better than the best; return whether any is."""
         results = self._evaluated(
             [trial.offsets for trial in trials],
             stretches=[self._slowest_first(trial)[:1] for trial in trials],
@@ -240,7 +240,7 @@ class PlacementSearch:
         return any(result.bound is not None for result in results)
 
     def mapped(self, about: PlacementTrial, points: int) -> PlacementMap:
-        """Try a grid over the first two variables about a placement, as all others are tried."""
+        """Evaluate a grid over the first two variables around a placement."""
         names = list(self.ranges)[:2]
         axes = [np.linspace(*self.ranges[name], points) for name in names]
         grid = np.array(np.meshgrid(*axes)).reshape(len(names), -1).T
@@ -258,14 +258,14 @@ class PlacementSearch:
     def find_bounds(
         self, trials: Sequence[PlacementTrial], progress: Callable[[int], None]
     ) -> None:
-        """Find the bounds of placements."""
+        """Compute the bounds or estimates of placements."""
         results = self._evaluated([trial.offsets for trial in trials], progress=progress)
         for trial, result in zip(trials, results, strict=True):
             trial.result, trial.stretches = result, len(self.stretches)
             self.found(trial)
 
     def _refresh(self, trials: Sequence[PlacementTrial]) -> bool:
-        """Find bounds again that were found with fewer stretches; return whether there were any."""
+        """Update bounds that were found with fewer stretches; return whether there were any."""
         stale = [
             t for t in trials
             if not t.searched and t.result.feasible and t.stretches < len(self.stretches)
@@ -274,7 +274,7 @@ class PlacementSearch:
         return bool(stale)
 
     def _take(self, trial: PlacementTrial) -> None:
-        """Learn from a value: the best placement, the stretches that bind, how estimates err."""
+        """Update the best placement, the limiting stretches and the error of estimates."""
         result, why = trial.result, trial.result.infeasibility
         value = result.value if result.feasible else None
         if value is not None and result.estimate is not None:
@@ -292,7 +292,7 @@ class PlacementSearch:
             self._add_stretch(why.index, why.node, why.nodes)
 
     def _add_stretch(self, contour: int, node: int, nodes: int) -> None:
-        """Add the stretch about a node, unless one holds it well inside."""
+        """Add the stretch around a node, unless another stretch has it well inside."""
         first, last = max(0, node - HALF), min(nodes - 1, node + HALF)
         for c, begin, end in self.stretches:
             near = max(begin, first) <= node - HALF // 2 or begin == 0
@@ -313,7 +313,7 @@ class PlacementSearch:
         floor: float | None = None,
         progress: Callable[[int], None] = lambda done: None,
     ) -> list[PlacementValue]:
-        """Return what placements are worth, by all stretches or by those given for each."""
+        """Return the values of placements, by all stretches or by the ones given for each."""
         keys = [
             self.sweep.submit(
                 **self.task,
@@ -330,13 +330,13 @@ class PlacementSearch:
         for key in keys:
             result = self.sweep.result(key)
             if result.failure is not None:
-                raise InputError(f"a placement could not be looked at: {result.failure.reason}")
+                raise InputError(f"a placement could not be evaluated: {result.failure.reason}")
             found.append(PlacementValue.from_data(result.value))
             progress(len(found))
         return found
 
     def _places(self, offsets: Mapping[str, float]) -> list[dict[str, float]]:
-        """Return a placement, and those at the ends of what each variable may be off."""
+        """Return a placement, and the ones with each variable off by its tolerance."""
         ends = [
             {**offsets, name: offsets[name] + side * size}
             for name, size in self.tolerance.items()
@@ -345,7 +345,7 @@ class PlacementSearch:
         return [dict(offsets), *ends]
 
     def _trial(self, point: Array) -> PlacementTrial:
-        """Return the placement at a point, rounded to 0.01 mm and 0.001 deg; one for one."""
+        """Return the trial at a point, rounded to 0.01 mm and 0.001 deg; the same one each time."""
         offsets = {
             name: round(float(value), 2 if name.endswith("_mm") else 3) + 0.0
             for name, value in zip(self.ranges, point, strict=True)
@@ -353,7 +353,7 @@ class PlacementSearch:
         return self.known.setdefault(tuple(offsets.values()), PlacementTrial(offsets=offsets))
 
     def _slowest_first(self, trial: PlacementTrial) -> list[list[int]]:
-        """Return the stretches, that of the estimate first if there is one."""
+        """Return the stretches, the slowest one of the estimate first if there is one."""
         first = trial.result.slowest
         if first is None:
             return self.stretches
@@ -372,7 +372,7 @@ class PlacementSearch:
         return is_better(self.goal, eased, self.floor)
 
     def _energy(self, trial: PlacementTrial) -> float:
-        """Return what evolution makes small: any feasible placement below every other."""
+        """Return the energy that evolution minimises; feasible placements have the lowest ones."""
         why, bound = trial.result.infeasibility, trial.result.promise
         if why is not None:
             return 10.0 - why.progress

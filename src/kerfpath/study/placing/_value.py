@@ -1,4 +1,4 @@
-"""What a placement is worth, contour by contour, and what is better."""
+"""Values of placements, contour by contour, and their comparison."""
 
 from __future__ import annotations
 
@@ -23,21 +23,22 @@ __all__ = [
 ]
 
 SLACK = 1e-9
-"""Relative: by how much rounding may lift a value over its bound."""
+"""Relative amount by which rounding may lift a value above its bound."""
 
 Stage = Literal["reach", "stretch", "exact", "estimate", "proved", "planned"]
-"""Tests on the grid: reach, stretch, exact; over continuous gamma: reach, estimate, and planned or
-proved to be no better than another."""
+"""Tests on the grid: reach, stretch, exact. Over continuous gamma: reach, estimate, and planned or
+proved (to be no better than another placement)."""
 Status = Literal["unreachable", "collision", "speed"]
 """Why a placement is infeasible."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContourValue:
-    """What a placement is worth for one contour, by its place in the job, its name and nodes.
+    """The value of a placement for one contour, given by its index in the job, name and nodes.
 
-    The value is in the unit of the goal; where only a part of the graph was searched, `at_least`
-    was found on it. A speed has what binds it: the joint, from 1, the limit and the node.
+    The value is in the unit of the goal; if only a part of the graph was searched, `at_least` is
+    the value found there. A speed comes with the joint (from 1), the limit and the node that limit
+    it.
     """
 
     index: int
@@ -55,10 +56,10 @@ class ContourValue:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Infeasibility:
-    """Why a placement is infeasible, and in which contour, at which of its nodes.
+    """Why a placement is infeasible, in which contour and at which node.
 
-    More `progress` is nearer to being feasible. The contour's place in the job, `index`, is known
-    where a search found no path. It is `sure` unless there may be a plan all the same.
+    A larger `progress` is nearer to being feasible. The index of the contour in the job, `index`,
+    is known where a search found no path. `sure` is false if there may still be a plan.
     """
 
     status: Status
@@ -75,23 +76,25 @@ class Infeasibility:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacementValue:
-    """What is known of a placement, or of the worst of several (`place`).
+    """The result for a placement, or for the worst of several.
 
     Parameters
     ----------
     stage : Stage
         The test that decided.
     bound, value : float, optional
-        What the value cannot beat, and the value, exact on the grid or that of plans over
-        continuous gamma: m/min of the slowest contour, least share of the asked speeds, or
-        displacement (14); None where that is not known.
+        Bound on the value, and the value, exact on the grid or of plans over continuous gamma:
+        m/min of the slowest contour, least ratio to the speeds asked for, or displacement (14).
+        None where it is not known.
     estimate : float, optional
-        About what the value is over continuous gamma; it may be better or worse.
+        Estimate of the value over continuous gamma; the value may be better or worse.
     slowest : int, optional
-        The stretch that the estimate is of, by its number.
+        Number of the stretch that the estimate comes from.
     infeasibility : Infeasibility, optional
     contours : tuple of ContourValue
-        Of the first placement.
+        Values of the contours at the first placement.
+    place : int
+        Number of the worst placement.
     """
 
     stage: Stage
@@ -107,27 +110,27 @@ class PlacementValue:
 
     @property
     def feasible(self) -> bool:
-        """Whether nothing forbids it, as far as is known."""
+        """Whether the placement is feasible as far as is known."""
         return self.infeasibility is None
 
     @property
     def promise(self) -> float | None:
-        """What it is worth as far as is known: its value, or else its bound, or its estimate."""
+        """The best known figure: the value, or otherwise the bound, or the estimate."""
         known = (self.value, self.bound, self.estimate)
         return next((number for number in known if number is not None), None)
 
     @property
     def status(self) -> str:
-        """Whether it is "feasible", or why not."""
+        """The status of the infeasibility, or "feasible"."""
         return "feasible" if self.infeasibility is None else self.infeasibility.status
 
     @classmethod
     def from_data(cls, data: object) -> PlacementValue:
-        """Return the value that `dataclasses.asdict` made `data` of."""
+        """Return the value from the data that `dataclasses.asdict` made of it."""
         return _DATA.validate_python(data)
 
     def entry(self, *names: str) -> dict[str, object]:
-        """Return some of what is known, with why it is infeasible, as JSON holds it."""
+        """Return the named fields that are known, also those of the infeasibility, for JSON."""
         known = {
             name: getattr(self, name) for name in ("status", "stage", "bound", "value", "estimate")
         }
@@ -146,10 +149,10 @@ def is_better(goal: str, value: float, other: float | None) -> bool:
 
 
 def is_estimated(value: PlacementValue) -> bool:
-    """Return whether all that says that a placement is not the best is an estimate.
+    """Return whether only an estimate says that a placement is not the best.
 
-    For a displacement, too, where no motion was found along a stretch or by the value function; and
-    with external axes wherever none was found along a course of theirs.
+    This includes displacements where no motion was found along a stretch or by the value function,
+    and external axes where no motion was found along one of their courses.
     """
     why = value.infeasibility
     return value.stage == "estimate" and (why is None or not why.sure)
