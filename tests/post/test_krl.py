@@ -251,7 +251,7 @@ def test_preflight_refuses_a_joint_move_that_rounds_its_corner(program):
     [
         ("&ACCESS RVP\r\n", "", "cut_skin_outer.src, line 1: not expected here: '&REL 1'"),
         ("&REL 1\r\n", "", "line 2: expected &REL 1 before"),
-        ("DEF cut_skin_outer()", "DEF other()", "line 3: the first routine must be named"),
+        ("DEF cut_skin_outer()", "DEF other()", "line 3: the first routine must have the name"),
         ("END\r\n\r\nDEF", "END\r\n\r\nHALT\r\nDEF", "not expected here: 'HALT'"),
         ("BAS(#INITMOV,0)\r\n", "", "line 13: not expected here: '$ADVANCE=5'"),
         (
@@ -279,15 +279,15 @@ def test_preflight_refuses_a_joint_move_that_rounds_its_corner(program):
         ("$VEL.CP=0.100000\r\n", "", "$VEL.CP has not been set in this routine"),
         ("$APO.CDIS=0.300\r\n", "", "$APO.CDIS has not been set"),
         ("BAS(#VEL_PTP,25)\r\n", "", "BAS(#VEL_PTP,...) has not been set"),
-        ("DO $OUT[5]=TRUE", "DO $OUT[7]=TRUE", "switches the output 7; expected 5"),
-        ("DELAY=-20", "DELAY=20", "must not come after its place"),
-        ("=TRUE\r\nLIN", "=TRUE\r\nWAIT SEC 1.0\r\nLIN", "must stand right before its motion"),
+        ("DO $OUT[5]=TRUE", "DO $OUT[7]=TRUE", "expected the output 5 to be switched, got 7"),
+        ("DELAY=-20", "DELAY=20", "must not have a positive DELAY"),
+        ("=TRUE\r\nLIN", "=TRUE\r\nWAIT SEC 1.0\r\nLIN", "must come right before its motion"),
         ("PATH=0", "PATH=-5", "not expected here: 'TRIGGER WHEN PATH=-5"),
         ("} C_DIS", "} C_ORI", "not expected here: 'LIN"),
         ("LIN {X", "LIN_REL {X", "not expected here"),
         ("PTP {A1", "PTP {X 0,A1", "not expected here"),
         ("WAIT SEC 0.400", "WAIT FOR $IN[1]", "not expected here"),
-        ("WAIT SEC 0.400", "$OUT[5]=TRUE", "5 is the output of no partner"),
+        ("WAIT SEC 0.400", "$OUT[5]=TRUE", "no partner with the output 5"),
         ("\r\nEND\r\n\r\nDEF skin", "\r\n\r\nDEF skin", "expected 'END'"),
     ],
 )
