@@ -165,7 +165,7 @@ def test_contours_that_are_left_out_added_or_in_another_order_are_named(read):
     assert (one.code, one.message) == ("added", "1 contour only in B: again")
     (one,) = found(read, replace(read, sections=(c, a, b))).values()
     assert one.code == "order"
-    assert one.message.endswith("in B hole_2, hole_0, hole_1")
+    assert one.message.endswith("B has hole_2, hole_0, hole_1")
 
 
 def test_a_contour_moved_far_is_the_same_by_its_name(read):

@@ -173,7 +173,7 @@ def test_speed_data_have_the_speeds_of_the_axes():
 EDITS = {
     "rapid": (
         (",[20.000000,0.000000,9E9", ",[9E9,0.000000,9E9", "eax_a has no value for rail"),
-        (",[20.000000,0.000000,9E9", ",[20.000000,0.000000,5", "eax_c = 5: the robot has no such axis"),
+        (",[20.000000,0.000000,9E9", ",[20.000000,0.000000,5", "eax_c = 5: the robot has no such"),
         ("    ActUnit TRACK_1;\n", "", "expected these lines for the mechanical units"),
         ('"STN_1"', '"STN_2"', "expected a work object moved by STN_1"),
         ("[FALSE,FALSE,", "[FALSE,TRUE,", "expected a work object moved by STN_1"),

@@ -267,7 +267,7 @@ def test_preflight_refuses_a_joint_move_that_rounds_its_corner(program):
         ("$ADVANCE=5", "$ADVANCE=3", "line 14: not expected here"),
         ("$CIRC_TYPE=#BASE", "$CIRC_TYPE=#PATH", "not expected here"),
         ("$TOOL={", "; $TOOL={", "expected $TOOL before"),
-        ("$BASE={", "$TOOL={", "another tool"),
+        ("$BASE={", "$TOOL={", "expected no tool here"),
         ("$BASE={X", "$BASE={FRAME: X", "not expected here"),
         ("IF first_contour<=1 THEN\r\nskin_outer()\r\nENDIF\r\n", "", "set once, after all calls"),
         ("skin_outer()\r\nEND", "skin_outer()\r\nskin_outer()\r\nEND", "called twice"),

@@ -263,7 +263,7 @@ def test_what_preflight_refuses_is_not_written(program):
         ("speeddata vCut", "speeddata vAir", "vAir is declared twice"),
         ("SetDO doLaser", "SetDO doOther", "expected 'SetDO doLaser,0;'"),
         ("TriggIO trOff", "TriggIO trOn", "set once"),
-        ("9E9]],vAir", "0]],vAir", "external axes"),
+        ("9E9]],vAir", "0]],vAir", "the robot has no such axis"),
         ("[0,-1,0,0]", "[0.5,-1,0,0]", "must be whole numbers"),
     ],
 )

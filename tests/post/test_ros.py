@@ -233,7 +233,7 @@ def test_a_straight_move_that_changes_posture_is_refused(program):
 
 
 def test_more_points_than_a_file_may_have_are_refused(program):
-    with pytest.raises(InputError, match=r"yaml: the program has \d+ lines, but lines_per_file allows"):
+    with pytest.raises(InputError, match=r"yaml: the program has \d+ lines, but lines_per_file"):
         post(program, "ros", RosSettings(lines_per_file=100, step_ms=1))
 
 
@@ -256,7 +256,7 @@ def test_more_points_than_a_file_may_have_are_refused(program):
         (".events.yaml", "done: linear}", "done: joint}", "do not lie on a straight line"),
         (".events.yaml", "done: wait}", "done: waited}", "not expected here: '- {time: 0.8"),
         (".events.yaml", "0.800000000", "0.810000000", "the trajectory has no point"),
-        (".events.yaml", "{time: 0.500000000, done", "{time: 0.800000000, done", "the robot stops before this is done"),
+        (".events.yaml", "{time: 0.500000000, done", "{time: 0.800000000, done", "stops before"),
         (".events.yaml", "time: 0.000000000", "time: 0.020000000", "that is done at time 0"),
         (".events.yaml", "done: wait}", "done: wait}\n- {time: 0.800000000, set: laser, to: true}",
          "a switch must follow a linear move"),

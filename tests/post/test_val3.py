@@ -379,7 +379,7 @@ START, STOP = f"{NAME}/start.pgx", f"{NAME}/stop.pgx"
         (CODE, "mAir[0]", "mAir[1]", "line 6: mAir[1] is not declared"),
         (CODE, "jAir[0]", "jAir[1]", "jAir[1] is not declared"),
         (CODE, "waitEndMove()\n", "\n", "line 9: a switch must follow a move of the path and"),
-        (CODE, "mPath[0])\n  waitEndMove()", "mPath[1])\n  waitEndMove()", "the robot must not wait"),
+        (CODE, "mPath[0])\n  waitEndMove()", "mPath[1])\n  waitEndMove()", "robot must not wait"),
         (CODE, "  delay(0.400)\n  movel(pPath[1]", "  movel(pPath[1],tLaser,mPath[1])\n  delay(0.4)"
          "\n  movel(pPath[1]", "a wait must follow waitEndMove()"),
         (CODE, "delay(0.400)", "delay(0.400)\n  dioLaser=true", "a switch must follow a move"),

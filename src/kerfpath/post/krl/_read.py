@@ -261,7 +261,7 @@ class _File(LineReader):
     def coupled_base(self, root: str, kind: str, *point: str) -> None:
         if not coupled(self.robot) or {int(root), int(kind)} != {self.settings.machine_number}:
             expected = f"MACHINE_DEF[{self.settings.machine_number}]"
-            raise self.fault(f"expected a fixed base, or one that moves with {expected}")
+            raise self.fault(f"expected a base that moves with {expected}, or a fixed one")
         self.frame("base", self.settings.base_number, point)
         frame = carrier_frame(self.robot, self.settings.positioner_frame)
         self.frames["base"] = freeze(np.asarray(frame @ self.frames["base"]))
