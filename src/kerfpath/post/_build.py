@@ -207,7 +207,7 @@ class _Process:
         return LinearMove(T_part_tip=T, q=q, speed=speed, duration=duration, switches=switches)
 
     def _cut(self, plan: Plan, T: Array, q: Array) -> Iterator[LinearMove]:
-        """Yield the moves from the second node of a contour on, with the laser off along joints."""
+        """Yield the moves from the second node of a contour on, laser off along micro joints."""
         took = np.diff(plan.time)
         speed = np.diff(plan.contour.s) / took
         joint = [kind == "micro joint" for kind in plan.contour.kinds]

@@ -69,4 +69,4 @@ class Controller:
 
 
 PLAIN = Controller()
-"""A controller without limit of the turning speed, which turns the tool about one axis."""
+"""A controller without a limit of the turning speed, which turns the tool about one axis."""

@@ -114,7 +114,7 @@ def differences(
         Programs in the same language, or in two languages without their words for postures. A
         program that gives joints alone needs `with_tips` before.
     rules : sequence of Rules
-        Rules of the languages if they differ, for their digits.
+        Rules of the languages, for their digits; empty if both texts are in the same language.
     names : (str, str)
         Names of the two programs in messages.
     strict : bool

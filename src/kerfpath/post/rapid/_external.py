@@ -42,7 +42,7 @@ class ExternalSpeeds:
     Parameters
     ----------
     linear_mm_s, rotary_deg_s : float
-        Speeds at full speed of the program.
+        Speeds of linear and rotary axes at full speed.
     shared : bool
         Whether joint moves at a share of the full speed also take that share of these speeds.
     """
