@@ -206,7 +206,7 @@ def test_settings_of_the_ros_message_and_its_refusals_are_those_of_the_program(p
     coarse = joint_trajectory([plain], settings)
     assert coarse["joint_names"] == settings.joint_names
     assert len(coarse["points"]) < len(plain.to_ros()["points"])
-    with pytest.raises(InputError, match="joint_names has 5 names, the robot 6 joints"):
+    with pytest.raises(InputError, match="expected 6 names in joint_names, got 5"):
         joint_trajectory([plain], RosSettings(joint_names=[f"a{i}" for i in range(5)]))
 
 

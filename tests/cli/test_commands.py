@@ -111,7 +111,7 @@ def test_post_takes_the_settings_of_a_language_from_the_job_as_it_is_now(planned
     assert written == {"guessed.src", "guessed.dat"}
     assert "DEF guessed()" in (folder / "there" / "guessed.src").read_text()
     assert_refused(run(*post, "-o", "no name.src", cwd=folder), "letters, digits and _")
-    assert "laser, 1 is taken; say which with laser_output in [program.krl]" in guessed.stdout
+    assert "laser, so 1 is used; name it with laser_output in [program.krl]" in guessed.stdout
     text = (folder / "small.toml").read_text() + "\n[program.krl]\nlaser_output = 7\n"
     (folder / "krl.toml").write_text(text)
     done = run(*post, "-o", "krl", "--job", "krl.toml", cwd=folder)

@@ -119,7 +119,7 @@ def test_nodes_are_held_where_more_is_needed_though_a_run_is_ahead_of_its_plan()
 def test_what_a_straight_stretch_takes_is_said_to_be_that():
     kept = kept_of("abb_irb2400_155", 0)
     assert not kept.done
-    assert "what the straight stretch between two zones takes" in kept.statement
+    assert "the straight stretch between two zones needs that" in kept.statement
 
 
 def test_plan_itself_says_which_call_does_it(circle, arm, tool, placement):

@@ -95,5 +95,5 @@ def test_an_arm_without_a_wrist_of_three_joints_is_refused(made):
         acceleration=np.full(5, 8.0),
     )
     moves = from_stop_to_stop(build_program([made]).sections[0].moves)[0]
-    with pytest.raises(InputError, match="'wrist' is modelled for six joints, it has 5"):
+    with pytest.raises(InputError, match="'wrist' is modelled for six joints, got 5"):
         run_along(moves, five, T_base_part=np.eye(4), T_flange_tip=np.eye(4), controller=WRIST)

@@ -106,7 +106,7 @@ def test_a_language_that_cannot_say_seven_axes_is_refused_before_planning(folder
     (folder / "other.toml").write_text(JOB.replace('"csv"\nretract', f'"{language}"\nretract'))
     result = run("plan", "other.toml", "--out", "none", cwd=folder)
     assert result.returncode == 2
-    assert "cannot yet say the axes of an arm like 'kuka_lbr_iiwa14_r820'" in result.stderr
+    assert "cannot yet express the axes of an arm like 'kuka_lbr_iiwa14_r820'" in result.stderr
 
 
 def test_the_speed_is_found(folder):

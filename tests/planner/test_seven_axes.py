@@ -184,12 +184,12 @@ def test_the_fastest_speed_can_be_planned(lbr):
 def test_what_does_not_know_a_free_elbow_says_so(lbr):
     cut, cell = task(1)
     made = plan(cut, lbr, speed=0.05, options=BACK_OFF, **cell)
-    with pytest.raises(InputError, match="how controllers move joint 3 along an arc differs"):
+    with pytest.raises(InputError, match="controllers move joint 3 along an arc in different ways"):
         build_program([made], arc_tolerance=1e-4)
     program = build_program([made], retract=0.02)
     for language in ("rapid", "krl", "fanuc", "inform", "val3", "urscript"):
         with pytest.raises(
-            InputError, match=f"'{language}' cannot yet say the axes of an arm like"
+            InputError, match=f"'{language}' cannot yet express the axes of an arm like"
         ):
             post_and_read(program, language)
     with pytest.raises(InputError, match=r"motion between the nodes .* poses leave joint 3"):

@@ -115,8 +115,8 @@ def test_a_table_without_times_is_refused(program):
         ("q6_deg", "q7_deg", "line 1: expected the columns section,kind,t_s,"),
         (",linear,", ",straight,", "line 3: kind: expected joint, linear"),
         (",linear,", ",circular,", "line 3: an arc must follow the point on its way"),
-        (",linear,", ",joint,", "line 3: a row of kind joint says too much"),
-        (",joint,", ",via,", "line 2: a row of kind via says too much"),
+        (",linear,", ",joint,", "line 3: a row of kind joint must not have the value"),
+        (",joint,", ",via,", "line 2: a row of kind via must not have the value"),
         (",wait,", ",linear,", "expected a number with decimals, got ''"),
         ("0.800000000", "0.400000000", "the time runs backwards"),
         (",0.0000,", ",1e3,", "expected a number with decimals, got '1e3'"),
@@ -134,7 +134,7 @@ def test_the_reader_refuses_a_quaternion_that_is_none_and_sections_apart(program
         CASE.read({TABLE: text})
     lines = GOLDEN.splitlines()
     lines[4] = lines[4].replace("skin_outer", "other", 1)
-    with pytest.raises(InputError, match="'skin_outer' do not stand together"):
+    with pytest.raises(InputError, match="'skin_outer' are not consecutive"):
         CASE.read({TABLE: "\n".join(lines)})
     with pytest.raises(InputError, match="line 1: expected the columns"):
         CASE.read({TABLE: ""})

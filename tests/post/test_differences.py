@@ -88,12 +88,12 @@ def test_a_target_that_is_moved_or_turned_is_told_with_its_lines(read):
     T = move.T_part_tip @ pose([3e-4, 0, -4e-4])
     (one,) = found(read, with_moves(read, 6, section=1, T_part_tip=T, line=999)).values()
     assert (one.code, one.count) == ("targets", 1)
-    assert one.message == "1 moved, at most by 0.5000 mm and 0.0000 deg"
+    assert one.message == "1 moved, by up to 0.5000 mm and 0.0000 deg"
     assert one.places == (move.place, f"{move.file}, line 999")
     assert str(one) == f"targets: {one.message}, at {move.place} / {move.file}, line 999"
     turned = move.T_part_tip @ pose([0, 0, 0], Rotation.from_rotvec([0, 2e-3, 0]).as_matrix())
     (one,) = found(read, with_moves(read, 6, section=1, T_part_tip=turned)).values()
-    assert one.message == "1 moved, at most by 0.0000 mm and 0.1146 deg"
+    assert one.message == "1 moved, by up to 0.0000 mm and 0.1146 deg"
 
 
 def test_all_targets_of_a_contour_moved_are_as_many(read):
@@ -133,7 +133,7 @@ def test_a_target_that_is_added_or_left_out_moves_no_other(read, number):
         (1, {"switches": ()}, "switches", "laser on 0.02 s ahead in A and nothing in B"),
         (5, {"posture": (0, 0, 0, 9)}, "postures", "and 0 0 0 9 in B"),
         (5, {"kind": "circular"}, "kinds", "linear in A and circular in B"),
-        (0, {"q": np.radians([0, 0, 0, 0, 3.0, 0])}, "joints", "1 moved, at most by"),
+        (0, {"q": np.radians([0, 0, 0, 0, 3.0, 0])}, "joints", "1 moved, by up to"),
     ],
 )
 def test_what_else_a_move_says_is_compared(read, number, changes, code, words):
@@ -165,7 +165,7 @@ def test_contours_that_are_left_out_added_or_in_another_order_are_named(read):
     assert (one.code, one.message) == ("added", "1 contour only in B: again")
     (one,) = found(read, replace(read, sections=(c, a, b))).values()
     assert one.code == "order"
-    assert one.message.endswith("in B hole_2, hole_0, hole_1")
+    assert one.message.endswith("B has hole_2, hole_0, hole_1")
 
 
 def test_a_contour_moved_far_is_the_same_by_its_name(read):
@@ -177,7 +177,7 @@ def test_a_contour_moved_far_is_the_same_by_its_name(read):
         ]  # fmt: skip
 
     (one,) = found(read, with_steps(read, away, section=2)).values()
-    assert one.message.startswith("13 moved, at most by 30.0000 mm")
+    assert one.message.startswith("13 moved, by up to 30.0000 mm")
 
 
 def test_frames_are_compared_where_both_say_them(read):
@@ -203,7 +203,7 @@ def test_one_program_in_several_languages_is_the_same(program):
 
 def test_a_path_in_joints_alone_needs_its_tips(program, read):
     joints = read_program(post(program, "ros"), "ros", program.robot)
-    with pytest.raises(InputError, match="joints alone along its path; give it with_tips first"):
+    with pytest.raises(InputError, match="joints alone along its path; apply with_tips first"):
         differences(read, joints)
     bare = with_moves(read, 4, T_part_tip=None)
     with pytest.raises(InputError, match="neither a pose nor joints"):

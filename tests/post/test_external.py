@@ -172,22 +172,22 @@ def test_speed_data_have_the_speeds_of_the_axes():
 
 EDITS = {
     "rapid": (
-        (",[20.000000,0.000000,9E9", ",[9E9,0.000000,9E9", "eax_a says no value of rail"),
-        (",[20.000000,0.000000,9E9", ",[20.000000,0.000000,5", "eax_c = 5: no external axes are"),
-        ("    ActUnit TRACK_1;\n", "", "mechanical units are not activated as they should be"),
-        ('"STN_1"', '"STN_2"', "expected a work object that STN_1 moves"),
-        ("[FALSE,FALSE,", "[FALSE,TRUE,", "expected a work object that STN_1 moves"),
+        (",[20.000000,0.000000,9E9", ",[9E9,0.000000,9E9", "eax_a has no value for rail"),
+        (",[20.000000,0.000000,9E9", ",[20.000000,0.000000,5", "eax_c = 5: the robot has no such"),
+        ("    ActUnit TRACK_1;\n", "", "expected these lines for the mechanical units"),
+        ('"STN_1"', '"STN_2"', "expected a work object moved by STN_1"),
+        ("[FALSE,FALSE,", "[FALSE,TRUE,", "expected a work object moved by STN_1"),
         (",2000,143];", ",5000,143];", "speeds of v"),
     ),
     "krl": (
-        (",E1 20.000000,E2", ",E2", "E1 is missing: the target says no value of rail"),
+        (",E1 20.000000,E2", ",E2", "E1 is missing: the target has no value for rail"),
         (",E1 20.000000,", ",E1 20.000000,E3 1.0,", "E3 = 1: the robot has no such external axis"),
-        (",E1 20.000000,", ",E1 20.000000,E1 2.0,", "says an external axis twice"),
+        (",E1 20.000000,", ",E1 20.000000,E1 2.0,", "gives an external axis twice"),
         ("MACHINE_DEF[2].ROOT", "MACHINE_DEF[3].ROOT", "expected a base that moves with MACHINE_D"),
         ("EK(MACHINE_DEF[2].ROOT,MACHINE_DEF[2].MECH_TYPE,", "EK(", "not expected here"),
     ),
     "fanuc": (
-        (",\r\n\tE1=    20.000000  mm", "", "E1 is missing: the position says no value of rail"),
+        (",\r\n\tE1=    20.000000  mm", "", "E1 is missing: the position has no value for rail"),
         ("\tE1=    20.000000  mm", "\tE1=    20.000000 deg", "E1: expected mm, got deg"),
         ("\tE1=    20.000000  mm", "\tE2=    20.000000  mm", "E2: the robot has no such external"),
         ("1,1,*,*,*", "1,*,*,*,*", "not an attribute"),
@@ -237,7 +237,7 @@ def test_languages_without_external_kinematics_refuse_with_the_reason():
     for name in ("val3", "urscript"):
         case = ExternalCase("chuck", name)
         (said,) = {text for text in issues(case.program(), name) if "external" in text}
-        assert f"language '{name}' has no external kinematics as it is written here" in said
+        assert f"language '{name}' is written here without external axes" in said
         assert "cannot move chuck" in said
         with pytest.raises(InputError, match="cannot move chuck"):
             read_program({"a program": ""}, name, case.plan().robot)
@@ -253,8 +253,8 @@ def test_languages_without_external_kinematics_refuse_with_the_reason():
             {"mechanical_units": ["TRACK_1", "STN_1"], "external_letters": "bb"},
             "two external axes have the same letter",
         ),
-        ("krl", {"external_numbers": [1]}, "expected another number for each external axis"),
-        ("krl", {"external_numbers": [2, 2]}, "expected another number for each external axis"),
+        ("krl", {"external_numbers": [1]}, "expected a different number for each external axis"),
+        ("krl", {"external_numbers": [2, 2]}, "expected a different number for each external axis"),
         ("krl", {"base_number": 3}, "leave base_number out"),
         ("inform", {}, "expected the pulses per mm or deg of each external axis (rail, turn)"),
         ("inform", {"pulses_per_deg": None, "external_pulses": [9.0, 9.0]}, "give pulses_per_deg"),
@@ -300,7 +300,7 @@ def test_a_changed_value_is_a_difference(case):
     own = (program.robot, program.T_flange_tip, program.T_base_part)
     found = differences(with_tips(read, *own), with_tips(case.read(files), *own))
     found = {each.code: each for each in found}
-    assert found["external"].message == "rail at 1 targets, at most by 4.0000 mm"
+    assert found["external"].message == "rail moved at 1 target, by up to 4.0000 mm"
     assert not {"joints", "speeds", "zones"} & set(found)
     assert any("rail is 4.0" in str(issue) for issue in case.deviations(program, case.read(files)))
 

@@ -47,7 +47,7 @@ def test_another_program_in_the_folder_stays(folder):
 
 def test_a_file_that_was_edited_since_is_not_removed_and_nothing_is_written(folder):
     (folder / "b.src").write_text("b, by hand")
-    with pytest.raises(InputError, match=r"b\.src is of the earlier program .* move it away"):
+    with pytest.raises(InputError, match=r"b\.src belongs to the earlier program .* move it away"):
         replace_program(folder, SHORT, list(SHORT), only="cut.src")
     assert (folder / "cut.src").read_text() == LONG["cut.src"]
     assert names(folder) == {*MINE, *LONG, MANIFEST}

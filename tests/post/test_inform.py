@@ -257,7 +257,7 @@ def test_a_contour_longer_than_a_job_is_refused_not_divided(long):
 def test_more_jobs_than_a_main_job_can_call_are_refused(program):
     (section,) = program.sections
     many = replace(program, sections=tuple(replace(section, name=f"c{k}") for k in range(100)))
-    with pytest.raises(InputError, match="lines_per_file allows 100; raise it"):
+    with pytest.raises(InputError, match="but lines_per_file allows 100; raise it"):
         Inform(many, IN_PULSES.model_copy(update={"lines_per_file": 100})).files()
 
 
@@ -284,9 +284,9 @@ def test_preflight_refuses_a_speed_beyond_that_of_the_settings(program):
         (MAIN, "//NAME CUT_SKIN_OUTER", "//NAME OTHER", "line 2: expected '//NAME CUT_SKIN_OUTER'"),
         (MAIN, "///NPOS 0,", "///NPOS 1,", "line 4: the main job must have no positions"),
         (MAIN, "NOP", "NOP\r\nPAUSE", "line 10: not expected here: 'PAUSE'"),
-        (MAIN, "'UFRAME 1 X", "'UFRAME 2 X", "UFRAME 1 is not given whole"),
+        (MAIN, "'UFRAME 1 X", "'UFRAME 2 X", "UFRAME 1 is not complete"),
         (MAIN, "'UFRAME 1 Y", "'UFRAME 1 X", "UFRAME 1 X is given twice"),
-        (MAIN, "'TOOL 0 RZ", "' TOOL 0 RZ", "TOOL 0 is not given whole"),
+        (MAIN, "'TOOL 0 RZ", "' TOOL 0 RZ", "TOOL 0 is not complete"),
         (OFF, "DOUT OT#(1) OFF", "DOUT OT#(1) ON", "expected 'DOUT OT#(1) OFF'"),
         (OFF, "DOUT OT#(1) OFF", "DOUT OT#(3) OFF", "expected 'DOUT OT#(1) OFF'"),
         (OFF, "DOUT OT#(2) OFF\r\n", "", "'DOUT OT#(2) OFF' is missing"),
@@ -294,14 +294,14 @@ def test_preflight_refuses_a_speed_beyond_that_of_the_settings(program):
         (MAIN, "CALL JOB:SKIN_OUTER\r\n", "CALL JOB:SKIN_OUTER_AIR\r\n", "is called twice"),
         (MAIN, "END\r\n", "END\r\nNOP", "nothing may follow END"),
         (MAIN, "END\r\n", "", "the job ends too early; END is missing"),
-        (MAIN, "CALL JOB:SKIN_OUTER\r\n", "CALL JOB:HOLE\r\n", "the file 'HOLE.JBI' is not there"),
+        (MAIN, "CALL JOB:SKIN_OUTER\r\n", "CALL JOB:HOLE\r\n", "the file 'HOLE.JBI' is missing"),
         (AIR, "///NPOS 1,", "///NPOS 2,", "expected position C00001, got '//INST'"),
         (AIR, "///NPOS 1,", "///NPOS x,", "line 4: expected the number of positions"),
         (AIR, "///TOOL 0", "///TOOL 1", "line 5: expected '///TOOL 0', got '///TOOL 1'"),
         (AIR, "C00000=", "C00001=", "expected position C00000"),
         (AIR, "SC,RW", "SC,RW,RJ", "expected '///ATTR SC,RW'"),
         (AIR, "VJ=25.00", "VJ=25", "not expected here: 'MOVJ"),
-        (AIR, "MOVJ C00000", "MOVJ C00001", "C00001 is not there"),
+        (AIR, "MOVJ C00000", "MOVJ C00001", "C00001 is missing"),
         (AIR, "MOVJ C00000 VJ=25.00", "MOVL C00000 V=25.0", "needs a position in the user frame"),
         (AIR, "PL=0", "PL=2", "expected PL=0 or PL=1, got PL=2"),
         (PATH, "///RCONF 1", "///RCONF 2", "expected position C00000"),
@@ -315,7 +315,7 @@ def test_preflight_refuses_a_speed_beyond_that_of_the_settings(program):
          "a wait must follow a move with PL=0"),
         (PATH, "MOVL C00002", "MOVC C00002", "an arc must begin where the move before it ends"),
         (PATH, "MOVL C00002", "MOVC C00001 V=120.0\r\nMOVL C00002", "an arc needs three MOVC"),
-        (PATH, "MOVL C00002", "MOVC C00001 V=120.0 PL=1\r\nMOVL C00002", "at the third MOVC"),
+        (PATH, "MOVL C00002", "MOVC C00001 V=120.0 PL=1\r\nMOVL C00002", "at its third MOVC"),
         (PATH, "MOVL C00002 V=120.0 PL=1", "MOVL C00002 V=120.0", "an arc must begin where"),
         (PATH, "MOVL C00002", "MOVS C00002", "not expected here: 'MOVS"),
         (PATH, "END", "JUMP *A\r\nEND", "not expected here: 'JUMP *A'"),

@@ -262,7 +262,7 @@ def test_preflight_refuses_names_of_the_controller_and_of_our_own_data(case, nam
 )  # fmt: skip
 def test_a_missing_file_is_said(case, file):
     files = {name: text for name, text in case.golden.items() if name != file}
-    with pytest.raises(InputError, match=re.escape(f"the file '{file}' is not there")):
+    with pytest.raises(InputError, match=re.escape(f"the file '{file}' is missing")):
         case.read(files)
 
 

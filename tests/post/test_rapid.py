@@ -226,7 +226,7 @@ def test_gas_flows_from_before_the_start_to_the_end_and_needs_an_output(small):
 
 
 def test_what_preflight_refuses_is_not_written(program):
-    with pytest.raises(InputError, match="tool: 't-laser' is no name in ABB RAPID"):
+    with pytest.raises(InputError, match="tool: 't-laser' is not a name in ABB RAPID"):
         post(program, settings=RapidSettings(tool_name="t-laser"))
 
 
@@ -253,7 +253,7 @@ def test_what_preflight_refuses_is_not_written(program):
         ("    SetDO doLaser,0;\n", "", "expected 'SetDO doLaser,0;'"),
         (",trOff,fine", ",trX,fine", "trX has not been set"),
         (",fine,tLaser", ",z10,tLaser", "z10 is not declared"),
-        (r"fine,tLaser\WObj", r"fine,tool0\WObj", "are not the module's"),
+        (r"fine,tLaser\WObj", r"fine,tool0\WObj", "not those of the module"),
         ("[FALSE,TRUE,", "[TRUE,TRUE,", "line 10: expected a fixed work object"),
         ("tLaser:=[TRUE,", "tLaser:=[FALSE,", "expected a tool held by the robot"),
         ("zCorner:=[FALSE,", "zCorner:=[TRUE,", "expected a zone"),
@@ -263,7 +263,7 @@ def test_what_preflight_refuses_is_not_written(program):
         ("speeddata vCut", "speeddata vAir", "vAir is declared twice"),
         ("SetDO doLaser", "SetDO doOther", "expected 'SetDO doLaser,0;'"),
         ("TriggIO trOff", "TriggIO trOn", "set once"),
-        ("9E9]],vAir", "0]],vAir", "external axes"),
+        ("9E9]],vAir", "0]],vAir", "the robot has no such axis"),
         ("[0,-1,0,0]", "[0.5,-1,0,0]", "must be whole numbers"),
     ],
 )
@@ -279,7 +279,7 @@ def test_the_reader_refuses_a_quaternion_that_is_none():
 
 def test_the_reader_refuses_a_module_without_a_tool():
     lines = [line for line in GOLDEN.splitlines() if "tooldata" not in line]
-    with pytest.raises(InputError, match="tool tLaser and work object wPart are not the module's"):
+    with pytest.raises(InputError, match="tool tLaser, work object wPart: not those of the module"):
         read_text("\n".join(lines), robot("abb_irb4600_60_205"))
 
 
@@ -309,7 +309,7 @@ def test_a_long_program_is_loaded_module_by_module(long_program):
         ("long.mod", "ENDIF", "", "expected 'ENDIF'"),
         ("long.mod", "IF nFirst<=1 THEN", "", "without a condition"),
         ("long.mod", "IF nFirst<=1 THEN", "IF nFirst<=2 THEN", "hole_0 is contour 1, not 2"),
-        ("long.mod", "HOME:/long_part.mod", "HOME:/other.mod", "the file 'other.mod' is not there"),
+        ("long.mod", "HOME:/long_part.mod", "HOME:/other.mod", "the file 'other.mod' is missing"),
         ("long.mod", 'UnLoad "HOME:/long_part.mod', 'UnLoad "HOME:/x.mod', "x.mod is not loaded"),
         ("long_part.mod", "PROC hole_0()", "PROC main()", "main is declared twice"),
         ("long_part.mod", "ENDMODULE", "", "long_part.mod, line .*ENDMODULE is missing"),

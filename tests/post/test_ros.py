@@ -233,7 +233,7 @@ def test_a_straight_move_that_changes_posture_is_refused(program):
 
 
 def test_more_points_than_a_file_may_have_are_refused(program):
-    with pytest.raises(InputError, match=r"yaml: the program has \d+ lines, lines_per_file allows"):
+    with pytest.raises(InputError, match=r"yaml: the program has \d+ lines, but lines_per_file"):
         post(program, "ros", RosSettings(lines_per_file=100, step_ms=1))
 
 
@@ -249,15 +249,15 @@ def test_more_points_than_a_file_may_have_are_refused(program):
         (".yaml", "positions: [0.", "positions: [0.1.", "line 10: expected 6 numbers"),
         (".yaml", "nanosec: 20000000}", "nanosec: 0}", "expected a time after that of the point"),
         (".yaml", "[0.12333", "[0.12334", "the velocities do not follow from the positions"),
-        (".events.yaml", "cut_skin_outer.yaml", "x.yaml", "are the events of x.yaml, expected"),
+        (".events.yaml", "cut_skin_outer.yaml", "x.yaml", "got those of x.yaml"),
         (".events.yaml", "events:", "events: []", "line 7: expected events, got"),
         (".events.yaml", '- {section: "skin_outer"}\n', "", "expected a section first"),
-        (".events.yaml", "done: linear}", "done: wait}", "the robot moves in a wait"),
-        (".events.yaml", "done: linear}", "done: joint}", "do not lie on the straight way"),
+        (".events.yaml", "done: linear}", "done: wait}", "the robot moves during a wait"),
+        (".events.yaml", "done: linear}", "done: joint}", "do not lie on a straight line"),
         (".events.yaml", "done: wait}", "done: waited}", "not expected here: '- {time: 0.8"),
-        (".events.yaml", "0.800000000", "0.810000000", "there is no point of the trajectory"),
-        (".events.yaml", "{time: 0.500000000, done", "{time: 0.800000000, done", "stands still"),
-        (".events.yaml", "time: 0.000000000", "time: 0.020000000", "to be done at time 0"),
+        (".events.yaml", "0.800000000", "0.810000000", "the trajectory has no point"),
+        (".events.yaml", "{time: 0.500000000, done", "{time: 0.800000000, done", "stops before"),
+        (".events.yaml", "time: 0.000000000", "time: 0.020000000", "that is done at time 0"),
         (".events.yaml", "done: wait}", "done: wait}\n- {time: 0.800000000, set: laser, to: true}",
          "a switch must follow a linear move"),
     ],
@@ -270,7 +270,7 @@ def test_the_reader_refuses_what_it_does_not_know(file, old, new, message):
     ("file", "message"),
     [
         (".events.yaml", "the trajectory goes on after the last event"),
-        (".yaml", "must stand at the first and last point"),
+        (".yaml", "must be at rest at the first and last point"),
     ],
 )
 def test_the_reader_refuses_a_lost_end(file, message):

@@ -190,7 +190,7 @@ def test_joint_speeds_must_be_known(program):
 
 
 def test_a_program_longer_than_a_file_may_be_is_refused(program):
-    with pytest.raises(InputError, match=r"lines_per_file allows 100, and this language cannot"):
+    with pytest.raises(InputError, match=r"lines_per_file allows 100 and this language cannot"):
         script(
             with_steps(program, [*program.sections[0].steps, *[Comment("x")] * 60]),
             GAS.model_copy(update={"lines_per_file": 100}),
@@ -211,8 +211,8 @@ def test_a_program_longer_than_a_file_may_be_is_refused(program):
         ("movel(", "movep(", "not expected here: 'movep(pose"),
         ("sleep(0.300)", "sleep(0.300)\n    stopl(1)", "not expected here: 'stopl(1)'"),
         ("a=1.200000, v=0.1", "a=0.000000, v=0.1", "must be above 0"),
-        ("    laser_set(True)\n", "", "the laser is switched ahead of a move, not at its end"),
-        ("    laser_set(True)", "    laser_set(False)", "to True ahead, to False here"),
+        ("    laser_set(True)\n", "", "the laser is switched ahead of a move, but not at its end"),
+        ("    laser_set(True)", "    laser_set(False)", "to True ahead, but to False here"),
         ("laser_ahead(p[0.08", "laser_ahead(p[0.18", "ahead of another point"),
         ("sleep(0.300)", "sleep(0.300)\n    laser_set(False)", "must follow a linear or circ"),
         ("  laser_run = run laser_thread()\n", "", "expected 'laser_run = run laser_thread()'"),
@@ -232,12 +232,12 @@ def test_the_reader_refuses_what_it_does_not_know(old, new, message):
 def test_the_reader_refuses_a_signal_that_is_not_defined(cell):
     text = script([hand_plan(arc(), *cell)], WIRED)
     bad = text.replace("    laser_set(True)", "    gas_set(True)\n    laser_set(True)", 1)
-    with pytest.raises(InputError, match="does not say how it switches the gas"):
+    with pytest.raises(InputError, match="does not define how it switches the gas"):
         reread(bad, cell[0], WIRED)
     more = CASE.golden[SCRIPT].replace(
         "  set_runstate_standard_digital_output_to_value(1, 1)\n", ""
     )
-    with pytest.raises(InputError, match="say by which output with gas_output"):
+    with pytest.raises(InputError, match="name its output with gas_output"):
         reread(more, cell[0], WIRED)
 
 

@@ -158,8 +158,8 @@ def test_several_contours_become_routines_called_in_order(cell):
 def test_a_lead_time_is_left_out_and_said(program):
     found = [i for i in preflight(program, "val3", OUTPUTS) if i.code == "lead-time"]
     assert [i.level for i in found] == ["warning"]
-    assert "3 switches are to come up to 300 ms ahead" in found[0].message
-    with pytest.raises(InputError, match="which VAL 3 cannot say"):
+    assert "3 switches are planned up to 300 ms ahead" in found[0].message
+    with pytest.raises(InputError, match="VAL 3 switches only after the tip has stopped"):
         post(program, "val3", OUTPUTS, strict=True)
 
 
@@ -271,7 +271,7 @@ def test_a_program_that_fits_is_one_project(long):
 def test_more_libraries_than_a_project_can_list_are_refused(program):
     (section,) = program.sections
     endless = replace(program, sections=tuple(replace(section, name=f"c{k}") for k in range(60)))
-    with pytest.raises(InputError, match="lines_per_file allows 100; raise it"):
+    with pytest.raises(InputError, match="but lines_per_file allows 100; raise it"):
         Val3(endless, OUTPUTS.model_copy(update={"lines_per_file": 100})).files()
 
 
@@ -283,7 +283,7 @@ def test_more_libraries_than_a_project_can_list_are_refused(program):
         ("start.pgx", "if nFirst<=1\n    call long_2:hole()\n  endIf\n", "", "not expected here"),
         ("long_2/start.pgx", "begin", "begin\n  dioLaser=true", "must not do anything"),
         ("long_2/stop.pgx", "dioLaser=false", "dioLaser=true", "in stop()"),
-        ("start.pgx", "call long_2:hole()", "call hole()", "hole is no routine of the project"),
+        ("start.pgx", "call long_2:hole()", "call hole()", "hole is not a routine of the project"),
         ("long_2.dtx", 'x="51.3000"', 'x="51.4000"', "with the tool and the frame of long"),
         ("long_2.pjx", "<Libraries>", '<Libraries><Library alias="long_2" path="Disk://long_2/'
          'long_2.pjx" />', "without libraries"),
@@ -330,8 +330,8 @@ START, STOP = f"{NAME}/start.pgx", f"{NAME}/stop.pgx"
     ("file", "old", "new", "message"),
     [
         (PJX, "Project/3", "Project/2", "line 2: <Project> is not expected"),
-        (PJX, "<Project", "<!DOCTYPE Project []><Project", "line 2: not expected in a project"),
-        (PJX, "</Project>", "", "no XML"),
+        (PJX, "<Project", "<!DOCTYPE Project []><Project", "line 2: a document type or"),
+        (PJX, "</Project>", "", "not XML"),
         (PJX, 's7.3.1"', 's8"', "line 3: expected <Parameters version='s7.3.1'"),
         (PJX, 'millimeterUnit="true"', 'millimeterUnit="false"', "expected <Parameters"),
         (PJX, '<Program file="stop.pgx" />', "", "stop.pgx is missing"),
@@ -355,8 +355,8 @@ START, STOP = f"{NAME}/start.pgx", f"{NAME}/stop.pgx"
         (DTX, 'rmax="99999"', 'rmax="10"', "expected <Value accel='100'"),
         (DTX, 'reach="0.3000"', 'reach="0.5000"', "expected <Value accel='100'"),
         (DTX, 'blend="Cartesian"', 'blend="joint"', "expected <Value accel='100'"),
-        (DTX, "%Q0", "%Q7", r"switches the output BasicIO-1\%Q7; expected BasicIO-1\%Q0"),
-        (DTX, ' link="BasicIO-1\\%Q0"', "", "switches the output ; expected"),
+        (DTX, "%Q0", "%Q7", r"expected the output BasicIO-1\%Q0 to be switched, got BasicIO-1\%Q7"),
+        (DTX, ' link="BasicIO-1\\%Q0"', "", "to be switched, got "),
         (START, "dioLaser=false", "", "expected dioLaser=false before anything else"),
         (START, "waitEndMove()", "", "expected waitEndMove() and nFirst=1 at the end"),
         (START, "nFirst=1", "nFirst=2", "expected waitEndMove() and nFirst=1 at the end"),
@@ -365,8 +365,8 @@ START, STOP = f"{NAME}/start.pgx", f"{NAME}/stop.pgx"
         (DTX, 'value="1"', 'value="0"', "must be the number of a contour, got \'0\'"),
         (DTX, "valve1", "valve2", "expected ioLink \'valve1\' of a tool"),
         (START, "if nFirst<=1\n    call skin_outer()\n  endIf\n", "", "number of a contour"),
-        (START, "call skin_outer()", "call hole()", "hole is no routine"),
-        (START, "call skin_outer()", "call start()", "start is no routine"),
+        (START, "call skin_outer()", "call hole()", "hole is not a routine"),
+        (START, "call skin_outer()", "call start()", "start is not a routine"),
         (START, "waitEndMove()", "if nFirst<=2\n  call skin_outer()\n  endIf\n  waitEndMove()",
          "is called twice"),
         (START, "call skin_outer()", "movej(jAir[0],flange,mAir[0])", "line 13: not expected here"),
@@ -379,7 +379,7 @@ START, STOP = f"{NAME}/start.pgx", f"{NAME}/stop.pgx"
         (CODE, "mAir[0]", "mAir[1]", "line 6: mAir[1] is not declared"),
         (CODE, "jAir[0]", "jAir[1]", "jAir[1] is not declared"),
         (CODE, "waitEndMove()\n", "\n", "line 9: a switch must follow a move of the path and"),
-        (CODE, "mPath[0])\n  waitEndMove()", "mPath[1])\n  waitEndMove()", "the robot is to stand"),
+        (CODE, "mPath[0])\n  waitEndMove()", "mPath[1])\n  waitEndMove()", "robot must not wait"),
         (CODE, "  delay(0.400)\n  movel(pPath[1]", "  movel(pPath[1],tLaser,mPath[1])\n  delay(0.4)"
          "\n  movel(pPath[1]", "a wait must follow waitEndMove()"),
         (CODE, "delay(0.400)", "delay(0.400)\n  dioLaser=true", "a switch must follow a move"),

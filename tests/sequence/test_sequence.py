@@ -241,7 +241,7 @@ def test_one_program_for_the_part_says_that_its_air_moves_are_clear(walled):
     expected = [cut.moves[0].q[0], *(q for move in cut.moves for q in move.q[1:])]
     np.testing.assert_array_equal(corners, expected)
     assert len(read_text(text, program.robot).sections) == 4
-    with pytest.raises(InputError, match="4 plans need 3 moves between them, or 5"):
+    with pytest.raises(InputError, match="expected 3 moves between 4 plans, or 5"):
         build_program(cut.plans, moves=cut.moves[:2])
 
 

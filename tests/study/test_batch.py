@@ -73,7 +73,7 @@ def test_each_job_has_its_row_with_what_came_of_it(done):
         "fast": "a: contour 'a': on this grid of the rotation no admissible edge",
         "misspelt": "plan.gama_step_deg: expected a key of [plan]",
         "unknown": "'c'",
-        "mute": "A6 = 360.0 deg cannot be said by Status and Turn",
+        "mute": "A6 = 360.0 deg cannot be expressed by Status and Turn",
         "foreign": "program.language: ",
         "gone": "gone.toml: no such file",
     }

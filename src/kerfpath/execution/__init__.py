@@ -1,4 +1,4 @@
-"""The motion as a controller runs it: straight and circular moves, rounded in zones."""
+"""The motion as a controller runs it: straight and circular moves, with rounded corners."""
 
 from kerfpath.execution._course import ToolCourse as ToolCourse
 from kerfpath.execution._deviation import Deviation as Deviation

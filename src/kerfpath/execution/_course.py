@@ -1,4 +1,4 @@
-"""Where the tool is over time, from stop to stop, as programmed speeds and zones have it."""
+"""The pose of the tool over time, from stop to stop, by programmed speeds and zones."""
 
 from __future__ import annotations
 
@@ -23,38 +23,37 @@ from kerfpath.post import (
 __all__ = ["ToolCourse"]
 
 SHORTEST = 1e-9
-"""s: no move and no stretch is shorter."""
+"""Shortest time (s) of a move or a stretch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolCourse:
-    """The tool's pose over the time that the programmed speeds leave it.
+    """The pose of the tool over time, at the programmed speeds.
 
-    Between the zones the tip runs straight, or along an arc, at the programmed speed, and the tool
-    turns as `orientation` says. Within `half` s of a target it goes from one move over to the next
-    at constant acceleration, the tip and the angles alike: along a parabola, tangent to both, where
-    both are straight. That is a model: makers of controllers publish the zones, not what happens in
-    them.
+    Between the zones the tip moves straight or along an arc at the programmed speed, and the tool
+    turns as `orientation` says. Within `half` s of a target, tip and angles change from one move to
+    the next at constant acceleration; between straight moves, that is a parabola tangent to both.
+    This is a model: makers of controllers publish the zones, but not the motion in them.
 
     Parameters
     ----------
     T : (K, 4, 4) m
-        Poses of the tip at the targets, in the part; the robot stands at the first and the last.
+        Poses of the tip at the targets, in the part; the robot stops at the first and the last.
     duration : (K-1,) s
-        Of each move.
+        Time of each move.
     half : (K,) s
-        Before and after each target: half the time in its zone.
+        Time in the zone before, and after, each target.
     centre, normal : (K-1, 3) m, 1
         Circle of each move, in the part; the normal is zero where the move is straight.
     orientation : {"slerp", "two-angle"}
-        What the tool does between two targets, see `Controller`.
+        How the tool turns between two targets, see `Controller`.
 
     Attributes
     ----------
     time : (K,) s
-        At the targets.
+        Times at the targets.
     sweep : (K-1,) rad
-        How far the arc of each move turns; 0 where it is straight.
+        Angle of the arc of each move; 0 if it is straight.
     """
 
     T: Array
@@ -97,7 +96,7 @@ class ToolCourse:
             T_part_tip where the first move begins.
         moves : sequence of LinearMove
         controller : Controller
-            Of orientation "wrist" the course says where the tip is, not how the tool is turned.
+            With orientation "wrist" the course gives the tip's place, not the tool's orientation.
         """
         T = np.array([start, *(move.T_part_tip for move in moves)])
         via = [move.T_part_via if isinstance(move, CircularMove) else None for move in moves]
@@ -122,7 +121,7 @@ class ToolCourse:
     ) -> ToolCourse:
         """Return the course through poses, (K, 4, 4) m, without zones: each move takes a second.
 
-        It leads along an arc through each of `via`, K-1 poses (4, 4) m, where that is not None.
+        A move is an arc where its pose in `via`, of K-1 poses (4, 4) m or None, is not None.
         """
         centre, normal = np.zeros((2, len(via), 3))
         for k, middle in enumerate(via):
@@ -145,7 +144,7 @@ class ToolCourse:
 
     @property
     def borders(self) -> Array:
-        """Times, s, of ends and middles of moves and of ends of zones: it is smooth in between."""
+        """Times, s, of ends and middles of moves and of ends of zones, smooth in between."""
         between = (self.time[1:] + self.time[:-1]) / 2
         ends = [self.time, between, self.time - self.half, self.time + self.half]
         every = np.unique(np.clip(np.concatenate(ends), 0.0, self.time[-1]))
@@ -166,9 +165,9 @@ class ToolCourse:
         return T
 
     def blended(self, values: Array, time: Array) -> Array:
-        """Return values that go evenly from each target's (K, c) to the next's, (m, c), at times.
+        """Return values (m, c) at times (m,) that change evenly between those at targets (K, c).
 
-        In zones they go over as straight moves do.
+        In zones they are blended as straight moves are.
         """
         k, near, blend = self._at(time)
         left, right = self._beside(near)
@@ -179,7 +178,7 @@ class ToolCourse:
     def pieces(self, external: Array | None = None) -> CoursePieces:
         """Return the course as closed formulas of the time, one between each two borders.
 
-        External axes go as `blended` has them between values (K, E) at the targets; default: none.
+        External axes follow `blended` between values (K, E) at the targets; default: none.
         """
         values = np.zeros((len(self.T), 0)) if external is None else external
         borders = self.borders
@@ -194,7 +193,7 @@ class ToolCourse:
         bends = np.where((blend > 0) & (half > 0), 1 / np.maximum(4 * half, 1e-12), 0.0)
 
         def parts(own: Array, change: Array) -> Array:
-            # bends (half -+ t)^2 of the change from one move to the next comes on top
+            # plus bends (half -+ t)^2 times the change from one move to the next
             b, sign = (bends[:, None] * change, np.where(after, -2.0, 2.0)[:, None])
             wide = half[:, None]
             return np.stack([b * wide**2, own + sign * wide * b, 2 * b], axis=1)
@@ -220,12 +219,12 @@ class ToolCourse:
         )
 
     def _at(self, time: Array) -> tuple[Ints, Ints, Array]:
-        """Return at times (m,) the move, the target next in time, and the share of the blend, s."""
+        """Return move, nearest target in time, and share of the blend, s, at times (m,)."""
         k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.duration) - 1)
         after, before = time - self.time[k], self.time[k + 1] - time
         near = np.where(after < before, k, k + 1)
         away, half = np.minimum(after, before), self.half[near]
-        # What is added to the corner: of constant acceleration, and gone at the ends of the zone.
+        # Added to the corner: of constant acceleration, and zero at the ends of the zone.
         return k, near, np.maximum(half - away, 0.0) ** 2 / np.maximum(4 * half, 1e-12)
 
     def _beside(self, near: Ints) -> tuple[Ints, Ints]:
@@ -237,7 +236,7 @@ class ToolCourse:
         return np.asarray(self.normal.any(axis=1))
 
     def _points(self, k: Ints, after: Array) -> Array:
-        """Return the points (m, 3) of moves k (m,), s after each began."""
+        """Return the points (m, 3) of moves k (m,), `after` s from the start of each."""
         start = self.T[k, :3, 3]
         x, at = start - self.centre[k], (self.sweep[k] / self.duration[k] * after)[:, None]
         arc = self.centre[k] + np.cos(at) * x + np.sin(at) * np.cross(self.normal[k], x)
@@ -251,11 +250,11 @@ class ToolCourse:
 
 
 def _turns(R: Array, orientation: Orientation) -> Array:
-    """Return by how much tools turn, (2, m, 3) rad, as seen where they begin and where they end.
+    """Return the turns of tools, (2, m, 3) rad, as seen from where they begin and where they end.
 
-    Of rotations R (m, 3, 3) in the tool's own axes: rotation vectors. Of "two-angle" those by which
-    the axis z swings, whose own z is zero, with the turn about it in that place; R is the swing
-    after the turn.
+    `R` are the rotations (m, 3, 3) in the tool's own axes. For "slerp" they become rotation
+    vectors. For "two-angle" x and y are the rotation vector by which the z axis swings, and z is
+    the turn about it; R is the swing after the turn.
     """
     if orientation == "slerp":
         turn = Rotation.from_matrix(R).as_rotvec()
@@ -272,7 +271,7 @@ def _turns(R: Array, orientation: Orientation) -> Array:
 
 
 def _turned(turn: Array, orientation: Orientation) -> Array:
-    """Return the rotations (m, 3, 3) that turns (m, 3) rad are, see `_turns`."""
+    """Return the rotations (m, 3, 3) of turns (m, 3) rad, see `_turns`."""
     if orientation == "slerp":
         return np.asarray(Rotation.from_rotvec(turn).as_matrix())
     swing, about = turn * [1.0, 1.0, 0.0], turn * [0.0, 0.0, 1.0]

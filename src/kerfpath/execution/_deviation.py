@@ -1,4 +1,4 @@
-"""How far a run leaves the contour that it is cut along: at its targets, and in its zones."""
+"""Deviation of a run from the contour that it cuts, at its targets and in its zones."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from kerfpath.execution._executed import Executed
 __all__ = ["Deviation", "deviation_of"]
 
 SAMPLES = 8
-"""Of the path for each of its nodes, or each target."""
+"""Number of samples of the path for each of its nodes, or each target."""
 
 
 class Deviation(NamedTuple):
-    """The largest distance of the tip, m, and angle of the tool axis, rad, and when, s."""
+    """Largest distance of the tip, m, and largest angle of the tool axis, rad, with times, s."""
 
     tip: float
     tip_time: float
@@ -26,14 +26,14 @@ class Deviation(NamedTuple):
 
 
 def deviation_of(run: Executed, path: Contour) -> Deviation:
-    """Return how far the tip is from the path, and the tool axis from its axes, where it is near.
+    """Return how far the tip is from the path, and the tool axis from that of the nearest point.
 
     Parameters
     ----------
     run : Executed
-        Looked at where its joints were.
+        Evaluated at its samples.
     path : Contour
-        As drawn, in the part.
+        The contour as drawn, in the part.
     """
     tip, axis = run.T[:, :3, 3], run.T[:, :3, 2]
     even = np.linspace(path.s[0], path.s[-1], SAMPLES * max(len(path), len(run.course.T)))

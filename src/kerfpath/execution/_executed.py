@@ -1,4 +1,4 @@
-"""What the joints do in a program as a controller runs it, between the targets too."""
+"""Motion of the joints as a controller runs a program, also between the targets."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from kerfpath.robots import Robot, base_in_part
 __all__ = ["Executed", "Peak", "executed", "from_stop_to_stop", "run_along"]
 
 WHERE = (0.1, 0.5, 0.9)
-"""Shares of each smooth stretch at which the joints are looked at."""
+"""Shares of each smooth stretch at which the joints are sampled."""
 TIGHT = 1.02
-"""Bounds need not be nearer to what is seen."""
+"""Bounds are refined to this multiple of the sampled peak."""
 RESOLVED = 2e-5
-"""s: between zones that all but meet, shorter stretches, differences of joints are rounding."""
+"""Shortest stretch (s) that is sampled: in shorter ones, differences of joints are rounding."""
 STEP = 0.05
-"""Share of it by which they are looked at before and after, for their rates."""
+"""Share of a stretch between a sample and the joints before and after it, for the rates."""
 
 
 class Peak(NamedTuple):
-    """The largest share of a limit, of which joint (counted from 0), and at which time, s."""
+    """The largest share of a limit, its joint (counted from 0), and its time, s."""
 
     share: float
     joint: int
@@ -43,30 +43,30 @@ class Executed:
     Parameters
     ----------
     section : str
-        Of the program.
+        Name of the section of the program.
     course : ToolCourse
     time : (m,) s
-        Where the joints were looked at, from the start of the run.
+        Times of the samples, from the start of the run.
     planned : (m,) s
-        When that was planned to be: chords are shorter than the path, so that a run is ahead.
+        Planned times of the samples: chords are shorter than the path, so that a run is ahead.
     q : (m, n) rad
-        NaN where the posture of the targets does not reach.
+        Joints; NaN where the posture of the targets does not reach.
     T : (m, 4, 4) m
-        Poses of the tip there, in the part.
+        Poses of the tip, in the part.
     velocity_share, acceleration_share : (m, n)
-        Signed, of the full limit of each joint. Where one is above 1 in size, the robot cannot run
-        at the programmed speed: a controller slows down.
+        Signed shares of the full limit of each joint. If one is above 1 in size, the robot cannot
+        run at the programmed speed, and a controller slows down.
     torque_share : (m, n) or None
-        As those, of rigid links at the samples; None where the robot has no load, see
+        The same for torques, of rigid links at the samples; None if the robot has no load, see
         `Robot.with_load`.
     velocity_bound, acceleration_bound : float
-        No joint uses more of a limit at any instant: proved, without a sample, and at most 2 % more
-        than what was seen, as far as a limit allows. Infinite where nothing is proved: next to a
-        singularity, and where there are samples alone.
+        Proved bounds: no joint uses a larger share of a limit at any instant, also between samples.
+        They are refined to 2 % above the sampled peak, or to the limit if the peak is below it.
+        Infinite if nothing is proved: next to a singularity, and if there are only samples.
     sampled : str
-        Why there are samples alone; empty where the bounds are proofs.
+        Why there are only samples; empty if the bounds are proved.
     controller : Controller
-        By which it is run.
+        The controller that runs it.
     """
 
     section: str
@@ -107,7 +107,7 @@ class Executed:
 
     @property
     def missed(self) -> float:
-        """The largest distance, m, by which the tip passes a target."""
+        """The largest distance, m, by which the tip misses a target."""
         poses = self.course.poses(self.course.time)
         return float(np.linalg.norm(poses[:, :3, 3] - self.course.T[:, :3, 3], axis=1).max())
 
@@ -123,21 +123,21 @@ def executed(program: Program, *, controller: Controller = PLAIN) -> tuple[Execu
 
     The motion is that of `ToolCourse`, at the programmed speeds throughout: neither speeding up
     from the stop nor slowing down for a limit is modelled. The joints follow it exactly; external
-    axes go evenly from target to target, in zones as the tip does. Velocities and accelerations are
-    looked at three times in each stretch that is smooth; bounds that hold everywhere come with
-    them, see `kerfpath.auditor.rates_along`. Torques are those at the samples.
+    axes move evenly from target to target, in zones like the tip. Velocities and accelerations are
+    sampled three times in each smooth stretch, together with bounds that hold everywhere; see
+    `kerfpath.auditor.rates_along`. Torques are those at the samples.
 
     Parameters
     ----------
     program : Program
     controller : Controller
-        That of a language is `language(name).controller(settings)`.
+        For a language it is `language(name).controller(settings)`.
 
     Raises
     ------
     InputError
-        A robot whose limits of velocity and acceleration are not known; of orientation "wrist" one
-        without a wrist of three joints.
+        The velocity and acceleration limits of the robot are not known, or the orientation is
+        "wrist" and the robot has no wrist of three joints.
     """
     return tuple(
         run_along(
@@ -154,7 +154,7 @@ def executed(program: Program, *, controller: Controller = PLAIN) -> tuple[Execu
 
 
 def from_stop_to_stop(moves: Sequence[JointMove | LinearMove]) -> list[list[LinearMove]]:
-    """Return each run of straight and circular moves; it begins with that to where it starts."""
+    """Return the runs of straight and circular moves, each with the move to its start first."""
     found: list[list[LinearMove]] = []
     run: list[LinearMove] = []
     for move in moves:
@@ -177,7 +177,7 @@ def run_along(
     controller: Controller = PLAIN,
     section: str = "",
 ) -> Executed:
-    """Return the run of moves from the target of the first, where the robot stands, to a stop.
+    """Return the run of moves from the target of the first, where the robot is stopped, to a stop.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ def _by_pose(
     robot: Robot, course: ToolCourse, time: Array, targets: Array, T_base_part: Array,
     T_flange_tip: Array,
 ) -> Array:  # fmt: skip
-    """Return the joints (m, n) at times (m,), next to those at the targets (K, n)."""
+    """Return the joints (m, n) at times (m,) that are close to those at the targets (K, n)."""
     arm, x, seen = _alone(robot, course, time, targets, T_base_part)
     near = np.stack([np.interp(time, course.time, joint) for joint in targets.T], axis=1)
     q = arm.nearest(seen @ np.linalg.inv(T_flange_tip), near[:, : arm.joints])
@@ -264,7 +264,7 @@ def _by_wrist(
     robot: Robot, course: ToolCourse, time: Array, targets: Array, T_base_part: Array,
     T_flange_tip: Array,
 ) -> Array:  # fmt: skip
-    """Return the joints (m, n) at times (m,), the wrist going evenly from target to target."""
+    """Return the joints (m, n) at times (m,), with even motion of the wrist between targets."""
     arm, x, seen = _alone(robot, course, time, targets, T_base_part)
     require_wrist(arm)
     near = course.blended(targets[:, : arm.joints], time)
@@ -277,7 +277,7 @@ def _alone(
 ) -> tuple[Robot, Array, Array]:
     """Return the arm, its external axes (m, E) at times, and the poses of the tip that it sees.
 
-    In the robot base as it stands there.
+    The poses are in the robot base, wherever external axes carry it.
     """
     arm = robot.alone()
     x = course.blended(targets[:, arm.joints :], time)
@@ -286,9 +286,9 @@ def _alone(
 
 
 def _sampled(robot: Robot, controller: Controller) -> str:
-    """Return why nothing is proved of a robot and a controller; empty where it is."""
+    """Return why nothing is proved for a robot and a controller; empty if bounds are proved."""
     if controller.orientation == "wrist":
-        return "where the controller moves the wrist by its joints nothing is proved"
+        return "nothing is proved if the controller moves the wrist by its joints"
     if robot.kinematics not in ENCLOSED:
         return f"nothing is proved for arms of the family {robot.kinematics}"
     return ""

@@ -1,4 +1,4 @@
-"""A plan that keeps the limits of its joints between the nodes, too, as its program has it run."""
+"""A plan that keeps the joint limits between the nodes, too, when its program runs."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ from kerfpath.refiner import KeptShares, refine
 __all__ = ["Kept", "keep_limits", "longest_run"]
 
 ROUNDS = 10
-"""Refinements at most; the first two or three do most of it."""
+"""Largest number of refinements; the first two or three do most of the work."""
 AIM = 0.998
-"""Share of the limits that is aimed at: a proof says a little more than there is."""
+"""Share of the limits that is aimed at: proved bounds are a little above the true values."""
 CLOSER = 0.003
-"""By how much the aim goes down where only the proof is missing."""
+"""Reduction of the aim if only the proof is missing."""
 LEAST = 0.05
-"""Share of a limit that a node keeps at least, however much is needed beside it."""
+"""Smallest share of a limit that is left to a node."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Kept:
-    """What came of it.
+    """Result of `keep_limits`.
 
     Parameters
     ----------
     plan : Plan
-        The plan whose program keeps the limits; the one given where `done` is False.
+        The plan whose program keeps the limits; the given plan if `done` is False.
     done : bool
-        It is proved that no joint exceeds a limit at any instant of the program.
+        Whether it is proved that no joint exceeds a limit at any instant of the program.
     rounds : int
-        Refinements that it took.
+        Number of refinements.
     run : Executed or None
-        That plan as it is run; None where the robot stops at every node.
+        The run of that plan; None if the robot stops at every node.
     statement : str
-        What was done; or what is exceeded where and what would help.
+        What was done, or which limit is exceeded, where, and what would help.
     """
 
     plan: Plan
@@ -66,9 +66,10 @@ def keep_limits(
 ) -> Kept:
     """Return a plan whose program keeps every limit of velocity and acceleration at every instant.
 
-    Where the motion of the program, see `executed`, needs more of a limit than the nodes do, the
-    nodes are held to as much less and the plan is refined again, until the bounds that hold at
-    every instant are within the limits. Speed, nodes, postures and turns stay; gamma moves.
+    Where the motion of the program (see `executed`) needs more of a limit than the nodes, the limit
+    at the nodes is reduced by the difference and the plan is refined again, until the bounds that
+    hold at every instant are within the limits. Speed, nodes, postures and turns stay; only gamma
+    changes.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def keep_limits(
     intervals, n = np.diff(plan.q, axis=0).shape
     into, _ = meetings(intervals, periodic=plan.settings.closure == "periodic")
     kept = KeptShares(np.ones((intervals, n)), np.ones((len(into), n)))
-    made, aim, why = plan, AIM, "holding the nodes to less does not bring it down"
+    made, aim, why = plan, AIM, "lower limits at the nodes do not reduce it"
     for count in range(ROUNDS + 1):
         if max(run.velocity_bound, run.acceleration_bound) <= 1:
             said = "it keeps the limits between the nodes, too"
@@ -101,7 +102,7 @@ def keep_limits(
             why = run.sampled or "nothing can be proved there for this arm"
             break
         if worst > 1 >= max(run.peak_velocity.share, np.abs(_in_zones(run)).max()):
-            why = "that is what the straight stretch between two zones takes, whatever nodes do"
+            why = "the straight stretch between two zones needs that, whatever the nodes do"
             break
         aim -= CLOSER if worst <= 1 else 0.0
         kept = _held(made, run, kept, aim)
@@ -116,15 +117,15 @@ def keep_limits(
 
 
 def longest_run(program: Program, controller: Controller = PLAIN) -> Executed | None:
-    """Return the run of a program of one plan with the most targets, its cut; None without one."""
+    """Return the run with the most targets in a program of one plan, its cut; None without one."""
     runs = executed(program, controller=controller)
     return max(runs, key=lambda each: len(each.course.T), default=None)
 
 
 def _held(plan: Plan, run: Executed, kept: KeptShares, aim: float) -> KeptShares:
-    """Return the shares of the limits with less where the run needs more than is aimed at.
+    """Return the shares of the limits, reduced where the run needs more than the aim.
 
-    What is needed between the nodes beyond what is needed at them is taken to stay as it is.
+    The difference of the needs between the nodes and at them is assumed to stay the same.
     """
     settings, time = plan.settings, plan.time - plan.time[0]
     intervals, nodes = len(kept.velocity), len(kept.acceleration)
@@ -143,9 +144,9 @@ def _held(plan: Plan, run: Executed, kept: KeptShares, aim: float) -> KeptShares
 
 
 def _in_zones(run: Executed) -> Array:
-    """Return what is needed of acceleration limits (m, n) in zones; 0 on what is straight.
+    """Return the needed shares of acceleration limits (m, n) in zones; 0 on straight stretches.
 
-    What a straight stretch needs does not depend on how its ends are turned into.
+    What a straight stretch needs does not depend on the corners at its ends.
     """
     course = run.course
     after = np.searchsorted(course.time, run.time).clip(1, len(course.time) - 1)
@@ -162,7 +163,7 @@ def _less(kept: Array, own: Array, needed: Array, place: Ints, aim: float, eta: 
 
 
 def _need(plan: Plan, run: Executed, why: str) -> str:
-    """Say what a plan needs between its nodes, why it is not brought down, and what would help."""
+    """Return what a plan needs between its nodes, why that is not reduced, and what would help."""
     velocity, acceleration = run.peak_velocity, run.peak_acceleration
     fast = velocity.share > 1
     peak, what = (velocity, "velocity") if fast else (acceleration, "acceleration")
@@ -177,12 +178,13 @@ def _need(plan: Plan, run: Executed, why: str) -> str:
         return said
     if peak.share > 1:
         slower = max(velocity.share, np.sqrt(acceleration.share))
-        said += f"; at {np.floor(99 / slower) / 100:.0%} of the speed it keeps the limits as it is"
+        share = np.floor(99 / slower) / 100
+        said += f"; at {share:.0%} of the speed the plan keeps the limits as it is"
     return said if fast else said + _wider(run, peak)
 
 
 def _wider(run: Executed, peak: Peak) -> str:
-    """Say how near nodes would be, or how far the tip would pass one, for zones that meet."""
+    """Return the spacing of nodes, or the zone error, with which zones would meet."""
     course = run.course
     k = int(np.clip(np.abs(course.time - peak.time).argmin(), 1, len(course.time) - 2))
     share = 2 * course.half[k] / min(course.duration[k - 1], course.duration[k])
@@ -192,7 +194,7 @@ def _wider(run: Executed, peak: Peak) -> str:
     gaps = np.linalg.norm(steps, axis=1)
     passed = float(np.linalg.norm(np.diff(steps / gaps[:, None], axis=0)) * gaps.min() / 8)
     return (
-        f"; the zone there takes {share:.0%} of the way to the next node: nodes at most "
+        f"; the zone there takes {share:.0%} of the way to the next node; nodes at most "
         f"{gaps.min() * np.sqrt(share) * 1000:.2g} mm apart, or a zone error of "
-        f"{passed * 1000:.2g} mm, let zones meet"
+        f"{passed * 1000:.2g} mm, would let the zones meet"
     )

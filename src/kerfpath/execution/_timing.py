@@ -1,9 +1,9 @@
 """How long a run takes and where it slows down, if its robot keeps every limit.
 
-The path is fixed, and the robot goes along it at the programmed speed where the limits of its
-joints let it, else as fast as they do: time-optimal path parametrisation by reachable sets (Pham
-and Pham 2018). With x the square of the rate at which programmed time passes, and u its derivative
-by that time over two, both limits are linear: q'^2 x <= v^2 and |q' u + q'' x| <= a.
+The path is fixed. The robot follows it at the programmed speed where the joint limits allow, else
+as fast as they allow: time-optimal path parametrisation by reachable sets (Pham and Pham 2018).
+With x the square of the rate at which programmed time passes, and u its derivative by that time
+over two, both limits are linear: q'^2 x <= v^2 and |q' u + q'' x| <= a.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ AT_SPEED = 0.995
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Timing:
-    """A run as fast as its programmed speeds and the limits of the joints let it be.
+    """A run as fast as its programmed speeds and the joint limits allow.
 
     Parameters
     ----------
     seconds : float s
-        That it takes from rest to rest.
+        Time from rest to rest.
     programmed : float s
-        That it would take at the programmed speeds throughout.
+        Time at the programmed speeds throughout.
     time : (m,) s
-        Where it was looked at, in programmed time from the start of the run.
+        Samples, in programmed time from the start of the run.
     share : (m,)
-        Of the programmed speed that the tool has there.
+        Share of the programmed speed that the tool has there.
     length : (m,) m
-        That the tip has gone until there.
+        Distance that the tip has moved up to there.
     """
 
     seconds: float
@@ -52,7 +52,7 @@ class Timing:
 
     @property
     def under_way(self) -> Bools:
-        """Between the ramps: from where the speed is reached to where it is left, (m,)."""
+        """Whether samples are between the ramps, where the speed is reached and left, (m,)."""
         held = np.flatnonzero(self.share >= AT_SPEED)
         k = np.arange(len(self.share))
         first, last = (held[0], held[-1]) if len(held) else (0, len(k))
@@ -67,13 +67,13 @@ class Timing:
 
     @property
     def ramps(self) -> tuple[float, float]:
-        """Lengths, m, in which the speed is reached at the start and left at the end."""
+        """Lengths, m, of the ramps to the speed at the start and from it at the end."""
         inside = self.length[self.under_way]
         return float(inside[0] - self.length[0]), float(self.length[-1] - inside[-1])
 
     @property
     def slowest(self) -> tuple[float, float]:
-        """The least share of the programmed speed between the ramps, and at which length, m."""
+        """The smallest share of the programmed speed between the ramps, and its place, m."""
         share = np.where(self.under_way, self.share, np.inf)
         k = int(np.argmin(share))
         return float(min(share[k], 1.0)), float(self.length[k])
@@ -86,19 +86,19 @@ def timing_of(run: Executed, robot: Robot, *, eta_v: float = 1.0, eta_a: float =
     ----------
     run : Executed
     robot : Robot
-        Of the run.
+        Robot of the run.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
 
     Raises
     ------
     InputError
-        Joints that are not reached: there is no motion.
+        The posture does not reach some samples of the run (NaN).
     """
     velocity, acceleration = robot.speed_limits()
     first, second = run.velocity_share * velocity, run.acceleration_share * acceleration
     if np.isnan(second).any():
-        raise InputError("timing_of: expected a run whose joints are in reach")
+        raise InputError("timing_of: expected a run within reach, got joints that are NaN")
     steps = np.diff(run.time)
     room, lean, most = _rows(first, second, eta_v * velocity, eta_a * acceleration)
     x = _forward(_backward(most, steps, room, lean), steps, room, lean)
@@ -118,9 +118,9 @@ def timing_of(run: Executed, robot: Robot, *, eta_v: float = 1.0, eta_a: float =
 def _rows(
     first: Array, second: Array, velocity: Array, acceleration: Array
 ) -> tuple[Array, Array, Array]:
-    """Return room and lean (m, n), |u + lean x| <= room, and the largest x (m,) by themselves.
+    """Return room and lean (m, n) of |u + lean x| <= room, and the largest x (m,) of each sample.
 
-    A joint that does not move bounds x alone. Of two joints a u is left for both where
+    A joint that does not move bounds x alone. Two joints have a common u where
     |lean_1 - lean_2| x <= room_1 + room_2.
     """
     moves = np.abs(first) > 1e-12
@@ -137,8 +137,7 @@ def _rows(
 def _backward(most: Array, steps: Array, room: Array, lean: Array) -> Array:
     """Return the largest x (m,) from which the end is reached at rest.
 
-    A step leads from x to x + 2 step u, which is neither below zero nor above what the next sample
-    is left from.
+    A step leads from x to x + 2 step u, which must lie between zero and the x of the next sample.
     """
     reach = most.copy()
     reach[-1] = 0.0
@@ -153,7 +152,7 @@ def _backward(most: Array, steps: Array, room: Array, lean: Array) -> Array:
 
 
 def _forward(reach: Array, steps: Array, room: Array, lean: Array) -> Array:
-    """Return the largest x (m,) that is come to from rest."""
+    """Return the largest x (m,) that is reached from rest."""
     x = reach.copy()
     x[0] = 0.0
     for i, step in enumerate(steps):

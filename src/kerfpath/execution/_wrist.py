@@ -1,4 +1,4 @@
-"""Joints where a controller moves the wrist evenly and keeps the tip on its way."""
+"""Joints of a controller that moves the wrist evenly and keeps the tip on its path."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from kerfpath.robots import Robot
 __all__ = ["joints_with_wrist", "require_wrist"]
 
 ARM = 3
-"""Joints that place the tip, while as many after them are the wrist."""
+"""Number of joints that place the tip; as many joints of the wrist follow."""
 STEPS = 8
-"""Of Newton's method, each of which doubles the digits."""
+"""Steps of Newton's method, each of which doubles the digits."""
 NEAR = 1e-10
-"""m: the tip is where it has to be; rounding leaves 1e-15."""
+"""Distance (m) below which the tip is at its point; rounding leaves 1e-15."""
 
 
 def require_wrist(robot: Robot) -> None:
-    """Raise InputError where a robot does not have three joints and a wrist of three."""
+    """Raise InputError unless a robot has three joints and a wrist of three."""
     if robot.joints != 2 * ARM:
         raise InputError(
-            f"robot {robot.id!r}: orientation 'wrist' is modelled for six joints, it has "
+            f"robot {robot.id!r}: orientation 'wrist' is modelled for six joints, got "
             f"{robot.joints}"
         )
 
@@ -31,15 +31,15 @@ def require_wrist(robot: Robot) -> None:
 def joints_with_wrist(robot: Robot, points: Array, near: Array, tool: Array) -> Array:
     """Return the joints (m, 6) rad that bring the tip to points, (m, 3) m, with the wrist as given.
 
-    Newton's method in the first three joints. NaN where it does not get there.
+    It uses Newton's method in the first three joints; NaN where that does not converge.
 
     Parameters
     ----------
     robot : Robot
     points : (m, 3) m
-        In the robot base.
+        Points in the robot base.
     near : (m, 6) rad
-        The first three joints nearby, the others as they are to be.
+        The first three joints close to the solution, the others as they must be.
     tool : (4, 4) m
         T_flange_tip.
     """

@@ -1,4 +1,4 @@
-"""Robot programs: one neutral program, one preflight that refuses, one formatter per language."""
+"""Robot programs: a neutral program, a preflight check, and a formatter for each language."""
 
 from kerfpath._extras import require_extra
 

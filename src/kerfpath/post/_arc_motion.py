@@ -1,4 +1,4 @@
-"""What the joints do along an arc that is to replace straight moves, and whether they may."""
+"""The joint motion along an arc that is to replace straight moves, and its limits."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from kerfpath.post._program import Program
 __all__ = ["ArcLimits", "Stretch"]
 
 MARGIN = 0.01
-"""Share of a limit that arcs leave unused, for the digits of their text and other node times."""
+"""Share of a limit that arcs leave unused, for rounding in the text and other node times."""
 NEAR = np.radians(5.0)
-"""Farther (rad) from the planned joints than this, an arc is on another branch."""
+"""An arc farther than this (rad) from the planned joints is on another branch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stretch:
-    """Moves of a path, with the stretches that join them to the motion before and behind.
+    """Moves of a path, with the moves that join them to the motion before and after.
 
     Parameters
     ----------
     before, after : (q (n,) rad, dt s) or None
-        The node before the first and how long it is ago, the node after the last and how long the
-        way there takes; None where the robot stands.
+        The node before the first with the time since it, and the node after the last with the time
+        to it; None where the robot is stopped.
     q : (m + 1, n) rad
         Joints planned from the first node to the last.
     dt : (m,) s
@@ -40,7 +40,7 @@ class Stretch:
     __repr__ = short_repr
 
     def joined(self, q: Array, dt: Array) -> tuple[Array, Array]:
-        """Return joints and time steps from `before` to `after`, by way of q (m + 1, n) in dt."""
+        """Return joints and time steps from `before` to `after`, through q (m + 1, n) in dt."""
         if self.before is not None:
             q, dt = np.vstack([self.before[0], q]), np.append(self.before[1], dt)
         if self.after is not None:
@@ -50,14 +50,14 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArcLimits:
-    """What the joints may do along an arc: limits of position, velocity and acceleration.
+    """Limits of position, velocity and acceleration that the joints keep along an arc.
 
-    A share of a limit that is used up to `MARGIN` below it, or no more than planned there, is kept.
+    A limit is kept if an arc stays `MARGIN` below it or uses no more of it than planned there.
 
     Parameters
     ----------
     program : Program
-        Its robot and frames.
+        Program with the robot and the frames.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
     """
@@ -67,19 +67,19 @@ class ArcLimits:
     eta_a: float = 1.0
 
     def along(self, poses: Array, stretch: Stretch) -> Array | None:
-        """Return the joints (m + 1, n) rad along an arc, or None where they break a limit.
+        """Return the joints (m + 1, n) rad along an arc, or None if they exceed a limit.
 
         Parameters
         ----------
         poses : (m, 4, 4) m
-            Of the tip in the part, at even times after the first node.
+            Tip poses in the part frame, at even times after the first node.
         stretch : Stretch
             The moves that the arc is to replace.
         """
         program, planned = self.program, stretch.q
         T = program.T_base_part @ poses @ np.linalg.inv(program.T_flange_tip)
         found = program.robot.nearest(T, planned[1:])
-        if not np.abs(found - planned[1:]).max() < NEAR:  # nor where it is NaN
+        if not np.abs(found - planned[1:]).max() < NEAR:  # also catches NaN
             return None
         q = np.vstack([planned[:1], found])
         even = np.full(len(poses), stretch.dt.sum() / len(poses))

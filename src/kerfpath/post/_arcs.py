@@ -1,4 +1,4 @@
-"""Circular moves in place of linear ones, where a path runs along arcs."""
+"""Replace linear moves by circular ones where a path runs along arcs."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from kerfpath.post._program import CircularMove, LinearMove, Program, Step
 __all__ = ["circle_through", "with_arcs"]
 
 FEWEST = 3
-"""Linear moves that a circular one replaces at least."""
+"""Smallest number of linear moves that a circular move replaces."""
 MOST = 1000
-"""Linear moves that a circular one replaces at most."""
+"""Largest number of linear moves that a circular move replaces."""
 LONGEST = np.radians(150.0)
-"""Sweep of one circular move: none of the controllers wants half a circle at once."""
+"""Largest sweep (rad) of one circular move: controllers expect less than half a circle."""
 MOST_TURN = np.radians(80.0)
-"""How far the tool may turn in one: beyond, controllers do not all take the same way."""
+"""Largest turn (rad) of the tool in one; beyond it, controllers may turn it different ways."""
 SAME_SPEED = 1e-3
-"""Relative difference of speeds that one move may have."""
+"""Largest relative difference of speeds that are merged into one move."""
 SMALLEST, LARGEST = 1e-3, 10.0
-"""Radii (m) that are written as arcs."""
+"""Smallest and largest radius (m) of arcs."""
 
 
 def with_arcs(
@@ -36,27 +36,27 @@ def with_arcs(
     eta_v: float = 1.0,
     eta_a: float = 1.0,
 ) -> Program:
-    """Return the program with circular moves where its linear ones run along an arc.
+    """Return the program with circular moves where its linear moves run along an arc.
 
-    Between two targets the tool is taken to turn evenly along the arc, as controllers do; where
-    the plan turns it otherwise, or the joints would break a limit along the arc or as they come
-    and leave, moves stay linear. A move at whose end something is switched, or where the robot
-    stops or changes its speed, ends an arc.
+    The tool is assumed to turn evenly along an arc, as controllers do. Moves stay linear where the
+    plan turns it otherwise, or where the joints would exceed a limit along the arc, or just before
+    or after it. An arc ends where an output is switched, the robot stops, or the speed changes.
 
     Parameters
     ----------
     program : Program
     tolerance : float m
-        How far arcs may leave the targets that they replace, and the straight lines between them.
+        Largest distance of an arc from the targets that it replaces, and from the straight lines
+        between them.
     angle : float rad
-        How far the tool may be turned from the targets that an arc replaces.
+        Largest angle between the tool along an arc and at the targets that the arc replaces.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that the joints may use.
 
     Raises
     ------
     InputError
-        A tolerance that is not above 0, limits of the joints that are not known.
+        `tolerance` or `angle` is not above 0, or the joint limits are not known.
     """
     tolerance = scalar(tolerance, "tolerance", unit="m", above=0.0)
     angle = scalar(angle, "angle", unit="rad", above=0.0)
@@ -71,7 +71,7 @@ def with_arcs(
 
 
 class _Arcs:
-    """The steps of a section, each arc as long as may be from where the last one ended."""
+    """The steps of a section, with arcs that are each as long as possible."""
 
     def __init__(
         self, steps: Sequence[Step], tolerance: float, angle: float, limits: ArcLimits
@@ -79,7 +79,7 @@ class _Arcs:
         self._steps, self._tolerance, self._angle = steps, tolerance, angle
         self._limits = limits
         self._before: tuple[Array, float] | None = None
-        """The node before the last one done, and how long the way from there took."""
+        """The node before the last one done, and the time from there to it."""
 
     def __iter__(self) -> Iterator[Step]:
         """Yield the steps."""
@@ -101,7 +101,7 @@ class _Arcs:
     def _longest(
         self, start: LinearMove, run: Sequence[LinearMove], k: int
     ) -> tuple[CircularMove | None, int]:
-        """Return the arc that replaces the most moves of a run, by bisection, and their number."""
+        """Return the arc that replaces the most moves, found by bisection, and their number."""
         found, good, bad = None, FEWEST - 1, len(run) + 1
         while bad - good > 1:
             count = min(2 * good, (good + bad) // 2) if found is None else (good + bad) // 2
@@ -119,7 +119,7 @@ class _Arcs:
     def _arc(
         self, start: LinearMove, moves: Sequence[LinearMove], k: int
     ) -> tuple[CircularMove, Array] | None:
-        """Return the circular move that replaces `moves`, the joints along it, or None."""
+        """Return the circular move that replaces `moves` and the joints along it, or None."""
         poses = _spread_evenly(start, moves, self._tolerance, self._angle)
         if poses is None:
             return None
@@ -151,7 +151,7 @@ class _Arcs:
 
 
 def _run(steps: Sequence[Step], first: int) -> list[LinearMove]:
-    """Return the linear moves from `first` on that one move could be."""
+    """Return the linear moves from `first` on that one move could replace."""
     run: list[LinearMove] = []
     for step in steps[first : first + MOST]:
         if type(step) is not LinearMove:
@@ -165,7 +165,7 @@ def _run(steps: Sequence[Step], first: int) -> list[LinearMove]:
 
 
 def _middle(T: Array) -> int:
-    """Return which of poses (m, 4, 4) is about as far from the first as from the last."""
+    """Return the index of the pose (m, 4, 4) about as far from the first as from the last."""
     points = T[:, :3, 3]
     ends = np.linalg.norm(points[:, None] - points[[0, -1]], axis=2)
     return int(np.argmin(np.abs(ends[:, 0] - ends[:, 1])))
@@ -174,9 +174,9 @@ def _middle(T: Array) -> int:
 def _spread_evenly(
     start: LinearMove, moves: Sequence[LinearMove], tolerance: float, angle: float
 ) -> Array | None:
-    """Return the poses (m, 4, 4) m at even shares of an arc through m moves; None: there is none.
+    """Return poses (m, 4, 4) m spaced evenly along the arc through m moves, or None without one.
 
-    The last is the end of the last move.
+    The last pose is the end of the last move.
     """
     T = np.array([start.T_part_tip, *(move.T_part_tip for move in moves)])
     points = T[:, :3, 3]
@@ -213,7 +213,8 @@ def _spread_evenly(
 def circle_through(a: Array, b: Array, c: Array) -> tuple[Array, Array, float] | None:
     """Return centre, unit normal and radius of the circle through three points (3,), m.
 
-    None where they lie on one line. Seen against the normal it runs counter-clockwise from a by b.
+    Return None if they lie on one line. Seen against the normal, the circle runs counter-clockwise
+    from a through b.
     """
     u, v = b - a, c - a
     normal = np.cross(u, v)

@@ -1,4 +1,4 @@
-"""How controllers count the axes of an arm, and on which side of it the wrist lies."""
+"""Axes of an arm as controllers count them, and the side of the arm on which the wrist lies."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ __all__ = ["AxisCount", "offset_near", "wrist_in_plane"]
 def offset_near(robot: Robot, makers_deg: ArrayLike) -> Array:
     """Return the joint offsets (6,) rad of a robot, each within half a turn of its maker's (deg).
 
-    The geometry of an arm is the same whether joint 6 counts from -180 or from 180 deg; the axes
-    and turns that its controller reads are not.
+    The geometry of an arm is the same whether joint 6 counts from -180 or from 180 deg, but the
+    axes and turns of its controller are not.
     """
-    # The least share less than half a turn: halves are rounded one way, whatever their last digit.
+    # Slightly less than half a turn, so that halves always round the same way.
     makers = np.radians(np.asarray(makers_deg, dtype=float))
     off = robot.offset - makers
     return np.asarray(makers + off - 2 * np.pi * np.round(off / (2 * np.pi) - 1e-9))
@@ -29,7 +29,9 @@ def offset_near(robot: Robot, makers_deg: ArrayLike) -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AxisCount:
-    """Axes of an ortho-parallel arm: matrix @ angles + shift; the model's are 0 with it upright.
+    """Axes of an ortho-parallel arm as a controller counts them: matrix @ angles + shift.
+
+    The angles of the model are 0 with the arm upright.
 
     Parameters
     ----------
@@ -46,28 +48,28 @@ class AxisCount:
     __repr__ = short_repr
 
     def from_joints(self, robot: Robot, q: ArrayLike) -> Array:
-        """Return the controller's axes (K, 6) rad of the arm, of joint vectors q (K, n) rad."""
+        """Return the controller's axes (K, 6) rad for joint vectors q (K, n) rad."""
         angles = robot.sign * arm_joints(robot, q)
         return freeze(np.asarray(angles @ self.matrix.T + self._shift(robot), dtype=np.float64))
 
     def to_joints(self, robot: Robot, axes: ArrayLike) -> Array:
-        """Return the joints (K, 6) rad of the arm at a controller's axes (K, 6) rad."""
+        """Return the joints (K, 6) rad of the arm for the controller's axes (K, 6) rad."""
         rows = floats(axes, "axes", (None, 6)) - self._shift(robot)
         angles = rows @ np.linalg.inv(self.matrix).T
         return freeze(np.asarray(robot.sign * angles, dtype=np.float64))
 
     def _shift(self, robot: Robot) -> Array:
-        """Return the axes (6,) rad where the robot's own joints are 0, but for their senses."""
+        """Return the axes (6,) rad at which all joints of the robot are 0."""
         return np.asarray(self.shift - self.matrix @ offset_near(robot, self.counted_from))
 
 
 def wrist_in_plane(robot: Robot, q: Array) -> tuple[Array, Array]:
-    """Return how far the wrist centre is ahead of axis 1, and of the lower arm, (K,) m each.
+    """Return how far the wrist centre is ahead of axis 1 and of the lower arm, (K,) m each.
 
-    At joint vectors q (K, n) rad. In the plane of the arm, with x ahead and z up, the lower arm
-    points along u = (sin q2, cos q2) and the wrist centre lies at
-    w = c3 (sin q23, cos q23) + a2 (cos q23, -sin q23) from axis 3. It is behind the lower arm, the
-    second value negative, where w turns from u towards the back: u_x w_z > u_z w_x, that is
+    The joint vectors q are (K, n) rad. In the plane of the arm, with x ahead and z up, the lower
+    arm points along u = (sin q2, cos q2) and the wrist centre lies at
+    w = c3 (sin q23, cos q23) + a2 (cos q23, -sin q23) from axis 3. It is behind the lower arm, and
+    the second value is negative, where w turns from u towards the back: u_x w_z > u_z w_x, that is
     c3 sin q3 + a2 cos q3 < 0.
     """
     arm = robot.arm()

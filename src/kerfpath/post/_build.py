@@ -1,4 +1,4 @@
-"""From plans to the neutral program."""
+"""Build the neutral program from plans."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ from kerfpath.transfer import End, TransferMove, back_off, least_time, speed_sha
 __all__ = ["build_program"]
 
 CAPSULES = "The links were drawn as capsules: clear of the real ones is not proved."
-"""Said at the head of a program whose plans say so of their proof."""
+"""Comment at the head of a program whose plans were made with capsules for links."""
 PLANNED, UNPLANNED = 1.0, 0.25
-"""Shares of the full speed of joint moves that are planned and that are not."""
+"""Share of the full speed of joint moves, with and without planned transfer moves."""
 LOWEST_SHARE = 0.01
-"""Controllers count shares in per cent."""
+"""Smallest share of the full speed: controllers count it in per cent."""
 MEETS = 1e-5
-"""How far (m) planned moves may be from where the tool backs off to."""
+"""Largest distance (m) of planned moves from the point to which the tool backs off."""
 PLAN_AND_CONTOUR = 1e-5
-"""Distance (m) and sine of an angle by which the planned joints may miss the contour."""
+"""Largest distance (m) and sine of an angle by which the planned joints may miss the contour."""
 
 
 def build_program(
@@ -62,60 +62,61 @@ def build_program(
 ) -> Program:
     """Return the program that cuts the planned contours one after the other.
 
-    For each contour: a joint move to a pose backed off the start along the tool axis, a straight
-    move to the start with a stop, laser on, straight moves through all nodes with a stop at the
-    last, laser off, and a straight move back along the tool axis. Along micro joints the laser is
-    off. The gas, if it is switched, flows from before the start to the end of the contour.
+    The steps of each contour are: a joint move to a pose backed off from the start along the tool
+    axis, a straight move to the start with a stop, laser on, straight moves through all nodes with
+    a stop at the last, laser off, and a straight move back along the tool axis. The laser is off
+    along micro joints. The gas, if it is switched, flows from before the start to the end.
 
     Parameters
     ----------
     plans : sequence of Plan
-        In the order of cutting; same robot, tool and placement.
+        Plans in the order of cutting, for the same robot, tool and placement.
     moves : sequence of TransferMove
-        Between the contours, as `kerfpath.sequence.plan_part` returns them, one less than plans or,
-        from and to a home position, one more; default: joint moves straight to each start.
+        Transfer moves, as `kerfpath.sequence.plan_part` returns them: one less than plans, or one
+        more from and to a home position. Default: joint moves directly to each start.
     name : str, optional
-        Name of the program, made an identifier; default: "cut" and the first contour.
+        Name of the program, made an identifier. Default: "cut" and the first contour.
     retract : float m
         How far the tool backs off before and after a contour.
     zone : float m or "auto"
-        Radius in which the corners at the inner nodes may be rounded; halved, where nodes are
-        nearer to each other, until zones do not overlap. "auto": up to half way to the next node,
-        which keeps the limits between the nodes, see `kerfpath.execution`.
+        Radius within which the corners at the inner nodes may be rounded. It is halved where nodes
+        are close, until zones do not overlap. "auto": up to half way to the next node, which keeps
+        the limits between the nodes; see `kerfpath.execution`.
     zone_error : float m
-        Of "auto": the largest distance by which the tip may pass a node.
+        Largest distance by which the tip may miss a node with `zone` "auto".
     lead_time : float s
-        How long before the tip arrives the laser is switched.
+        Time by which the laser is switched before the tip arrives.
     gas_lead : float s, optional
-        How long before the tip arrives at the start the gas is switched on; default: the program
-        does not switch it.
+        Time by which the gas is switched on before the tip arrives at the start. Default: the
+        program does not switch the gas.
     pierce_time : float s
-        How long to wait at the start, laser on, until the beam is through.
+        Time to wait at the start with the laser on until the beam is through.
     approach_speed : float m/s
         Speed along the tool axis before and after a contour.
     air_speed : float, optional
-        Share of the full speed of joint moves: they take the least time that their limits leave
-        them, by this share. Default: all where `moves` are planned, a quarter where they are not;
-        the first, of which nobody knows where it begins, has a quarter at most.
+        Share of the full speed of joint moves: a move takes its least time within the limits,
+        divided by this share. Default: 1 with `moves`, else 0.25. The first move has 0.25 at most,
+        because its start is not known.
     arc_tolerance : float m, optional
-        Arcs that stay so near to the planned path are written as circular moves, see `with_arcs`.
+        Arcs that stay within this distance of the planned path are written as circular moves; see
+        `with_arcs`. Default: no circular moves.
     handshakes : sequence of Request or Await
-        What is done before each contour where the tool has backed off, in order; what has been
-        asked for is withdrawn after it.
+        Handshakes before each contour, in order, with the tool backed off. Requests are withdrawn
+        after the contour.
 
     Raises
     ------
     InputError
-        No plans, plans that do not belong together, joints that do not lead the tool along the
-        contour, or no way to back off by `retract`.
+        There are no plans, plans or moves do not belong together, the joints do not lead the tool
+        along the contour, or the tool cannot back off by `retract`.
     """
     if not plans:
         raise InputError("build_program: expected at least one plan, got none")
     first = plans[0]
     if arc_tolerance is not None and first.robot.free.size:
         raise InputError(
-            f"program: how controllers move {first.robot.free_names} along an arc differs; leave "
-            "arcs_mm out"
+            f"program: controllers move {first.robot.free_names} along an arc in different ways; "
+            "leave arcs_mm out"
         )
     for plan in plans[1:]:
         _require_same_cell(first, plan)
@@ -159,7 +160,7 @@ def build_program(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Process:
-    """What is done for each contour, with the parameters of `build_program`."""
+    """The steps of a contour, with the parameters of `build_program`."""
 
     retract: float
     zone: Zone
@@ -173,7 +174,7 @@ class _Process:
     __repr__ = short_repr
 
     def steps(self, plan: Plan, way: Iterable[JointMove]) -> Iterator[Step]:
-        """Yield the steps of a contour, `way` leading to where the tool has backed off."""
+        """Yield the steps of a contour; `way` leads to the pose where the tool is backed off."""
         _require_on_contour(plan)
         T = plan.T_part_tip
         q = plan.unwrapped
@@ -201,12 +202,12 @@ class _Process:
         return Switch(signal="laser", on=on, lead_time=self.lead_time)
 
     def _straight(self, T: Array, q: Array, switches: tuple[Switch, ...] = ()) -> LinearMove:
-        """Return a move along the tool axis, to a stop."""
+        """Return a move along the tool axis that ends with a stop."""
         speed, duration = self.approach_speed, self.retract / self.approach_speed
         return LinearMove(T_part_tip=T, q=q, speed=speed, duration=duration, switches=switches)
 
     def _cut(self, plan: Plan, T: Array, q: Array) -> Iterator[LinearMove]:
-        """Yield the moves to the second node of a contour and on, the laser off along joints."""
+        """Yield the moves from the second node of a contour on, laser off along micro joints."""
         took = np.diff(plan.time)
         speed = np.diff(plan.contour.s) / took
         joint = [kind == "micro joint" for kind in plan.contour.kinds]
@@ -230,20 +231,20 @@ class _Process:
 
 
 class _Air:
-    """Joint moves that take the times that are planned.
+    """Joint moves that take the planned times.
 
-    A controller runs all joints from stop to stop together, the slowest at the share of its full
-    speed that it is given, and gains speed as fast as it may; the share is that which takes the
-    time.
+    A controller runs all joints from stop to stop together: the slowest joint runs at the given
+    share of its full speed and accelerates as fast as it may. The share is chosen so that the move
+    takes the planned time.
     """
 
     def __init__(self, plan: Plan, share: float) -> None:
         self._plan, self._share = plan, share
         self.here: Array | None = None
-        """Where the robot comes from."""
+        """Joints from which the next move starts."""
 
     def moves(self, corners: Sequence[Array]) -> Iterator[JointMove]:
-        """Yield a move to each of some corners."""
+        """Yield a joint move to each corner."""
         robot, eta_v, eta_a = self._plan.robot, self._plan.settings.eta_v, self._plan.settings.eta_a
         for q in corners:
             here, self.here = self.here, q
@@ -263,7 +264,7 @@ class _Air:
 def _corners(
     plans: Sequence[Plan], moves: Sequence[TransferMove], retract: float
 ) -> list[list[Array]]:
-    """Return the joint vectors on the way to each of P plans, and P + 1st those after the last."""
+    """Return the joint vectors on the way to each of P plans, then those after the last."""
     if not moves:
         return [*([back_off(plan, "start", retract)] for plan in plans), []]
     ways = [list(move.q[1:]) for move in moves]
@@ -274,13 +275,13 @@ def _corners(
         _require_meeting(plans, moves, retract)
         return [list(moves[0].q), *ways[1:]]
     raise InputError(
-        f"build_program: {len(plans)} plans need {len(plans) - 1} moves between them, or "
+        f"build_program: expected {len(plans) - 1} moves between {len(plans)} plans, or "
         f"{len(plans) + 1} from and to a home position, got {len(moves)}"
     )
 
 
 def _require_meeting(plans: Sequence[Plan], moves: Sequence[TransferMove], retract: float) -> None:
-    """Raise InputError where moves do not begin and end where the tool has backed off to."""
+    """Raise InputError unless moves begin and end where the tool is backed off."""
     between = len(moves) < len(plans)
     into, starts = (moves, plans[1:]) if between else (moves[:-1], plans)
     out, ends = (moves, plans[:-1]) if between else (moves[1:], plans)
@@ -291,8 +292,8 @@ def _require_meeting(plans: Sequence[Plan], moves: Sequence[TransferMove], retra
         T = plan.robot.forward(np.array([q, back_off(plan, end, retract)])) @ plan.T_flange_tip
         if (off := np.linalg.norm(T[0, :3, 3] - T[1, :3, 3])) > MEETS:
             raise InputError(
-                f"contour {plan.name!r}: the planned transfer move is {off * 1e3:.4g} mm "
-                f"off where the tool backs off to by {retract * 1e3:g} mm; write the retract_mm "
+                f"contour {plan.name!r}: the planned transfer move is {off * 1e3:.4g} mm off the "
+                f"point where the tool is backed off by {retract * 1e3:g} mm; set the retract_mm "
                 "that it was planned with, or plan again"
             )
 
@@ -306,7 +307,7 @@ def _require_same_cell(first: Plan, plan: Plan) -> None:
     if differing := [what for what, is_same in same.items() if not is_same]:
         raise InputError(
             f"contours {first.name!r} and {plan.name!r} differ in {', '.join(differing)}; write "
-            "one program for each"
+            "a program for each"
         )
 
 

@@ -1,4 +1,4 @@
-"""Programs that are called by a main one, in whose remarks a person finds the frames to enter."""
+"""A main program that calls the others and gives the frames to enter in its remarks."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from kerfpath.post._program import Program
 __all__ = ["CalledFormatter", "off_name"]
 
 OFF = "_OFF"
-"""End of the name of the program that switches everything off."""
+"""Suffix of the name of the program that switches everything off."""
 MOST_REMARKS = 3
-"""Lines that a comment is cut to."""
+"""Largest number of lines of a comment."""
 FRAME_DECIMALS = (4, 4, 4, 6, 6, 6)
-"""Of mm and deg in remarks."""
+"""Decimals of mm and deg in remarks that give a frame."""
 
 
 def off_name(name: str, settings: Any) -> str:
-    """Return the name of the program that switches everything off, by that of the main one."""
+    """Return the name of the program that switches everything off, from that of the main one."""
     return name[: settings.longest_name - len(OFF)] + OFF
 
 
 class CalledFormatter(Formatter):
-    """Writes a main program, one for each section, and one that switches off, named in capitals."""
+    """Formatter of a main program, one for each section and one that switches off, in capitals."""
 
     remark_width: int
-    """Characters of a remark."""
+    """Largest number of characters of a remark."""
     angles: Order
     frame_words: tuple[str, ...]
-    """What the three lengths and three angles of a frame are called."""
+    """Names of the three lengths and three angles of a frame."""
     frame_line: str
-    """The remark that gives one of them: frame, word, value."""
+    """Format of the remark that gives one of them: frame, name, value."""
 
     def __init__(self, program: Program, settings: Any) -> None:
         longest = settings.longest_name
@@ -70,7 +70,7 @@ class CalledFormatter(Formatter):
             yield from self._frame(name, T)
 
     def _frame(self, name: str, T: Array) -> Iterator[str]:
-        """Yield a frame as remarks, to be entered by a person and read back."""
+        """Yield a frame as remarks, to be entered at the controller and read back."""
         values = euler(T, self.angles)[0]
         for word, value, decimals in zip(self.frame_words, values, FRAME_DECIMALS, strict=True):
             yield self.frame_line % (name, word, number(value, decimals))

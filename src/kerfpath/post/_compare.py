@@ -1,4 +1,4 @@
-"""Whether a program that was read back says what was to be written."""
+"""Compare a program that was read back with the one that was written."""
 
 from __future__ import annotations
 
@@ -31,39 +31,39 @@ from kerfpath.robots import Robot
 __all__ = ["deviations", "handshake_in_words", "switches_in_words"]
 
 POINT = 1e-6
-"""How far (m) a target that is read back may be from the one written, beyond its digits."""
+"""Largest distance (m) of a target that is read back from the one written, beyond its digits."""
 ANGLE = np.radians(1e-3)
-"""The same of the tool's orientation and of joints, rad."""
+"""The same for the orientation of the tool and for joints, rad."""
 FRAME = 1e-7
-"""The same of frames, m and sine."""
+"""The same for frames, m and sine."""
 LEAD = 6e-4
-"""The same of lead times and waits (s): controllers count milliseconds."""
+"""The same for lead times and waits (s): controllers count milliseconds."""
 DURATION = 1e-6
-"""The same of durations (s), where a text says times."""
+"""The same for durations (s), where a text gives times."""
 DERIVED = np.radians(1.0)
-"""How far (rad) joints may be off that follow from a pose and its words: the digits of the pose,
-near a singular stand; another posture is farther."""
+"""Largest error (rad) of joints that follow from a pose and its configuration: the digits of the
+pose, near a singularity. Another posture is farther off."""
 REACH = 4.0
-"""Farther (m) than a tip is from any axis: the lever of what digits leave of joints."""
+"""Distance (m) that no tip has from an axis: the lever arm of rounding errors of joints."""
 SHARE = 6e-3
-"""The same of shares of the full speed: controllers count per cent."""
+"""Largest difference of shares of the full speed: controllers count per cent."""
 
 
 def deviations(
     program: Program, read: ReadProgram, language: Language, settings: LanguageSettings
 ) -> list[ProgramIssue]:
-    """Return every difference between a program and what was read back of it; empty = the same.
+    """Return every difference between a program and what was read back; empty if there is none.
 
-    Of the program counts what the language can say.
+    Only what the language can express is compared.
 
     Parameters
     ----------
     program : Program
     read : ReadProgram
-        What the reader of the language made of the text.
+        The program that the reader of the language returned for the text.
     language : Language
     settings : LanguageSettings
-        With which it was written.
+        Settings with which it was written.
     """
     if language.sayable is not None:
         program = language.sayable(program, settings)
@@ -71,7 +71,7 @@ def deviations(
     ours = [step for step in program.steps if not isinstance(step, Comment)]
     theirs = list(read.steps)
     if len(ours) != len(theirs):
-        message = f"{len(theirs)} moves and waits are read back, expected {len(ours)}"
+        message = f"{len(theirs)} moves and waits were read back, expected {len(ours)}"
         return [*issues, ProgramIssue("error", "read-back", message, "program")]
     pairs: list[tuple[Move, ReadMove]] = []
     for step, back in zip(ours, theirs, strict=True):
@@ -95,7 +95,7 @@ def deviations(
 
 
 def _issue(back: ReadStep, message: str) -> ProgramIssue:
-    return ProgramIssue("error", "read-back", f"{message}, as planned", back.place)
+    return ProgramIssue("error", "read-back", f"not as planned: {message}", back.place)
 
 
 def _kind(step: object) -> str:
@@ -126,13 +126,14 @@ def _compare_frames(program: Program, read: ReadProgram) -> Iterator[ProgramIssu
         back = getattr(read, what)
         if back is not None and np.abs(back - getattr(program, what)).max() > FRAME:
             name = "tool" if what == "T_flange_tip" else "part frame"
-            yield ProgramIssue("error", "read-back", f"the {name} is another", "program")
+            message = f"the {name} differs from the planned one"
+            yield ProgramIssue("error", "read-back", message, "program")
 
 
 def _compare_places(
     program: Program, pairs: list[tuple[Move, ReadMove]], rules: Rules
 ) -> Iterator[ProgramIssue]:
-    """Compare the tips of all targets, by joints where the text says them."""
+    """Compare the tips of all targets, by joints where the text gives them."""
     point, angle = POINT + rules.point_step, ANGLE + rules.angle_step
     tips = program.tips([m for m, _ in pairs])
     posed = [
@@ -173,20 +174,21 @@ def _compare_places(
         if back.q is not None and _joints_follow(back):
             off_by = float(np.abs(move.q - back.q)[: program.robot.family.joints].max())
             if off_by > DERIVED:
-                yield _issue(back, f"its words lead to joints {np.degrees(off_by):.1f} deg off")
+                message = f"the configuration leads to joints {np.degrees(off_by):.1f} deg off"
+                yield _issue(back, message)
         if back.q is None and back.T_part_tip is None:
-            yield _issue(back, "says no target")
+            yield _issue(back, "the target is missing")
 
 
 def _compare_external(
     robot: Robot, pairs: list[tuple[Move, ReadMove]], point: float, angle: float
 ) -> Iterator[ProgramIssue]:
-    """Compare the values of external axes at all targets; a text has to say them."""
+    """Compare the values of external axes at all targets, where a text must give them."""
     arm = robot.family.joints
     for move, back in pairs if robot.externals else ():
         values = back.external_of(robot.externals)
         if values is None:
-            yield _issue(back, f"says no value of {robot.externals[0].name}")
+            yield _issue(back, f"the value of {robot.externals[0].name} is missing")
             continue
         for axis, ours, theirs in zip(robot.externals, move.q[arm:], values, strict=True):
             off = abs(float(ours - theirs))
@@ -198,7 +200,7 @@ def _compare_external(
 
 
 def _joints_follow(back: ReadMove) -> bool:
-    """Return whether the joints of a move follow from a pose and its words."""
+    """Return whether the joints of a move follow from a pose and its configuration."""
     return back.T_part_tip is not None and back.posture != ()
 
 
@@ -232,7 +234,7 @@ def _compare_motion(
         ):
             yield _issue(back, f"takes {took:g} s, expected {move.duration:g} s")
         if back.zone is None and move.zone == 0:
-            yield _issue(back, "does not stop, but should")
+            yield _issue(back, "the move does not stop, expected a stop")
         if back.zone is not None and abs(move.zone - back.zone) > POINT:
             message = f"the zone is {back.zone * 1e3:g} mm, expected {move.zone * 1e3:g} mm"
             yield _issue(back, message)
@@ -248,14 +250,14 @@ def _compare_motion(
 
 
 class _Air:
-    """How long the joint moves of a program take, in all and at their speed throughout (s)."""
+    """Times (s) of the joint moves of a program, in all and at constant speed."""
 
     def __init__(self, program: Program, read: ReadProgram) -> None:
         self._took = dict(zip(read.moves, air_times(program), strict=False))
         self._cruise = cruises(program)
 
     def apart(self, move: JointMove, back: ReadMove) -> str:
-        """Say how the time of a move that was read back is another; empty where it is not."""
+        """Return how the time of a move that was read back differs; empty if it does not."""
         for took, planned in (
             (back.duration, self._took.get(back)),
             (back.cruise, self._cruise.get(move)),

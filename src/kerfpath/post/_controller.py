@@ -1,4 +1,4 @@
-"""How a controller runs straight moves and arcs: what its maker says, and what is assumed."""
+"""How a controller runs straight moves and arcs, from its maker's documents or assumed."""
 
 from __future__ import annotations
 
@@ -12,30 +12,32 @@ from kerfpath._repr import short_repr
 __all__ = ["PLAIN", "Controller", "Orientation"]
 
 Orientation = Literal["slerp", "two-angle", "wrist"]
-"""What the tool does between two targets.
+"""How the tool turns between two targets.
 
-"slerp": it turns evenly about one axis that stands still. "two-angle": its axis z swings evenly in
-the plane of where it points to at both, and the tool turns evenly about it. "wrist": the last three
-of six joints go evenly from one to the other, and the first three keep the tip on its way.
+"slerp": it turns evenly about one fixed axis. "two-angle": its z axis swings evenly in the plane of
+its directions at both targets, and the tool turns evenly about it. "wrist": the last three of six
+joints move evenly from one target to the other, and the first three keep the tip on its path.
 """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Controller:
-    """What of a controller decides how it runs the path of a program.
+    """Properties of a controller that decide how it runs the path of a program.
 
     Parameters
     ----------
     turning_speed : float rad/s
-        How fast the tool may turn before its tip goes more slowly; of "two-angle" each angle.
+        Largest turning speed of the tool; beyond it the tip slows down. For "two-angle", the limit
+        of each angle.
     orientation : {"slerp", "two-angle", "wrist"}
-        What the tool does between two targets.
+        How the tool turns between two targets, see `Orientation`.
     corner : float m, optional
-        How far from every corner the tip begins and ends to round it, whatever the program says.
+        Distance from every corner at which the tip begins and ends to round it, whatever the
+        program contains.
     corner_time : float s, optional
         The same as a time at the programmed speed.
     assumed : str
-        What of its corners is assumed as long as nobody has stated it; empty: nothing.
+        What is assumed of its corners, because the settings do not give it; empty if nothing is.
     """
 
     turning_speed: float = np.inf
@@ -48,13 +50,18 @@ class Controller:
 
     @property
     def rounds_by_itself(self) -> bool:
-        """Whether it rounds corners by a measure of its own, and not by that of a program."""
+        """Whether it rounds corners by its own measure, not by that of the program."""
         return self.corner is not None or self.corner_time is not None
 
     def zone(self, said: float, speed: float) -> float:
-        """Return how far (m) from a corner it is rounded, of what a program says (m) and m/s.
+        """Return the distance (m) from a corner at which the controller begins to round it.
 
-        Nothing is rounded where a program says 0: there it stops.
+        Parameters
+        ----------
+        said : float m
+            Zone in the program; nothing is rounded at 0, which is a stop.
+        speed : float m/s
+            Programmed speed.
         """
         if said == 0 or not self.rounds_by_itself:
             return said
@@ -62,4 +69,4 @@ class Controller:
 
 
 PLAIN = Controller()
-"""One that is never too slow to turn, about one axis."""
+"""A controller without a limit of the turning speed, which turns the tool about one axis."""

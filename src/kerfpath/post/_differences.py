@@ -1,4 +1,4 @@
-"""What differs between two programs that were read, in few words."""
+"""List the differences between two programs that were read."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ __all__ = ["Difference", "differences", "not_compared"]
 Both = Sequence[tuple[Stop, Stop]]
 """Moves that both programs have."""
 SAID = {"speeds": "speed", "zones": "zone", "switches": "switches", "postures": "target"}
-"""Which of `ReadMove.elsewhere` a difference is about."""
+"""The key of `ReadMove.elsewhere` for the code of a difference."""
 UNSAID = (("speed", "speeds"), ("duration", "times"), ("cruise", "times"), ("zone", "zones"))
-"""What a move may leave unsaid, and the code of a difference in it."""
+"""Attributes that a move may lack, and the code of a difference in them."""
 JOINTS = 9
-"""A robot has no more."""
+"""Largest number of joints of a robot."""
 Names = tuple[str, str]
-"""What programs A and B are called."""
+"""Names of programs A and B in messages."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,15 +49,15 @@ class Difference:
         frames, added, removed, order, targets, joints, external, kinds, speeds, times, zones,
         switches, waits, postures or handshakes.
     count : int
-        How many contours or moves it is found at.
+        Number of contours or moves that differ.
     message : str
-        How much it is at most.
+        Text with the largest difference.
     places : tuple of str
-        File and line of the largest in A and in B, as far as it has one there.
+        File and line of the largest difference in A and in B, as far as it has one there.
     said_at : str
-        File and line in B of what differs, where it is not said where the move stands.
+        File and line in B of what differs, if that is not the line of the move.
     near : str
-        Of what is left out in B: file and line there before which it is missing.
+        File and line in B before which something is missing there.
     """
 
     code: str
@@ -71,7 +71,7 @@ class Difference:
 
     @property
     def place(self) -> str:
-        """File and line in B; empty where it has none there."""
+        """File and line in B; empty if there is none."""
         return self.near or (self.places[-1] if self.places else "")
 
     def __str__(self) -> str:
@@ -81,9 +81,9 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Digits:
-    """How far (m, rad, sine, m/s, s) what two texts say may be apart for their digits.
+    """Largest differences (m, rad, sine, m/s, s) of two texts that come from their digits.
 
-    Tips of joints that both say may be `by_joints` (m) farther: those are compared, too.
+    Tips may differ by `by_joints` (m) more if both give joints: those are compared, too.
     """
 
     point: float
@@ -102,28 +102,28 @@ def differences(
     names: Names = ("A", "B"),
     strict: bool = False,
 ) -> list[Difference]:
-    """Return what differs between two programs for the same robot, at most one of each kind.
+    """Return the differences between two programs for the same robot, at most one of each kind.
 
-    Contours are known by their paths, and the targets along them by their places, so that one
-    that is added or left out moves no other. Names of routines and comments are not compared, nor
-    what only one of the two says, see `not_compared`.
+    Contours are matched by their paths, and targets along them by their positions, so that one
+    that is added or left out does not affect the others. Names of routines and comments are not
+    compared, nor what only one of the two programs contains; see `not_compared`.
 
     Parameters
     ----------
     a, b : ReadProgram
-        In the same language, or in two whose words of posture have been left out. One that says
-        joints alone `with_tips`.
+        Programs in the same language, or in two languages without their words for postures. A
+        program that gives joints alone needs `with_tips` before.
     rules : sequence of Rules
-        Of languages whose digits may make a difference; none where both texts are in the same one.
+        Rules of the languages, for their digits; empty if both texts are in the same language.
     names : (str, str)
-        What the two are called in messages.
+        Names of the two programs in messages.
     strict : bool
-        Whether a speed, time or zone that only one of them says is a difference.
+        Whether a speed, time or zone that only one of them gives is a difference.
 
     Raises
     ------
     InputError
-        A path in joints alone.
+        A path is given in joints alone.
     """
     steps = [(r.point_step, r.angle_step, r.speed_step) for r in rules] or [(0.0, 0.0, 0.0)]
     point, angle, speed = np.sum(steps, axis=0).tolist()
@@ -155,7 +155,7 @@ def differences(
 
 
 def not_compared(a: ReadProgram, b: ReadProgram) -> list[str]:
-    """Return what only one of two programs says, so that it cannot be compared."""
+    """Return what only one of two programs contains, so that it cannot be compared."""
     said = []
     for attribute, words in (
         ("speed", "speeds"), ("duration", "times"), ("zone", "zones"), ("posture", "postures"),
@@ -196,12 +196,12 @@ def _compare_order(
     """Compare the order of contours, given the numbers in B of those of A."""
     if numbers != sorted(numbers):
         names = ", ".join(groups[j].name for j in sorted(numbers) if groups[j].path)
-        message = f"the contours are cut in another order, in {both[1]} {names}"
+        message = f"the contours are cut in another order; {both[1]} has {names}"
         yield Difference(code="order", count=1, message=message)
 
 
 def _name_moves(pairs: Sequence[MovePair], names: Names) -> Iterator[Difference]:
-    """Find moves that only one of the programs has; one left out, before which of the other."""
+    """Find moves that only one of the programs has, and where they are missing in B."""
     for side, code, words in (
         (1, "removed", f"left out in {names[1]}"), (0, "added", f"only in {names[1]}"),
     ):  # fmt: skip
@@ -220,7 +220,7 @@ def _name_moves(pairs: Sequence[MovePair], names: Names) -> Iterator[Difference]
 
 
 def _compare_targets(both: Both, digits: _Digits) -> Iterator[Difference]:
-    """Compare the tip poses that moves lead to and by."""
+    """Compare the tip poses of targets and of points on the way to them."""
     posed = [
         (a, b, getattr(a.move, which), getattr(b.move, which))
         for a, b in both
@@ -239,14 +239,14 @@ def _compare_targets(both: Both, digits: _Digits) -> Iterator[Difference]:
     if moved.size:
         a, b, _, _ = posed[moved[np.lexsort((turned[moved], off[moved]))[-1]]]
         message = (
-            f"{len(moved)} moved, at most by {off[moved].max() * 1e3:.4f} mm "
+            f"{len(moved)} moved, by up to {off[moved].max() * 1e3:.4f} mm "
             f"and {np.degrees(turned[moved].max()):.4f} deg"
         )
         yield _difference("targets", len(moved), message, a, b)
 
 
 def _compare_joints(both: Both, digits: _Digits, external: int) -> Iterator[Difference]:
-    """Compare the joints of the arm, where both programs say them; the last are external axes."""
+    """Compare the joints of the arm, if both programs give them; the last are external axes."""
     said = [(a, b) for a, b in both if a.move.q is not None and b.move.q is not None]
     if not said:
         return
@@ -255,14 +255,14 @@ def _compare_joints(both: Both, digits: _Digits, external: int) -> Iterator[Diff
     moved = np.flatnonzero(off > digits.angle)
     if moved.size:
         worst = int(moved[np.argmax(off[moved])])
-        message = f"{len(moved)} moved, at most by {np.degrees(off[worst]):.4f} deg"
+        message = f"{len(moved)} moved, by up to {np.degrees(off[worst]):.4f} deg"
         yield _difference("joints", len(moved), message, *said[worst])
 
 
 def _compare_external(
     both: Both, digits: _Digits, axes: Sequence[ExternalAxis]
 ) -> Iterator[Difference]:
-    """Compare the values of external axes, where both programs say them."""
+    """Compare the values of external axes, if both programs give them."""
     values = ((a.move.external_of(axes), b.move.external_of(axes), a, b) for a, b in both)
     said = [(np.abs(x - y), a, b) for x, y, a, b in values if x is not None and y is not None]
     for i, axis in enumerate(axes):
@@ -271,7 +271,7 @@ def _compare_external(
         if moved:
             off, a, b = max(moved, key=lambda each: each[0])
             by = f"{off * 1e3:.4f} mm" if axis.kind == "linear" else f"{np.degrees(off):.4f} deg"
-            message = f"{axis.name} at {len(moved)} targets, at most by {by}"
+            message = f"{axis.name} moved at {counted(len(moved), 'target')}, by up to {by}"
             yield _difference("external", len(moved), message, a, b)
 
 
@@ -282,7 +282,7 @@ def _difference(code: str, count: int, message: str, a: Stop, b: Stop) -> Differ
 
 
 def _compare_values(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
-    """Compare what else moves say, one thing after the other."""
+    """Compare the other attributes of moves, one after the other."""
     rows: tuple[tuple[str, Callable[[Stop, Stop], float], Callable[[Stop], str]], ...] = (
         ("kinds", lambda a, b: a.move.kind != b.move.kind, lambda a: a.move.kind),
         ("speeds", lambda a, b: _speeds(a.move, b.move, digits), lambda a: _speed(a.move)),
@@ -328,13 +328,13 @@ def _compare_values(both: Both, digits: _Digits, names: Names) -> Iterator[Diffe
 
 
 def _find_unsaid(both: Both, names: Names) -> Iterator[Difference]:
-    """Find moves that say a speed, a time or a zone in one of the programs alone."""
+    """Find moves that have a speed, a time or a zone in only one of the programs."""
     for attribute, code in UNSAID:
         said = [[getattr(stop.move, attribute) is not None for stop in pair] for pair in both]
         if alone := [k for k, (one, two) in enumerate(said) if one != two]:
             a, b = both[alone[0]]
             where = names[0] if said[alone[0]][0] else names[1]
-            message = f"{counted(len(alone), 'move')}, said in {where} alone"
+            message = f"{counted(len(alone), 'move')}, given in {where} alone"
             places = (a.move.place, b.move.place)
             yield Difference(code=code, count=len(alone), message=message, places=places)
 
@@ -342,7 +342,7 @@ def _find_unsaid(both: Both, names: Names) -> Iterator[Difference]:
 def _compare_handshakes(
     groups: Sequence[tuple[ReadGroup, ReadGroup]], names: Names
 ) -> Iterator[Difference]:
-    """Compare who is asked and awaited, and when."""
+    """Compare which partners are asked and awaited, and when."""
     said = [[[(k, h.what) for k, h in g.handshakes] for g in both] for both in groups]
     differ = [both for both, (one, two) in zip(groups, said, strict=True) if one != two]
     if differ:
@@ -359,12 +359,12 @@ def _compare_handshakes(
 
 
 def _excess(one: float | None, two: float | None, allowed: float) -> float:
-    """Return how far two numbers are apart beyond what is allowed; 0 where one is not said."""
+    """Return by how much two numbers differ beyond `allowed`; 0 if one is missing."""
     return 0.0 if one is None or two is None else max(abs(one - two) - allowed, 0.0)
 
 
 def _zones(a: ReadMove, b: ReadMove, digits: _Digits) -> float:
-    """Return how far two zones are apart; a stop is none, whatever its length is."""
+    """Return by how much two zones differ; a stop differs from any rounded corner."""
     if (a.zone is None) != (b.zone is None) and 0.0 in (a.zone, b.zone):
         return np.inf
     return _excess(a.zone, b.zone, digits.point)
@@ -372,7 +372,7 @@ def _zones(a: ReadMove, b: ReadMove, digits: _Digits) -> float:
 
 def _zone(stop: Stop) -> str:
     if stop.move.zone is None:
-        return "a corner passed by"
+        return "a rounded corner"
     return f"{stop.move.zone * 1e3:g} mm" if stop.move.zone else "a stop"
 
 
@@ -389,7 +389,7 @@ def _speed(move: ReadMove) -> str:
 
 
 def _switches(a: ReadMove, b: ReadMove, digits: _Digits) -> bool:
-    """Say whether two moves switch something else, or at another time."""
+    """Return whether two moves switch different signals, or at different times."""
     ours, theirs = ([(s.signal, s.on) for s in move.switches] for move in (a, b))
     return ours != theirs or any(
         abs(one.lead_time - two.lead_time) > digits.lead

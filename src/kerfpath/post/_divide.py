@@ -1,4 +1,4 @@
-"""Programs too long for one file, divided between contours: never where the beam is on."""
+"""Divide programs that are too long for one file between contours, where the beam is off."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ __all__ = [
 def rename_sections(
     program: Program, taken: Iterable[str] = (), *, longest_name: int = LONGEST_NAME
 ) -> Program:
-    """Return the program with names of sections cut to `longest_name`, and none twice or taken."""
+    """Return the program with unique section names of at most `longest_name` characters.
+
+    None of them is the name of the program or in `taken`.
+    """
     texts = (section.name for section in program.sections)
     names = identifiers(texts, taken=(program.name, *taken), longest=longest_name)
     sections = (replace(s, name=name) for s, name in zip(program.sections, names, strict=True))
@@ -33,10 +36,10 @@ def rename_sections(
 def divide_sections(
     sections: Sequence[Section], lines: Sequence[int], most_lines: int
 ) -> list[list[Section]]:
-    """Return sections, of so many lines each, in order, in files of at most `most_lines` lines.
+    """Return the sections, with their numbers of `lines`, in files of at most `most_lines` lines.
 
-    A section that is longer by itself has a file of its own: a file ends where the robot stands
-    with the beam off, as between two sections.
+    Their order stays. A longer section gets its own file: a file may only end between two sections,
+    where the robot is stopped with the beam off.
     """
     files: list[list[Section]] = []
     room = 0
@@ -50,20 +53,20 @@ def divide_sections(
 
 
 def find_long_contours(written: Formatter) -> Iterator[ProgramIssue]:
-    """Yield the contours of more lines than a file is to have: none is divided.
+    """Yield an issue for each contour with more lines than a file may have: none is divided.
 
-    A warning where the language gives each of them a file of its own.
+    It is a warning if the language gives the contour its own file.
     """
     if written.too_long is None:
         return
-    remedy = "allow more with lines_per_file, or take fewer nodes (spacing_mm) or arcs (arcs_mm)"
-    kept = "" if written.too_long == "error" else ", and has a file of its own"
+    remedy = "raise lines_per_file, or use fewer nodes (spacing_mm) or arcs (arcs_mm)"
+    kept = "" if written.too_long == "error" else ", and gets its own file"
     most = written.room()
     for name, count in written.lengths().items():
         if count > most:
             message = (
-                f"the contour has {count} lines, lines_per_file allows {most}; it is not "
-                f"divided, as the robot could stop there with the beam on{kept}: {remedy}"
+                f"the contour has {count} lines, but lines_per_file allows {most}; it is not "
+                f"divided, because the robot could stop there with the beam on{kept}; {remedy}"
             )
             yield ProgramIssue(written.too_long, "file-length", message, name)
 
@@ -71,7 +74,7 @@ def find_long_contours(written: Formatter) -> Iterator[ProgramIssue]:
 def divide_program(
     program: Program, lines: Sequence[int], room: int, longest_name: int
 ) -> dict[str, list[Section]]:
-    """Return the files, by their names, that sections of so many lines each are divided in."""
+    """Return the sections of each file by its name; `lines` has the length of each section."""
     groups = divide_sections(program.sections, lines, room)
     taken = [program.name, *(section.name for section in program.sections)]
     names = identifiers([program.name] * len(groups), taken=taken, longest=longest_name)
@@ -84,11 +87,12 @@ def require_one_file(name: str, lines: Sequence[str], most_lines: int) -> dict[s
     Raises
     ------
     InputError
-        It has more than `most_lines` lines.
+        The program has more than `most_lines` lines.
     """
     if len(lines) > most_lines:
         raise InputError(
-            f"{name}: the program has {len(lines)} lines, lines_per_file allows {most_lines}, and "
-            "this language cannot divide it; cut fewer contours in one program, or allow more lines"
+            f"{name}: the program has {len(lines)} lines, but lines_per_file allows {most_lines} "
+            "and this language cannot divide it; cut fewer contours in one program, or raise "
+            "lines_per_file"
         )
     return {name: "\n".join([*lines, ""])}

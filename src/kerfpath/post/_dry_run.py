@@ -1,4 +1,4 @@
-"""A program to watch before the first cut: same motions, slower, nothing switched."""
+"""A dry run before the first cut: the same motions, slower, with nothing switched."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ __all__ = ["dry_run"]
 
 
 def dry_run(program: Program, share: float) -> Program:
-    """Return the program, slower, with nothing switched and no waits or handshakes.
+    """Return the program at a lower speed, without switches, waits and handshakes.
 
-    It stops where the program stops, and passes the same targets in the same posture. Its name and
+    It stops where the program stops and passes the same targets in the same posture. Its name and
     those of its sections begin with "dry_", so that neither program ever calls a routine of the
-    other, and each section begins with a comment.
+    other. Each section begins with a comment.
 
     Parameters
     ----------
     program : Program
     share : float
-        Speed of every move as a share of the program's, above 0 and at most 1; joint moves are
-        not made slower than 1 % of the full speed, which no language can say.
+        Speed of every move as a share of that in the program, above 0 and at most 1. Joint moves
+        keep at least 1 % of the full speed, because languages cannot express less.
 
     Raises
     ------
     InputError
-        Another share.
+        `share` is not above 0 and at most 1.
     """
     share = scalar(share, "dry run", above=0.0)
     if share > 1:

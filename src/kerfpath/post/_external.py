@@ -1,9 +1,9 @@
-"""External axes in programs: values as controllers say them, and what has to be set up for them.
+"""External axes in programs: their values in the controller's units, and their set-up.
 
-The targets of a program are poses of the tip in the part, wherever robot and part stand. Some
-controllers couple the work object to what carries the part and say them so (RAPID, KRL); others
-say where the tip is against what stands still (FANUC), see `standing`. Where an axis carries the
-robot, the controller knows how far it has carried it in either case.
+The targets of a program are poses of the tip in the part, wherever external axes carry robot and
+part. Some controllers couple the work object to the axes that carry the part, and have the same
+poses (RAPID, KRL); others have poses of the tip in the fixed frame (FANUC), see `standing`. In both
+cases the controller itself takes account of axes that carry the robot.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ __all__ = [
 ]  # fmt: skip
 
 SAME_DIRECTION = 0.1
-"""Sine below which x of the base does not say how a frame about an axis is turned."""
+"""Sine below which x of the base does not define how a frame about an axis is turned."""
 
 
 def said_unit(axis: ExternalAxis) -> str:
-    """Return the unit in which controllers say the values of an axis."""
+    """Return the unit of the values of an axis in programs: mm or deg."""
     return "mm" if axis.kind == "linear" else "deg"
 
 
 def arm_joints(robot: Robot, q: ArrayLike) -> Array:
-    """Return the joints (K, m) rad of the arm alone, of joint vectors q (K, n)."""
+    """Return the joints (K, m) rad of the arm alone from joint vectors q (K, n)."""
     return floats(q, "q", (None, robot.joints))[:, : robot.family.joints]
 
 
 def said(robot: Robot, q: ArrayLike) -> Array:
-    """Return the values (K, E) of the external axes, mm and deg, of joint vectors q (K, n)."""
+    """Return the values (K, E) of the external axes, mm and deg, from joint vectors q (K, n)."""
     values = floats(q, "q", (None, robot.joints))[:, robot.family.joints :]
     return np.asarray(values * _scales(robot))
 
@@ -57,17 +57,18 @@ def axes_that_carry(robot: Robot, what: str) -> list[int]:
 
 
 def carrier_frame(robot: Robot, values: Sequence[float] | None = None) -> Array:
-    """Return where the frame that moves with the part stands, (4, 4) m, all axes at zero.
+    """Return the frame that moves with the part, (4, 4) m in the robot base, all axes at zero.
 
-    In the robot base; the identity where nothing carries the part.
+    It is the identity if no axis carries the part.
 
     Parameters
     ----------
     robot : Robot
     values : six numbers, optional
-        As the controller has it: mm, and deg about fixed x, y, z. Default: at the point of the
-        last axis that carries the part; z along a rotary one, x as near to that of the base as
-        may be (to its y, where the axis runs along x); of a linear one turned as the base.
+        The frame at the controller: mm, and deg about fixed x, y, z. Default: a frame at the point
+        of the last axis that carries the part. For a linear axis it is parallel to the base; for a
+        rotary one, z is along the axis and x as close as possible to x of the base (to its y if
+        the axis runs along x).
     """
     if values is not None:
         return freeze(from_euler(values, "xyz")[0])
@@ -84,35 +85,35 @@ def carrier_frame(robot: Robot, values: Sequence[float] | None = None) -> Array:
 
 
 def standing(robot: Robot, T_base_part: Array, external: Array) -> Array:
-    """Return what brings poses in the part to poses in its frame at zero, (K, 4, 4) m.
+    """Return the poses (K, 4, 4) m of the part in the part frame with all axes at zero.
 
-    At values (K, E) m and rad of the external axes.
+    `external` has the values (K, E) m and rad of the external axes.
     """
     moved = carried(robot.externals, external, "part")
     return np.asarray(np.linalg.inv(T_base_part) @ moved @ T_base_part)
 
 
 def words_of(values: Iterable[float], decimals: int) -> str:
-    """Return numbers in words for a remark."""
+    """Return numbers as text for a remark."""
     return " ".join(f"{round(float(x), decimals) + 0.0:.10g}" for x in values)
 
 
 def calibration_remarks(robot: Robot, what: str, values: Sequence[float] | None) -> Iterator[str]:
-    """Yield where the controller must have the frame of what carries the part, named `what`."""
+    """Yield remarks on the required frame of the unit that carries the part, named `what`."""
     place = words_of(euler(carrier_frame(robot, values)[None], "xyz")[0], 4)
     yield f"At 0 the frame of {what} stands in the base at {place}"
     yield "(mm, deg about fixed x, y, z): calibrate it so, or say positioner_frame."
 
 
 def axis_numbers(given: Sequence[int] | None, count: int) -> Sequence[int]:
-    """Return the controller's numbers of so many external axes; default: 1 and on."""
+    """Return the controller's numbers of `count` external axes; default: from 1 on."""
     return (given or range(1, count + 1))[:count]
 
 
 def setup_remarks(robot: Robot, *, si: bool = False) -> Iterator[str]:
-    """Yield what the controller has to know of the external axes, a line for each.
+    """Yield remarks on the external axes that must be set up at the controller.
 
-    The unit is that of the program's values: mm or deg; in `si` m or rad.
+    The units are those of the program: mm and deg, or m and rad with `si`.
     """
     for axis in robot.externals:
         unit = axis.unit if si else said_unit(axis)

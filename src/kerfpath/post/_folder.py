@@ -1,4 +1,4 @@
-"""Programs in folders: written whole or not at all, no file of an earlier one left beside them."""
+"""Write programs into folders, all files or none, and remove those of an earlier program."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from kerfpath.errors import InputError
 __all__ = ["MANIFEST", "FolderChanges", "replace_program", "write_files", "write_program"]
 
 MANIFEST = ".kerfpath.json"
-"""File in a folder that says which programs in it are ours: of which each file is, and its hash."""
+"""File that lists the program files that were written into a folder: program and hash of each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FolderChanges:
-    """What was done to the files of a folder.
+    """Changes to the files of a folder.
 
     Parameters
     ----------
     written : tuple of Path
         The new files, the one to start first.
     removed : tuple of Path
-        Of an earlier program of ours, and not of the new one.
+        Files that were written for an earlier program and do not belong to the new one.
     edited : tuple of Path
-        The same, but changed by someone since, and so left.
+        Such files that were edited since then, and are therefore kept.
     """
 
     written: tuple[Path, ...]
@@ -48,27 +48,27 @@ def replace_program(
     *,
     only: str | None = None,
 ) -> FolderChanges:
-    """Write files into a folder, and remove those of an earlier program that is replaced.
+    """Write files into a folder, and remove those of the earlier program that is replaced.
 
-    Ours are only files that this function has written and listed in `MANIFEST`; nothing else is
-    touched, nor what was edited since. Files that are there as they are to be stay.
+    Only files that this function has written and listed in `MANIFEST` are removed, and only if they
+    were not edited since. Files that already have the right text are not written again.
 
     Parameters
     ----------
     folder : path
     files : mapping of str to str
-        Text by name, that of the file to start first.
+        Text of each file by its name; the file to start is the first.
     program : sequence of str
-        Which of them are the program, the one that is started first; none: there is no program
-        now, and the earlier ones are removed before anything is written.
+        Names of the files of the program, the one to start first. If it is empty, there is no
+        program now, and the earlier ones are removed before anything is written.
     only : str, optional
-        Replace only the program that is started with this file, and write nothing where a file of
-        it was edited; default: all that the folder has.
+        Replace only the program that is started with this file, and write nothing if one of its
+        files was edited. Default: replace all programs of the folder.
 
     Raises
     ------
     InputError
-        A file cannot be written, or was edited.
+        A file cannot be written or removed, or was edited.
     """
     folder = Path(folder)
     ours = _read_list(folder)
@@ -77,8 +77,8 @@ def replace_program(
     edited = [n for n in there if _hash((folder / n).read_bytes()) != old[n]["sha256"]]
     if edited and only is not None:
         raise InputError(
-            f"{folder / edited[0]} is of the earlier program {only} and was edited since; it must "
-            "not stay beside the new one: move it away"
+            f"{folder / edited[0]} belongs to the earlier program {only} and was edited since; it "
+            "must not stay beside the new one, so move it away"
         )
     stale = [n for n in there if n not in edited]
     if not program:
@@ -100,10 +100,10 @@ def replace_program(
 
 
 def write_files(folder: str | os.PathLike[str], files: Mapping[str, str]) -> list[Path]:
-    """Write files into a folder, all or none, the first one last.
+    """Write files into a folder, all or none, and return their paths; the first is written last.
 
-    So the program that is started calls no file that is not there yet. All are written beside
-    their places first: a disk that is full leaves everything as it was.
+    The program that is started therefore never calls a missing file. All texts go to temporary
+    files first, so that a full disk leaves everything as it was.
 
     Raises
     ------
@@ -115,15 +115,15 @@ def write_files(folder: str | os.PathLike[str], files: Mapping[str, str]) -> lis
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise InputError(f"{path.parent}: no folder can be made ({error})") from None
+            raise InputError(f"{path.parent}: cannot create the folder ({error})") from None
     _write({paths[name]: files[name] for name in reversed(list(files))})
     return list(paths.values())
 
 
 def write_program(path: str | os.PathLike[str], text: str) -> None:
-    """Write `text` to the file at `path`, whole or not at all.
+    """Write `text` to the file at `path` atomically.
 
-    The text goes to a file beside it first, so that no controller ever loads half a program.
+    The text goes to a temporary file first, so that no controller ever loads half a program.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def _write(texts: Mapping[Path, str]) -> None:
 
 
 def _read_list(folder: Path) -> dict[str, dict[str, str]]:
-    """Return the files that are listed as ours; none where the list is not there, or not ours."""
+    """Return the files in the manifest; none if it does not exist or is not valid."""
     try:
         found = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["programs"]
         entries = {str(n): {k: str(e[k]) for k in ("of", "sha256")} for n, e in found.items()}
@@ -179,7 +179,7 @@ def _remove(folder: Path, names: Sequence[str]) -> None:
             (folder / name).unlink(missing_ok=True)
         except OSError as error:
             raise InputError(
-                f"{folder / name} is of an earlier program and cannot be removed "
+                f"{folder / name} belongs to an earlier program and cannot be removed "
                 f"({error.strerror}); remove it yourself"
             ) from None
         if (parent := (folder / name).parent) != folder:
@@ -188,7 +188,7 @@ def _remove(folder: Path, names: Sequence[str]) -> None:
 
 
 def _holds(path: Path, text: str) -> bool:
-    """Return whether a file is there with this very text."""
+    """Return whether the file exists and has exactly this text."""
     try:
         return path.read_bytes() == text.encode("utf-8")
     except OSError:

@@ -1,4 +1,4 @@
-"""Steps to lines: what every formatter has in common."""
+"""The base of all formatters, which turn the steps of a program into lines."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ __all__ = ["Formatter", "number", "plain"]
 
 
 class Formatter(ABC):
-    """Writes one program in one language; each kind of step has a method of its own.
+    """Formatter of one program in one language; each kind of step has its own method.
 
-    A dialect is a subclass that says one thing otherwise. `preflight` has approved the program.
+    A dialect is a subclass that overrides some of them. The program must have passed `preflight`.
 
     Parameters
     ----------
     program : Program
     settings : LanguageSettings
-        Those of the language.
+        Settings of the language.
     """
 
     program: Program
     settings: Any
     around = 0
-    """Lines of a contour's routine, or of a file, beside those of its steps."""
+    """Number of lines of a contour's routine, or of its file, beside those of its steps."""
     too_long: Level | None = None
-    """What it is that a contour is longer than a file is to be; None where nothing looks at it."""
+    """Level of the issue that a contour is longer than a file may be; None: not checked."""
 
     def __init__(self, program: Program, settings: LanguageSettings) -> None:
         self.program, self.settings = program, settings
@@ -72,7 +72,7 @@ class Formatter(ABC):
         Raises
         ------
         InputError
-            The language has no arcs; its `check` says so before.
+            The language has no arcs; its `check` reports that before.
         """
         raise InputError("the language has no arcs; leave arcs_mm out of the job")
 
@@ -86,19 +86,19 @@ class Formatter(ABC):
         Raises
         ------
         InputError
-            The language has no such outputs; the preflight says so before.
+            The language has no such outputs; the preflight reports that before.
         """
-        raise InputError("the language cannot ask a partner; leave request out of the job")
+        raise InputError("the language cannot request anything; leave request out of the job")
 
     def wait_for(self, awaited: Await) -> Iterator[str]:
-        """Yield the lines that wait for an input, and end the program safely where it stays off.
+        """Yield the lines that wait for an input, and end the program safely if it stays off.
 
         Raises
         ------
         InputError
-            The language has no inputs; the preflight says so before.
+            The language has no inputs; the preflight reports that before.
         """
-        raise InputError("the language waits for no inputs; leave wait_for out of the job")
+        raise InputError("the language cannot wait for inputs; leave wait_for out of the job")
 
     @abstractmethod
     def comment(self, text: str) -> Iterator[str]:
@@ -135,7 +135,7 @@ class Formatter(ABC):
             yield from self.comment(plain(step.text))
 
     def head(self, *about: str) -> list[str]:
-        """Return what is said first: for which robot it is, `about`, what is and is not proved."""
+        """Return the remarks at the head: the robot, `about`, and what is and is not proved."""
         robot = self.program.robot
         clear = "been proved clear in the planned cell"
         checked = clear if self.program.air_checked else "not been checked for collisions"
@@ -152,23 +152,23 @@ class Formatter(ABC):
         Raises
         ------
         InputError
-            None is named.
+            The settings name no output for the signal.
         """
         name = getattr(self.settings, f"{signal}_output")
         if name is None:
             raise InputError(
-                f"the program switches the {signal}, but no output is named for it; say which "
+                f"the program switches the {signal}, but no output is named for it; name it "
                 f"with {signal}_output"
             )
         return name
 
     def port(self, partner: Partner, way: Literal["input", "output"]) -> Any:
-        """Return the input or output of a partner, by which it answers or is asked."""
+        """Return the input by which a partner answers, or the output by which it is asked."""
         return getattr(self.settings, f"{partner}_{way}")
 
 
 def number(value: float, decimals: int) -> str:
-    """Return a number with so many decimals, and no minus before zero."""
+    """Return a number with `decimals` decimals, and no minus before zero."""
     return f"{round(float(value), decimals) + 0.0:.{decimals}f}"
 
 

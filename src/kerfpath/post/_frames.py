@@ -40,8 +40,8 @@ def controller_frames(program: Program) -> tuple[Array, Array]:
 def euler(T: ArrayLike, order: Order) -> Array:
     """Return poses (K, 4, 4) m as X, Y, Z in mm and three angles in deg, (K, 6).
 
-    The angles are about the axes of `order`, one after the other: about fixed axes where it has
-    small letters, each about the axes turned before where it has capitals.
+    The angles are about the axes of `order`, one after the other: fixed axes for small letters,
+    axes turned by the angles before for capitals.
     """
     poses = np.asarray(T, dtype=np.float64).reshape(-1, 4, 4)
     turned = Rotation.from_matrix(poses[:, :3, :3])
@@ -50,7 +50,7 @@ def euler(T: ArrayLike, order: Order) -> Array:
 
 
 def from_euler(values: ArrayLike, order: Order) -> Array:
-    """Return the poses (K, 4, 4) m of X, Y, Z in mm and three angles in deg, (K, 6), as `euler`."""
+    """Return poses (K, 4, 4) m from X, Y, Z in mm and three angles in deg, (K, 6); see `euler`."""
     rows = np.asarray(values, dtype=np.float64).reshape(-1, 6)
     T = np.tile(np.eye(4), (len(rows), 1, 1))
     T[:, :3, :3] = Rotation.from_euler(order, rows[:, 3:], degrees=True).as_matrix()

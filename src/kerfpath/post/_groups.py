@@ -1,4 +1,4 @@
-"""The contours of a program that was read: joint moves, and the path behind them."""
+"""The contours of a program that was read: joint moves, and the path after them."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ __all__ = ["ReadGroup", "groups_of"]
 
 @dataclass(slots=True)
 class ReadGroup:
-    """Joint moves, and the moves of the path behind them: none after the last contour.
+    """Joint moves and the moves of the path after them; no path after the last contour.
 
     Parameters
     ----------
     name : str
-        Of the routine that it begins in.
+        Name of the routine in which its path begins.
     joint, path : list of ReadMove
     waits : list of (int, ReadWait)
-        Behind how many moves of the path the robot waits, and how long.
+        After how many moves of the path the robot waits, and how long.
     handshakes : list of (int, ReadHandshake)
-        Behind how many moves of the path a partner is asked or awaited.
+        After how many moves of the path a partner is asked or awaited.
     """
 
     name: str = ""
@@ -35,7 +35,7 @@ class ReadGroup:
 
 
 def groups_of(read: ReadProgram) -> list[ReadGroup]:
-    """Return what a program does contour by contour, over the borders of its routines."""
+    """Return the contours of a program, each of which may extend over several routines."""
     groups: list[ReadGroup] = []
     for section in read.sections:
         for step in section.steps:

@@ -1,4 +1,4 @@
-"""One thing that speaks against a program."""
+"""An issue that the checks find in a program."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ __all__ = ["ProgramIssue"]
 
 @dataclass(frozen=True, slots=True)
 class ProgramIssue:
-    """One thing that is wrong with a program, or that its user has to know.
+    """An error in a program, or a warning to its user.
 
     Parameters
     ----------
     level : {"error", "warning"}
         An error forbids writing the program.
     code : str
-        What kind of issue it is.
+        Kind of the issue.
     message : str
         What was expected, what came, and what to do.
     place : str
-        Where in the program.
+        Place in the program.
     """
 
     level: Level

@@ -1,4 +1,4 @@
-"""A program as a ROS message in memory, refused as the file would be."""
+"""A program as a ROS message in memory, with the same checks as the file."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def joint_trajectory(
 ) -> Message:
     """Return the fields of a trajectory_msgs/JointTrajectory, as `post(..., "ros")` writes them.
 
-    Arguments and refusals are those of `post`. What is switched when is in no message: the events
-    beside it, which only `post` returns, say that.
+    Arguments and errors are those of `post`. The message does not contain what is switched: that
+    is in the events file, which only `post` returns.
     """
     program = source if isinstance(source, Program) else build_program(source)
     settings = settings or RosSettings()

@@ -1,4 +1,4 @@
-"""The robot languages that programs can be written in, and what each brings along."""
+"""The robot languages that programs can be written in, and their properties."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ SHIPPED = {
     "urscript": "kerfpath.post.urscript:URSCRIPT",
     "val3": "kerfpath.post.val3:VAL3",
 }
-"""Where the languages are that come with the package."""
+"""Modules and names of the languages that come with the package."""
 BROKEN = (ImportError, AttributeError, NameError, SyntaxError, TypeError, ValueError)
-"""What a module that was written for another version raises when it is imported."""
+"""Exceptions that a module written for another version may raise when it is imported."""
 
 
 def _none_is_reserved(name: str) -> bool:
@@ -44,7 +44,7 @@ def _none_is_reserved(name: str) -> bool:
 
 
 def no_settings_needed(robot: Robot, settings: object) -> Iterator[str]:
-    """Yield nothing: external axes are said by their own names and units."""
+    """Yield nothing: external axes have their own names and units in programs."""
     yield from ()
 
 
@@ -55,43 +55,43 @@ class Language:
     Parameters
     ----------
     name : str
-        What jobs and the command line call it.
+        Name in jobs and on the command line.
     title : str
-        What people call it.
+        Name in messages.
     manufacturers : tuple of str
-        Whose robots it moves; empty: everyone's.
+        Manufacturers of the robots that it moves; empty: all.
     families : tuple of str
         The arms that it can express, by `Robot.kinematics`; empty: all.
     axis_3 : tuple of str
-        The arms that it can express, by `Robot.axis_3`. Without "", it must be known what the
-        axis 3 that it says measures.
+        The arms that it can express, by `Robot.axis_3`. Without "", it must be known what axis 3
+        of the controller measures.
     suffix : str
         Suffix of the file to start, with its dot.
     settings : type of LanguageSettings
     rules : callable
-        (settings) to the Rules of programs.
+        (settings) -> the Rules of programs.
     formatter : type of Formatter
     is_reserved : callable, optional
         Whether a name means something else in the language; default: none does.
     posture : callable, optional
-        (robot, q (K, n) rad, settings) to what the text says of posture and turns at each target,
-        in the words of its reader; None where a target says nothing of them.
+        (robot, q (K, n) rad, settings) -> posture and turns at each target, in the words of its
+        reader. None: targets do not contain them.
     check : callable, optional
-        (program, settings) to the issues that only this language has.
+        (program, settings) -> the issues that only this language has.
     sayable : callable, optional
-        (program, settings) to what the language can say of it, where that is less; `check` warns
-        of all that is left out.
+        (program, settings) -> the program as far as the language can express it; `check` warns of
+        all that is left out. None: it can express all.
     ahead : bool
-        Whether outputs are switched ahead of a target, on the path; else where the tip stands.
+        Whether outputs are switched on the path, ahead of a target; else the robot stops first.
     zones : bool
         Whether its moves are straight lines and arcs whose corners the controller rounds.
     assumed : mapping of str to value
-        Settings that are taken where a person has left them None; the preflight warns of outputs.
+        Values of settings that are None; the preflight warns of assumed outputs.
     externals : callable, optional
-        (robot, settings) to what is missing or wrong in the settings to say the robot's external
-        axes and have the motion coordinated with them, sentences; None where it cannot say them.
+        (robot, settings) -> what is missing or wrong in the settings for the robot's external axes
+        and coordinated motion, as sentences. None: the language has no external axes.
     read : Reader, optional
-        Reads back what is written; without one a program cannot be audited.
+        Reader of the text; without one a program cannot be audited.
     """
 
     name: str
@@ -116,7 +116,7 @@ class Language:
     __repr__ = short_repr
 
     def completed(self, settings: LanguageSettings | None) -> LanguageSettings:
-        """Return settings, by default the language's defaults, with what is `assumed` of them."""
+        """Return settings, by default those of the language, with `assumed` values where None."""
         settings = self.settings() if settings is None else settings
         lacks = {k: v for k, v in self.assumed.items() if getattr(settings, k, v) is None}
         return settings.model_copy(update=lacks) if lacks else settings
@@ -126,37 +126,37 @@ class Language:
         return self.rules(self.completed(settings)).controller
 
     def refusal(self, robot: Robot) -> str:
-        """Say why no program in this language can move a robot; empty where one can."""
+        """Return why no program in this language can move a robot; empty if one can."""
         if self.families and robot.kinematics not in self.families:
-            return f"language {self.name!r} cannot yet say the axes of an arm like {robot.id!r}"
+            return f"language {self.name!r} cannot yet express the axes of an arm like {robot.id!r}"
         if robot.externals and self.externals is None:
             names = ", ".join(axis.name for axis in robot.externals)
             return (
-                f"language {self.name!r} has no external kinematics as it is written here, and "
-                f"cannot move {names}; take another language, or plan the arm alone"
+                f"language {self.name!r} is written here without external axes and cannot move "
+                f"{names}; use another language, or plan the arm alone"
             )
         if robot.axis_3 in self.axis_3:
             return ""
         if robot.axis_3:
             return (
-                f"language {self.name!r} cannot say a {robot.axis_3} axis 3 like that of "
+                f"language {self.name!r} cannot express a {robot.axis_3} axis 3 like that of "
                 f"{robot.id!r}"
             )
         ways = {
-            "serial": 'axis_3 = "serial" where it is joint 3 alone',
+            "serial": 'axis_3 = "serial" if it is joint 3 alone',
             "horizontal": (
                 'axis_3 = "horizontal", with axis_3_deg = [LOWER, UPPER] from its data sheet, '
-                "where it measures the upper arm from the horizontal, as with a parallel rod"
+                "if it measures the upper arm from the horizontal, as with a parallel rod"
             ),
         }
         return (
-            f"language {self.name!r} says axis 3 of a controller, and nothing says what that of "
-            f"{robot.id!r} measures (no arm of the library has its lengths); add to [robot] "
-            + ", or ".join(ways[way] for way in self.axis_3 if way)
+            f"language {self.name!r} writes axis 3 of the controller, but it is not known what "
+            f"axis 3 of {robot.id!r} measures (no arm of the library has its lengths); add to "
+            "[robot] " + ", or ".join(ways[way] for way in self.axis_3 if way)
         )
 
     def doubt(self, robot: Robot) -> str:
-        """Say why a robot may not understand this language; empty where it does."""
+        """Return why a robot may not understand this language; empty if it does."""
         if not self.manufacturers or robot.manufacturer in self.manufacturers:
             return ""
         return (
@@ -169,7 +169,7 @@ class Language:
 def languages() -> dict[str, Language]:
     """Return all languages by name: those shipped, and those that entry points add.
 
-    An entry point that cannot be loaded, that is no language, or that has the name of one shipped
+    An entry point that cannot be loaded, is not a language, or has the name of a shipped language
     is left out with a warning.
     """
     found = {name: _shipped_languages(name) for name in SHIPPED}
@@ -181,7 +181,7 @@ def languages() -> dict[str, Language]:
         if not fault and not isinstance(loaded, Language):
             fault = f"is a {type(loaded).__name__}, expected a kerfpath.post.Language"
         if not fault and loaded.name in found:
-            fault = f"has the name {loaded.name!r} of another; give it one of its own"
+            fault = f"has the name {loaded.name!r} of another language; rename it"
         if fault:
             warnings.warn(f"language {point.name!r} ({point.value}) {fault}", stacklevel=2)
         else:

@@ -1,4 +1,4 @@
-"""Programs read line by line: what the readers of all languages have in common."""
+"""The base of all readers, which read programs line by line."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["END_OF_FILE", "LineReader", "only", "patterns", "statements"]
 SHOWN = 60
 """Characters of a line that a message shows."""
 END_OF_FILE = "the end of the file"
-"""What stands behind the last line."""
+"""Text of the row after the last one."""
 
 
 def patterns(by_kind: Mapping[str, str]) -> dict[str, re.Pattern[str]]:
@@ -38,15 +38,15 @@ def statements(lines: Iterable[str], comment: str, first: int = 1) -> list[tuple
 
 
 class LineReader:
-    """Reads one text; a subclass has the grammar of its language, a method for each kind of line.
+    """Reader of one text; a subclass has a method for each kind of line of its language.
 
     Parameters
     ----------
     file : str
     robot : Robot
-        Whose joints the controller's axes are turned into.
+        Robot to whose joints the controller's axes are converted.
     settings : LanguageSettings
-        Those of the language.
+        Settings of the language.
     rows : sequence of (int, str)
         Numbers and texts of the lines, for readers that `advance` from one to the next.
     """
@@ -65,23 +65,23 @@ class LineReader:
         self.rows, self.row = rows, -1
         self.line, self.text = 0, ""
         self.steps: list[ReadStep] = []
-        """Of the routine that is being read."""
+        """Steps of the routine that is being read."""
         self.required: list[str] = []
-        """Lines that have to come next, word for word."""
+        """Lines that must come next, exactly."""
 
     # Lines.
 
     @property
     def place(self) -> str:
-        """Where the line stands that is being read."""
+        """File and number of the line that is being read."""
         return f"{self.file}, line {self.line}"
 
     def fault(self, message: str) -> InputError:
-        """Return the error that something is wrong on this line."""
+        """Return an error with the place of this line."""
         return InputError(f"{self.place}: {message}")
 
     def advance(self) -> str:
-        """Go to the next row and return it; behind the last one stands `END_OF_FILE`."""
+        """Go to the next row and return it; after the last one it is `END_OF_FILE`."""
         self.row += 1
         end = self.rows[-1][0] + 1 if self.rows else 1
         self.line, self.text = (
@@ -90,7 +90,7 @@ class LineReader:
         return self.text
 
     def next_row(self) -> str:
-        """Go to the next row and return it, refusing an end before it."""
+        """Go to the next row and return it; raise InputError if there is none."""
         row = self.advance()
         if self.row >= len(self.rows):
             raise self.fault(self.too_early)
@@ -105,7 +105,7 @@ class LineReader:
         return match.groups()
 
     def expect(self, lines: Iterable[str]) -> None:
-        """Pass over lines that must stand here, word for word."""
+        """Pass over lines that must come here, exactly."""
         for line in lines:
             self.require_line(self.text, line.strip())
             self.advance()
@@ -116,7 +116,7 @@ class LineReader:
             raise self.fault(f"expected {expected!r}, got {row[:SHOWN]!r}")
 
     def read(self, row: str, kinds: Mapping[str, re.Pattern[str]]) -> None:
-        """Read a row by the method of its kind, unless it is one that is required here."""
+        """Read a row with the method of its kind, unless it is a required row."""
         if self.required:
             self.require_line(row, self.required.pop(0))
             return
@@ -128,23 +128,23 @@ class LineReader:
         raise self.fault(f"not expected here: {row[:SHOWN]!r}")
 
     def admit(self, kind: str) -> None:
-        """Refuse a kind of line that must not stand here; a language says which."""
+        """Refuse a kind of line that must not come here; each language overrides this."""
 
     def remark(self) -> None:
         """Pass over a remark."""
 
     def require_complete(self) -> None:
-        """Refuse an end while lines are required."""
+        """Refuse the end while lines are required."""
         if self.required:
             raise self.fault(f"{self.required[0]!r} is missing")
 
     # Steps.
 
     def require_standing(self, what: str) -> None:
-        """Refuse a wait or handshake where the robot moves; a language says when it does."""
+        """Refuse a wait or handshake while the robot moves; each language overrides this."""
 
     def add_move(self, kind: MoveKind, speed: float | None, **said: Any) -> None:
-        """Add a move that stands on this line; `said` is what else `ReadMove` holds."""
+        """Add the move on this line; `said` are further attributes of `ReadMove`."""
         self.steps.append(ReadMove(kind=kind, speed=speed, file=self.file, line=self.line, **said))
 
     def wait(self, time: str | float) -> None:
@@ -153,7 +153,7 @@ class LineReader:
         self.steps.append(ReadWait(time=float(time), file=self.file, line=self.line))
 
     def ask(self, port: object, *, on: bool) -> None:
-        """Add a request by an output that the settings name."""
+        """Add a request through an output that the settings name."""
         self.add_handshake(Request(partner=self.partner(port, "output"), on=on))
 
     def expect_answer(self, port: object, timeout: float) -> None:
@@ -166,23 +166,23 @@ class LineReader:
         self.steps.append(ReadHandshake(what=what, file=self.file, line=self.line))
 
     def partner(self, port: object, way: Literal["input", "output"]) -> Partner:
-        """Return whose input or output a port is, by the settings."""
+        """Return the partner of an input or output, by the settings."""
         for (partner, its_way), name in handshakes(self.settings).items():
             if its_way == way and name == port:
                 return partner
-        raise self.fault(f"{port} is the {way} of no partner that the settings name")
+        raise self.fault(f"the settings name no partner with the {way} {port}")
 
     def signal(self, output: object) -> Signal:
-        """Return what an output switches, by the settings."""
+        """Return the signal that an output switches, by the settings."""
         if output == self.settings.gas_output:
             return "gas"
         self.require_output(output, self.settings.laser_output)
         return "laser"
 
     def require_output(self, output: object, expected: object) -> None:
-        """Refuse another output than the settings name."""
+        """Refuse an output that is not the expected one."""
         if output != expected:
-            raise self.fault(f"switches the output {output}; expected {expected}")
+            raise self.fault(f"expected the output {expected} to be switched, got {output}")
 
     def last_on_path(self) -> ReadMove | None:
         """Return the last step, if it is a move of the path."""
@@ -190,7 +190,7 @@ class LineReader:
         return last if isinstance(last, ReadMove) and last.kind != "joint" else None
 
     def add_switch(self, move: ReadMove, switch: Switch, place: str) -> None:
-        """Add a switch, which stands at `place`, to the last step, a move."""
+        """Add a switch from the line `place` to the last step, a move."""
         self.steps[-1] = replace(
             move,
             switches=(*move.switches, switch),

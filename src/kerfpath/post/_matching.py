@@ -1,4 +1,4 @@
-"""Which contours and moves of two programs belong together."""
+"""Match the contours and moves of two programs."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from kerfpath.post._read import ReadMove, ReadWait
 __all__ = ["MovePair", "Stop", "match_groups", "pair_moves"]
 
 NEAR = 5e-3
-"""Contours whose paths are farther apart (m) are the same by their names only."""
+"""Contours whose paths are farther apart (m) are matched by their names only."""
 SAMPLES = 50
-"""Points at equal shares of the way that paths are compared at."""
+"""Number of evenly spaced points at which paths are compared."""
 NEVER = 1e6
 """Distance (m) of what must not be matched."""
 
 
 class Stop(NamedTuple):
-    """A move, how long (s) the robot waits where it ends, and where that is said."""
+    """A move, the wait (s) at its end, and file and line of the wait."""
 
     move: ReadMove
     wait: float = 0.0
@@ -34,25 +34,25 @@ class Stop(NamedTuple):
 
 
 class MovePair(NamedTuple):
-    """A move of program A and one of B; None where the other program has one more."""
+    """A move of program A and one of B; None if only the other program has the move."""
 
     a: Stop | None
     b: Stop | None
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Where the two stand."""
+        """File and line of both."""
         return tuple(stop.move.place for stop in self if stop is not None)
 
 
 def match_groups(a: Sequence[ReadGroup], b: Sequence[ReadGroup]) -> list[tuple[int, int]]:
-    """Return which contours of A are which of B: those along the same path, or of the same name."""
+    """Return the pairs of contours of A and B along the same path, or with the same name."""
     one, two = [_trace(group) for group in a], [_trace(group) for group in b]
     cost = np.full((len(a), len(b)), NEVER)
     for i, path in enumerate(one):
         for j, other in enumerate(two):
             if (path is None) == (other is None):
-                # Of two that are alike the one in order.
+                # Of equal contours, the one in the same order.
                 cost[i, j] = _distance(path, other) + 1e-9 * abs(i - j)
     rows, columns = linear_sum_assignment(np.minimum(cost, NEAR))
     found = {int(i): int(j) for i, j in zip(rows, columns, strict=True) if cost[i, j] < NEAR}
@@ -65,14 +65,14 @@ def match_groups(a: Sequence[ReadGroup], b: Sequence[ReadGroup]) -> list[tuple[i
 
 
 def _distance(one: Array | None, two: Array | None) -> float:
-    """Return how far (m) two paths mostly are from each other."""
+    """Return the median distance (m) of two paths."""
     if one is None or two is None:
         return 0.0
     return float(np.median(np.linalg.norm(one - two, axis=1)))
 
 
 def _trace(group: ReadGroup) -> Array | None:
-    """Return points (SAMPLES, 3) along the path of a contour; None behind the last."""
+    """Return points (SAMPLES, 3) along the path of a contour; None after the last."""
     points = _points(group.path)
     if not len(points):
         return None
@@ -85,14 +85,14 @@ def _points(moves: Sequence[ReadMove]) -> Array:
     """Return the ends (K, 3) m of moves in the part."""
     ends = [move.T_part_tip for move in moves if move.T_part_tip is not None]
     if len(ends) < len(moves):
-        raise InputError("a program says joints alone along its path; give it with_tips first")
+        raise InputError("a program gives joints alone along its path; apply with_tips first")
     return np.array(ends).reshape(-1, 4, 4)[:, :3, 3]
 
 
 def pair_moves(a: ReadGroup, b: ReadGroup, near: float) -> list[MovePair]:
     """Return the moves of a contour in A with those in B that end at the same place.
 
-    Between moves that do, as many as there are in both belong together in order.
+    Other moves between them are paired in order, as many as both programs have.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def pair_moves(a: ReadGroup, b: ReadGroup, near: float) -> list[MovePair]:
 
 
 def _add_waits(moves: Sequence[ReadMove], waits: Sequence[tuple[int, ReadWait]]) -> list[Stop]:
-    """Return moves with the waits behind them."""
+    """Return moves with the waits after them."""
     stops = [Stop(move) for move in moves]
     for behind, wait in waits:
         if behind > 0:

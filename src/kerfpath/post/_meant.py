@@ -1,4 +1,4 @@
-"""Texts of programs whose numbers can be meant: checked in one place, for all languages."""
+"""Check that texts of programs have no absurdly large numbers, for all languages."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from kerfpath.errors import InputError
 __all__ = ["CheckedTexts"]
 
 LARGEST = 1e10
-"""No number of a program is larger: ABB's 9E+09 for an axis that is not there is the largest."""
+"""Largest number of a program, above ABB's 9E+09 for an axis that does not exist."""
 NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 LONG = re.compile(r"\d{10,}|[eE]\+?\d", re.ASCII)
-"""What a number needs in its text to be so large."""
+"""What the text of such a large number contains."""
 
 REMARK = re.compile(r"\s*(?:\d+:\s*)?(?:!|;|//|'|#) ", re.ASCII)
-"""How a person's remark begins in any of the languages; one that gives a frame has no space."""
+"""Start of a remark in any of the languages; a remark that gives a frame has no space."""
 
 
 class CheckedTexts(Mapping[str, str]):
-    """The same texts by name; one with a number that nobody means is refused with its line."""
+    """Texts by name; a text with a number that is too large is refused with its line."""
 
     def __init__(self, files: Mapping[str, str]) -> None:
         self.files = files

@@ -1,4 +1,4 @@
-"""Poses of many targets at once: how far they are apart, orientations without jumps."""
+"""Distances between the poses of many targets, and orientations without jumps."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from kerfpath._arrays import Array, freeze
 __all__ = ["distances", "pose_of", "quaternions", "rotation_vectors"]
 
 UNIT = 1e-6
-"""How far the length of a quaternion may be from one: eight printed decimals pass."""
+"""Largest error of the length of a quaternion: eight printed decimals pass."""
 
 
 def pose_of(position: ArrayLike, wxyz: ArrayLike) -> Array | None:
@@ -35,7 +35,7 @@ def distances(one: Array, two: Array) -> tuple[Array, Array]:
 def quaternions(T: Array) -> Array:
     """Return unit quaternions (K, 4), w first, of poses (K, 4, 4).
 
-    The first has w >= 0; each other has of its two signs the one nearer to that before.
+    The first has w >= 0; each other has the sign that brings it closer to the one before.
     """
     wxyz = Rotation.from_matrix(T[:, :3, :3]).as_quat(canonical=True, scalar_first=True)
     turned = (wxyz[1:] * wxyz[:-1]).sum(axis=1) < 0
@@ -46,7 +46,7 @@ def quaternions(T: Array) -> Array:
 def rotation_vectors(T: Array) -> Array:
     """Return axis times angle (K, 3) rad of poses (K, 4, 4).
 
-    Angles run to 2 pi, as the signs of `quaternions` say, so that vectors do not jump at pi.
+    Angles go up to 2 pi, by the signs of `quaternions`, so that vectors do not jump at pi.
     """
     wxyz = quaternions(T)
     sine = np.linalg.norm(wxyz[:, 1:], axis=1)

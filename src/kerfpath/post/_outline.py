@@ -1,4 +1,4 @@
-"""What a program will be called and will switch, before there is a plan to write it from."""
+"""Check the names, numbers and outputs of a program before there is a plan for it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kerfpath.robots import Robot
 __all__ = ["issues_before_planning"]
 
 SOME_ZONE = 1.23456e-3
-"""m: stands for zones that depend on the spacing of the nodes, which are no round numbers."""
+"""Zone (m) in place of those that depend on the spacing of nodes and are no round numbers."""
 
 
 def issues_before_planning(
@@ -35,7 +35,7 @@ def issues_before_planning(
     gas_lead: float | None = None,
     handshakes: Sequence[Handshake] = (),
 ) -> list[ProgramIssue]:
-    """Return the errors that the program of some cuts will have wherever it leads the robot.
+    """Return the errors that the program of some cuts will have, whatever its targets are.
 
     Parameters
     ----------

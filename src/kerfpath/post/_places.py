@@ -1,4 +1,4 @@
-"""Where a program says what: the line of each move and wait in its text, and when it runs."""
+"""Find the line of each move and wait in the text of a program, and when it runs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Line(NamedTuple):
 
 
 class TimedLine(NamedTuple):
-    """A line that moves or waits, and from when to when (s) it does, on the program's clock."""
+    """A line that moves or waits, with its begin and end (s) on the program's clock."""
 
     line: Line
     begin: float
@@ -40,12 +40,12 @@ def timed_lines(program: Program, read: ReadProgram) -> tuple[TimedLine, ...]:
     ----------
     program : Program
     read : ReadProgram
-        What was read back of its text.
+        The program as read back from its text.
 
     Raises
     ------
     InputError
-        Joint limits that are not known.
+        The joint limits are not known.
     """
     lines = [
         line
@@ -63,15 +63,15 @@ def timed_lines(program: Program, read: ReadProgram) -> tuple[TimedLine, ...]:
 def issue_lines(
     issues: Sequence[ProgramIssue], program: Program, read: ReadProgram
 ) -> tuple[Line | None, ...]:
-    """Return the line at which each issue of a preflight stands, None where it is of no line.
+    """Return the line of each issue of a preflight, or None if it belongs to no line.
 
     Parameters
     ----------
     issues : sequence of ProgramIssue
-        Of the program.
+        Issues of the program.
     program : Program
     read : ReadProgram
-        What was read back of its text.
+        The program as read back from its text.
     """
     lines = _lines(program, read)
     return tuple(_line_of(issue.place, program, lines) for issue in issues)
@@ -97,7 +97,7 @@ def _line_of(place: str, program: Program, lines: Sequence[Line | None]) -> Line
 def _lines(program: Program, read: ReadProgram) -> list[Line | None]:
     """Return the line of each step; a text has as many of a kind, in the same order.
 
-    What a language does not say, as the waits of one without any, has no line.
+    Steps that a language does not write have no line, for example waits.
     """
     found: list[Line | None] = [None] * len(program.steps)
     kinds: tuple[tuple[Any, type], ...] = (

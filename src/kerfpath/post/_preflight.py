@@ -1,4 +1,4 @@
-"""What a program must pass before it is written: one check for all languages."""
+"""Checks that a program must pass before it is written, for all languages."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ from kerfpath.post._settings import LanguageSettings, Rules, handshakes
 __all__ = ["foresee", "preflight"]
 
 LARGEST_JOINT_STEP = np.pi
-"""From half a turn on (rad), "the short way" no longer says which way a joint turns."""
+"""Joint step (rad) from which the short way round is no longer unique."""
 LARGEST_ORIENTATION_STEP = np.pi / 2
-"""Turn of the tool (rad) between linear targets that every controller interpolates alike."""
+"""Turn of the tool (rad) between linear targets below which all controllers interpolate alike."""
 LOWEST_SHARE = 0.01
 """Smallest share of the full speed of a joint move: controllers count it in percent."""
 LONGEST_WAIT = 60.0
-"""s; a longer one is a mistake in its unit."""
+"""Longest wait (s); a longer one is a mistake in its unit."""
 LONGEST_TIMEOUT = 600.0
-"""s; nobody waits longer for an input."""
+"""Longest timeout (s) of an input."""
 ROUNDING = 1e-9
-"""Share by which half a distance may be exceeded for rounding."""
+"""Share by which half a distance may be exceeded because of rounding."""
 LIMIT_NOISE = 1e-9
-"""Excess over a joint limit (rad) that is rounding."""
+"""Excess over a joint limit (rad) that comes from rounding."""
 
 
 def preflight(
     program: Program, language: str = "rapid", settings: LanguageSettings | None = None
 ) -> list[ProgramIssue]:
-    """Return everything that speaks against running `program`; empty = nothing known.
+    """Return all issues that speak against running `program`; empty if none is known.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ def preflight(
     language : str
         One of `languages()`.
     settings : LanguageSettings, optional
-        Those of the language; default: its defaults.
+        Settings of the language; default: its defaults.
 
     Raises
     ------
     InputError
-        An unknown language, or settings of another.
+        The language is unknown, or the settings are those of another language.
     """
     chosen = find_language(language)
     settings = chosen.settings() if settings is None else settings
@@ -87,8 +87,8 @@ def preflight(
             ProgramIssue(
                 "warning",
                 "air-moves",
-                "the moves to and between contours have not been checked for collisions; run them "
-                "at low speed first",
+                "the transfer moves have not been checked for collisions; run them at low speed "
+                "first",
                 "program",
             )
         )
@@ -96,7 +96,7 @@ def preflight(
 
 
 def foresee(program: Program, chosen: Language, settings: LanguageSettings) -> list[ProgramIssue]:
-    """Return what speaks against a program whatever its targets are: names, numbers, outputs."""
+    """Return the issues of a program that do not depend on targets: names, numbers, outputs."""
     rules = chosen.rules(settings)
     issues = list(_check_robot(program, chosen))
     numbers = [issue for section in program.sections for issue in _check_numbers(section, rules)]
@@ -117,23 +117,23 @@ def foresee(program: Program, chosen: Language, settings: LanguageSettings) -> l
 def _check_outputs(
     program: Program, language: Language, settings: LanguageSettings
 ) -> Iterator[ProgramIssue]:
-    """Check that there is an output for everything that is switched, and warn of one assumed."""
+    """Check that there is an output for everything that is switched; warn of assumed ones."""
     assumed = [key.removesuffix("_output") for key in language.assumed]
     for signal in sorted({*program.signals, *assumed}):
         key = f"{signal}_output"
         if key not in type(settings).model_fields or getattr(settings, key) is not None:
             continue
-        remedy = f"say which with {key} in [program.{language.name}]"
+        remedy = f"name it with {key} in [program.{language.name}]"
         message = f"the {signal} is switched, but no output is named for it; {remedy}"
         if (taken := language.assumed.get(key)) is not None:
-            message = f"no output is named for the {signal}, {taken} is taken; {remedy}"
+            message = f"no output is named for the {signal}, so {taken} is used; {remedy}"
         yield ProgramIssue("error" if taken is None else "warning", "output", message, "program")
 
 
 def _check_ports(
     program: Program, language: Language, settings: LanguageSettings
 ) -> Iterator[ProgramIssue]:
-    """Check that every handshake has an input or output of its own."""
+    """Check that every handshake has its own input or output."""
     known = handshakes(settings)
     steps = dict.fromkeys(s for s in program.steps if isinstance(s, Request | Await))
     wanted = {(s.partner, "input" if isinstance(s, Await) else "output") for s in steps}
@@ -143,7 +143,7 @@ def _check_ports(
             yield ProgramIssue("error", "handshake", message, "program")
         elif known[partner, way] is None:
             message = (
-                f"no {way} is named for the handshake {partner}; say which with {partner}_{way} in "
+                f"no {way} is named for the handshake {partner}; name it with {partner}_{way} in "
                 f"[program.{language.name}]"
             )
             yield ProgramIssue("error", "handshake", message, "program")
@@ -155,7 +155,7 @@ def _check_ports(
     for name, way, port in ports:
         key = f"{name}_{way}"
         if port is not None and (other := taken.setdefault((way, port), key)) != key:
-            message = f"{other} and {key} are both {port}; name one for each"
+            message = f"{other} and {key} are both {port}; name two different ones"
             code = "output" if name in SIGNALS else "handshake"
             yield ProgramIssue("error", code, message, "program")
 
@@ -178,14 +178,15 @@ def _check_names(
             yield ProgramIssue(
                 "error",
                 "name-identifier",
-                f"{name!r} is no name in {language.title}: a letter, then letters, digits and _",
+                f"{name!r} is not a name in {language.title}; expected a letter, then letters, "
+                "digits and _",
                 what,
             )
         elif len(name) > rules.longest_name:
             yield ProgramIssue(
                 "error",
                 "name-length",
-                f"{name!r} has {len(name)} characters, at most {rules.longest_name} are allowed",
+                f"{name!r} has {len(name)} characters, expected at most {rules.longest_name}",
                 what,
             )
         elif language.is_reserved(name):
@@ -223,7 +224,7 @@ def _check_numbers(section: Section, rules: Rules) -> Iterator[ProgramIssue]:
 
 
 def _walk(section: Section) -> Iterator[tuple[str, Step, bool, bool]]:
-    """Yield place and step, and whether the robot stands before it and the laser is on."""
+    """Yield place and step, and whether the robot is stopped before it and the laser is on."""
     stands, on = False, False
     for number, step in enumerate(section.steps):
         yield f"{section.name}, step {number}", step, stands, on
@@ -234,7 +235,7 @@ def _walk(section: Section) -> Iterator[tuple[str, Step, bool, bool]]:
 
 
 def _check_stays(section: Section) -> Iterator[ProgramIssue]:
-    """Check that waits and handshakes take a sensible time, where the robot stands."""
+    """Check that waits and handshakes take a sensible time while the robot is stopped."""
     for place, step, stands, on in _walk(section):
         if isinstance(step, Wait):
             if not 0 < step.time <= LONGEST_WAIT:
@@ -255,10 +256,11 @@ def _check_laser(section: Section) -> Iterator[ProgramIssue]:
     on = False
     for place, step, _, on in _walk(section):
         if isinstance(step, JointMove) and on:
-            yield ProgramIssue("error", "laser-order", "a joint move with the laser on", place)
+            yield ProgramIssue("error", "laser-order", "the laser is on during a joint move", place)
         for switch in switches_of(step):
             if switch.signal == "laser" and on == switch.on:
-                message = f"the laser is switched {'on' if on else 'off'}, but is so already"
+                state = "on" if on else "off"
+                message = f"the laser is switched {state}, but is already {state}"
                 yield ProgramIssue("error", "laser-order", message, place)
             on = switch.on if switch.signal == "laser" else on
     if on:

@@ -1,4 +1,4 @@
-"""The neutral program: what the robot does, in order, before any language formats it."""
+"""The neutral program: the steps of the robot in order, before a language formats them."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ __all__ = [
 
 Signal = Literal["laser", "gas"]
 SIGNALS: dict[str, Signal] = {word: word for word in get_args(Signal)}
-"""Every signal by its word, for readers."""
+"""Every signal by its name, for readers."""
 Partner = Literal["ready", "shutter", "gas_pressure", "height", "interlock"]
 PARTNERS: dict[str, Partner] = {word: word for word in get_args(Partner)}
-"""Every partner of a handshake by its word: source, shutter, gas, height control, cell."""
+"""Every partner of a handshake by its name: source, shutter, gas, height control, cell."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,10 +52,10 @@ class Switch:
     Parameters
     ----------
     signal : {"laser", "gas"}
-        What is switched; the settings of a language say by which output.
+        What is switched; the settings of a language name its output.
     on : bool
     lead_time : float s
-        How long before the tip arrives there; makes up for the delay of output and source.
+        Time before the tip arrives there; it compensates for the delay of output and source.
     """
 
     signal: Signal
@@ -65,7 +65,7 @@ class Switch:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointMove:
-    """Move all joints at once to a joint vector; the tip's way there is not a straight line.
+    """Move all joints at once to a joint vector; the tip does not move in a straight line.
 
     Parameters
     ----------
@@ -74,10 +74,9 @@ class JointMove:
     speed : float
         Share of the full speed, from 0.01 to 1; the acceleration is the full one.
     duration : float s or None
-        How long the move was planned to take, from stop to stop; None where it is not known from
-        where it comes.
+        Planned time of the move, from stop to stop; None if its start is not known.
     zone : float m
-        Radius in which the corner may be rounded; 0 = stop at the target.
+        Radius within which the corner may be rounded; 0 = stop at the target.
     """
 
     q: Array
@@ -93,22 +92,22 @@ class JointMove:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinearMove:
-    """Move the tool tip in a straight line, the tool turning evenly, the posture kept.
+    """Move the tool tip in a straight line; the tool turns evenly, the posture stays.
 
     Parameters
     ----------
     T_part_tip : (4, 4)
         Tip pose in the part frame, m.
     q : (n,) rad
-        Joints that the robot has on arrival; endless joints unrolled along the contour.
+        Joints of the robot on arrival; endless joints are not wrapped along the contour.
     speed : float m/s
         Speed of the tip.
     duration : float s
-        How long the move was planned to take.
+        Planned time of the move.
     zone : float m
-        Radius in which the corner may be rounded; 0 = stop at the target.
+        Radius within which the corner may be rounded; 0 = stop at the target.
     switches : tuple of Switch
-        What is switched at its end.
+        Switches at the end of the move.
     """
 
     T_part_tip: Array
@@ -127,14 +126,14 @@ class LinearMove:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CircularMove(LinearMove):
-    """Move the tool tip along the arc through a point on the way, the tool turning evenly.
+    """Move the tool tip along the arc through a point on the way; the tool turns evenly.
 
     Parameters
     ----------
     T_part_via : (4, 4)
         Tip pose at the point on the way, in the part frame, m.
     q_via : (n,) rad
-        Joints that the robot has there.
+        Joints of the robot there.
     """
 
     T_part_via: Array
@@ -150,7 +149,7 @@ class CircularMove(LinearMove):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wait:
-    """Stay where the last move stopped, as while the beam pierces.
+    """Wait where the last move stopped, for example while the beam pierces.
 
     Parameters
     ----------
@@ -162,12 +161,12 @@ class Wait:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """Set or reset the output that asks a partner for something, where the robot stands.
+    """Set or reset the output that asks a partner for something; the robot is stopped.
 
     Parameters
     ----------
     partner : Partner
-        Who is asked; the settings of a language say by which output, as `shutter_output`.
+        Partner that is asked; the settings of a language name its output, as `shutter_output`.
     on : bool
     """
 
@@ -179,14 +178,14 @@ class Request:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Await:
-    """Wait where the robot stands, beam off, until an input is on; else end the program safely.
+    """Wait, stopped and with the beam off, until an input is on; else end the program safely.
 
     Parameters
     ----------
     partner : Partner
-        Who answers; the settings of a language say by which input, as `shutter_input`.
+        Partner that answers; the settings of a language name its input, as `shutter_input`.
     timeout : float s
-        After which the program switches everything off and ends.
+        Time after which the program switches everything off and ends.
     """
 
     partner: Partner
@@ -205,7 +204,7 @@ class Comment:
 
 
 class Target(NamedTuple):
-    """What a move leads to or by: joints (n,) rad, and of a path move the tip's pose (4, 4) m."""
+    """A target or point on the way: joints (n,) rad and, for a path move, tip pose (4, 4) m."""
 
     move: Move
     q: Array
@@ -213,7 +212,7 @@ class Target(NamedTuple):
 
 
 def targets_of(moves: Iterable[Move]) -> list[Target]:
-    """Return the targets of moves in order, each behind the point on the way to it."""
+    """Return the targets of moves in order, each after the point on the way to it."""
     found: list[Target] = []
     for move in moves:
         if isinstance(move, CircularMove):
@@ -223,7 +222,7 @@ def targets_of(moves: Iterable[Move]) -> list[Target]:
 
 
 def switches_of(step: Step) -> tuple[Switch, ...]:
-    """Return what is switched at the end of a step; nothing but at that of a move of the path."""
+    """Return the switches at the end of a step; only moves of the path have any."""
     return step.switches if isinstance(step, LinearMove) else ()
 
 
@@ -235,7 +234,7 @@ Step = Move | Wait | Handshake | Comment
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """The steps of one contour, or of a part of one, under an identifier."""
+    """The steps of one contour, or of a part of one, with an identifier."""
 
     name: str
     steps: tuple[Step, ...]
@@ -250,7 +249,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Program:
-    """What one robot does with one tool on one part, contour by contour.
+    """The steps of one robot with one tool on one part, contour by contour.
 
     Parameters
     ----------
@@ -262,9 +261,9 @@ class Program:
     sections : tuple of Section
         One for each contour, in order.
     air_checked : bool
-        Whether the moves to and between the contours have been proved clear.
+        Whether the transfer moves have been proved clear.
     caveats : tuple of str
-        What the plans do not prove, sentences for the comment at its head.
+        Sentences on what the plans do not prove, for the comment at the head.
     """
 
     name: str
@@ -283,8 +282,8 @@ class Program:
         for move in self.moves:
             if len(move.q) != self.robot.joints:
                 raise InputError(
-                    f"program {self.name!r}: a target has {len(move.q)} joints, the robot "
-                    f"{self.robot.joints}"
+                    f"program {self.name!r}: expected {self.robot.joints} joints at each target, "
+                    f"got {len(move.q)}"
                 )
 
     @property
@@ -294,7 +293,7 @@ class Program:
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """What is switched anywhere."""
+        """Signals that are switched anywhere in the program."""
         return tuple(sorted({switch.signal for move in self.moves for switch in switches_of(move)}))
 
     @property

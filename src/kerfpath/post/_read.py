@@ -1,4 +1,4 @@
-"""What a program's text says, read back: positions, speeds and events, in SI units."""
+"""A program as read back from its text: positions, speeds and events, in SI units."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ __all__ = [
 
 MoveKind = Literal["joint", "linear", "circular"]
 MOVE_KINDS: dict[str, MoveKind] = {word: word for word in get_args(MoveKind)}
-"""Every kind of move by its word, for readers."""
+"""Every kind of move by its name, for readers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _InFile:
-    """Something that stands on a line of a file."""
+    """Something on a line of a file."""
 
     file: str
     line: int
@@ -36,42 +36,41 @@ class _InFile:
 
     @property
     def place(self) -> str:
-        """Where it stands."""
+        """File and line."""
         return f"{self.file}, line {self.line}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReadMove(_InFile):
-    """One move as its text says it.
+    """One move as read from its text.
 
     Parameters
     ----------
     kind : {"joint", "linear", "circular"}
     file, line
-        Where it stands.
+        Place of the move in the text.
     speed : float or None
-        Of the tip, m/s; of a joint move the share of the full speed; None where the text has none.
+        Speed of the tip, m/s; for a joint move the share of the full speed; None if not given.
     duration : float s or None
-        How long it takes, where the text says times.
+        Time of the move, if the text gives times.
     cruise : float s or None
-        How long a joint move takes at its speed throughout, neither gaining nor losing it, where
-        the text says that.
+        Time of a joint move at constant speed, without acceleration, if the text gives it.
     zone : float m or None
-        None where the language has no length for it.
+        Radius of the zone, 0 at a stop; None if the language has no length for it.
     q : (n,) rad or None
-        Joints of the target, of the robot's model, where the text says them; m of linear axes.
+        Joints of the target in the robot's model, if the text gives them; m for linear axes.
     T_part_tip : (4, 4) m or None
-        Tip pose in the part frame, where the text says it.
+        Tip pose in the part frame, if the text gives it.
     T_part_via : (4, 4) m or None
-        That of the point on the way of a circular move.
+        Tip pose at the point on the way of a circular move.
     external : (E,) m, rad or None
-        Values of the external axes at a target that is said by a pose; where joints are said they
-        are the last of q.
+        Values of the external axes at a target that is given by a pose; with joints, they are the
+        last of q.
     posture : tuple
-        What the text says of posture and turns, as `Language.posture` does; empty where nothing.
+        Words of the text for posture and turns, as from `Language.posture`; empty without any.
     switches : tuple of Switch
     elsewhere : mapping of str to str
-        File and line of what is not said where the move stands: "target", "speed", "zone",
+        File and line of what is not on the line of the move: "target", "speed", "zone",
         "switches".
     """
 
@@ -91,9 +90,9 @@ class ReadMove(_InFile):
     __repr__ = short_repr
 
     def external_of(self, axes: Sequence[ExternalAxis]) -> Array | None:
-        """Return the values (E,) m and rad of the external axes of the robot, where it says them.
+        """Return the values (E,) m and rad of the robot's external axes, or None if not given.
 
-        Those of its joints, where it says both.
+        If the move has joints, the values are the last of them.
         """
         if self.q is not None:
             return self.q[len(self.q) - len(axes) :]
@@ -102,7 +101,7 @@ class ReadMove(_InFile):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadWait(_InFile):
-    """A wait of `time` (s) where the robot stands."""
+    """A wait of `time` (s) while the robot is stopped."""
 
     time: float
 
@@ -111,7 +110,7 @@ class ReadWait(_InFile):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadHandshake(_InFile):
-    """A handshake with a partner where the robot stands."""
+    """A handshake with a partner while the robot is stopped."""
 
     what: Handshake
 
@@ -138,7 +137,7 @@ class ReadSection:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReadProgram:
-    """A program as its text says it.
+    """A program as read from its text.
 
     Parameters
     ----------
@@ -146,9 +145,9 @@ class ReadProgram:
     sections : tuple of ReadSection
         In the order in which they run.
     T_flange_tip, T_base_part : (4, 4) m or None
-        Tool and work object; None where the text only gives their numbers.
+        Tool and work object; None if the text only gives their numbers.
     externals : tuple of ExternalAxis
-        Of the robot that it was read for.
+        External axes of the robot that it was read for.
     """
 
     name: str
@@ -173,14 +172,19 @@ class ReadProgram:
 def with_tips(
     read: ReadProgram, robot: Robot, T_flange_tip: Array, T_base_part: Array
 ) -> ReadProgram:
-    """Return the program with the tip poses of its path also where it says joints alone.
+    """Return the program with the tip poses of its path also where it gives joints alone.
 
     Parameters
     ----------
     read : ReadProgram
     robot : Robot
     T_flange_tip, T_base_part : (4, 4) m
-        Tool and work object, where the program does not say them.
+        Tool and work object, if the program does not give them.
+
+    Raises
+    ------
+    InputError
+        A target has neither a pose nor joints.
     """
     tool = T_flange_tip if read.T_flange_tip is None else read.T_flange_tip
     part = T_base_part if read.T_base_part is None else read.T_base_part
@@ -189,7 +193,7 @@ def with_tips(
         if not isinstance(step, ReadMove) or step.kind == "joint" or step.T_part_tip is not None:
             return step
         if step.q is None:
-            raise InputError(f"{step.place}: neither a pose nor joints are said for the target")
+            raise InputError(f"{step.place}: the target has neither a pose nor joints")
         T = np.linalg.solve(part, robot.forward(step.q) @ tool)
         return replace(step, T_part_tip=freeze(np.asarray(T, dtype=np.float64)))
 
@@ -201,7 +205,7 @@ def with_tips(
 
 
 class Reader(Protocol):
-    """Reads what the formatter of the same language writes, and nothing else."""
+    """Reader of what the formatter of the same language writes, and nothing else."""
 
     def __call__(
         self, main: str, files: Mapping[str, str], robot: Robot, settings: Any
@@ -213,14 +217,14 @@ class Reader(Protocol):
         main : str
             A name in `files`.
         files : mapping of str to str
-            Text of each file by its name; others than `main` are looked up as it calls them.
+            Text of each file by its name; files other than `main` are read when it calls them.
         robot : Robot
-            Whose joints the controller's axes are turned into.
+            Robot to whose joints the controller's axes are converted.
         settings : Settings
-            Those of the language.
+            Settings of the language.
 
         Raises
         ------
         InputError
-            A line that is not of our making, or that does not fit the others: file and line.
+            A line cannot come from the formatter or does not fit the others; with file and line.
         """

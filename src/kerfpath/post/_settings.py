@@ -1,4 +1,4 @@
-"""What a controller can do and what it calls things, as a person states it for one language."""
+"""Settings of a language: what users state about a controller, and rules of its programs."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ __all__ = [
 
 
 def setting(expected: str, example: str, **bounds: Any) -> Any:
-    """Return the bounds of a setting, with what is expected and an example, for messages."""
+    """Return a setting with its bounds, and what is expected and an example for messages."""
     return Field(description=expected, examples=[example], **bounds)
 
 
 def numbered(port: str, most: int, least: int = 1) -> Any:
-    """Return the bounds of a setting that is the number of a port."""
+    """Return a setting that is the number of a port, with its bounds."""
     return setting(f"the number of {port}, {least} to {most}", "5", ge=least, le=most)
 
 
@@ -49,12 +49,12 @@ OrientationSetting = Annotated[
 PositionerFrame = Annotated[
     Annotated[list[float], Field(min_length=6, max_length=6)] | None,
     setting(
-        "six numbers: where the frame that moves with the part stands in the robot base with all "
-        "external axes at 0, x, y, z in mm and turns about x, y, z in deg, axes fixed",
+        "six numbers: the frame that moves with the part, in the robot base with all external axes "
+        "at 0, as x, y, z in mm and rotations about fixed x, y, z in deg",
         "[1200.0, 0.0, 300.0, 0.0, 0.0, 90.0]",
     ),
 ]
-"""Of languages that couple the part's frame to what carries the part; see `carrier_frame`."""
+"""For languages that couple the part frame to the axes that carry it; see `carrier_frame`."""
 
 
 class LanguageSettings(BaseModel):
@@ -68,9 +68,8 @@ class LanguageSettings(BaseModel):
 class PortSettings(LanguageSettings):
     """Settings that name inputs and outputs: of laser and gas, and of handshakes.
 
-    A subclass gives, as keywords, the annotations of what its language calls an output and an
-    input, with their bounds and what messages say of them; they become those of all fields here
-    that it does not annotate itself.
+    A subclass gives, as keywords, the annotations of an output and an input in its language, with
+    bounds and texts for messages. They apply to all fields here that it does not annotate itself.
     """
 
     laser_output: Any = None
@@ -115,24 +114,24 @@ def outputs(settings: Any) -> list[Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rules:
-    """What programs in a language must keep to, with given settings.
+    """Rules that programs in a language must keep, with given settings.
 
     Parameters
     ----------
     longest_name : int
-        Characters of a name.
+        Largest number of characters of a name.
     name : str
         Regular expression that every name matches.
     slowest, fastest : float m/s
-        Speeds of the tip that can be said.
+        Range of tip speeds that can be written.
     speed_step : float m/s
         Speeds are written as multiples of this.
     controller : Controller
-        How the path is run.
+        How the controller runs the path.
     longest_lead : float s
         The longest lead time of a switch on the path.
     point_step, angle_step : float m, rad
-        What the digits of targets leave of positions and angles.
+        Rounding errors of positions and angles in the digits of targets.
     """
 
     longest_name: int = 32

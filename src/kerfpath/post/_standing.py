@@ -1,4 +1,4 @@
-"""What controllers do otherwise than planned: switches where the robot stands, other postures."""
+"""Differences of controllers from the plan: switches only at stops, other postures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["stop_to_switch", "warn_of_changed_postures", "warn_of_late_switches"
 
 
 def stop_to_switch(program: Program, settings: object = None) -> Program:
-    """Return a program with all its switches where the tip stands, and without a lead."""
+    """Return the program with a stop at each switch, and without lead times."""
 
     def stop(move: LinearMove) -> LinearMove:
         switches = tuple(replace(switch, lead_time=0.0) for switch in move.switches)
@@ -33,7 +33,7 @@ def stop_to_switch(program: Program, settings: object = None) -> Program:
 def warn_of_changed_postures(
     section: Section, words: Sequence[tuple[int | str, ...]]
 ) -> Iterator[ProgramIssue]:
-    """Warn of straight moves that change the words for the posture, given at each target."""
+    """Warn of straight moves that change the configuration; `words` has that of each target."""
     for k, move in enumerate(section.moves):
         if k > 0 and isinstance(move, LinearMove) and words[k] != words[k - 1]:
             before, after = (" ".join(map(str, words[i])) for i in (k - 1, k))
@@ -52,15 +52,15 @@ def warn_of_late_switches(section: Section, title: str) -> Iterator[ProgramIssue
         yield ProgramIssue(
             "warning",
             "lead-time",
-            f"{len(leads)} switches are to come up to {max(leads) * 1e3:g} ms ahead, which {title} "
-            "cannot say: they come once the tip stands; measure the delay, and give no lead",
+            f"{len(leads)} switches are planned up to {max(leads) * 1e3:g} ms ahead, but {title} "
+            "switches only after the tip has stopped; measure the delay, and set no lead time",
             section.name,
         )
     if flying := sum(move.zone > 0 for move in moves):
         yield ProgramIssue(
             "warning",
             "stop-to-switch",
-            f"the robot will stop at {flying} places to switch there, as at each micro joint: "
-            f"{title} switches only where it stands",
+            f"the robot will stop at {flying} places to switch there, as at each micro joint, "
+            f"because {title} switches only while it is stopped",
             section.name,
         )

@@ -1,4 +1,4 @@
-"""When each step of a program ends, for languages that say times."""
+"""When each step of a program ends, for languages that write times."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ __all__ = [
 ]  # fmt: skip
 
 SHORTEST_CRUISE = 1e-3
-"""s; a joint move that takes less goes nowhere worth a time."""
+"""Shortest time (s) that is written for a joint move."""
 TICK = 0.01
-"""s; some controllers count times in whole numbers of it."""
+"""Step (s) in which some controllers count times."""
 TICK_NOISE = 1e-4
-"""How far (s) a time may be from them."""
+"""Largest difference (s) of a time from a multiple of it."""
 SHORTEST = 1e-6
-"""s; a move that takes less has no duration worth writing."""
+"""Shortest duration (s) of a move that can be written."""
 
 
 def timetable(program: Program) -> list[tuple[Move | Wait, float]]:
     """Return each move and wait with the time (s) at which it ends; the first target is at 0.
 
-    Waits and moves take what was planned. A joint move is straight, from stop to stop; where it is
-    not planned how long it takes, it is the least time that the joint limits leave it, divided by
-    its share of the full speed.
+    Waits and moves take their planned times. A joint move is straight, from stop to stop; without a
+    planned time it takes the least time within the joint limits, divided by its share of the full
+    speed.
 
     Raises
     ------
     InputError
-        Joint limits that are not known.
+        The joint limits are not known.
     """
     steps = [step for step in program.steps if isinstance(step, JointMove | LinearMove | Wait)]
     ways = np.diff(np.array([move.q for move in program.moves]), axis=0)
@@ -52,9 +52,9 @@ def timetable(program: Program) -> list[tuple[Move | Wait, float]]:
 
 
 def cruises(program: Program) -> dict[Move, float]:
-    """Return how long planned joint moves take (s) at their speed throughout.
+    """Return how long planned joint moves take (s) at constant speed.
 
-    Neither gaining nor losing it: the way of the slowest joint by its share of its full speed.
+    Without acceleration, that is the way of the slowest joint by its share of its full speed.
     """
     if program.robot.velocity is None:
         return {}
@@ -66,9 +66,9 @@ def cruises(program: Program) -> dict[Move, float]:
 
 
 def air_times(program: Program) -> list[float | None]:
-    """Return how long each move takes (s), as `timetable` has it; None where that is not known.
+    """Return how long each move takes (s), from `timetable`; None if that is not known.
 
-    So it is of the first move, of moves along the path, and where limits are not known.
+    It is None for the first move, for moves along the path, and if the limits are not known.
     """
     if program.robot.velocity is None or program.robot.acceleration is None:
         return [None] * len(program.moves)
@@ -82,18 +82,18 @@ def air_times(program: Program) -> list[float | None]:
 
 
 def not_whole(time: float) -> bool:
-    """Return whether a time (s) is no whole number of `TICK`."""
+    """Return whether a time (s) is not a multiple of `TICK`."""
     return abs(time - TICK * round(time / TICK)) > TICK_NOISE
 
 
 def check_times(program: Program, settings: object = None) -> Iterator[ProgramIssue]:
-    """Yield what forbids to say times: unknown limits, no start, a move without a duration."""
+    """Yield what prevents writing times: unknown limits, no start, a move without a duration."""
     try:
         program.robot.speed_limits()
     except InputError as error:
         yield ProgramIssue("error", "joint-speed", str(error), "program")
     if not isinstance(next(iter(program.moves), None), JointMove):
-        message = "times are counted from a first joint move, but there is none"
+        message = "times start at a first joint move, but there is none"
         yield ProgramIssue("error", "start", message, "program")
     for section in program.sections:
         for number, move in enumerate(section.moves):

@@ -1,4 +1,4 @@
-"""Programs as text: refused by their preflight, formatted, read back, and written."""
+"""Programs as text: checked by the preflight, formatted, and read back."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def post(
 ) -> dict[str, str]:
     """Return the files of a program in a robot language; the same input gives the same bytes.
 
-    What is written is read back and compared with the program first.
+    The text is read back and compared with the program first.
 
     Parameters
     ----------
@@ -43,9 +43,9 @@ def post(
     language : str
         One of `languages()`.
     settings : LanguageSettings, optional
-        Those of the language; default: its defaults.
+        Settings of the language; default: its defaults.
     strict : bool
-        Refuse what is only warned of otherwise.
+        Treat warnings as errors.
 
     Returns
     -------
@@ -55,8 +55,8 @@ def post(
     Raises
     ------
     InputError
-        An unknown language, settings of another language, a program that its preflight refuses,
-        or one that does not read back as it was meant.
+        The language is unknown, the settings are those of another language, the preflight finds
+        errors, or the text does not read back as the program.
     """
     program = source if isinstance(source, Program) else build_program(source)
     return post_and_read(program, language, settings, strict=strict).files
@@ -71,9 +71,9 @@ class ProgramText:
     files : dict of str to str
         Text of every file by its name, the one to start first.
     read : ReadProgram or None
-        What the text says; None where the language has no reader.
+        The program as read back; None if the language has no reader.
     warnings : tuple of ProgramIssue
-        Of the preflight.
+        Warnings of the preflight.
     """
 
     files: dict[str, str]
@@ -92,7 +92,7 @@ def post_and_read(
 ) -> ProgramText:
     """Return a program as text, what was read back of it, and the warnings of its preflight.
 
-    Arguments and refusals are those of `post`.
+    Arguments and errors are those of `post`.
     """
     chosen = find_language(language)
     settings = chosen.settings() if settings is None else settings
@@ -119,32 +119,32 @@ def read_program(
     *,
     main: str | None = None,
 ) -> ReadProgram:
-    """Return what the files of a program say, in a language's own convention.
+    """Read a program from its files, in the convention of a language.
 
     Parameters
     ----------
     files : mapping of str to str
-        Text of each file by its name; those that are not called are not looked at.
+        Text of each file by its name; files that are not called are not read.
     language : str
         One of `languages()`.
     robot : Robot
-        Whose joints the controller's axes are turned into.
+        Robot to whose joints the controller's axes are converted.
     settings : LanguageSettings, optional
-        With which it was written; default: the language's defaults.
+        Settings with which it was written; default: those of the language.
     main : str, optional
         The file that is started; default: the first.
 
     Raises
     ------
     InputError
-        An unknown language or one without a reader, a file that is not there, external axes that
-        the settings or the language do not say, a line that is not of our making, or that does not
-        fit the others: file and line.
+        The language is unknown or has no reader, a file is missing, the settings or the language
+        do not cover the external axes, or a line cannot come from the formatter or does not fit
+        the others; then with file and line.
     """
     chosen = find_language(language)
     settings = chosen.completed(settings)
     if chosen.read is None:
-        raise InputError(f"language {language!r} has no reader, so that its programs stay unread")
+        raise InputError(f"language {language!r} has no reader, so its programs cannot be read")
     main = next(iter(files)) if main is None else main
     if robot.externals:
         says = chosen.externals
@@ -156,31 +156,31 @@ def read_program(
             read = chosen.read(main, CheckedTexts(files), robot, settings)
             return replace(read, externals=robot.externals)
     except KeyError as missing:
-        raise InputError(f"{main}: the file {missing.args[0]!r} is not there") from None
+        raise InputError(f"{main}: the file {missing.args[0]!r} is missing") from None
     except InputError:
         raise
     except (ArithmeticError, ValueError) as error:
         raise InputError(
-            f"{main}: numbers in it make no pose or joints ({error}); write the program again"
+            f"{main}: its numbers do not form a pose or joints ({error}); write the program again"
         ) from None
 
 
 def read_as_written(program: Program, chosen: Language, settings: LanguageSettings) -> ReadProgram:
-    """Return what the reader of a language makes of a program that its formatter writes.
+    """Return a program as the reader of a language reads it from the formatter's text.
 
-    Neither refused nor compared: what a text would say, as a measure for another.
+    There is no preflight and no comparison: the result is a reference for another text.
 
     Parameters
     ----------
     program : Program
     chosen : Language
-        With a reader.
+        Language with a reader.
     settings : LanguageSettings
 
     Raises
     ------
     InputError
-        The language cannot say it.
+        The language cannot express the program.
     """
     settings = chosen.completed(settings)
     files = chosen.formatter(program, settings).files()

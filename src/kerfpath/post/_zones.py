@@ -1,4 +1,4 @@
-"""How wide the zones of a path are, in which a controller rounds the corner at a node.
+"""Widths of the zones of a path, in which a controller rounds the corner at a node.
 
 Where the zones of neighbouring nodes meet half way, and the tool runs through each at constant
 acceleration, the motion is a quadratic B-spline with the nodes as its control points: its velocity
@@ -18,27 +18,27 @@ __all__ = ["ZONE_STEP", "Zone", "zones_at"]
 
 Zone = float | Literal["auto"]
 SHARE = 0.49
-"""Of the distance to the next node: zones that meet are too large for some controllers (UR)."""
+"""Zone as a share of the distance to the next node: zones that meet are too large for UR."""
 STEPS = 64
-"""To the octave: zones are rounded down to steps of 1.1 %, so that a program has few of them."""
+"""Steps per octave: zones are rounded down by up to 1.1 %, so that a program has few of them."""
 ZONE_STEP = 2 ** (1 / STEPS) - 1
-"""Such a step as a share of a zone."""
+"""This step as a share of a zone."""
 DIGIT = 1e-6
-"""m: and to what languages say of them."""
+"""Zones are also rounded down to this (m), as languages write them."""
 
 
 def zones_at(points: Array, zone: Zone, error: float) -> list[float]:
-    """Return the zone (m) at each node but the first; 0 at the last, where the robot stops.
+    """Return the zone (m) at each node except the first; 0 at the last, where the robot stops.
 
     Parameters
     ----------
     points : (K, 3) m
         The nodes.
     zone : float m or "auto"
-        Radius; halved, where nodes are nearer to each other, until zones do not overlap. "auto":
-        just short of half way to the next node.
+        Radius. It is halved where nodes are close, until zones do not overlap. "auto": just short
+        of half way to the next node.
     error : float m
-        Of "auto": the largest distance by which the tip may pass a node, on a parabola.
+        Largest distance by which the tip may miss a node with "auto", on a parabola.
     """
     if zone == 0:
         return [0.0] * (len(points) - 1)

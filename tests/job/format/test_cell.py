@@ -498,7 +498,7 @@ def test_a_language_that_the_robot_does_not_speak_is_refused_before_planning(fol
     path = job(folder, text, "ur.toml")
     result = run("plan", path, cwd=folder)
     assert_refused(
-        result, f"{path}:", "program.language", "cannot yet say the axes", 'language = "none"'
+        result, f"{path}:", "program.language", "cannot yet express the axes", 'language = "none"'
     )
 
 

@@ -238,12 +238,12 @@ def test_an_edited_program_is_compared_in_words(folder, written):
     lines = [line.replace("WaitTime 0.250;", "WaitTime 0.100;") for line in lines]
     found = compared(folder, "\n".join(lines))
     assert set(found) == {"targets", "waits"}
-    assert found["targets"]["message"].startswith("1 moved, at most by 0.4000 mm")
+    assert found["targets"]["message"].startswith("1 moved, by up to 0.4000 mm")
     assert found["targets"]["places"][1].endswith(f"line {k + 1}")
     assert found["waits"]["count"] == 3
     result = run("compare", folder / "out/job.mod", folder / "edited.mod", "--job",
                  folder / "job.toml")  # fmt: skip
-    assert "targets: 1 moved, at most by 0.4000 mm" in result.stdout
+    assert "targets: 1 moved, by up to 0.4000 mm" in result.stdout
     assert result.stdout.endswith("not the same\n")
 
 

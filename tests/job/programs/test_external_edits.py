@@ -171,4 +171,4 @@ def test_the_command_finds_a_value_that_is_edited_and_names_its_line(subjects, f
     (folder / "ours.mod").write_text(text.replace(",9E9,9E9,9E9,9E9]],v", ",5,9E9,9E9,9E9]],v", 1))
     refused = run(*words)
     assert refused.returncode == 2
-    assert "eax_c = 5: no external axes are there" in refused.stderr
+    assert "eax_c = 5: the robot has no such axis" in refused.stderr

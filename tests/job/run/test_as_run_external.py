@@ -69,7 +69,7 @@ def test_a_chuck_that_turns_while_it_is_cut_is_guaranteed_and_so_is_the_text(tmp
 @pytest.mark.parametrize(
     ("said", "why"),
     [
-        ('orientation = "wrist"\n', "moves the wrist by its joints nothing is proved"),
+        ('orientation = "wrist"\n', "nothing is proved if the controller moves the wrist by its"),
         ('language = "csv"\n', "csv has no zones"),
     ],
 )

@@ -1,4 +1,4 @@
-"""A table of all targets (CSV), for spreadsheets and programs of one's own."""
+"""A table of all targets (CSV), for spreadsheets and your own programs."""
 
 from kerfpath.post._languages import Language, no_settings_needed
 from kerfpath.post._times import check_times
@@ -22,4 +22,4 @@ CSV = Language(
     externals=no_settings_needed,
     read=read,
 )
-"""What is registered."""
+"""The language as registered."""

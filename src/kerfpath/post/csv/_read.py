@@ -1,4 +1,4 @@
-"""Read back the table that `Csv` writes, and nothing else: what it does not know, it refuses."""
+"""Read back the table that `Csv` writes; anything else is refused."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _KINDS = (*MOVE_KINDS, "via", "wait")
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: CsvSettings) -> ReadProgram:
-    """Return the program that a table of ours says; see `kerfpath.post.Reader`."""
+    """Return the program in a table that `Csv` wrote; see `kerfpath.post.Reader`."""
     header, *lines = files[main].splitlines() or [""]
     if header != ",".join(columns(robot)):
         names, got = columns(robot), header.split(",")
@@ -40,14 +40,14 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: CsvSetting
     for reader.line, line in enumerate(lines, 2):
         reader.read_row(line.split(","))
     if reader.via is not None:
-        raise reader.fault("a point on the way without its target")
+        raise reader.fault("expected the target of the arc after its point on the way")
     name = main.removesuffix(".csv")
     sections = [ReadSection(name=name, steps=tuple(s)) for name, s in reader.sections.items()]
     return ReadProgram(name=name, sections=tuple(sections))
 
 
 class _Reader(LineReader):
-    """Reads row by row; knows the last time and the section."""
+    """Reader of rows, which keeps the last time and the section."""
 
     time = 0.0
     section = ""
@@ -68,7 +68,7 @@ class _Reader(LineReader):
         if self.via is not None and kind != "circular":
             raise self.fault("a point on the way must be followed by the target of its arc")
         if name != self.section and name in self.sections:
-            raise self.fault(f"the rows of section {name!r} do not stand together")
+            raise self.fault(f"the rows of section {name!r} are not consecutive")
         self.section = name
         self.steps = self.sections.setdefault(name, [])
         empty = {
@@ -79,7 +79,7 @@ class _Reader(LineReader):
             "wait": rest,
         }[kind]
         if any(empty):
-            raise self.fault(f"a row of kind {kind} says too much: {max(empty)[:40]!r}")
+            raise self.fault(f"a row of kind {kind} must not have the value {max(empty)[:40]!r}")
         if kind == "via":
             self.via = self.target(target)[1]
             return

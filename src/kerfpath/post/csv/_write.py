@@ -35,13 +35,13 @@ POSE = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
 
 
 class CsvSettings(LanguageSettings):
-    """How long a table may be."""
+    """Settings of a table: its length."""
 
     lines_per_file: LinesPerFile = 1_000_000
 
 
 def rules(settings: CsvSettings) -> Rules:
-    """Return what programs must keep to: the digits of the table."""
+    """Return the rules of programs: the digits of the table."""
     return Rules(slowest=1e-6, speed_step=1e-6, point_step=0.5e-10, angle_step=1e-11)
 
 
@@ -66,7 +66,7 @@ def event(switch: Switch) -> str:
 
 
 class Csv(Formatter):
-    """Writes the one table."""
+    """Formatter of the one table."""
 
     settings: CsvSettings
 
@@ -98,7 +98,7 @@ class Csv(Formatter):
         yield self._row("circular", move, self._along(move))
 
     def wait(self, wait: Wait) -> Iterator[str]:
-        """Yield the row of a wait, which says only when it ends."""
+        """Yield the row of a wait, which only contains its end."""
         fields = self.program.robot.joints + len(POSE) + 4
         yield f"wait,{next(self._ends)}{',' * fields}"
 

@@ -29,4 +29,4 @@ FANUC = Language(
     externals=no_settings_needed,
     read=read,
 )
-"""What is registered."""
+"""The language as registered."""

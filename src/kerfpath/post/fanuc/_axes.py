@@ -1,11 +1,11 @@
-"""What a FANUC controller calls the joints, the configuration of a pose, and the frames.
+"""Axes of FANUC controllers, the configuration of a pose, and the frames.
 
-Axes: J2 is 0 with the lower arm upright and grows forwards; J3 is the height of the upper arm over
+Axes: J2 is 0 with the lower arm upright and grows forwards; J3 is the angle of the upper arm above
 the horizontal, whatever J2 is; J4, J5 and J6 are 0 with the tool straight ahead. All of them follow
-from the geometry of the arm, so that a robot from any description is turned into them.
+from the geometry of the arm, so that joints of any description can be converted.
 
 Configuration: F where J5 is above 0 (beyond half a turn, its sine), else N; D where the wrist
-centre lies behind the line of the lower arm, prolonged, else U; B where it lies behind axis 1, else
+centre lies behind the extended line of the lower arm, else U; B where it lies behind axis 1, else
 T; then the turns of three axes, 0 within 180 deg, 1 from 180 to 540 deg, -1 from -180 to -540 deg.
 
 The frames of the controller: its world has its origin on axis 1 at the height of axis 2; its
@@ -44,7 +44,7 @@ TURNING = {"J1 J4 J6": [0, 3, 5], "J4 J5 J6": [3, 4, 5]}
 
 
 def turns(robot: Robot, q: ArrayLike, settings: FanucSettings) -> Ints:
-    """Return the turns (K, 3) of the axes that the settings name, of joint vectors (K, n) rad."""
+    """Return the turns (K, 3) of the axes in the settings, for joint vectors q (K, n) rad."""
     axes_deg = np.degrees(axes_from_joints(robot, q))[:, TURNING[settings.turns]]
     axes_deg = np.round(axes_deg, NOISE_DECIMALS)
     return freeze((np.sign(axes_deg) * np.floor((np.abs(axes_deg) + 180) / 360)).astype(np.int64))
@@ -53,7 +53,7 @@ def turns(robot: Robot, q: ArrayLike, settings: FanucSettings) -> Ints:
 def posture(robot: Robot, q: Array, settings: FanucSettings) -> list[tuple[int | str, ...]]:
     """Return the configurations of joint vectors q (K, n) rad: three letters and three turns.
 
-    Shoulder and elbow as `wrist_in_plane` has them.
+    Shoulder and elbow follow from `wrist_in_plane`.
     """
     q = floats(q, "q", (None, robot.joints))
     ahead, bend = wrist_in_plane(robot, q)

@@ -1,4 +1,4 @@
-"""What only FANUC controllers cannot do, or do otherwise than planned."""
+"""Issues that only FANUC controllers have."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ LARGEST_CORNER = 1.0
 CORNER_STEP = 1e-3
 """Corner regions are written in whole numbers of this (m)."""
 CORNER_NOISE = 1e-6
-"""How far (m) a zone may be from them."""
+"""Largest difference (m) of a zone from a whole number of them."""
 FEWEST_TURNS, MOST_TURNS = -8, 7
-"""Turn numbers that a configuration is taken to hold."""
+"""Smallest and largest turn number that a configuration is assumed to hold."""
 
 
 def check(program: Program, settings: FanucSettings) -> Iterator[ProgramIssue]:
@@ -43,7 +43,7 @@ def check(program: Program, settings: FanucSettings) -> Iterator[ProgramIssue]:
     lines, most = len(Fanuc(program, settings).main()), settings.lines_per_file
     if lines > most:
         message = (
-            f"the main program would have {lines} lines, {most} are allowed; raise lines_per_file"
+            f"the main program would have {lines} lines, but lines_per_file allows {most}; raise it"
         )
         yield ProgramIssue("error", "file-length", message, "program")
     for section in program.sections:
@@ -70,25 +70,25 @@ def _check_times(section: Section) -> Iterator[ProgramIssue]:
                 yield from _check_early(before, stands, place)
         for time in times:
             if not_whole(time):
-                message = f"times are written in whole {TICK * 1e3:g} ms, got {time * 1e3:g} ms"
+                message = f"expected times in steps of {TICK * 1e3:g} ms, got {time * 1e3:g} ms"
                 yield ProgramIssue("error", "time-step", message, place)
         if isinstance(step, JointMove | LinearMove):
             stands = step.zone == 0
 
 
 def _check_early(before: tuple[Switch, ...], stands: bool, place: str) -> Iterator[ProgramIssue]:
-    """Check what is switched before a motion, as one TB on its line switches something else."""
+    """Check the switches before a motion, whose line has its one TB for another switch."""
     signals = " and ".join(switch.signal for switch in before)
     if not stands or any(switch.signal == "laser" for switch in before):
         message = (
-            f"the {signals} cannot be switched here: one TB stands on the line of a motion, and "
-            "before it the robot does not stand, or the laser would be on"
+            f"the {signals} cannot be switched here: the line of a motion has only one TB, and "
+            "before it the robot does not stop, or the laser would be on"
         )
         yield ProgramIssue("error", "two-switches", message, place)
     else:
         message = (
-            f"the {signals} is switched as the motion begins, earlier than planned: one TB stands "
-            "on the line of a motion"
+            f"the {signals} is switched when the motion begins, earlier than planned, because the "
+            "line of a motion has only one TB"
         )
         yield ProgramIssue("warning", "two-switches", message, place)
 
@@ -101,7 +101,7 @@ def _check_corners(section: Section) -> Iterator[ProgramIssue]:
         yield ProgramIssue(
             "error",
             "corner-region",
-            f"corner regions are written in whole mm up to {LARGEST_CORNER * 1e3:g}, got "
+            f"expected corner regions in whole mm up to {LARGEST_CORNER * 1e3:g}, got "
             f"{wrong[0] * 1e3:g} mm; change the zone, or write corners as CNT",
             section.name,
         )
@@ -114,7 +114,7 @@ def _check_speeds(section: Section, step: float) -> Iterator[ProgramIssue]:
         yield ProgramIssue(
             "warning",
             "speed-step",
-            f"speeds are written in whole {step * 1e3:.3g} mm/s, which changes "
+            f"speeds are written in steps of {step * 1e3:.3g} mm/s, which changes "
             f"{speeds[off.argmax()] * 1e3:g} mm/s by {off.max():.1%}",
             section.name,
         )

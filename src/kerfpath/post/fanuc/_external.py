@@ -1,10 +1,10 @@
 """External axes in FANUC listings: extended axes of group 1, and group 2 that carries the part.
 
-What carries the robot are extended axes of its group, E1 and on, integrated: X to Z are those of
-the tip in the world, wherever the robot stands. What carries the part are the joints of group 2,
-the leader, and COORD on a motion has the tip go straight against it. Positions stay in the user
-frame, which stands still: that of the part with all axes at 0. So they say where the tip is once
-the part has been moved, and each belongs to the values of group 2 beside it. The layout is that of
+Axes that carry the robot are integrated extended axes of its group, E1 and on: X to Z are those of
+the tip in the world, wherever the robot is. Axes that carry the part are the joints of group 2, the
+leader, and COORD on a motion moves the tip straight relative to the part. Positions are in the user
+frame, which is fixed: the part frame with all axes at 0. They therefore give the tip after the part
+has been moved, and each belongs to the values of group 2 beside it. The layout is that of
 controllers' own listings with extended axes and a second group.
 """
 
@@ -29,9 +29,9 @@ __all__ = [
 DECIMALS = 6
 _VALUE = r"= *-?\d*\.\d+ +(?:mm|deg)"
 EXTENDED = rf"((?:,\s*E\d{_VALUE})*)"
-"""Regular expression of the extended axes of a position, behind its last value."""
+"""Regular expression of the extended axes of a position, after its last value."""
 GROUP_2 = rf"(?:\n\s*GP2:\n\s*UF : (\d+), UT : (\d+),\s*(J\d{_VALUE}(?:,\s*J\d{_VALUE})*))?"
-"""That of its group 2: user frame, tool frame, values."""
+"""Regular expression of group 2 of a position: user frame, tool frame, values."""
 _SAID = re.compile(r"([EJ]\d)= *(-?\d*\.\d+) +(mm|deg)", re.ASCII)
 
 
@@ -41,18 +41,18 @@ def leads(robot: Robot) -> bool:
 
 
 def groups(robot: Robot) -> str:
-    """Return the motion groups of programs that move a robot, of five."""
+    """Return the motion groups, of five, in programs that move a robot."""
     return "1,1,*,*,*" if leads(robot) else "1,*,*,*,*"
 
 
 def _words(robot: Robot) -> dict[int, str]:
-    """Return what a position calls each external axis, by its number from 0."""
+    """Return the name of each external axis in positions, by its number from 0."""
     names = {i: f"E{k}" for k, i in enumerate(axes_that_carry(robot, "robot"), 1)}
     return names | {i: f"J{k}" for k, i in enumerate(axes_that_carry(robot, "part"), 1)}
 
 
 def _rows(robot: Robot, q: Array, letter: str) -> str:
-    """Return the values of the axes that are called by a letter, at joints q (n,)."""
+    """Return the values of the axes whose names begin with a letter, at joints q (n,)."""
     words, texts = _words(robot), []
     for i, value in enumerate(said(robot, q[None])[0]):
         if words[i][0] == letter:
@@ -72,12 +72,12 @@ def group_2_rows(robot: Robot, q: Array, frames: str) -> list[str]:
 
 
 def read_values(robot: Robot, extended: str, leading: str) -> Array:
-    """Return the values (E,) m and rad that a position says.
+    """Return the values (E,) m and rad in a position.
 
     Raises
     ------
     InputError
-        Other axes than the robot has, or in another unit: which.
+        The axes are not those of the robot, or have another unit; the message names one.
     """
     found = [*_SAID.findall(extended), *_SAID.findall(leading)]
     values = {word: (float(value), unit) for word, value, unit in found}
@@ -85,12 +85,12 @@ def read_values(robot: Robot, extended: str, leading: str) -> Array:
     if unknown := [word for word in values if word not in words.values()]:
         raise InputError(f"{unknown[0]}: the robot has no such external axis")
     if len(found) > len(values):
-        raise InputError("the position says an external axis twice")
+        raise InputError("the position gives an external axis twice")
     rows = []
     for i, word in sorted(words.items()):
         unit = "mm" if axes[i].kind == "linear" else "deg"
         if word not in values:
-            raise InputError(f"{word} is missing: the position says no value of {axes[i].name}")
+            raise InputError(f"{word} is missing: the position has no value for {axes[i].name}")
         if values[word][1] != unit:
             raise InputError(f"{word}: expected {unit}, got {values[word][1]}")
         rows.append(values[word][0])
@@ -98,7 +98,7 @@ def read_values(robot: Robot, extended: str, leading: str) -> Array:
 
 
 def remarks(robot: Robot) -> Iterator[str]:
-    """Yield what the controller has to have set up."""
+    """Yield remarks on what must be set up at the controller."""
     yield from setup_remarks(robot)
     for i, word in sorted(_words(robot).items()):
         where = "GP1, integrated" if word[0] == "E" else "GP2, the leader of GP1"

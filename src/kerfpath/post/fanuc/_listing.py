@@ -1,6 +1,6 @@
 """One listing of a FANUC controller: attributes, numbered lines, and what follows them.
 
-Attributes that controllers add when they list a program again are let pass.
+Attributes that controllers add when they list a program again are accepted.
 """
 
 from __future__ import annotations
@@ -72,15 +72,16 @@ class Listing(LineReader):
         self.required = [line.removesuffix(" ;").rstrip() for line in lines]
 
     def end(self) -> None:
-        """Read the end."""
+        """Read the end of the listing."""
         self.require_complete()
         if self.next_row() != "/END" or any(row for _, row in self.rows[self.line :]):
             raise self.fault(f"expected /END and nothing after it, got {self.text[:60]!r}")
 
     def require_frames(self, user: str, tool: str) -> None:
-        """Refuse frames of other numbers than those of the settings."""
+        """Refuse frames whose numbers are not those of the settings."""
         expected = [self.settings.user_frame, self.settings.tool_frame]
         if [int(user), int(tool)] != expected:
             raise self.fault(
-                f"user frame {user} and tool frame {tool}, expected {expected[0]} and {expected[1]}"
+                f"expected user frame {expected[0]} and tool frame {expected[1]}, got {user} and "
+                f"{tool}"
             )

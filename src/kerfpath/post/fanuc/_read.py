@@ -1,4 +1,4 @@
-"""Read back the listings that `Fanuc` writes; what it does not know, it refuses."""
+"""Read back the listings that `Fanuc` writes; anything else is refused."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ __all__ = ["read"]
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: FanucSettings) -> ReadProgram:
-    """Return the program that listings of ours say; see `kerfpath.post.Reader`."""
+    """Return the program in listings that `Fanuc` wrote; see `kerfpath.post.Reader`."""
     top = _Main(main, files[main], robot, settings)
     tool = faceplate(robot) @ top.frame("UTOOL")
     part = world(robot) @ top.frame("UFRAME")
@@ -60,7 +60,7 @@ def _time_early(
     steps: Sequence[ReadStep], early: Mapping[int, tuple[Switch, ...]], robot: Robot,
     part: Array, tool: Array,
 ) -> tuple[ReadStep, ...]:  # fmt: skip
-    """Return the steps with what is switched before a motion ahead of its end, by its line."""
+    """Return the steps; `early` switches get a lead before the end of the motion on their line."""
     found: list[ReadStep] = []
     start: Array | None = None
     for step in steps:
@@ -122,7 +122,7 @@ _POSITION = re.compile(
 
 
 class _Main(Listing):
-    """The main program: frames as remarks give them, and calls."""
+    """The main program: frames in remarks, and calls."""
 
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
         super().__init__(file, text, robot, settings)
@@ -133,7 +133,7 @@ class _Main(Listing):
         self.body(_MAIN)
         self.end()
         if self.resets != [line.strip(" ;") for line in switch_off_lines(settings)]:
-            raise self.fault("expected every output that is named to be reset once")
+            raise self.fault("expected one reset of every output that the settings name")
         for kind in ("UFRAME", "UTOOL"):
             if kind not in self.selected:
                 raise self.fault(f"{kind}_NUM is not set")
@@ -175,7 +175,7 @@ class _Main(Listing):
 
 
 class _Watching(Listing):
-    """The program that the background logic runs: exactly what switches off."""
+    """The program that the background logic runs, which only switches off."""
 
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
         super().__init__(file, text, robot, settings)
@@ -204,7 +204,7 @@ class _Section(Listing):
             raise self.fault("expected a motion, or the wait of a timeout, before the end")
         asked = [step.what for step in self.steps if isinstance(step, ReadHandshake)]
         if self.says_abort != any(isinstance(what, Await) for what in asked):
-            raise self.fault("a program that waits for inputs must say what it does without them")
+            raise self.fault("expected timeout lines if and only if the program waits for inputs")
         self.positions()
         self.end()
 
@@ -221,7 +221,7 @@ class _Section(Listing):
         self, speed: str, unit: str, fine: str | None, cnt: str | None, corner: str | None,
         wrist: str | None, coordinated: str | None, before: str,
     ) -> tuple[float, float | None, str]:  # fmt: skip
-        """Return speed (m/s), zone and what is switched, of the end of a line."""
+        """Return speed (m/s), zone and switches from the end of a line."""
         if (wrist is not None) != (self.settings.orientation == "wrist"):
             word = WRIST.strip()
             raise self.fault(f"expected no {word}" if wrist else f"expected {word}")
@@ -295,7 +295,7 @@ class _Section(Listing):
         while at < len(text) and last:
             match = _POSITION.match(text, at)
             if not match:
-                raise self.fault("no position of ours begins after this line")
+                raise self.fault("expected a position after this line")
             number, user, tool, *said, extended, user_2, tool_2, leading = match.groups()
             self.said_at[int(number)] = f"{self.file}, line {self.line + 1}"
             self.row += match[0].count("\n")
@@ -304,7 +304,7 @@ class _Section(Listing):
             self.require_frames(user_2 or user, tool_2 or tool)
             self.read_external(int(number), extended, leading or "")
             if int(number) in self.targets:
-                raise self.fault(f"P[{number}] is there twice")
+                raise self.fault(f"P[{number}] is given twice")
             self.targets[int(number)] = tuple(said)
             at = match.end()
 
@@ -315,7 +315,7 @@ class _Section(Listing):
             raise self.fault(f"P[{number}]: {error}") from None
 
     def completed(self, T_base_part: Array) -> list[ReadStep]:
-        """Return the steps with their targets, all of which are turned into SI units at once."""
+        """Return the steps with their targets in SI units."""
         values = np.array([_six(words) for words in self.targets.values()]).reshape(-1, 6)
         arm = joints_from_axes(self.robot, np.radians(values))
         external = np.array(list(self.externals.values())).reshape(len(arm), -1)
@@ -337,11 +337,11 @@ class _Section(Listing):
     def with_targets(
         self, move: ReadMove, q: Mapping[int, Array], poses: Mapping[int, Array]
     ) -> ReadMove:
-        """Return a move with its targets, of joints and poses by their numbers."""
+        """Return a move with its targets, from joints and poses by their numbers."""
         self.line, joint = move.line, move.kind == "joint"
         targets = self.named[move.line]
         if unknown := [n for n in targets if n not in self.targets]:
-            raise self.fault(f"P[{unknown[0]}] is not there")
+            raise self.fault(f"P[{unknown[0]}] is missing")
         if wrong := [n for n in targets if (self.targets[n][0] is None) != joint]:
             form = "J1 to J6" if joint else "X to R"
             raise self.fault(f"P[{wrong[0]}] must be given by {form}")

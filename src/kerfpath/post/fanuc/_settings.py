@@ -1,4 +1,4 @@
-"""What a FANUC controller can do and what it calls things."""
+"""Settings of a FANUC controller, and rules of its programs."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ __all__ = ["CORNER_MS", "FanucSettings", "is_reserved", "rules", "unit"]
 UNITS = {"cm/min": 0.01 / 60, "mm/sec": 1e-3}
 """Units of speeds in m/s; controllers count both in whole numbers."""
 CORNER_MS = 100.0
-"""How long before and after a corner CNT100 is taken to round it where nobody has said."""
+"""Time before and after a corner in which CNT100 is assumed to round it, if not given."""
 LONGEST_LEAD = 30.0
-"""s; the longest time of TB."""
+"""Longest time (s) of TB."""
 SPECIAL = re.compile(r"(RSR|PNS|STYLE)\d*|CON|PRN|AUX|NUL|(COM|LPT)\d", re.IGNORECASE)
-"""Programs that signals start by their name, and names that are devices where files are kept."""
+"""Names of programs that signals start, and names of devices on file systems."""
 WORDS = (
     "abort call do else end endfor endif for gi go if ir jmp lbl macro message monitor override "
     "p pause payload pl pr r resume_prog return ro rs run select skip sr stop then timer ualm "
     "uframe uframe_num utool utool_num wait"
 )
-"""Words of the language, where a contour may be named so."""
+"""Words of the language that a contour could have as its name."""
 
 Output = Annotated[int | None, numbered("a digital output", 4096)]
 Input = Annotated[int | None, numbered("a digital input", 4096)]
@@ -77,7 +77,7 @@ def unit(settings: FanucSettings) -> float:
 
 
 def rules(settings: FanucSettings) -> Rules:
-    """Return what TP programs must keep to."""
+    """Return the rules of TP programs."""
     half_digit = 0.5 * 10.0**-settings.decimals
     return Rules(
         longest_name=settings.longest_name,
@@ -98,8 +98,8 @@ def _controller(settings: FanucSettings) -> Controller:
         return Controller(orientation=settings.orientation)
     full = CORNER_MS if settings.corner_ms is None else settings.corner_ms
     assumed = (
-        f"CNT100 is taken to round from {CORNER_MS:g} ms before a corner to as long after it; "
-        "write corner_ms in [program.fanuc]"
+        f"CNT100 is assumed to round from {CORNER_MS:g} ms before a corner to {CORNER_MS:g} ms "
+        "after it; set corner_ms in [program.fanuc]"
     )
     return Controller(
         orientation=settings.orientation,

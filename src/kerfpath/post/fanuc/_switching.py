@@ -1,8 +1,8 @@
-"""What is switched on the way to the end of a motion, once the tip stands there, or before it.
+"""Switches before a motion, on the way to its end, and after the tip has stopped there.
 
-One TB stands on the line of a motion; controllers take no second one. What else is to be switched
-ahead of that end is switched before the motion, where the robot stands: gas comes as the tool sets
-out for the start of a contour.
+The line of a motion has one TB; controllers accept no second one. Other switches ahead of its end
+come before the motion, while the robot is stopped: for example gas, when the tool leaves for the
+start of a contour.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["Switching", "sayable", "split_switches", "time_before"]
 
 
 class Switching(NamedTuple):
-    """The switches of a move by the line that has them: before it, with TB, after it."""
+    """The switches of a move by their line: before it, on it with TB, after it."""
 
     before: tuple[Switch, ...]
     timed: tuple[Switch, ...]
@@ -29,7 +29,7 @@ class Switching(NamedTuple):
 
 
 def split_switches(move: LinearMove) -> Switching:
-    """Return which switches of a move stand where; of those ahead the last has the TB."""
+    """Return the switches of a move by their line; of those ahead, the last has the TB."""
     switches = move.switches
     after = 0
     while move.zone == 0 and after < len(switches) and switches[-1 - after].lead_time == 0:
@@ -40,12 +40,12 @@ def split_switches(move: LinearMove) -> Switching:
 
 
 def time_before(start: Array, end: Array, speed: float) -> float:
-    """Return how long (s) the tip is on its way between two poses (4, 4) m at a speed (m/s)."""
+    """Return how long (s) the tip moves between two poses (4, 4) m at a speed (m/s)."""
     return float(np.linalg.norm(end[:3, 3] - start[:3, 3])) / speed
 
 
 def sayable(program: Program, settings: FanucSettings) -> Program:
-    """Return the program with what is switched before a motion that long ahead of its end."""
+    """Return the program; switches before a motion get its duration as their lead time."""
     sections = tuple(
         replace(s, steps=tuple(_with_early_switches(program, s, settings)))
         for s in program.sections

@@ -2,8 +2,8 @@
 
 Units of TP: mm, deg, cm/min or mm/sec, per cent, seconds in hundredths. A listing is one program:
 attributes, numbered lines, and the positions that they name. TB on the line of a motion switches an
-output so long before the tip reaches its end; a line of its own after a motion that stops does so
-once the tip is there.
+output the given time before the tip reaches its end; a separate line after a motion that stops
+switches it once the tip is there.
 
 The layout is that of controllers' own listings: LeroyDu56/robconv, docs/fanuc_ls_format.md and
 tests/fixtures/fanuc/roboguide_export, JuniorNatalin/VASC (TB).
@@ -45,13 +45,13 @@ __all__ = [
 ANGLES: Final = "xyz"
 """W turns about x, then P about y, then R about z, all axes fixed."""
 WRIST = " Wjnt"
-"""Option of path motions: the wrist goes evenly from joints to joints."""
+"""Option of path motions: the wrist moves evenly in its joints."""
 NEW_LINE = "\r\n"
 PADDING = "    "
 REMARK = 32
 """Characters of a remark that every controller keeps."""
 NO_ANSWER = 1
-"""The label to which a wait for an input jumps when nobody answers."""
+"""The label to which a wait for an input jumps without an answer."""
 JOINT_WORDS = tuple((f"J{k}=", "deg") for k in range(1, 7))
 POSE_WORDS = tuple((f"{k} =", " mm") for k in "XYZ") + tuple((f"{k} =", "deg") for k in "WPR")
 ATTRIBUTES = """/ATTR
@@ -74,11 +74,11 @@ TCD:  STACK_SIZE\t= 0,
 DEFAULT_GROUP\t= {group};
 CONTROL_CODE\t= 00000000 00000000;
 """
-"""Controllers count sizes themselves; the date is that of the settings, so that bytes repeat."""
+"""Controllers count sizes themselves; the date comes from the settings, so that bytes repeat."""
 
 
 def selection_lines(settings: FanucSettings) -> list[str]:
-    """Return the lines that select the frames; each program has them, to be started alone."""
+    """Return the lines that select the frames; each program has them and can start alone."""
     return [f"  UFRAME_NUM={settings.user_frame} ;", f"  UTOOL_NUM={settings.tool_frame} ;"]
 
 
@@ -93,13 +93,13 @@ def abort_lines(settings: FanucSettings) -> list[str]:
 
 
 def watch_lines(settings: FanucSettings) -> list[str]:
-    """Return the lines that background logic runs: all is off wherever no program runs (UO[3])."""
+    """Return the lines that background logic runs: all is off while no program runs (UO[3])."""
     off = (f"  IF (!UO[3]),DO[{output}]=(OFF) ;" for output in outputs(settings))
     return ["  ! Run this as BG logic (SETUP) ;", *off]
 
 
 class Fanuc(CalledFormatter):
-    """Writes one listing for each section, and a main program that calls them."""
+    """Formatter of one listing for each section, and of a main program that calls them."""
 
     settings: FanucSettings
     too_long = "error"
@@ -145,18 +145,18 @@ class Fanuc(CalledFormatter):
             yield from abort_lines(self.settings)
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
-        """Yield a J motion; it knows no corner region."""
+        """Yield a J motion, which has no corner region."""
         end = "FINE" if move.zone == 0 else f"CNT{self.settings.cnt_percent}"
         yield f"J P[{next(self._target)}] {number(move.speed * 100, 0)}% {end}{PADDING};"
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
-        """Yield an L motion, what is switched before it, and what after it."""
+        """Yield an L motion with the switches before and after it."""
         yield from self._before(move)
         yield f"L P[{next(self._target)}] {self._path_end(move)}{PADDING};"
         yield from self._after(move)
 
     def circular_move(self, move: CircularMove) -> Iterator[str]:
-        """Yield a C motion, in two rows under one number, and what is switched after it."""
+        """Yield a C motion, in two rows under one number, with the switches before and after it."""
         yield from self._before(move)
         via, end = next(self._target), next(self._target)
         row = f"C P[{via}]{PADDING}{NEW_LINE}    :  P[{end}]"
@@ -168,7 +168,7 @@ class Fanuc(CalledFormatter):
         yield f"  WAIT {_seconds(wait.time)}(sec) ;"
 
     def request(self, request: Request) -> Iterator[str]:
-        """Yield an output; the robot stands."""
+        """Yield an output; the robot is stopped."""
         yield f"  DO[{self.port(request.partner, 'output')}]={'ON' if request.on else 'OFF'} ;"
 
     def wait_for(self, awaited: Await) -> Iterator[str]:
@@ -178,11 +178,11 @@ class Fanuc(CalledFormatter):
         yield f"  WAIT DI[{number}]=ON TIMEOUT,LBL[{NO_ANSWER}] ;"
 
     def comment(self, text: str) -> Iterator[str]:
-        """Yield remarks; a semicolon would end them, those of frames have no space."""
+        """Yield remarks; a semicolon would end them, and remarks with frames have no space."""
         yield from (f"  ! {line} ;" for line in self.wrap(text.replace(";", ",")))
 
     def _path_end(self, move: LinearMove) -> str:
-        """Say how fast a move is, how it ends, and what is switched on the way there."""
+        """Return the speed of a move, its end, and the switches on the way there."""
         settings = self.settings
         end = "FINE"
         if move.zone > 0 and settings.corner == "CNT":
@@ -244,7 +244,7 @@ class Fanuc(CalledFormatter):
 
 
 def _seconds(time: float) -> str:
-    """Return a time as controllers say it, without a zero before the point."""
+    """Return a time as controllers write it, without a zero before the point."""
     said = number(time, 2)
     return f"{said.removeprefix('0') if time >= 0.005 else said:>6}"
 
@@ -252,7 +252,7 @@ def _seconds(time: float) -> str:
 def _listing(
     name: str, lines: list[str], positions: list[str], settings: FanucSettings, group: str
 ) -> str:
-    """Return a program as a listing; that of no motion has the group "*" throughout."""
+    """Return a program as a listing; one without motions has "*" for all groups."""
     numbered = [f"{n:4d}:{line}" for n, line in enumerate(lines, 1)]
     day, time = settings.date.split(" ")
     head = ATTRIBUTES.format(count=len(lines), day=day, time=time, group=group).splitlines()

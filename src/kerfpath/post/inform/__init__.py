@@ -32,4 +32,4 @@ INFORM = Language(
     externals=missing,
     read=read,
 )
-"""What is registered."""
+"""The language as registered."""

@@ -1,4 +1,4 @@
-"""What INFORM says otherwise than planned, or not at all."""
+"""Issues that only INFORM has."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def check(program: Program, settings: InformSettings) -> Iterator[ProgramIssue]:
         yield ProgramIssue(
             "warning",
             "joint-targets",
-            "joint moves go to positions by their manipulator type (RCONF), not to pulses: give "
-            "pulses_per_deg, from the robot's parameters, or check each start at low speed",
+            "joint moves go to positions with a manipulator type (RCONF), not to pulses; give "
+            "pulses_per_deg from the robot's parameters, or check each start at low speed",
             "program",
         )
     for section in program.sections:
@@ -45,7 +45,7 @@ def _check_times(section: Section) -> Iterator[ProgramIssue]:
             yield ProgramIssue(
                 "error",
                 "time-step",
-                f"waits are written in whole {TICK * 1e3:g} ms, got {times[0] * 1e3:g} ms",
+                f"expected waits in steps of {TICK * 1e3:g} ms, got {times[0] * 1e3:g} ms",
                 f"{section.name}, step {number}",
             )
 
@@ -53,7 +53,7 @@ def _check_times(section: Section) -> Iterator[ProgramIssue]:
 def _check_turns(
     program: Program, section: Section, settings: InformSettings
 ) -> Iterator[ProgramIssue]:
-    """Check that the turns of R, T and S can be said where a position is no pulses."""
+    """Check that the turns of R, T and S can be expressed where a position is not in pulses."""
     if not section.moves or program.robot.externals:
         return
     q = np.array([move.q for move in section.moves])
@@ -66,7 +66,7 @@ def _check_turns(
                 yield ProgramIssue(
                     "error",
                     "turns",
-                    f"{name} = {axes_deg[k, i]:.1f} deg cannot be said by a position, only up to "
-                    f"{WHOLE_TURN_DEG:g} deg either way; bound the axis",
+                    f"{name} = {axes_deg[k, i]:.1f} deg cannot be expressed by a position, only up "
+                    f"to {WHOLE_TURN_DEG:g} deg either way; limit the axis",
                     f"{section.name}, move {k}",
                 )

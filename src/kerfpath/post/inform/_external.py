@@ -1,9 +1,9 @@
 """External axes in jobs: base axes that carry the robot, stations that carry the part, in pulses.
 
 With external axes every position is in pulses: those of the arm (C), of the base axes (BC, control
-group BS1 beside RB1) and of the station (EC, group ST1). A path against what a station carries is
-SMOVL, the robot following the station that +MOVJ moves beside it. Layout and groups are those of a
-DX200's own jobs (MQCIA/yaskawa-cadcam, reference cell with RECT-X and TURN-1).
+group BS1 beside RB1) and of the station (EC, group ST1). A path on a part that a station carries is
+SMOVL: the robot follows the station, which +MOVJ moves. Layout and groups are those of a DX200's
+own jobs (MQCIA/yaskawa-cadcam, reference cell with RECT-X and TURN-1).
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ _POSITION = re.compile(r"(BC|EC)(\d{5})=(-?\d+(?:,-?\d+)*)", re.ASCII)
 
 
 class ExternalPulses:
-    """The external axes of a robot as the lines of its jobs say them.
+    """The external axes of a robot in the lines of its jobs.
 
     Parameters
     ----------
     robot : Robot
     settings : InformSettings
-        With pulses for each axis; `missing` says before where they are not given.
+        Settings with pulses for each axis; `missing` reports before if they are not given.
     """
 
     def __init__(self, robot: Robot, settings: InformSettings) -> None:
@@ -46,14 +46,14 @@ class ExternalPulses:
         self.numbers = {
             word: axes_that_carry(robot, what) for word, what in (("BC", "robot"), ("EC", "part"))
         }
-        """The numbers, from 0, of the axes that positions of each kind say."""
+        """The numbers, from 0, of the axes in positions of each kind."""
 
     def kinds(self) -> list[str]:
-        """Return which kinds of positions there are beside those of the arm."""
+        """Return the kinds of positions beside those of the arm."""
         return [word for word, numbers in self.numbers.items() if numbers]
 
     def counts(self, count: int) -> str:
-        """Return the numbers of ///NPOS for so many positions."""
+        """Return the numbers of ///NPOS for `count` positions."""
         each = [count, *(count if self.numbers[word] else 0 for word in ("BC", "EC")), 0, 0, 0]
         return ",".join(map(str, each))
 
@@ -72,12 +72,12 @@ class ExternalPulses:
         ]
 
     def read(self, row: str, word: str, k: int, pulses: Array) -> None:
-        """Put what a row says as position k of a kind into pulses (E,) of the external axes.
+        """Read position k of a kind from a row into the pulses (E,) of the external axes.
 
         Raises
         ------
         InputError
-            Another position than `rows` writes there.
+            The row is not a position that `rows` writes there.
         """
         match, numbers = _POSITION.fullmatch(row), self.numbers[word]
         if match is None or (match[1], int(match[2])) != (word, k):
@@ -103,12 +103,12 @@ class ExternalPulses:
         return " ".join([word, target, *base, *rest, "+MOVJ", f"E{target}", *share])
 
     def plain(self, row: str) -> str:
-        """Return the line of a move without base axes and station; any other as it is.
+        """Return the line of a move without base axes and station; any other line unchanged.
 
         Raises
         ------
         InputError
-            A move that does not move what the robot has beside its arm, or more.
+            The move does not have exactly the external axes of the robot.
         """
         match = _MOVE.fullmatch(row)
         if match is None:
@@ -119,7 +119,7 @@ class ExternalPulses:
         return line
 
     def remarks(self) -> Iterator[str]:
-        """Yield what the controller has to have set up."""
+        """Yield remarks on what must be set up at the controller."""
         yield from setup_remarks(self.robot)
         for word, group in (("BC", "base axis"), ("EC", "axis of station ST1")):
             for number, i in enumerate(self.numbers[word], 1):
@@ -127,7 +127,7 @@ class ExternalPulses:
 
 
 def missing(robot: Robot, settings: InformSettings) -> Iterator[str]:
-    """Yield what is not known of a robot's external axes."""
+    """Yield what is missing in the settings for a robot's external axes."""
     names = ", ".join(axis.name for axis in robot.externals)
     if settings.pulses_per_deg is None:
         yield (

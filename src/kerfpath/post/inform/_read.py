@@ -1,4 +1,4 @@
-"""Read back the jobs that `Inform` writes, and nothing else: what it does not know, it refuses."""
+"""Read back the jobs that `Inform` writes; anything else is refused."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _JOB = patterns(
 def read(
     main: str, files: Mapping[str, str], robot: Robot, settings: InformSettings
 ) -> ReadProgram:
-    """Return the program that jobs of ours say; see `kerfpath.post.Reader`."""
+    """Return the program in jobs that `Inform` wrote; see `kerfpath.post.Reader`."""
     top = _Main(main, files[main], robot, settings)
     tool = faceplate(robot) @ top.frame(f"TOOL {settings.tool_number}")
     part = world(robot) @ top.frame(f"UFRAME {settings.user_frame}")
@@ -92,12 +92,12 @@ class _Text(LineReader):
         self.external = ExternalPulses(robot, settings)
 
     def require_rows(self, expected: Sequence[str]) -> None:
-        """Read rows that are known."""
+        """Require these rows to come next, and read them."""
         for line in expected:
             self.require_line(self.next_row(), line)
 
     def begin(self) -> int:
-        """Take the first lines; return how many positions the job is said to have."""
+        """Read the first lines; return the number of positions that they give."""
         *known, _ = head(self.name, "")
         self.require_rows(known)
         match = _COUNT.fullmatch(self.next_row())
@@ -133,7 +133,7 @@ class _Off(_Text):
 
 
 class _Main(_Text):
-    """The main job: frames as remarks give them, outputs, calls."""
+    """The main job: frames in remarks, and calls."""
 
     def __init__(self, file: str, text: str, robot: Robot, settings: InformSettings) -> None:
         super().__init__(file, text, robot, settings)
@@ -162,7 +162,7 @@ class _Main(_Text):
         """Return a frame (4, 4) m that remarks give."""
         values = [self.frames.get((name, word)) for word in FRAME_WORDS]
         if None in values:
-            raise self.fault(f"{name} is not given whole")
+            raise self.fault(f"{name} is not complete")
         return freeze(from_euler(np.array(values, dtype=np.float64), ANGLES)[0])
 
 
@@ -253,7 +253,7 @@ class _Job(_Text):
         )
 
     def joints_at(self, k: int) -> Array | None:
-        """Return the joints to which the type of a position leads."""
+        """Return the joints of position k by its type."""
         T_base_flange = self.T_base_part @ self.T[k] @ self.T_tip_flange
         return joints_at(self.robot, T_base_flange, self.types[k], self.settings.flip)
 
@@ -274,7 +274,7 @@ class _Job(_Text):
         self.move(kind, float(speed) * 1e-3, level, **said)
 
     def part(self, target: str, speed: str) -> None:
-        """Check a move to where the tip is already, which parts two arcs."""
+        """Check a move to where the tip is already, which separates two arcs."""
         self.require_here(self.pose(target)[0])
         self.arc_speed = speed
 
@@ -286,7 +286,7 @@ class _Job(_Text):
         if speed != self.arc_speed:
             raise self.fault(f"the speed of an arc changes from V={self.arc_speed} to V={speed}")
         if (level is None) != (len(self.arc_poses) < 2):
-            raise self.fault("an arc has its position level at the third MOVC")
+            raise self.fault("an arc must have a position level at its third MOVC only")
         self.arc_poses.append(T)
         if level is None:
             self.stands = False
@@ -308,7 +308,7 @@ class _Job(_Text):
         _, below = (*self.rows[self.line : self.line + 1], (0, ""))[0]
         said = re.match(r"WAIT IN#\((\d+)\)=ON T=(\d+\.\d\d)$", below)
         if said is None:
-            raise self.fault("expected the wait for an input behind the label")
+            raise self.fault("expected the wait for an input after the label")
         port, timeout = int(said[1]), float(said[2])
         self.required = wait_lines(int(label), port, timeout, self.settings)[1:]
         self.expect_answer(port, timeout)
@@ -318,7 +318,7 @@ class _Job(_Text):
             raise self.fault(f"{what} must follow a move with PL=0")
 
     def move(self, kind: MoveKind, speed: float, level: str, **said: Any) -> None:
-        """Add a move; a position level above 0 is no length."""
+        """Add a move; a position level above 0 has no length."""
         if self.arc_poses:
             raise self.fault("an arc needs three MOVC, one after the other")
         if level not in ("0", str(self.settings.position_level)):
@@ -339,6 +339,6 @@ class _Job(_Text):
 
     def number(self, target: str) -> int:
         if int(target) >= max(len(self.q), len(self.T)):
-            raise self.fault(f"C{target} is not there")
+            raise self.fault(f"C{target} is missing")
         self.target_at = self.said_at[int(target)]
         return int(target)

@@ -1,4 +1,4 @@
-"""What a person states of a Yaskawa controller, and what its jobs must keep to."""
+"""Settings of a Yaskawa controller, and rules of its jobs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from kerfpath.robots import MOST_EXTERNAL
 __all__ = ["LEVEL_MM", "InformSettings", "is_reserved", "rules"]
 
 LEVEL_MM = 12.5
-"""How far from a corner a position level is taken to round it where nobody has said."""
+"""Distance from a corner at which a position level is assumed to round it, if not given."""
 SPEED_STEP = 1e-4
 """Speeds (m/s) have one decimal of mm/s."""
 POINT_STEP = 0.5e-6
@@ -34,7 +34,7 @@ Input = Annotated[int | None, numbered("an input", 4096)]
 
 
 class InformSettings(PortSettings, output=Output, input=Input):
-    """Frames, outputs and the pulses of the very robot."""
+    """Frames, outputs, and the pulses of the individual robot."""
 
     lines_per_file: Annotated[
         int, setting("a whole number of lines from 100 to 9999", "9999", ge=100, le=9999)
@@ -87,7 +87,7 @@ class InformSettings(PortSettings, output=Output, input=Input):
 
 
 def rules(settings: InformSettings) -> Rules:
-    """Return what jobs must keep to."""
+    """Return the rules of jobs."""
     pulses = np.abs(settings.pulses_per_deg or [np.inf])
     external = np.abs(settings.external_pulses or [np.inf])
     return Rules(
@@ -106,7 +106,7 @@ def _controller(settings: InformSettings) -> Controller:
     """Return the controller: the length of a position level is one of its parameters."""
     level, length = settings.position_level, settings.position_level_mm
     assumed = (
-        f"PL={level} is taken to round from {LEVEL_MM:g} mm before a corner; write "
+        f"PL={level} is assumed to round from {LEVEL_MM:g} mm before a corner; set "
         f"position_level_mm in [program.inform], the controller's parameter S1CxG{32 + level:03d}"
     )
     return Controller(
@@ -117,5 +117,5 @@ def _controller(settings: InformSettings) -> Controller:
 
 
 def is_reserved(name: str) -> bool:
-    """Return whether a job cannot be called `name`: any may be; MASTER is the controller's own."""
+    """Return whether a job cannot be called `name`: only MASTER is the controller's own."""
     return name.upper() == "MASTER"

@@ -1,9 +1,9 @@
 """INFORM, the language of Yaskawa controllers, as jobs (.JBI): this module only formats.
 
-Units: mm, deg, mm/s, per cent of the joint speed, seconds. A job holds its positions, then its
-instructions. The main job has none of the first: a person finds the frames in it, which are the
-controller's, and calls the others. Each of them is of one kind: joint positions in pulses, or a
-relative job with positions in the user frame. Outputs are switched where the tip stands.
+Units: mm, deg, mm/s, per cent of the joint speed, seconds. A job contains its positions, then its
+instructions. The main job has no positions: it gives the frames to enter at the controller in
+remarks, and calls the other jobs. Each of them is of one kind: joint positions in pulses, or a
+relative job with positions in the user frame. Outputs are switched while the robot is stopped.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ __all__ = [
 ]  # fmt: skip
 
 ANGLES: Final = "xyz"
-"""RX, RY, RZ turn about x, y, z, one after the other, all fixed."""
+"""RX, RY, RZ turn about fixed x, y, z, one after the other."""
 SUFFIX = ".JBI"
 NEW_LINE = "\r\n"
 REMARK = 30
-"""Characters of a remark, which with its mark may have 32."""
+"""Characters of a remark, which may have 32 with its mark."""
 AROUND = 16
 """Lines of a job beside those of its steps."""
 POSE = "%.3f,%.3f,%.3f,%.4f,%.4f,%.4f"
@@ -63,7 +63,7 @@ FRAME_WORDS = ("X", "Y", "Z", "RX", "RY", "RZ")
 
 
 def head(name: str, counts: str) -> list[str]:
-    """Return the first lines of a job with so many positions of each kind."""
+    """Return the first lines of a job with the `counts` of positions of each kind."""
     return ["/JOB", f"//NAME {name}", "//POS", f"///NPOS {counts}"]
 
 
@@ -91,7 +91,7 @@ def switch_off_lines(settings: InformSettings) -> list[str]:
 def wait_lines(label: int, number: int, timeout: float, settings: InformSettings) -> list[str]:
     """Return the instructions that wait for an input.
 
-    After `timeout` (s) everything is off and the job pauses; started again it waits again.
+    After `timeout` (s) everything is off and the job pauses; when started again, it waits again.
     """
     return [
         f"*WAIT{label}",
@@ -105,7 +105,7 @@ def wait_lines(label: int, number: int, timeout: float, settings: InformSettings
 
 
 class Inform(CalledFormatter):
-    """Writes a main job, and one for the way to each contour and for its path."""
+    """Formatter of a main job, and of jobs for the way to each contour and for its path."""
 
     settings: InformSettings
     too_long = "error"
@@ -129,7 +129,7 @@ class Inform(CalledFormatter):
         if len(main) + AROUND > settings.lines_per_file:
             raise InputError(
                 f"program {program.name!r}: its main job would have {len(main) + AROUND} lines, "
-                f"lines_per_file allows {settings.lines_per_file}; raise it"
+                f"but lines_per_file allows {settings.lines_per_file}; raise it"
             )
         texts = {f"{program.name}{SUFFIX}": self._job(program.name, "main", [], main)}
         texts |= {f"{s.name}{SUFFIX}": self._section(s) for s in program.sections}
@@ -181,11 +181,11 @@ class Inform(CalledFormatter):
     def circular_move(self, move: CircularMove) -> Iterator[str]:
         """Yield the three MOVC of an arc and what is switched at its end.
 
-        A MOVL to where it begins, without a position level, parts it from an arc before it.
+        A MOVL to its start, without a position level, separates it from an arc before it.
         """
         before = self._before.get(move)
         if before is None:
-            raise InputError(f"program {self.program.name!r}: nothing is before an arc")
+            raise InputError(f"program {self.program.name!r}: expected a move before an arc")
         start = self._position(before.q, self.program.tips([before])[0])
         if isinstance(before, CircularMove):
             yield f"MOVL {start} {_speed(move)}"
@@ -199,7 +199,7 @@ class Inform(CalledFormatter):
         yield f"TIMER T={number(wait.time, 2)}"
 
     def request(self, request: Request) -> Iterator[str]:
-        """Yield a DOUT; the robot stands."""
+        """Yield a DOUT; the robot is stopped."""
         state = "ON" if request.on else "OFF"
         yield f"DOUT OT#({self.port(request.partner, 'output')}) {state}"
 
@@ -209,7 +209,7 @@ class Inform(CalledFormatter):
         yield from wait_lines(next(self._labels), port, awaited.timeout, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
-        """Yield remarks; those of frames have no space."""
+        """Yield remarks; remarks with frames have no space."""
         yield from (f"' {row}" for row in self.wrap(text))
 
     def _end(self, move: Move) -> str:
@@ -239,7 +239,7 @@ class Inform(CalledFormatter):
         return [*arm, *self._external.rows(q)]
 
     def _poses(self) -> list[str]:
-        """Return the lines of the positions so far, in the user frame, types where they change."""
+        """Return the lines of the positions so far in the user frame, types where they change."""
         if not self._targets:
             return []
         types = manipulator_type(
@@ -267,7 +267,7 @@ class Inform(CalledFormatter):
 def split_by_kind(program: Program) -> Program:
     """Return the program with joint moves in sections of their own.
 
-    Comments and waits stay with the move before them, at the start with the one behind.
+    Comments and waits stay with the move before them, or at the start with the move after them.
     """
     parts: list[Section] = []
     for section in program.sections:

@@ -29,4 +29,4 @@ KRL = Language(
     externals=missing,
     read=read,
 )
-"""What is registered."""
+"""The language as registered."""

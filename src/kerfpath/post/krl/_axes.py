@@ -1,11 +1,11 @@
-"""What a KUKA controller calls the joints: its axes, and Status and Turn of a pose.
+"""Axes of KUKA controllers, and Status and Turn of a pose.
 
-KUKA's axes 1, 4 and 6 turn positive against the right hand, and all axes are zero where the arm
-lies stretched ahead: the candle pose is A2 = -90 deg, A3 = 0. Library robots by KUKA say their
-joints so. From KUKA's manuals: bit 0 of the Status is set where the wrist centre lies behind axis 1
+KUKA's axes 1, 4 and 6 turn positive against the right-hand rule, and all axes are zero with the arm
+stretched ahead: the candle pose is A2 = -90 deg, A3 = 0. Library robots by KUKA count their joints
+this way. From KUKA's manuals: bit 0 of the Status is set where the wrist centre lies behind axis 1
 (x below zero in a frame that turns with it), bit 1 where A3 is not below the angle at which the arm
 is stretched (0 deg without an offset between axes 3 and 4), bit 2 where A5 is negative; bit n of
-the Turn where axis n + 1 is negative. What a manual says of bit 2 at A5 = 0 differs: here it is 0.
+the Turn where axis n + 1 is negative. Manuals differ on bit 2 at A5 = 0: here it is 0.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["axes_from_joints", "joints_from_axes", "posture", "status_and_turn"]
 
 SIGN = np.array([-1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
 COUNTED_FROM = (0.0, -90.0, 0.0, 0.0, 0.0, 0.0)
-"""KUKA's axes (deg) where the angles of the model are 0, before their senses."""
+"""KUKA's axes (deg) where the angles of the model are 0, before the signs."""
 COUNT = AxisCount(
     counted_from=COUNTED_FROM, matrix=np.diag(SIGN), shift=SIGN * np.radians(COUNTED_FROM)
 )
@@ -32,9 +32,9 @@ NOISE_DECIMALS = 6
 
 
 def status_and_turn(robot: Robot, q: ArrayLike) -> Ints:
-    """Return Status and Turn, (K, 2), of joint vectors q (K, n) rad.
+    """Return Status and Turn, (K, 2), for joint vectors q (K, n) rad.
 
-    An endless axis counts modulo 360 deg, from -180 deg on.
+    An endless axis is taken modulo 360 deg, from -180 deg on.
     """
     q = floats(q, "q", (None, robot.joints))
     arm = robot.arm()
@@ -51,5 +51,5 @@ def status_and_turn(robot: Robot, q: ArrayLike) -> Ints:
 
 
 def posture(robot: Robot, q: Array, settings: object) -> list[tuple[int | str, ...]]:
-    """Return `status_and_turn` of joint vectors q (K, n) rad, as tuples."""
+    """Return `status_and_turn` for joint vectors q (K, n) rad, as tuples."""
     return [tuple(row) for row in status_and_turn(robot, q).tolist()]

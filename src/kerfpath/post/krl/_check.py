@@ -1,4 +1,4 @@
-"""Issues that only KRL has: the controller's frames, turns that it cannot say, the short way."""
+"""Issues that only KRL has: the controller's frames, turns beyond Turn, the short way."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from kerfpath.robots import Robot
 __all__ = ["check"]
 
 HOME = np.radians([[0.0, -90.0, 90.0, 0.0, 0.0, 0.0]])
-"""Axes at which the lower arm stands upright and the rest points ahead."""
+"""Axes at which the lower arm is upright and the rest points ahead."""
 FLANGE = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """Orientation of the controller's flange there: z ahead, x down."""
 FRAME = 1e-6
-"""How far (m and sine) a description's frames may be from the controller's."""
+"""Largest difference (m and sine) of a description's frames from the controller's."""
 TURN_DEG = 360.0
-"""Turn has one bit for each axis: beyond this either way it cannot say where the axis is."""
+"""Largest axis value, either way, that Turn with its one bit for each axis can express."""
 HALF_TURN_DEG = 180.0 - 1e-3
-"""An endless axis that is to turn farther in one motion turns the other way."""
+"""An endless axis that should turn farther in one motion turns the other way."""
 
 
 def check(program: Program, settings: KrlSettings) -> Iterator[ProgramIssue]:
-    """Yield what KRL or a KUKA controller cannot say or do of a program."""
+    """Yield what KRL cannot express of a program, or a KUKA controller cannot do."""
     yield from _check_frames(program.robot)
     moves = program.moves
     places = [
@@ -40,12 +40,12 @@ def check(program: Program, settings: KrlSettings) -> Iterator[ProgramIssue]:
     beyond = (np.abs(axes_deg) > TURN_DEG) & ~program.robot.endless[:6]
     axes_deg = np.hstack([axes_deg, said(program.robot, q)])
     for k, i in np.argwhere(beyond).tolist():
-        message = f"A{i + 1} = {axes_deg[k, i]:.1f} deg cannot be said by Status and Turn"
-        fix = "only an endless axis may pass 360 deg: set endless, or bound the axis"
+        message = f"A{i + 1} = {axes_deg[k, i]:.1f} deg cannot be expressed by Status and Turn"
+        fix = "only an endless axis may pass 360 deg; set endless, or limit the axis"
         yield ProgramIssue("error", "turn", f"{message}; {fix}", places[k])
     for k, move in enumerate(moves):
         if isinstance(move, JointMove) and move.zone > 0:
-            message = "a joint move cannot round its corner by a length; give it no zone"
+            message = "a joint move cannot have a zone given as a length; give it no zone"
             yield ProgramIssue("error", "zone", message, places[k])
         if isinstance(move, JointMove) and k > 0:
             yield from _check_short_way(program, axes_deg[k] - axes_deg[k - 1], places[k])
@@ -62,8 +62,8 @@ def _check_frames(robot: Robot) -> Iterator[ProgramIssue]:
             "error",
             "frames",
             f"base or flange of {robot.id!r} are not the controller's: at A1 to A6 = 0, -90, 90, "
-            f"0, 0, 0 deg the flange must be at {np.round(point * 1e3, 3).tolist()} mm, z ahead "
-            "and x down; choose those links of the description",
+            f"0, 0, 0 deg the flange must be at {np.round(point * 1e3, 3).tolist()} mm, with z "
+            "ahead and x down; choose those links of the description",
             "program",
         )
 
@@ -71,7 +71,7 @@ def _check_frames(robot: Robot) -> Iterator[ProgramIssue]:
 def _check_short_way(program: Program, step_deg: Array, place: str) -> Iterator[ProgramIssue]:
     """Check the joint moves of endless axes, which turn by less than half a turn in a motion.
 
-    Where the way through the air has been checked, another one is an error.
+    Another way is an error if the transfer moves have been checked for collisions.
     """
     names = [*AXES, *(axis.name for axis in program.robot.externals)]
     for i in np.flatnonzero(program.robot.endless & (np.abs(step_deg) > HALF_TURN_DEG)).tolist():

@@ -1,4 +1,4 @@
-"""Read back the KRL that `Krl` writes, and nothing else: what it does not know, it refuses."""
+"""Read back the KRL that `Krl` writes; anything else is refused."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ _FIRST = re.compile(rf"INT {FIRST}=(\d+)", re.ASCII)
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: KrlSettings) -> ReadProgram:
-    """Return the program that .src and .dat files of ours say; see `kerfpath.post.Reader`."""
+    """Return the program in .src and .dat files that `Krl` wrote; see `kerfpath.post.Reader`."""
     first = _File(main, files, robot, settings, opening_lines(settings))
     begin = first.require_data([name for name in first.calls if name not in first.contours])
     sections: list[ReadSection] = []
@@ -148,12 +148,12 @@ class _File(LineReader):
 
     def admit(self, kind: str) -> None:
         if self.switches and kind not in {"linear", "circular", "trigger"}:
-            raise self.fault("a trigger must stand right before its motion")
+            raise self.fault("a trigger must come right before its motion")
 
     def require_data(self, others: list[str]) -> int:
         """Check that all routines are called and that the .dat declares exactly the other files.
 
-        Returns the contour at which the program begins, if it is the main file's.
+        Return the contour at which the program begins, if this is the main file.
         """
         self.line = 1
         if unknown := set(self.calls) ^ {*self.contours, *others}:
@@ -173,9 +173,9 @@ class _File(LineReader):
 
     def routine(self, name: str, passed: str) -> None:
         if self.head:
-            raise self.fault(f"expected {self.head[0]} before")
+            raise self.fault(f"expected {self.head[0]} before this line")
         if not self.routines and name != self.name:
-            raise self.fault(f"the first routine must be named as the file, {self.name}")
+            raise self.fault(f"the first routine must have the name of the file, {self.name}")
         if name in self.routines:
             raise self.fault(f"{name} is defined twice")
         if bool(passed) != (not self.is_main and not self.routines):
@@ -195,7 +195,7 @@ class _File(LineReader):
         if self.condition_open:
             raise self.fault("ENDIF is missing")
         if self.is_main and len(self.routines) == 1 and not self.begins_again:
-            raise self.fault(f"expected {FIRST}=1 before")
+            raise self.fault(f"expected {FIRST}=1 before this line")
         self.inside = False
 
     def again(self) -> None:
@@ -210,7 +210,7 @@ class _File(LineReader):
             or self.condition_open
             or variable != (FIRST if self.is_main else PASSED)
         ):
-            raise self.fault("a call must have one condition of its own")
+            raise self.fault("each call must have its own condition")
         self.condition_open, self.number = True, int(number)
 
     def call(self, name: str, passed: str) -> None:
@@ -244,11 +244,11 @@ class _File(LineReader):
 
     def require_opening(self) -> None:
         if self.opening:
-            raise self.fault(f"expected {self.opening[0]} before")
+            raise self.fault(f"expected {self.opening[0]} before this line")
         numbers = {"tool": self.settings.tool_number, "base": self.settings.base_number}
         for kind, n in numbers.items():
             if self.is_main and n is None and kind not in self.frames:
-                raise self.fault(f"expected ${kind.upper()} before")
+                raise self.fault(f"expected ${kind.upper()} before this line")
 
     def tool(self, *point: str) -> None:
         self.frame("tool", self.settings.tool_number, point)
@@ -261,14 +261,14 @@ class _File(LineReader):
     def coupled_base(self, root: str, kind: str, *point: str) -> None:
         if not coupled(self.robot) or {int(root), int(kind)} != {self.settings.machine_number}:
             expected = f"MACHINE_DEF[{self.settings.machine_number}]"
-            raise self.fault(f"expected a base that moves with {expected}, if anything does")
+            raise self.fault(f"expected a base that moves with {expected}, or a fixed one")
         self.frame("base", self.settings.base_number, point)
         frame = carrier_frame(self.robot, self.settings.positioner_frame)
         self.frames["base"] = freeze(np.asarray(frame @ self.frames["base"]))
 
     def frame(self, kind: str, numbered: int | None, point: Sequence[str]) -> None:
         if numbered is not None or kind in self.frames:
-            raise self.fault(f"another {kind}")
+            raise self.fault(f"expected no {kind} here: it is given before, or by its number")
         self.frames[kind] = self.pose(point)
 
     def share(self, percent: str) -> None:
@@ -285,7 +285,7 @@ class _File(LineReader):
 
     def trigger(self, delay_ms: str, output: str, state: str) -> None:
         if int(delay_ms) > 0:
-            raise self.fault("a trigger must not come after its place")
+            raise self.fault("a trigger must not have a positive DELAY")
         self.held_at.setdefault("switches", self.place)
         lead = -int(delay_ms) * 1e-3
         switch = Switch(signal=self.signal(int(output)), on=state == "TRUE", lead_time=lead)
@@ -335,7 +335,7 @@ class _File(LineReader):
         return freeze(from_euler([float(str(field)) for field in fields], ANGLES)[0])
 
     def elsewhere(self, *whats: str) -> dict[str, str]:
-        """Return where what holds for a motion has been set."""
+        """Return file and line where the values that hold for a motion were set."""
         return {what: self.held_at[what] for what in whats if what in self.held_at}
 
     def holds(self, what: str, word: str) -> float:

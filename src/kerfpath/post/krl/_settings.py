@@ -1,4 +1,4 @@
-"""What a person states of a KUKA controller, and what its programs must keep to."""
+"""Settings of a KUKA controller, and rules of its programs."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
 LONGEST_NAME = 24
 """Characters of a name."""
 SLOWEST = 1e-5
-"""Lowest speed (m/s) that is written to within a tenth."""
+"""Lowest speed (m/s) that is written with an error of a tenth at most."""
 POINT_STEP, ANGLE_STEP = 0.5e-7, float(np.radians(0.5e-6))
-"""What four decimals of mm leave of positions (m), and six of deg of angles (rad)."""
+"""Rounding errors of four decimals of mm (m), and of six decimals of deg (rad)."""
 SPEED_STEP = 1e-6
 """Speeds have six decimals of m/s."""
 LONGEST_LEAD = 10.0
-"""The longest lead (s) of a trigger that is no mistake in its unit; KUKA's bound is 10000 s."""
+"""Longest lead (s) of a trigger; longer is a mistake in its unit (KUKA's bound is 10000 s)."""
 
 KEYWORDS = (
     "and anin anout asyptp asycancel b_and b_exor b_not b_or bool brake c_dis c_ori c_ptp c_spl "
@@ -51,7 +51,7 @@ MEANINGS = (
     "on_error_proceed cwrite copen cclose sread swrite forward inverse strlen strclear stradd "
     "strcomp strcopy strfind strtofrm timer flag msgnotify msgquit msgdialog"
 )
-"""Types, functions, data and programs that a controller has, where a contour may be named so."""
+"""Types, functions, data and programs of a controller that a contour could have as its name."""
 RESERVED = frozenset((KEYWORDS + " " + MEANINGS).split())
 
 Output = Annotated[int | None, numbered("a digital output", 8192)]
@@ -65,7 +65,7 @@ Numbers = Annotated[
 
 
 class KrlSettings(PortSettings, output=Output, input=Input):
-    """Which outputs, tool and base, and what the machine data allow."""
+    """Outputs, inputs, tool and base, and limits of the machine data."""
 
     lines_per_file: LinesPerFile = 1400
     tool_number: Annotated[
@@ -89,7 +89,7 @@ class KrlSettings(PortSettings, output=Output, input=Input):
 
 
 def rules(settings: KrlSettings) -> Rules:
-    """Return what KRL programs must keep to."""
+    """Return the rules of KRL programs."""
     return Rules(
         longest_name=LONGEST_NAME,
         slowest=SLOWEST,

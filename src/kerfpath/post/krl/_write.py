@@ -1,11 +1,11 @@
 """KRL, the language of KUKA controllers: this module only formats.
 
 Units of KRL: mm, deg, m/s, seconds, and milliseconds in triggers; A, B, C turn about Z, the new Y,
-the new X. What holds until it is changed (speed, corner radius) is written where it changes, and at
-the start of each routine. ``TRIGGER WHEN PATH=0 DELAY=-ms`` switches an output so long before the
-end of the linear or circular motion that follows it, or before the point of a rounded corner that
-is nearest to that end (KUKA's mxAutomation manual, KRC_SetPathTrigger); a plain assignment of an
-output would stop the advance run and with it the blending.
+the new X. Speed and corner radius hold until they are changed; they are written where they change,
+and at the start of each routine. ``TRIGGER WHEN PATH=0 DELAY=-ms`` switches an output that long
+before the end of the linear or circular motion that follows it, or before the point of a rounded
+corner that is nearest to that end (KUKA's mxAutomation manual, KRC_SetPathTrigger); a plain
+assignment of an output would stop the advance run and with it the blending.
 """
 
 from __future__ import annotations
@@ -63,18 +63,18 @@ LINES_OF_A_FILE = 5
 FIRST = "first_contour"
 """Number of the contour at which the program begins, for a restart; in the .dat."""
 PASSED = "first"
-"""The same, as a file that is called takes it."""
+"""The same number, as the parameter of a called file."""
 SWITCH_OFF = "switch_off"
 """The routine that switches everything off."""
 INTERRUPT = 20
 TIMER = 20
-"""The interrupt and the timer that are used; KUKA's own programs take others."""
+"""The interrupt and the timer that are used; KUKA's own programs use others."""
 ANGLES: Final = "ZYX"
 """A, B, C turn about Z, the new Y, the new X."""
 
 
 def opening_lines(settings: KrlSettings) -> list[str]:
-    """Return the statements that a main routine makes before it calls others, except for frames."""
+    """Return the statements of a main routine before it calls others, except for frames."""
     turning_deg_s = number(settings.turning_speed_deg_s, 1)
     numbered = (("TOOL", settings.tool_number), ("BASE", settings.base_number))
     return [
@@ -98,7 +98,7 @@ def switch_off_lines(settings: KrlSettings) -> list[str]:
 
 
 def wait_lines(number: int, timeout: float, settings: KrlSettings) -> list[str]:
-    """Return the lines that wait for an input; after `timeout` (s) all is off until it comes."""
+    """Return the lines that wait for an input; after `timeout` (s) all is off until it is on."""
     return [
         f"$TIMER[{TIMER}]={-round(timeout * 1e3)}",
         f"$TIMER_STOP[{TIMER}]=FALSE",
@@ -117,9 +117,9 @@ def call_lines(first: str, number: int, call: str) -> list[str]:
 
 
 def data_list(name: str, called: Sequence[str], first: int | None = None) -> list[str]:
-    """Return the lines of the .dat of a file that calls others: it declares what is not in it.
+    """Return the lines of the .dat of a file that calls others: it declares the other files.
 
-    That of the main file says at which contour the program begins.
+    The .dat of the main file contains the number of the contour at which the program begins.
     """
     calls = (f"EXT {other}(INT :IN)" for other in called)
     begin = [] if first is None else [f"INT {FIRST}={first}"]
@@ -144,7 +144,7 @@ class _File:
 
 
 class Krl(Formatter):
-    """Writes a main .src with a routine for each section, and more files where it is too long."""
+    """Formatter of a main .src with a routine for each section, and of more files if too long."""
 
     settings: KrlSettings
     around = 6  # DEF, END, the empty line before them, the call with its condition
@@ -183,7 +183,7 @@ class Krl(Formatter):
         ]
 
     def lines(self, section: Section) -> Iterator[str]:
-        """Yield the lines of a section, which takes nothing over from the one before."""
+        """Yield the lines of a section, which uses no values from the one before."""
         self._held.clear()
         yield from super().lines(section)
 
@@ -205,7 +205,7 @@ class Krl(Formatter):
         yield f"WAIT SEC {number(wait.time, 3)}"
 
     def request(self, request: Request) -> Iterator[str]:
-        """Yield an assignment; the robot stands."""
+        """Yield an assignment; the robot is stopped."""
         state = "TRUE" if request.on else "FALSE"
         yield f"$OUT[{self.port(request.partner, 'output')}]={state}"
 
@@ -214,7 +214,7 @@ class Krl(Formatter):
         yield from wait_lines(self.port(awaited.partner, "input"), awaited.timeout, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
-        """Yield a comment; a bar keeps one that says FOLD from folding the program."""
+        """Yield a comment; a bar keeps the word FOLD in it from folding the program."""
         yield f"; | {text}"
 
     def _path_move(self, word: str, move: LinearMove) -> Iterator[str]:
@@ -228,13 +228,13 @@ class Krl(Formatter):
         yield f"{word} {self._target[move]}{' C_DIS' if move.zone > 0 else ''}"
 
     def _hold(self, what: str, line: str) -> Iterator[str]:
-        """Yield a line that sets what holds from there on, where it changes that."""
+        """Yield a line that sets a value from there on, if the value changes."""
         if self._held.get(what) != line:
             self._held[what] = line
             yield line
 
     def _in_one_file(self) -> list[_File]:
-        """Return the program as one file; nothing where that is too long."""
+        """Return the program as one file; nothing if it is too long."""
         sections = self.program.sections
         routines = {section.name: list(self.lines(section)) for section in sections}
         calls = (call_lines(FIRST, n, f"{name}()") for n, name in enumerate(routines, 1))
@@ -243,7 +243,7 @@ class Krl(Formatter):
         return [file] if fits and len(sections) <= MOST_ROUTINES else []
 
     def _in_more_files(self) -> list[_File]:
-        """Return a main program and the files it calls between contours, the beam off."""
+        """Return a main program and the files it calls between contours, with the beam off."""
         room = self.settings.lines_per_file - LINES_OF_A_FILE
         share = -(-room // MOST_ROUTINES)
         counts = [max(count, share) for count in self.lengths().values()]

@@ -26,4 +26,4 @@ RAPID = Language(
     externals=missing,
     read=read,
 )
-"""What is registered."""
+"""The language as registered."""

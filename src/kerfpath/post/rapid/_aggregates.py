@@ -1,4 +1,4 @@
-"""Numbers in brackets, as RAPID writes them, with the place where they stand."""
+"""Read RAPID aggregates: values in brackets."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Aggregates"]
 
 
 class Aggregates(LineReader):
-    """Reads aggregates on the lines of a file."""
+    """Reader of aggregates on the lines of a file."""
 
     def values(self, text: str, count: int) -> list[Any]:
         """Return the `count` parts of an aggregate; RAPID writes it almost as JSON does."""
@@ -28,7 +28,7 @@ class Aggregates(LineReader):
         return values
 
     def numbers(self, values: Any, count: int) -> Array:
-        """Return a list of so many numbers as an array."""
+        """Return a list of `count` numbers as an array."""
         is_list = isinstance(values, list) and len(values) == count
         if not is_list or any(type(value) not in (int, float) for value in values):
             raise self.fault(f"expected {count} numbers, got {values!r}")

@@ -1,12 +1,12 @@
-"""What an ABB controller calls the joints: its axes, and the configuration (confdata) of a pose.
+"""Axes of ABB controllers, and the configuration (confdata) of a pose.
 
 From ABB's manuals: cf1, cf4 and cf6 are the quarter turns of axes 1, 4 and 6, 0 for 0 to 90 deg,
 -1 for -90 to 0 deg, unbounded both ways; cfx numbers the eight postures of a bending-backwards arm
 by three bits: 4 = wrist centre behind axis 1, 2 = wrist centre behind the lower arm, 1 = axis 5
-negative. Our reading of "behind": 4 where the wrist centre lies on the far side of axis 1 as the
-arm faces, 2 where it lies behind the line from axis 2 through axis 3, prolonged. That bit therefore
-turns over at the stretched arm, where the elbow is singular. So it does at 28 positions of an
-IRB 6700 that others had RobotStudio compute (tests/post/test_measured.py).
+negative. We read "behind" as follows: 4 where the wrist centre lies on the side of axis 1 away from
+which the arm faces, 2 where it lies behind the extended line from axis 2 through axis 3. That bit
+therefore changes at the stretched arm, where the elbow is singular. RobotStudio agrees at 28
+positions of an IRB 6700, which others published (tests/post/test_measured.py).
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from kerfpath.robots import Robot
 __all__ = ["axes_from_joints", "confdata", "joints_from_axes", "posture"]
 
 UPRIGHT = (0.0, 0.0, -90.0, 0.0, 0.0, 0.0)
-"""ABB's axes (deg) where the angles of the model are 0, the arm upright."""
+"""ABB's axes (deg) where the angles of the model are 0, with the arm upright."""
 ROD = np.eye(6) + np.outer(np.eye(6)[2], np.eye(6)[1])
-"""With a parallel rod axis 3 is joint 2 + joint 3."""
+"""With a parallel rod, axis 3 is joint 2 + joint 3."""
 SERIAL = AxisCount(counted_from=UPRIGHT, shift=np.radians(UPRIGHT))
 HORIZONTAL = replace(SERIAL, matrix=ROD)
 NOISE_DECIMALS = 6
-"""Angles are rounded to this many decimals (deg) before a quadrant: -1e-15 deg is zero."""
+"""Angles are rounded to this many decimals (deg) before their quadrant: -1e-15 deg is zero."""
 
 
 def axes_from_joints(robot: Robot, q: ArrayLike) -> Array:
-    """Return the controller's axes (K, 6) rad of the arm, of joint vectors q (K, n) rad.
+    """Return the controller's axes (K, 6) rad of the arm for joint vectors q (K, n) rad.
 
-    With a parallel rod (IRB 2400, IRB 4400: `Robot.axis_3` is "horizontal") axis 3 is joint 2 +
-    joint 3. Descriptions that count joints otherwise than ABB are converted by the arm's model.
+    With a parallel rod (IRB 2400, IRB 4400: `Robot.axis_3` is "horizontal"), axis 3 is joint 2 +
+    joint 3. Descriptions that count joints differently from ABB are converted by the arm's model.
     """
     return _count(robot).from_joints(robot, q)
 
 
 def joints_from_axes(robot: Robot, axes: ArrayLike) -> Array:
-    """Return the joints (K, 6) rad of the arm at a controller's axes (K, 6) rad."""
+    """Return the joints (K, 6) rad of the arm for the controller's axes (K, 6) rad."""
     return _count(robot).to_joints(robot, axes)
 
 
@@ -51,9 +51,9 @@ def _count(robot: Robot) -> AxisCount:
 
 
 def confdata(robot: Robot, q: ArrayLike) -> Ints:
-    """Return cf1, cf4, cf6 and cfx, (K, 4), of joint vectors q (K, n) rad.
+    """Return cf1, cf4, cf6 and cfx, (K, 4), for joint vectors q (K, n) rad.
 
-    See the module's text for what is ABB's and what is our reading.
+    The docstring of the module says what is from ABB's manuals and what is our reading.
     """
     q = floats(q, "q", (None, robot.joints))
     ahead, bend = wrist_in_plane(robot, q)
@@ -65,5 +65,5 @@ def confdata(robot: Robot, q: ArrayLike) -> Ints:
 
 
 def posture(robot: Robot, q: Array, settings: object) -> list[tuple[int | str, ...]]:
-    """Return `confdata` of joint vectors q (K, n) rad, as tuples."""
+    """Return `confdata` for joint vectors q (K, n) rad, as tuples."""
     return [tuple(row) for row in confdata(robot, q).tolist()]

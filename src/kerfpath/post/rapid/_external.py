@@ -1,10 +1,10 @@
-"""External axes in RAPID: their letters, their mechanical units, and how fast they are.
+"""External axes in RAPID: their letters, mechanical units and speeds.
 
-A target says each external axis by a letter, eax_a to eax_f, in mm or deg; 9E9 where there is none.
-A unit that carries the part moves the user frame of the work object that names it (wobjdata: ufprog
-FALSE, ufmec); where that frame stands is the unit's own calibration, and the object frame is the
-part in it. A track moves the robot's base, of which the controller knows by its own definition; the
-work object of what stands still is in the world.
+A target gives each external axis under a letter, eax_a to eax_f, in mm or deg; 9E9 means no axis. A
+unit that carries the part moves the user frame of the work object that names it (wobjdata: ufprog
+FALSE, ufmec). The calibration of the unit defines that frame, and the object frame is the part in
+it. A track moves the base of the robot, which the controller knows from its own configuration; a
+fixed work object is in the world.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ __all__ = ["NO_EXTERNAL", "ExternalSpeeds", "ExternalUnits", "missing"]
 LETTERS = "abcdef"
 NONE = "9E9"
 ABSENT = 9e9
-"""What stands for an axis that is not there."""
+"""Value for an axis that does not exist."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,9 +42,9 @@ class ExternalSpeeds:
     Parameters
     ----------
     linear_mm_s, rotary_deg_s : float
-        At full speed.
+        Speeds of linear and rotary axes at full speed.
     shared : bool
-        Whether joint moves that take a share of the full speed take it of these, too.
+        Whether joint moves at a share of the full speed also take that share of these speeds.
     """
 
     linear_mm_s: float = 5000.0
@@ -54,13 +54,13 @@ class ExternalSpeeds:
     __repr__ = short_repr
 
     def said(self, share: float) -> str:
-        """Return both at a share of the full speed."""
+        """Return both speeds as text, at a share of the full speed."""
         share = share if self.shared else 1.0
         return f"{number(share * self.linear_mm_s, 0)},{number(share * self.rotary_deg_s, 0)}"
 
 
 NO_EXTERNAL = ExternalSpeeds()
-"""Of an arm alone: speed data must say something."""
+"""Speeds for an arm alone, because speed data must contain some."""
 
 
 class ExternalUnits:
@@ -70,7 +70,7 @@ class ExternalUnits:
     ----------
     robot : Robot
     settings : RapidSettings
-        Which name a unit for every axis, and letters; `check` says before where they do not.
+        Names of a unit and letters for every axis; `missing` reports before if they lack.
     """
 
     def __init__(self, robot: Robot, settings: RapidSettings) -> None:
@@ -81,7 +81,7 @@ class ExternalUnits:
         self.letters = (settings.external_letters or LETTERS)[:count]
         carrying = [self.units[i] for i in axes_that_carry(robot, "part") if i < len(self.units)]
         self.coupled = carrying[0] if carrying else ""
-        """The unit that carries the part; empty where none does."""
+        """The unit that carries the part; empty if none does."""
 
     @property
     def speeds(self) -> ExternalSpeeds:
@@ -103,7 +103,7 @@ class ExternalUnits:
         )
 
     def values(self, q: Array) -> list[str]:
-        """Return what targets say of the axes at joint vectors q (K, n)."""
+        """Return the text of the external axes in targets at joint vectors q (K, n)."""
         texts = []
         for row in said(self.robot, q).tolist():
             values = dict(zip(self.letters, row, strict=True))
@@ -112,19 +112,19 @@ class ExternalUnits:
         return texts
 
     def read(self, values: Sequence[float]) -> Array | str:
-        """Return the values (E,) m and rad that a target says, or why it says none."""
+        """Return the values (E,) m and rad in a target, or what is wrong with them."""
         axes = self.robot.externals
         names = {c: axis.name for c, axis in zip(self.letters, axes, strict=True)}
         for letter, value in zip(LETTERS, values, strict=True):
             if letter in names and value == ABSENT:
-                return f"eax_{letter} says no value of {names[letter]}"
+                return f"eax_{letter} has no value for {names[letter]}"
             if letter not in names and value != ABSENT:
-                return f"eax_{letter} = {value:g}: no external axes are there, expected {NONE}"
+                return f"eax_{letter} = {value:g}: the robot has no such axis, expected {NONE}"
         said_values = [values[LETTERS.index(letter)] for letter in self.letters]
         return from_said(self.robot, said_values) if axes else freeze(np.zeros(0))
 
     def activated(self) -> list[str]:
-        """Return the lines that activate every unit; the robot stands."""
+        """Return the lines that activate every unit; the robot is stopped."""
         return [f"ActUnit {unit};" for unit in dict.fromkeys(self.units)]
 
     def deactivated(self) -> list[str]:
@@ -132,7 +132,7 @@ class ExternalUnits:
         return [f"DeactUnit {self.coupled};"] if self.coupled else []
 
     def remarks(self) -> Iterator[str]:
-        """Yield what the controller has to have set up."""
+        """Yield remarks on what must be set up at the controller."""
         yield from map(plain, setup_remarks(self.robot))
         for axis, unit, letter in zip(self.robot.externals, self.units, self.letters, strict=True):
             yield f"{plain(axis.name)} is eax_{letter}, of the mechanical unit {unit}."
@@ -141,7 +141,7 @@ class ExternalUnits:
 
 
 def missing(robot: Robot, settings: RapidSettings) -> Iterator[str]:
-    """Yield what is not known of a robot's external axes, or cannot be said of them."""
+    """Yield what is missing or wrong in the settings for a robot's external axes."""
     count, letters = len(robot.externals), settings.external_letters
     names = ", ".join(axis.name for axis in robot.externals)
     for key, values, what in (
@@ -150,7 +150,7 @@ def missing(robot: Robot, settings: RapidSettings) -> Iterator[str]:
     ):
         if len(values) != count:
             yield (
-                f"expected a {what} for each external axis ({names}), got {len(values)}; say which "
+                f"expected a {what} for each external axis ({names}), got {len(values)}; name them "
                 f"with {key} in [program.rapid]"
             )
     if len(set(letters or "")) < len(letters or ""):
@@ -159,8 +159,8 @@ def missing(robot: Robot, settings: RapidSettings) -> Iterator[str]:
     carry = {what: {u for u, axis in units if axis.carries == what} for what in ("part", "robot")}
     if len(carry["part"]) > 1:
         yield (
-            f"the part is carried by {' and '.join(sorted(carry['part']))}; a work object is "
-            "coordinated with one mechanical unit"
+            f"the part is carried by {' and '.join(sorted(carry['part']))}; a work object can be "
+            "coordinated with one mechanical unit only"
         )
     for unit in sorted(carry["part"] & carry["robot"]):
         yield f"the mechanical unit {unit} cannot carry both robot and part; name two"

@@ -1,4 +1,4 @@
-"""The lines of RAPID that are read, by their kind, and where each kind may stand."""
+"""Patterns of the RAPID lines that are read, by their kind, and where each kind may occur."""
 
 from __future__ import annotations
 

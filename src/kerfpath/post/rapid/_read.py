@@ -1,4 +1,4 @@
-r"""Read back the RAPID that `Rapid` writes, and nothing else: what it does not know, it refuses."""
+r"""Read back the RAPID that `Rapid` writes; anything else is refused."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _T = TypeVar("_T")
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSettings) -> ReadProgram:
-    """Return the program that a RAPID module of ours says; see `kerfpath.post.Reader`."""
+    """Return the program in a RAPID module that `Rapid` wrote; see `kerfpath.post.Reader`."""
     reader = _Reader(main, files, robot, settings)
     reader.read_module(main)
     for file in dict.fromkeys(reader.called_in.values()):
@@ -47,7 +47,7 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: RapidSetti
 
 
 class _Reader(Aggregates):
-    """Reads modules line by line."""
+    """Reader of modules, line by line."""
 
     settings: RapidSettings
 
@@ -111,7 +111,7 @@ class _Reader(Aggregates):
             raise self.fault(f"main and routines do not match: {names}")
         if self.active != [*self.units.activated(), *self.units.deactivated()]:
             expected = " ".join([*self.units.activated(), *self.units.deactivated()]) or "none"
-            raise self.fault(f"mechanical units are not activated as they should be: {expected}")
+            raise self.fault(f"expected these lines for the mechanical units: {expected}")
         if not 1 <= self.first_number <= len(self.called_in):
             raise self.fault(f"{FIRST} must be the number of a contour")
         return ReadProgram(
@@ -142,7 +142,7 @@ class _Reader(Aggregates):
         coupled = self.units.coupled
         if coupled:
             if [held, fixed, unit] != [False, False, coupled] or pose != here:
-                raise self.fault(f"expected a work object that {coupled} moves, without user frame")
+                raise self.fault(f"expected a work object moved by {coupled}, without user frame")
             frame = carrier_frame(self.robot, self.settings.positioner_frame)
             self.declare("work_object", name, frame @ self.pose(inner))
             return
@@ -152,7 +152,7 @@ class _Reader(Aggregates):
 
     def declare(self, kind: str, name: str, T: Array) -> None:
         if kind in self.frames:
-            raise self.fault(f"a second {kind.replace('_', ' ')}")
+            raise self.fault(f"a second {kind.replace('_', ' ')} is declared")
         self.frames[kind] = (name, T)
 
     def speed(self, name: str, text: str) -> None:
@@ -163,7 +163,7 @@ class _Reader(Aggregates):
     def zone(self, name: str, text: str) -> None:
         stop, *sizes = self.values(text, 7)
         if stop is not False:
-            raise self.fault("expected a zone to pass through, FALSE first")
+            raise self.fault("expected a zone without a stop, FALSE first")
         self.unused(name, self.zones)
         values = self.numbers(sizes, 6)
         self.zones[name] = float(values[0]) * 1e-3
@@ -188,7 +188,7 @@ class _Reader(Aggregates):
         if name != "main":
             self.homes[name] = self.file
         elif self.file != self.main:
-            raise self.fault("a second main")
+            raise self.fault("a second main is declared")
 
     def end_routine(self) -> None:
         if self.routine_name == "main":
@@ -197,7 +197,7 @@ class _Reader(Aggregates):
 
     def first(self, number: str) -> None:
         if self.first_number:
-            raise self.fault(f"a second {FIRST}")
+            raise self.fault(f"a second {FIRST} is declared")
         self.first_number = int(number)
 
     def request(self, output: str, value: str) -> None:
@@ -218,7 +218,9 @@ class _Reader(Aggregates):
 
     def activate(self, state: str, unit: str) -> None:
         if (state == "Act") == bool(self.called_in):
-            raise self.fault("units are activated before the first contour and deactivated behind")
+            raise self.fault(
+                "units must be activated before the first contour and deactivated after the last"
+            )
         self.active.append(f"{state}Unit {unit};")
 
     def load(self, folder: str, file: str) -> None:
@@ -320,7 +322,7 @@ class _Reader(Aggregates):
         return last
 
     def add_triggers(self, text: str) -> None:
-        """Add what the triggers of a move switch; `text` names them."""
+        """Add the switches of the triggers of a move; `text` names the triggers."""
         first, *_ = names = re.split(r"\\T\d:=", text)
         for name in names:
             switch = self.triggers.get(name)
@@ -331,16 +333,16 @@ class _Reader(Aggregates):
     def require_frames(self, tool: str, work_object: str) -> None:
         known = [self.frames[kind][0] for kind in ("tool", "work_object") if kind in self.frames]
         if [tool, work_object] != known:
-            raise self.fault(f"tool {tool} and work object {work_object} are not the module's")
+            raise self.fault(f"tool {tool}, work object {work_object}: not those of the module")
 
     def require_same(self, values: Array, data: str, what: str) -> None:
-        """Require what follows the first value of data (of zones, the second) as it is written."""
+        """Require the values after the first (in zones, the second) as they are written."""
         expected = np.array(self.values(data.replace("FALSE,", ""), len(values)), dtype=np.float64)
         if not np.array_equal(values[1:], expected[1:]):
             raise self.fault(f"{what}: expected {data}, got {values.tolist()}")
 
     def speed_of(self, name: str, data: Callable[[float, ExternalSpeeds], str]) -> float:
-        """Return the speed of declared data, the rest of which is as `data` writes it."""
+        """Return the speed of declared data; the other values must be as `data` writes them."""
         values = self.named(name, self.speeds)
         speed = float(values[0]) * 1e-3 / (FULL_AIR_SPEED if data is air_speed_data else 1.0)
         self.require_same(values, data(speed, self.units.speeds), f"speeds of {name}")
@@ -356,5 +358,5 @@ class _Reader(Aggregates):
             raise self.fault(f"{name} is declared twice")
 
     def elsewhere(self, **named: str) -> dict[str, str]:
-        """Return where the data that a move names are declared or set."""
+        """Return file and line where the data named by a move are declared or set."""
         return {what: self.said_at[name] for what, name in named.items() if name in self.said_at}

@@ -1,4 +1,4 @@
-"""What a person states of an ABB controller, and what its programs must keep to."""
+"""Settings of an ABB controller, and rules of its programs."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ SWITCH_OFF = "switchOff"
 TURNING_SPEED = np.radians(500.0)
 """v_ori of all speed data, rad/s: ABB's own for its predefined speeds."""
 SLOWEST = 1e-5
-"""Lowest speed (m/s) that two decimals of mm/s say to within half."""
+"""Lowest speed (m/s) that two decimals of mm/s give with an error of half at most."""
 SPEED_STEP = 1e-5
 """Speeds (m/s) have two decimals of mm/s."""
 POINT_STEP, ANGLE_STEP = 0.5e-7, 1e-8
-"""What four decimals of mm leave (m), and eight of a quaternion (rad)."""
+"""Rounding errors of four decimals of mm (m), and of eight decimals of a quaternion (rad)."""
 LONGEST_LEAD = 0.5
 r"""Longest lead (s) that ``TriggIO \Time`` takes."""
 
@@ -48,7 +48,7 @@ MEANINGS = (
     "round set setao setdo setgo singarea sqrt start stop stopmove tool0 tpwrite triggc triggio "
     "triggj triggl trunc unload velset waitdi waitdo waittime wobj0 load0 "
 )
-"""Types, instructions and data that every controller defines, where a contour may be named so."""
+"""Types, instructions and data of every controller that a contour could have as its name."""
 RESERVED = frozenset((KEYWORDS + MEANINGS).split())
 PREDEFINED = re.compile(r"[vz]\d+|vmax|vrot\d+|vlin\d+", re.IGNORECASE)
 """Speeds and zones that every controller defines: v100, z10."""
@@ -69,7 +69,7 @@ Folder = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_:/.\-]{1,60}$")]
 
 
 class RapidSettings(PortSettings, output=Request, input=Input):
-    """What the controller calls things."""
+    """Names of outputs, inputs, frames and units at the controller."""
 
     laser_output: Annotated[Name, setting("the name of a digital output", '"doLaser"')] = "doLaser"
     gas_output: Annotated[Name | None, setting("the name of a digital output", '"doGas"')] = None
@@ -83,7 +83,7 @@ class RapidSettings(PortSettings, output=Request, input=Input):
 
 
 def rules(settings: RapidSettings) -> Rules:
-    """Return what RAPID programs must keep to."""
+    """Return the rules of RAPID programs."""
     return Rules(
         longest_name=32,
         slowest=SLOWEST,

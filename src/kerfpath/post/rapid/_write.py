@@ -1,9 +1,9 @@
 r"""RAPID, the language of ABB controllers: this module only formats.
 
 Units of RAPID: mm, deg, mm/s, kg, seconds; quaternions w first. A linear target is written in
-place, so that one line says where the tip goes, how fast and how closely. ``TriggIO x,t\Time`` and
-``TriggL`` switch an output t seconds before the tip reaches the end of that one move; a plain
-``SetDO`` in its place would act as soon as the program is read ahead.
+place, so that one line gives target, speed and zone. ``TriggIO x,t\Time`` and ``TriggL`` switch an
+output t seconds before the tip reaches the end of that one move; a plain ``SetDO`` in its place
+would act as soon as the program is read ahead.
 """
 
 from __future__ import annotations
@@ -55,19 +55,19 @@ __all__ = [
 _Key = TypeVar("_Key", bound=Hashable)
 
 FULL_AIR_SPEED = 1.0
-"""Tip speed (m/s) that a joint move at its full share is given: RAPID knows no share."""
+"""Tip speed (m/s) that is written for a joint move at full speed, as RAPID has no shares."""
 WRIST = r"SingArea\Wrist;"
-"""Lets the wrist go evenly from joints to joints, instead of the tool from pose to pose."""
+"""Moves the wrist evenly in its joints, instead of the tool from pose to pose."""
 JOINT_TARGET = "[[" + ",".join(["%.6f"] * 6) + "],"
 TARGET = "[[%.4f,%.4f,%.4f],[%.8f,%.8f,%.8f,%.8f],[%d,%d,%d,%d],"
 NO_POSE = np.eye(4)
-"""Stands in for that of a joint move."""
+"""Placeholder for the pose of a joint move."""
 FIRST = "nFirst"
 """Number of the contour at which the program begins, for a restart."""
 
 
 class Rapid(Formatter):
-    """Writes one module: frames, speeds, zones, a main routine, and one for each section."""
+    """Formatter of a module: frames, speeds, zones, a main routine, and one for each section."""
 
     settings: RapidSettings
     around = 4  # first and last line, the empty one before, the call
@@ -99,9 +99,9 @@ class Rapid(Formatter):
                 self.trigger |= _number_names(f"{prefix}{suffix}", keys)
 
     def files(self) -> dict[str, str]:
-        """Return one module, or a main one and those with its routines that it loads.
+        """Return one module, or a main module and those with the routines that it loads.
 
-        The robot stands, beam off, wherever a module is loaded or unloaded: between contours.
+        Modules are loaded and unloaded between contours: the robot is stopped with the beam off.
         """
         name, sections = self.program.name, self.program.sections
         most, numbers = self.settings.lines_per_file, dict(zip(sections, count(1), strict=False))
@@ -229,11 +229,11 @@ class Rapid(Formatter):
         yield f"WaitTime {number(wait.time, 3)};"
 
     def request(self, request: Request) -> Iterator[str]:
-        """Yield a SetDO; the robot stands."""
+        """Yield a SetDO; the robot is stopped."""
         yield f"SetDO {self.port(request.partner, 'output')},{int(request.on)};"
 
     def wait_for(self, awaited: Await) -> Iterator[str]:
-        r"""Yield a WaitDI; after its MaxTime main's handler of errors switches off and stops."""
+        r"""Yield a WaitDI; after its MaxTime the error handler of main switches off and stops."""
         name = self.port(awaited.partner, "input")
         yield rf"WaitDI {name},1\MaxTime:={number(awaited.timeout, 3)};"
 
@@ -243,7 +243,7 @@ class Rapid(Formatter):
 
     @cached_property
     def target(self) -> dict[Move, list[str]]:
-        """The targets of each move, all at once; quaternions without a jump of sign."""
+        """Texts of the targets of each move; quaternions have no jumps of sign."""
         points, robot = targets_of(self.program.moves), self.program.robot
         q = np.array([point.q for point in points]).reshape(-1, robot.joints)
         axes_deg = (np.degrees(axes_from_joints(robot, q)).round(6) + 0.0).tolist()
@@ -260,7 +260,7 @@ class Rapid(Formatter):
         return texts
 
     def _work_object(self) -> str:
-        """Return the frame of the part: in the base, or in what carries it."""
+        """Return the frame of the part: in the base, or in the unit that carries it."""
         here, part = _pose(np.eye(4)), _pose(self.program.T_base_part)
         if not self._units.coupled:
             return f'[FALSE,TRUE,"",{part},[[0,0,0],[1,0,0,0]]]'
@@ -288,10 +288,10 @@ class Rapid(Formatter):
 
 
 def ending_lines() -> list[str]:
-    """Return how main ends: the next time with the first contour; and its handlers.
+    """Return the end of main, which resets the first contour for the next time, and its handlers.
 
-    Those are of an error, and of leaving main before its end. What is not handled below ends here:
-    everything is off, the robot stops, the error is shown.
+    These are for errors, and for leaving main before its end. Errors that routines do not handle
+    end here: everything is switched off, the robot stops, and the error is shown.
     """
     off = f"  {SWITCH_OFF};"
     return [f"  {FIRST}:=1;", "ERROR", off, "  StopMove;", "  RAISE;", "UNDO", off]
@@ -335,7 +335,7 @@ def linear_speed_data(speed: float, fast: ExternalSpeeds = NO_EXTERNAL) -> str:
 def air_speed_data(share: float, fast: ExternalSpeeds = NO_EXTERNAL) -> str:
     """Return the speed data of joint moves at a share of the full speed."""
     speed_mm_s = round(share * FULL_AIR_SPEED * 1e3, 2)
-    # Of the speed as it is written: who reads it knows no other.
+    # From the speed as it is written, because a reader has no other.
     share = speed_mm_s / (FULL_AIR_SPEED * 1e3)
     turning = number(share * np.degrees(TURNING_SPEED), 0)
     return f"[{number(speed_mm_s, 2)},{turning},{fast.said(share)}]"
@@ -345,8 +345,8 @@ def air_speed_data(share: float, fast: ExternalSpeeds = NO_EXTERNAL) -> str:
 def zone_data(zone: float) -> str:
     """Return the zone data of a radius (m).
 
-    ABB's own zones turn the tool within 1.5 times the path zone at most; here within the same, and
-    0.1 deg for each mm.
+    ABB's own zones turn the tool within at most 1.5 times the path zone. Here the tool turns within
+    the path zone, by 0.1 deg for each mm.
     """
     zone_mm = number(zone * 1e3, 3)
     zone_deg = number(float(zone_mm) * 0.1, 3)

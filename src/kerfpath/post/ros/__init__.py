@@ -1,4 +1,4 @@
-"""ROS trajectories: trajectory_msgs/JointTrajectory as YAML, and what is switched when."""
+"""ROS trajectories: trajectory_msgs/JointTrajectory and switching events, as YAML."""
 
 from kerfpath.post._languages import Language, no_settings_needed
 from kerfpath.post.ros._check import check
@@ -25,4 +25,4 @@ ROS = Language(
     externals=no_settings_needed,
     read=read,
 )
-"""What is registered."""
+"""The language as registered."""

@@ -1,4 +1,4 @@
-"""What forbids a trajectory, or speaks against it."""
+"""Issues that only trajectories have."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NOISE = 1e-3
 
 
 def check(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
-    """Yield what cannot be said in a trajectory, and where it asks too much of the joints."""
+    """Yield what a trajectory cannot express, and where it exceeds limits of the joints."""
     issues = [*check_times(program), *_check_shape(program, settings)]
     yield from issues
     if not issues:
@@ -31,7 +31,7 @@ def check(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
 def _check_shape(program: Program, settings: RosSettings) -> Iterator[ProgramIssue]:
     count, joints = len(joint_names(program.robot, settings)), program.robot.joints
     if count != joints:
-        message = f"joint_names has {count} names, the robot {joints} joints"
+        message = f"expected {joints} names in joint_names, got {count}"
         yield ProgramIssue("error", "joint-names", message, "program")
     steps = [(section.name, step) for section in program.sections for step in section.moves]
     for (name, move), (_, after) in zip(steps, [*steps[1:], ("", None)], strict=True):
@@ -39,7 +39,7 @@ def _check_shape(program: Program, settings: RosSettings) -> Iterator[ProgramIss
             message = "a trajectory has no arcs; leave arcs_mm out of the job"
             yield ProgramIssue("error", "arc", message, name)
         if move.zone > 0 and not (isinstance(move, LinearMove) and isinstance(after, LinearMove)):
-            message = "only between linear moves can a corner be rounded; expected a stop"
+            message = "a corner can only be rounded between linear moves; expected a stop"
             yield ProgramIssue("error", "zone", message, name)
 
 

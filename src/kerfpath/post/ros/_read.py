@@ -1,4 +1,4 @@
-"""Read back the two files that `Ros` writes, and nothing else: the rest is refused."""
+"""Read back the two files that `Ros` writes; anything else is refused."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from kerfpath.robots import Robot
 __all__ = ["read"]
 
 OFF_LINE = 1e-8
-"""How far (rad) points of a joint motion may be off it, and those of a wait from each other."""
+"""Largest error (rad) of points of a joint motion, and of points of a wait."""
 TIP_OFF_LINE = 2e-6
-"""How far (m) the tip may be off a straight move."""
+"""Largest distance (m) of the tip from a straight move."""
 DIGITS = 1e-9
-"""rad: what the digits of positions leave in a difference of them, generously."""
+"""Generous rounding error (rad) of a difference of positions."""
 
 _NUMBERS = r"\[([-\d., ]*)\]"
 _POINT = re.compile(
@@ -47,14 +47,14 @@ _EVENTS = patterns(
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: RosSettings) -> ReadProgram:
-    """Return the program that a trajectory of ours and its events say; see `Reader`."""
+    """Return the program in a trajectory and events that `Ros` wrote; see `Reader`."""
     points = _Points(main, files[main], robot, settings)
     events = f"{main.removesuffix('.yaml')}.events.yaml"
     return _Events(events, files[events], robot, settings, points).program()
 
 
 def _lines(text: str) -> list[tuple[int, str]]:
-    """Return lines with their numbers, without those that say nothing."""
+    """Return lines with their numbers, without empty lines and comments."""
     numbered = [(n, line.rstrip()) for n, line in enumerate(text.splitlines(), 1)]
     return [(n, line) for n, line in numbered if line and not line.startswith("#")]
 
@@ -70,7 +70,7 @@ def _numbers(text: str, count: int, place: str) -> list[float]:
 
 
 class _Points:
-    """The points of the trajectory, and the lines where they stand."""
+    """The points of the trajectory, and their lines."""
 
     def __init__(self, file: str, text: str, robot: Robot, settings: RosSettings) -> None:
         self.file, self.step_time = file, settings.step_ms * 1e-3
@@ -99,9 +99,9 @@ class _Points:
         self._require_rates(velocity, acceleration)
 
     def _require_rates(self, velocity: Array, acceleration: Array) -> None:
-        """Require velocities and accelerations that follow from the positions, up to digits."""
+        """Require velocities and accelerations that follow from the positions, up to rounding."""
         if not self.stops[[0, -1]].all():
-            raise InputError(f"{self.file}: the robot must stand at the first and last point")
+            raise InputError(f"{self.file}: the robot must be at rest at the first and last point")
         step = np.diff(self.time).min() if len(self.time) > 1 else 1.0
         left = 1e-6 + DIGITS / step, 1e-6 + 4 * DIGITS / step**2
         expected = rates(self.time, self.q, self.stops)
@@ -115,7 +115,7 @@ class _Points:
 
 
 class _Events(LineReader):
-    """Reads the events, and the moves from the points between them."""
+    """Reader of the events, and of the moves from the points between them."""
 
     def __init__(
         self, file: str, text: str, robot: Robot, settings: RosSettings, points: _Points
@@ -130,7 +130,7 @@ class _Events(LineReader):
     def program(self) -> ReadProgram:
         (name,) = self.take(_NAME, "trajectory")
         if f"{name}.yaml" != self.points.file:
-            raise self.fault(f"are the events of {name}.yaml, expected {self.points.file}")
+            raise self.fault(f"expected the events of {self.points.file}, got those of {name}.yaml")
         tool, part = (self.frame(*self.take(pattern, what)) for what, pattern in _FRAMES.items())
         self.tips = (self.robot.forward(self.points.q) @ tool)[:, :3, 3]
         self.take(re.compile("events:"), "events")
@@ -152,23 +152,23 @@ class _Events(LineReader):
             raise self.fault("expected a section first")
 
     def done(self, time: str, kind: str) -> None:
-        """Add the step that ends at a time, as the points before it say."""
+        """Add the step that ends at a time, from the points before it."""
         ns = round(float(time) * SECOND)
         points, first = self.points, max(self.last, 0)
         end = points.index.get(ns)
         if end is None or end < first:
-            raise self.fault("there is no point of the trajectory at this time, or it is earlier")
+            raise self.fault("the trajectory has no point at this time, or the time is too early")
         if self.last < 0 and (kind != "joint" or end > 0):
-            raise self.fault("expected a joint move to be done at time 0")
+            raise self.fault("expected a joint move that is done at time 0")
         took = float(points.time[end] - points.time[first])
         between = points.q[first : end + 1]
         if points.stops[first + 1 : end].any():
-            raise self.fault("the robot stands still before this is done")
+            raise self.fault("the robot stops before this is done")
         if kind != "linear" and not points.stops[end]:
-            raise self.fault(f"the robot does not stand still at the end of a {kind}")
+            raise self.fault(f"the robot does not stop at the end of a {kind}")
         if kind == "wait":
             if np.abs(between - between[0]).max() > OFF_LINE:
-                raise self.fault("the robot moves in a wait")
+                raise self.fault("the robot moves during a wait")
             self.wait(took)
             self.last = end
             return
@@ -189,7 +189,7 @@ class _Events(LineReader):
         self.last = end
 
     def require_dense(self, first: int, end: int) -> None:
-        """Require that points from stop to stop are as near to each other as they are written."""
+        """Require that points from stop to stop are as close in time as the settings say."""
         step = float(np.diff(self.points.time[first : end + 1]).max())
         if step > self.points.step_time + 2e-9:  # times are whole ns
             raise self.fault(f"expected a point every {self.points.step_time:g} s, got {step:g} s")
@@ -202,7 +202,7 @@ class _Events(LineReader):
         share = (points - points[0]) @ way / max(way @ way, 1e-300)
         off = np.linalg.norm(points - points[0] - share[:, None] * way, axis=1).max()
         if off > most or (np.diff(share) < -1e-9).any():
-            raise self.fault("the points before it do not lie on the straight way")
+            raise self.fault("the points before it do not lie on a straight line")
 
     def switch(self, time: str, signal: str, to: str) -> None:
         move = self.last_on_path()

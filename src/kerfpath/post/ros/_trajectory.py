@@ -1,4 +1,4 @@
-"""A program as joints over time: sampled where it moves from stop to stop, else node by node."""
+"""A program as joints over time: sampled in moves from stop to stop, else node by node."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from kerfpath.transfer import least_time
 __all__ = ["Trajectory", "rates", "trajectory"]
 
 BRANCH = 0.5
-"""rad: farther than joints leave their even way on a straight move, unless they change posture."""
+"""Largest distance (rad) of joints from even motion on a straight move in one posture."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,9 +32,9 @@ class Trajectory:
         Strictly increasing from 0.
     q : (K, n) rad
     stops : (K,) bool
-        Where the robot stands still.
+        Whether the robot is stopped.
     done : (S,) int
-        The point at which each move or wait of the program ends.
+        Index of the point at which each move or wait of the program ends.
     """
 
     time: Array
@@ -58,13 +58,13 @@ def rates(time: Array, q: Array, stops: Bools) -> tuple[Array, Array]:
 def trajectory(program: Program, step_time: float) -> Trajectory:
     """Return the motion of a program.
 
-    Joint moves, and path moves from stop to stop, have points every `step_time` (s) or less. Path
-    moves that are passed through have one where each ends: the nodes of the plan.
+    Joint moves, and path moves from stop to stop, have points every `step_time` (s) or less. Other
+    path moves have one point, where they end: the nodes of the plan.
 
     Raises
     ------
     InputError
-        A straight move that leaves the robot's reach or its posture on the way.
+        A straight move leaves the robot's reach or its posture on the way.
     """
     steps = timetable(program)
     moves, tips = program.moves, program.tips(program.moves)
@@ -117,7 +117,7 @@ def _straight(
 ) -> Array:
     """Return joints (m, n) along a straight move, after each share of its time.
 
-    The tip gains and loses speed as a cubic does: 3 s^2 - 2 s^3 of its way after the share s.
+    The tip speeds up and slows down as a cubic: 3 s^2 - 2 s^3 of its way after the share s.
     """
     if len(share) == 1:
         return move.q[None]
@@ -128,7 +128,7 @@ def _straight(
     T[:, :3, :3] = Slerp([0.0, 1.0], ends)(way[:, 0]).as_matrix()
     evenly = before + way * (move.q - before)
     robot, n = program.robot, program.robot.family.joints
-    # What a pose leaves free runs evenly; the arm sees the tip from where external axes carry it.
+    # Free joints move evenly; the arm sees the tip from where external axes carry it.
     seen = np.linalg.inv(base_in_part(robot.externals, evenly[:, n:])) @ program.T_base_part @ T
     # The tool's rotation about its axis counts only for arms that can choose it.
     arm = robot.alone()

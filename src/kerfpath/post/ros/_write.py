@@ -1,7 +1,7 @@
 """ROS trajectories as YAML: this module only formats.
 
 One file is the message: joints, their velocities and accelerations over time, in rad and s. The
-other says, by the same clock, when each move and wait is done and what is switched.
+other lists, on the same clock, when each move and wait is done and what is switched.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = ["Message", "Ros", "RosSettings", "head", "joint_names", "message", "r
 
 DECIMALS = {"positions": 10, "velocities": 6, "accelerations": 6}
 SECOND = 1_000_000_000
-"""In ns."""
+"""One second in ns."""
 
 
 class Time(TypedDict):
@@ -44,7 +44,7 @@ class Header(TypedDict):
 
 
 class Point(TypedDict):
-    """trajectory_msgs/JointTrajectoryPoint; rad, rad/s, rad/s^2, of linear axes in m."""
+    """trajectory_msgs/JointTrajectoryPoint; rad, rad/s, rad/s^2; linear axes are in m."""
 
     positions: list[float]
     velocities: list[float]
@@ -62,7 +62,7 @@ class Message(TypedDict):
 
 
 class RosSettings(LanguageSettings):
-    """What the robot's driver calls things, and how densely the way is written."""
+    """Joint names of the robot's driver, and the time between points."""
 
     lines_per_file: LinesPerFile = 1_000_000
     joint_names: Annotated[
@@ -72,7 +72,7 @@ class RosSettings(LanguageSettings):
 
 
 def rules(settings: RosSettings) -> Rules:
-    """Return what trajectories must keep to."""
+    """Return the rules of trajectories."""
     return Rules(slowest=1e-6, angle_step=0.5e-9)
 
 
@@ -93,7 +93,7 @@ def head(names: list[str]) -> list[str]:
 
 
 class Ros(Formatter):
-    """Writes the message, and the events beside it."""
+    """Formatter of the message, and of its events."""
 
     settings: RosSettings
 
@@ -144,11 +144,11 @@ class Ros(Formatter):
         return [(self.program.name, "the program"), *((name, "a joint") for name in joints)]
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
-        """Yield when a joint move is done."""
+        """Yield the time when a joint move is done."""
         yield self._done("joint")
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
-        """Yield when a linear move is done, and what is switched by then."""
+        """Yield the time when a linear move is done, and the switches by then."""
         end = next(self._ends)
         yield _event(end, "done: linear")
         for switch in move.switches:
@@ -156,7 +156,7 @@ class Ros(Formatter):
             yield _event(end - switch.lead_time, f"set: {switch.signal}, to: {to}")
 
     def wait(self, wait: Wait) -> Iterator[str]:
-        """Yield when a wait is done."""
+        """Yield the time when a wait is done."""
         yield self._done("wait")
 
     def comment(self, text: str) -> Iterator[str]:
@@ -168,7 +168,7 @@ class Ros(Formatter):
 
 
 def message(program: Program, settings: RosSettings) -> Message:
-    """Return the message that `Ros` writes of a program, as its fields."""
+    """Return the fields of the message that `Ros` writes for a program."""
     rows, ns = _rows(trajectory(program, settings.step_ms * 1e-3))
     parts = [part.tolist() for part in np.split(rows, len(DECIMALS), axis=1)]
     return {
@@ -188,7 +188,7 @@ def message(program: Program, settings: RosSettings) -> Message:
 
 
 def _rows(motion: Trajectory) -> tuple[Array, Ints]:
-    """Return what points say, (K, 3n), positions, velocities, accelerations, and times (K,) ns."""
+    """Return positions, velocities and accelerations of points (K, 3n), and times (K,) ns."""
     ns = _ns(motion.time)
     columns = zip(
         DECIMALS.values(), (motion.q, *rates(ns / SECOND, motion.q, motion.stops)), strict=True

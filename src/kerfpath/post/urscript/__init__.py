@@ -21,4 +21,4 @@ URSCRIPT = Language(
     assumed={"laser_output": 0},
     read=read,
 )
-"""What is registered."""
+"""The language as registered."""

@@ -1,4 +1,4 @@
-"""What only programs in URScript must keep to: blends that do not meet, and reserved names."""
+"""Issues that only URScript has: blends that meet, and reserved names."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from kerfpath.post.urscript._write import URScriptSettings, full_joint_speed
 __all__ = ["check", "is_reserved"]
 
 BLEND_ROOM = 1e-6
-"""m: what must be left between two blends; the digits of targets."""
+"""Smallest distance (m) between two blends, for the digits of targets."""
 FULL_TURN = 2 * np.pi
 
 KEYWORDS = re.compile(
     "and|break|continue|def|elif|else|end|enter_critical|exit_critical|false|global|goto|halt|if|"
     "in|join|kill|local|not|or|return|run|sec|sync|thread|true|while|xor"
 )
-"""Keywords, and words that stand alone."""
+"""Keywords, and statements of one word."""
 BUILT_IN = re.compile(
     r"(get|set|is|read|write|str|modbus|rpc|rtde|socket|encoder|path_offset|force_mode|"
     r"freedrive_mode|end_\w+_mode|tool_contact|twist|wrench|screw_driving|jog)_\w+|"
@@ -33,7 +33,7 @@ BUILT_IN = re.compile(
     r"powerdown|r2d|random|rotvec2rpy|rpc_factory|rpy2rotvec|size|sleep|sqrt|textmsg|time|"
     r"to_num|to_str|transpose|tcp"
 )
-"""What the controller's own functions are called, and may be in later versions."""
+"""Names of the controller's own functions, including likely ones of later versions."""
 
 
 def is_reserved(name: str) -> bool:
@@ -42,7 +42,7 @@ def is_reserved(name: str) -> bool:
 
 
 def check(program: Program, settings: URScriptSettings) -> Iterator[ProgramIssue]:
-    """Yield what only URScript refuses: unknown joint speeds, blends that meet, a signal twice."""
+    """Yield issues only of URScript: unknown joint speeds, blends that meet, a signal twice."""
     try:
         full_joint_speed(program.robot)
     except InputError as error:
@@ -53,8 +53,8 @@ def check(program: Program, settings: URScriptSettings) -> Iterator[ProgramIssue
         yield ProgramIssue(
             "warning",
             "turns",
-            f"a joint turns to {np.degrees(beyond):.0f} deg: the controller must be one that lets "
-            "it turn beyond 360 deg",
+            f"a joint turns to {np.degrees(beyond):.0f} deg; the controller must allow it to turn "
+            "beyond 360 deg",
             "program",
         )
     for section in program.sections:
@@ -66,7 +66,7 @@ def check(program: Program, settings: URScriptSettings) -> Iterator[ProgramIssue
 
 
 def _check_blends(program: Program) -> Iterator[ProgramIssue]:
-    """Check that blends do not meet: the controller leaves out a move whose blend does."""
+    """Check that blends do not meet: the controller skips a move whose blend meets another."""
     moves = program.moves
     if not moves:
         return
@@ -83,7 +83,7 @@ def _check_blends(program: Program) -> Iterator[ProgramIssue]:
             "blend-overlap",
             f"{met.size} moves are no longer than the blends at their ends, the first {kind} move "
             f"of {np.linalg.norm(points[k + 1] - points[k]) * 1e3:.3f} mm between blends of "
-            f"{zone[k] * 1e3:g} and {zone[k + 1] * 1e3:g} mm; the controller would leave moves "
-            "out; lower zone_mm or use fewer nodes",
+            f"{zone[k] * 1e3:g} and {zone[k + 1] * 1e3:g} mm; the controller would skip moves; "
+            "lower zone_mm or use fewer nodes",
             "program",
         )

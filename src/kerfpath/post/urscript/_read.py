@@ -1,4 +1,4 @@
-"""Read back the URScript that `URScript` writes, and nothing else: the rest it refuses."""
+"""Read back the URScript that `URScript` writes; anything else is refused."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ __all__ = ["read"]
 def read(
     main: str, files: Mapping[str, str], robot: Robot, settings: URScriptSettings
 ) -> ReadProgram:
-    """Return the program that a script of ours says; see `kerfpath.post.Reader`."""
+    """Return the program in a script that `URScript` wrote; see `kerfpath.post.Reader`."""
     return _Reader(main, files[main], robot, settings).program()
 
 
 DIGIT = 1e-6
-"""What the digits of an acceleration leave, m/s^2 or rad/s^2."""
+"""Rounding error of an acceleration, m/s^2 or rad/s^2."""
 
 _NUMBER = r"(-?\d+\.\d+)"
 _SIX = ", ".join([_NUMBER] * 6)
@@ -57,7 +57,7 @@ _STEPS = patterns(
 
 
 class _Reader(LineReader):
-    """Reads one part of the program after the other."""
+    """Reader of a script, one part after the other."""
 
     settings: URScriptSettings
 
@@ -85,7 +85,7 @@ class _Reader(LineReader):
                 continue
             output = getattr(self.settings, f"{known}_output")
             if output is None:
-                raise self.fault(f"switches the {known}; say by which output with {known}_output")
+                raise self.fault(f"the {known} is switched; name its output with {known}_output")
             signals.append(known)
             self.expect(switch_lines(known, output))
         sections: dict[str, ReadSection] = {}
@@ -138,7 +138,7 @@ class _Reader(LineReader):
         )
 
     def require_acceleration(self, said: float, expected: float) -> None:
-        """Refuse another acceleration than that of the settings."""
+        """Refuse an acceleration that is not that of the settings."""
         if abs(said - expected) > DIGIT:
             raise self.fault(f"expected the acceleration a={expected:.6f}, got {said:g}")
 
@@ -159,7 +159,7 @@ class _Reader(LineReader):
         self.require_acceleration(a, self.settings.acceleration)
         for signal, (point, near, on) in armed.items():
             if point != target:
-                raise self.fault(f"the {signal} is switched ahead of another point")
+                raise self.fault(f"the {signal} is switched ahead of another point than the target")
             self.leads[signal] = time_ahead(near, v, a, stops=r == 0), on
         kind: MoveKind = "linear" if via is None else "circular"
         self.add_move(kind, v, T_part_tip=_pose(target), T_part_via=via, zone=r)
@@ -179,7 +179,7 @@ class _Reader(LineReader):
             raise self.fault("a switch must follow a linear or circular move")
         lead, before = self.leads.pop(signal, (0.0, on))
         if before != on:
-            raise self.fault(f"the {signal} is switched to {before} ahead, to {on} here")
+            raise self.fault(f"the {signal} is switched to {before} ahead, but to {on} here")
         place = move.elsewhere.get("switches", self.ahead_at.pop(signal, self.place))
         switch = Switch(signal=SIGNALS[signal], on=on == "True", lead_time=lead)
         self.add_switch(move, switch, place)
@@ -189,21 +189,21 @@ class _Reader(LineReader):
 
     def wait_for(self, port: str, timeout: str) -> None:
         if not self.can_wait:
-            raise self.fault("the program does not say how it waits for an input")
+            raise self.fault("the program does not define how it waits for an input")
         self.expect_answer(int(port), float(timeout))
 
     def require_standing(self, what: str) -> None:
-        """Require that what is switched ahead of a move is switched at its end, too."""
+        """Require that a signal switched ahead of the end of a move is also switched at its end."""
         if ahead := [*self.ahead, *self.leads]:
-            raise self.fault(f"the {ahead[0]} is switched ahead of a move, not at its end")
+            raise self.fault(f"the {ahead[0]} is switched ahead of a move, but not at its end")
 
     def require_signal(self, signal: str) -> None:
         if signal not in self.signals:
-            raise self.fault(f"the program does not say how it switches the {signal}")
+            raise self.fault(f"the program does not define how it switches the {signal}")
 
 
 def _pose(words: tuple[str, ...]) -> Array:
-    """Return the pose (4, 4) m that six numbers say."""
+    """Return the pose (4, 4) m of six numbers."""
     values = np.array([float(word) for word in words])
     T = np.eye(4)
     T[:3, :3] = Rotation.from_rotvec(values[3:]).as_matrix()

@@ -1,9 +1,9 @@
 """How a program in URScript switches an output ahead of a target, and at what distance.
 
-No instruction of URScript switches an output along a path. An instruction after a move acts as the
-tip enters the blend at its end, or as it stops there. To switch earlier, a thread compares in every
-control cycle how far the tip is from the target, and switches once it is near enough; the
-instruction after the move then says the same again, so that an output is never switched later.
+No instruction of URScript switches an output along a path. An instruction after a move acts when
+the tip enters the blend at its end, or when it stops there. To switch earlier, a thread checks in
+every control cycle how far the tip is from the target, and switches once it is close enough; the
+instruction after the move repeats this, so that an output is never switched later.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ __all__ = [
 ]
 
 LOCAL = ("due", "gap", "most", "near", "on", "port", "target", "value", "waited")
-"""Names inside the thread and the functions of `switch_lines`; no contour may have them."""
+"""Names inside the thread and the functions of `switch_lines`; contours must not have them."""
 
 
 def distance_ahead(lead_time: float, speed: float, acceleration: float, *, stops: bool) -> float:
     """Return how far (m) from a target the tip is `lead_time` (s) before it arrives.
 
-    At constant speed (m/s), or where it stops braking with the acceleration (m/s^2).
+    Its speed (m/s) is constant; if it `stops`, it brakes with the acceleration (m/s^2).
     """
     braking = speed / acceleration if stops else 0.0
     if lead_time <= braking:
@@ -58,7 +58,7 @@ def stop_lines(outputs: Sequence[int]) -> list[str]:
 
 
 def wait_lines(outputs: Sequence[int]) -> list[str]:
-    """Return the lines that define how an input is waited for.
+    """Return the lines that define the wait for an input.
 
     Without an answer all `outputs` are switched off and the program ends.
     """

@@ -1,10 +1,11 @@
 """URScript, the language of Universal Robots' controllers: this module only formats.
 
-Units of URScript: m, rad, s. A pose is a position and a rotation vector in the robot's base; that
-of the part stands once, and targets follow it by ``pose_trans``. A pose says neither posture nor
-turns: the joint move before a contour fixes them, and ``movel`` keeps them. ``movel``, not
-``movep``: each move of a plan has a speed of its own, and ``movep`` forbids that the program waits
-on the way. ``movec`` with mode 0 turns the tool evenly from start to end.
+Units of URScript: m, rad, s. A pose is a position and a rotation vector in the robot's base. The
+part frame is written once, and targets are relative to it by ``pose_trans``. A pose contains
+neither posture nor turns: the joint move before a contour fixes them, and ``movel`` keeps them.
+``movel`` is used instead of ``movep``, because each move of a plan has its own speed, and ``movep``
+does not let the program wait on the way. ``movec`` with mode 0 turns the tool evenly from start to
+end.
 """
 
 from __future__ import annotations
@@ -50,14 +51,14 @@ SPEED_STEP = 1e-6
 FIRST = "first_contour"
 """Number of the contour at which the program begins, for a restart."""
 POINT_STEP, ANGLE_STEP = 0.5e-7, 0.5e-9
-"""What seven decimals of m leave of positions, and nine of rad of turns."""
+"""Rounding errors of seven decimals of m (m), and of nine decimals of rad (rad)."""
 
 Output = Annotated[int | None, setting("a standard digital output from 0 to 7", "0", ge=0, le=7)]
 Input = Annotated[int | None, setting("a standard digital input from 0 to 7", "0", ge=0, le=7)]
 
 
 class URScriptSettings(PortSettings, output=Output, input=Input):
-    """What is wired to the controller, and how fast it may speed up."""
+    """Inputs and outputs of the controller, and accelerations."""
 
     acceleration_mm_s2: Annotated[
         float, setting("a number from 1 to 50000, in mm/s^2", "1200", ge=1, le=50_000)
@@ -69,12 +70,12 @@ class URScriptSettings(PortSettings, output=Output, input=Input):
 
     @property
     def acceleration(self) -> float:
-        """Of the tip, m/s^2."""
+        """Acceleration of the tip, m/s^2."""
         return self.acceleration_mm_s2 * 1e-3
 
 
 def rules(settings: URScriptSettings) -> Rules:
-    """Return what programs in URScript must keep to."""
+    """Return the rules of programs in URScript."""
     return Rules(
         slowest=SPEED_STEP,
         speed_step=SPEED_STEP,
@@ -85,7 +86,7 @@ def rules(settings: URScriptSettings) -> Rules:
 
 
 def full_joint_speed(robot: Robot) -> float:
-    """Return the speed (rad/s) of the leading joint that is the full one: that of the slowest.
+    """Return the full speed (rad/s) of the leading joint: that of the slowest joint.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def full_joint_speed(robot: Robot) -> float:
 
 
 class URScript(Formatter):
-    """Writes one program: frames, switching, a function for each section, and their calls."""
+    """Formatter of one program: frames, switching, a function for each section, their calls."""
 
     settings: URScriptSettings
 
@@ -141,7 +142,7 @@ class URScript(Formatter):
 
     @property
     def signals(self) -> list[Signal]:
-        """What the program can switch."""
+        """Signals that the program can switch."""
         found: list[Signal] = [] if self.settings.laser_output is None else ["laser"]
         return [*found, "gas"] if "gas" in self.program.signals else found
 
@@ -180,7 +181,7 @@ class URScript(Formatter):
         yield f"sleep({number(wait.time, 3)})"
 
     def request(self, request: Request) -> Iterator[str]:
-        """Yield an output; the robot stands."""
+        """Yield an output; the robot is stopped."""
         yield f"set_standard_digital_out({self.port(request.partner, 'output')}, {request.on})"
 
     def wait_for(self, awaited: Await) -> Iterator[str]:
@@ -193,7 +194,7 @@ class URScript(Formatter):
         yield f"# {text}"
 
     def _switched(self, move: LinearMove, line: str) -> Iterator[str]:
-        """Yield a move between what is switched ahead of its end and what is switched there."""
+        """Yield the switches ahead of the end of a move, the move, and the switches at its end."""
         for switch in move.switches:
             stops, acceleration = move.zone == 0, self.settings.acceleration
             near = distance_ahead(switch.lead_time, move.speed, acceleration, stops=stops)

@@ -30,4 +30,4 @@ VAL3 = Language(
     assumed={"laser_output": r"BasicIO-1\%Q0"},
     read=read,
 )
-"""What is registered."""
+"""The language as registered."""

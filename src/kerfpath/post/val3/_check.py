@@ -1,4 +1,4 @@
-"""What VAL 3 says otherwise than planned, or not at all."""
+"""Issues that only VAL 3 has."""
 
 from __future__ import annotations
 

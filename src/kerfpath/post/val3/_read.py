@@ -1,4 +1,4 @@
-"""Read back the projects that `Val3` writes; what it does not know, it refuses."""
+"""Read back the projects that `Val3` writes; anything else is refused."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _LINES = patterns(
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: Val3Settings) -> ReadProgram:
-    """Return the program that projects of ours say; see `kerfpath.post.Reader`."""
+    """Return the program in projects that `Val3` wrote; see `kerfpath.post.Reader`."""
     top = _Project(main, files, robot, settings)
     projects = {"": top}
     for alias, path in top.libraries.items():
@@ -62,7 +62,7 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: Val3Settin
     start = top.routine("start")
     for line, alias, name in top.calls(start):
         if alias not in projects or name not in projects[alias].routines:
-            raise start.fault(f"{name} is no routine of {alias or 'the project'}", line)
+            raise start.fault(f"{name} is not a routine of {alias or 'the project'}", line)
         if (alias, name) in called:
             raise start.fault(f"{name} is called twice", line)
         called.add((alias, name))
@@ -86,7 +86,7 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: Val3Settin
 
 
 class _Project:
-    """One project: what it consists of, its data, and its routines."""
+    """One project: its files, its data, and its routines."""
 
     def __init__(
         self, file: str, files: Mapping[str, str], robot: Robot, settings: Val3Settings
@@ -133,7 +133,7 @@ class _Project:
         return found
 
     def require_same(self, top: _Project) -> None:
-        """Check that a library has the frames of the project and no libraries of its own."""
+        """Check that a library has the frames of the project and no libraries itself."""
         frames = self.data.frames
         same = all(np.array_equal(T, top.data.frames[name]) for name, T in frames.items())
         if not same or self.libraries:
@@ -143,7 +143,7 @@ class _Project:
             )
 
     def routine(self, name: str) -> Element:
-        """Return the code of a routine of its name."""
+        """Return the code of the routine `name`."""
         if name not in self.programs:
             raise InputError(f"{self.folder / self.name}.pjx: {name}.pgx is missing")
         file = str(self.folder / f"{name}.pgx")
@@ -189,7 +189,7 @@ class _Project:
             raise stop.fault(f"expected {' and '.join(stop_lines(self.settings))} in stop()")
 
     def steps(self, name: str) -> tuple[ReadStep, ...]:
-        """Return what a routine does."""
+        """Return the steps of a routine."""
         return tuple(_Routine(self, self.routine(name)).steps)
 
 
@@ -239,7 +239,7 @@ class _Routine(LineReader):
     def stand(self) -> None:
         last = self.steps[-1] if self.steps else None
         if isinstance(last, ReadMove) and last.zone:
-            raise self.fault("the robot is to stand where a corner is to be rounded")
+            raise self.fault("the robot must not wait where a corner is to be rounded")
         self.stands = True
 
     def switch(self, name: str, state: str) -> None:

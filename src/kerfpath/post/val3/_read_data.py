@@ -28,10 +28,10 @@ _BOUNDS = {"accel": "100", "decel": "100", "rmax": "99999"}
 
 
 class Val3Data:
-    """What a .dtx declares; each kind of datum has a method.
+    """The data that a .dtx declares; each kind of datum has a method.
 
-    `frames` by name, `q` (K, 6) rad, `T` (K, 4, 4) m in the part with their `words`, and of
-    `motions` by name the speed (m/s or share of the full one) and the zone (m).
+    They are `frames` by name; `q` (K, 6) rad; `T` (K, 4, 4) m in the part with their `words`; and
+    `motions` by name, with speed (m/s or share of the full speed) and zone (m).
     """
 
     def __init__(self, root: Element, robot: Robot, settings: Val3Settings) -> None:
@@ -88,7 +88,7 @@ class Val3Data:
         (value,) = values
         link = value.attributes.get("link", "")
         if link != (expected := links(self.settings).get(name)):
-            raise value.fault(f"switches the output {link}; expected {expected}")
+            raise value.fault(f"expected the output {expected} to be switched, got {link}")
         value.take(link=link)
 
     def _air_targets(self, name: str, values: list[Element]) -> None:

@@ -1,4 +1,4 @@
-"""What a person states of a Staubli controller, and what its programs must keep to."""
+"""Settings of a Staubli controller, and rules of its programs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["LONGEST_NAME", "Val3Settings", "is_reserved", "rules"]
 LONGEST_NAME = 15
 """Characters of a name."""
 POINT_STEP, ANGLE_STEP = 0.5e-7, float(np.radians(0.5e-6))
-"""What four decimals of mm leave of positions (m), and six of deg of angles (rad)."""
+"""Rounding errors of four decimals of mm (m), and of six decimals of deg (rad)."""
 SPEED_STEP = 1e-6
 """Speeds (m/s) have three decimals of mm/s."""
 
@@ -41,7 +41,7 @@ MEANINGS = (
     "tan taskcreate taskcreatesync taskkill taskresume taskstatus tasksuspend title tostring tonum "
     "userpage wait waitendmove watch workingmode"
 )
-"""Types, data, words and instructions of a controller, where a contour may be named so."""
+"""Types, data, words and instructions of a controller that a contour could have as its name."""
 RESERVED = frozenset((KEYWORDS + " " + MEANINGS).split())
 
 Link = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.%\\/:\-]{1,80}$")]
@@ -56,7 +56,7 @@ Input = Annotated[
 
 
 class Val3Settings(PortSettings, output=Output, input=Input):
-    """Which outputs, where the projects lie, and for which version they are."""
+    """Outputs and inputs, the folder of projects, and the version that they are for."""
 
     tool_link: Annotated[
         Link,
@@ -77,7 +77,7 @@ class Val3Settings(PortSettings, output=Output, input=Input):
 
 
 def rules(settings: Val3Settings) -> Rules:
-    """Return what VAL 3 programs must keep to."""
+    """Return the rules of VAL 3 programs."""
     return Rules(
         longest_name=LONGEST_NAME,
         slowest=SPEED_STEP,

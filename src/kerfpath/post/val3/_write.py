@@ -1,9 +1,9 @@
 """VAL 3, the language of Staubli controllers: this module only formats.
 
 Units of VAL 3: mm, deg, mm/s, seconds; rx, ry, rz turn about x, the new y, the new z. A program is
-a project, a folder of XML files: what belongs to it, its data, and one file for each routine.
+a project, a folder of XML files: a list of its files, its data, and one file for each routine.
 Targets, speeds and frames are data. Motions are queued while the routine runs on: to switch an
-output where the tip stands, the routine waits for the end of the motion; see `stop_to_switch`.
+output after the tip has stopped, the routine waits for the end of the motion; see `stop_to_switch`.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ PORTS = {
 FIRST = "nFirst"
 """Number of the contour at which the project begins, for a restart."""
 UNBOUNDED = 'tmax="99999" rmax="99999"'
-"""Speeds of tip and tool that bound nothing, the controller's own."""
+"""Speeds of tip and tool that limit nothing, the controller's own."""
 AIR_SPEED = 'accel="100" vel="%s" decel="100" ' + UNBOUNDED
 PATH_SPEED = 'accel="100" vel="100" decel="100" tmax="%s" rmax="99999"'
 JOINTS = " ".join(f'j{i}="%.6f"' for i in range(1, 7))
@@ -87,7 +87,7 @@ CONFIGURATION = 'shoulder="%s" elbow="%s" wrist="%s"'
 AROUND = 40
 """Lines of a file beside those of its steps and their data."""
 DATA_OF_A_STEP = 3
-"""A circular move: two points and a speed."""
+"""Largest number of data of a step: two points and a speed of a circular move."""
 
 
 def parameters(settings: Val3Settings) -> dict[str, str]:
@@ -111,7 +111,7 @@ def opening_lines(settings: Val3Settings) -> list[str]:
 def wait_lines(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
     """Return the statements that wait for an input.
 
-    After `timeout` (s) everything is off, the arm's power too, until the input comes.
+    After `timeout` (s) everything is off, including the arm's power, until the input is on.
     """
     asked = f"{PORTS[partner, 'input']}==true"
     return [
@@ -125,7 +125,7 @@ def wait_lines(partner: str, timeout: float, settings: Val3Settings) -> list[str
 
 
 def closing_lines() -> list[str]:
-    """Return the last statements of start(); the next time it begins with the first contour."""
+    """Return the last statements of start(), so that it begins with the first contour next time."""
     return ["waitEndMove()", f"{FIRST}=1"]
 
 
@@ -142,19 +142,19 @@ class _Database:
     places: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def add(self, name: str, value: str) -> str:
-        """Return how a routine names a new value."""
+        """Add a value, and return how routines name it."""
         self.values[name].append(value)
         return f"{name}[{len(self.values[name]) - 1}]"
 
     def shared(self, name: str, value: str) -> str:
-        """Return how a routine names a value that may be there already."""
+        """Return how routines name a value; add the value if it is new."""
         if (name, value) not in self.places:
             self.places[name, value] = self.add(name, value)
         return self.places[name, value]
 
 
 class Val3(Formatter):
-    """Writes a project with a routine for each section, and libraries where it is too long."""
+    """Formatter of a project with a routine for each section, and of libraries if too long."""
 
     settings: Val3Settings
     too_long = "warning"
@@ -189,7 +189,7 @@ class Val3(Formatter):
         if longest > most:
             raise InputError(
                 f"program {name!r}: {len(self._parts)} libraries need files of {longest} lines, "
-                f"lines_per_file allows {most}; raise it"
+                f"but lines_per_file allows {most}; raise it"
             )
         for part, own in self._parts.items():
             texts |= self._project(part, own, None)
@@ -210,7 +210,7 @@ class Val3(Formatter):
         ]
 
     def lines(self, section: Section) -> Iterator[str]:
-        """Yield the lines of a section, which does not know whether the robot stands."""
+        """Yield the lines of a section, at whose start the robot may be moving."""
         self._moving = True
         yield from super().lines(section)
 
@@ -230,26 +230,26 @@ class Val3(Formatter):
         yield from self._path_move("movec", move)
 
     def wait(self, wait: Wait) -> Iterator[str]:
-        """Yield a delay, once the robot stands."""
+        """Yield a delay, once the robot has stopped."""
         yield from self.standing()
         yield f"delay({number(wait.time, 3)})"
 
     def request(self, request: Request) -> Iterator[str]:
-        """Yield an output, once the robot stands."""
+        """Yield an output, once the robot has stopped."""
         yield from self.standing()
         yield f"{PORTS[request.partner, 'output']}={'true' if request.on else 'false'}"
 
     def wait_for(self, awaited: Await) -> Iterator[str]:
-        """Yield a wait for an input, once the robot stands."""
+        """Yield a wait for an input, once the robot has stopped."""
         yield from self.standing()
         yield from wait_lines(awaited.partner, awaited.timeout, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
-        """Yield a comment that does not end the text in which it stands."""
+        """Yield a comment, which must not end the CDATA section that contains it."""
         yield f"// {text.replace(']]>', ']] >')}"
 
     def standing(self) -> Iterator[str]:
-        """Yield the line that waits until the robot stands, where it may move."""
+        """Yield the line that waits until the robot has stopped, if it may be moving."""
         if self._moving:
             yield "waitEndMove()"
         self._moving = False
@@ -317,7 +317,7 @@ class Val3(Formatter):
             yield from self.comment(remark)
 
     def _target_texts(self) -> dict[Move, list[str]]:
-        """Return the targets of each move as they stand in the data, all at once."""
+        """Return the targets of each move as texts for the data."""
         robot, moves = self.program.robot, self.program.moves
         joint = [move for move in moves if isinstance(move, JointMove)]
         texts: dict[Move, list[str]] = {move: [] for move in moves}
@@ -352,7 +352,7 @@ def _tag(tag: str, **attributes: str) -> str:
 
 
 def _array(name: str, kind: str, values: Sequence[str]) -> list[str]:
-    """Return the lines of a datum; none where it would be empty."""
+    """Return the lines of a datum; none if it would be empty."""
     if not values:
         return []
     size = len(values)

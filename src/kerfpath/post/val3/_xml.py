@@ -11,12 +11,12 @@ from kerfpath.errors import InputError
 __all__ = ["SCHEMA", "Element", "parse"]
 
 SCHEMA = "http://www.w3.org/2001/XMLSchema-instance"
-"""Namespace of attributes that are called xsi: here."""
+"""Namespace of the attributes with the prefix xsi: here."""
 
 
 @dataclass(slots=True, kw_only=True)
 class Element:
-    """One element: where it stands, what it is called, and what is in it."""
+    """One element: its place, tag, attributes and content."""
 
     file: str
     line: int
@@ -28,7 +28,7 @@ class Element:
     __repr__ = short_repr
 
     def fault(self, message: str, line: int | None = None) -> InputError:
-        """Return the error that something is wrong in this element, or on a line of its text."""
+        """Return an error with the place of this element, or of a line of its text."""
         return InputError(f"{self.file}, line {self.line if line is None else line}: {message}")
 
     def take(self, **expected: str) -> None:
@@ -37,13 +37,13 @@ class Element:
             raise self.fault(f"expected {_show(self.tag, expected)}, got {self.shown()}")
 
     def only(self, *tags: str) -> list[Element]:
-        """Return the children, which must be called so, one after the other."""
+        """Return the children, which must have these tags in this order."""
         if [child.tag for child in self.children] != list(tags) or self.text.strip():
             raise self.fault(f"expected {' and '.join(tags) or 'nothing'} in {self.shown()}")
         return self.children
 
     def each(self, tag: str) -> list[Element]:
-        """Return the children, which must all be called so."""
+        """Return the children, which must all have this tag."""
         for child in self.children:
             if child.tag != tag:
                 raise child.fault(f"expected <{tag}>, got {child.shown()}")
@@ -57,12 +57,12 @@ class Element:
 
 
 def parse(file: str, text: str, tag: str, namespace: str) -> Element:
-    """Return the root of a document; it must be called `tag` in `namespace`.
+    """Return the root of a document; it must have the tag `tag` in `namespace`.
 
     Raises
     ------
     InputError
-        No XML, a document type or a processing instruction, another root or namespace.
+        The text is not XML, has a document type, a processing instruction, or another root.
     """
     top = Element(file=file, line=1, tag="", attributes={})
     stack = [top]
@@ -85,7 +85,10 @@ def parse(file: str, text: str, tag: str, namespace: str) -> Element:
         stack[-1].text += data
 
     def refuse(*_: object) -> None:
-        raise InputError(f"{file}, line {parser.CurrentLineNumber}: not expected in a project")
+        raise InputError(
+            f"{file}, line {parser.CurrentLineNumber}: a document type or a processing instruction "
+            "is not expected in a project"
+        )
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = characters
@@ -93,9 +96,9 @@ def parse(file: str, text: str, tag: str, namespace: str) -> Element:
     try:
         parser.Parse(text.encode("utf-8", "surrogatepass"), True)
     except expat.ExpatError as error:
-        raise InputError(f"{file}, line {error.lineno}: no XML ({error})") from None
+        raise InputError(f"{file}, line {error.lineno}: not XML ({error})") from None
     except (ValueError, LookupError) as error:  # an encoding that the parser does not have
-        raise InputError(f"{file}, line {parser.CurrentLineNumber}: no XML ({error})") from None
+        raise InputError(f"{file}, line {parser.CurrentLineNumber}: not XML ({error})") from None
     root = top.children[0]
     if root.tag != tag:
         raise root.fault(f"expected <{tag}>, got {root.shown()}")
