@@ -19,7 +19,7 @@ import numba
 import numpy as np
 import platformdirs
 from llvmlite import ir
-from numba.core.caching import UserProvidedCacheLocator
+from numba.core.caching import InTreeCacheLocator
 from numba.cpython.unsafe import numbers
 from numba.extending import intrinsic
 
@@ -35,6 +35,7 @@ __all__ = [
     "larger",
     "smaller",
     "trailing_zeros",
+    "variable",
 ]
 
 _P = ParamSpec("_P")
@@ -65,17 +66,12 @@ CACHE = _cache_folder()
 """Where the compiled kernels of exactly these sources are kept (or NUMBA_CACHE_DIR, if set)."""
 
 
-class Locator(UserProvidedCacheLocator):  # type: ignore[misc] # numba has no types
-    """Tells numba to keep compiled kernels in `CACHE`, wherever the package is installed."""
+class Locator(InTreeCacheLocator):
+    """Makes numba keep compiled kernels in `CACHE`, wherever the package is installed."""
 
-    def __init__(self, function: Callable[..., Any], file: str) -> None:
-        super().__init__(function, file)
-        self._cache_path = str(CACHE)
-
-    @classmethod
-    def from_function(cls, function: Callable[..., Any], file: str) -> Any:
-        """Return the locator of a function; None if the folder cannot be written."""
-        return super(UserProvidedCacheLocator, cls).from_function(function, file)
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return str(CACHE)
 
 
 def _compiled(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
@@ -89,6 +85,11 @@ def _compiled(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
     return compiled
 
 
+variable = cast("Callable[[int], int]", np.int64)
+"""Makes an int whose type is that of a variable: for a literal argument numba compiles a callee
+again, once for each literal."""
+
+
 class _Part(Generic[_P, _R]):
     """A kernel that only kernels call: numba sees its type, and Python has no way in."""
 
@@ -96,11 +97,12 @@ class _Part(Generic[_P, _R]):
         compiled: Any = _compiled(
             function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
         )
+        self._name = function.__qualname__
         self._compiled, self._numba_type_ = compiled, compiled._numba_type_
         update_wrapper(self, function)
 
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _R:
-        raise TypeError(f"{self.__wrapped__.__qualname__} is called by kernels alone")
+        raise TypeError(f"{self._name} is called by kernels alone")
 
 
 def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit, jit_inline, jit_part
+from kerfpath.kernels._jit import jit, jit_inline, jit_part, variable
 from kerfpath.kernels.continuous import (
     RELAXED,
     Steps,
@@ -89,7 +89,7 @@ def advance(
         for i in range(n):
             x[b, i] = targets.q[p, i]
     for k in range(1, K):
-        made = np.int64(0)
+        made = variable(0)
         for relaxed in RELAXED:
             free = np.inf if k == 1 else relaxed
             for i in range(n):
@@ -191,7 +191,7 @@ def _keep(
     for left in range(made - 1, -1, -1):
         o = heap[0]
         heap[0] = heap[left]
-        _sift(heap, offers.total, np.int64(0), left)
+        _sift(heap, offers.total, variable(0), left)
         known = False
         for b in range(kept):
             if out.at[k, b] != offers.at[o] or abs(out.share[k, b] - offers.share[o]) > alike.share:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.kernels._jit import jit, jit_inline, variable
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import EUCLID, MANHATTAN, increment, wrap_angle
 from kerfpath.kernels.search import first_from
@@ -302,7 +302,7 @@ def values_to_go(targets: Targets, steps: Steps, cost: Array, out_tail: Array) -
     K, n = len(targets.start) - 1, len(steps.low)
     a, d = np.empty(n), np.empty(n)
     for k in range(K - 2, -1, -1):
-        hint, alive = np.int64(-1), False
+        hint, alive = variable(-1), False
         for p in range(targets.start[k], targets.start[k + 1]):
             out_tail[p] = np.inf
             if cost[p] == np.inf:

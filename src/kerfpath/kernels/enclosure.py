@@ -14,10 +14,8 @@ from __future__ import annotations
 from math import atan2, ceil, cos, inf, pi, sin, sqrt
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit, jit_inline, jit_part, smaller
+from kerfpath.kernels._jit import jit, jit_inline, jit_part, smaller, variable
 from kerfpath.kernels.intervals import (
     DOWN,
     EPS,
@@ -67,8 +65,8 @@ ANGLE_ERROR = 1e-14
 """What the offset (of 1 rad) and the removal of whole turns add to an error, rad: the model's
 angles are below 16 rad, and each of three operations errs by half a unit in the last place."""
 
-X, Y, Z, CENTER = np.int64(0), np.int64(1), np.int64(2), np.int64(3)
-"""Rows and columns of a frame. Of a bare 0 numba compiles a `turned` of its own, of 1 the next."""
+X, Y, Z, CENTER = variable(0), variable(1), variable(2), variable(3)
+"""Rows and columns of a frame."""
 
 
 class Frames(NamedTuple):
