@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 DEMO_OUT ?= demo-out
 
-.PHONY: demo test test-slow check docs package bench figures lock clean
+.PHONY: demo test test-slow check docs package bench figures screenshots lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/kerfpath demo --out $(DEMO_OUT)
@@ -43,6 +43,10 @@ figures: .venv/run.stamp
 	$(BIN)/python examples/comfort.py
 	$(BIN)/python examples/known_against_proposed.py
 	$(BIN)/python examples/techniques.py
+
+# The pages that the documentation shows, photographed in Chromium.
+screenshots: .venv/dev.stamp
+	$(BIN)/python examples/screenshots.py
 
 # One environment, filled in steps: what running needs, what developing adds, what benchmarks and the site add.
 .venv/tools.stamp: requirements/build.txt

@@ -223,13 +223,25 @@ def busy(what: str) -> Iterator[None]:
         yield
 
 
-def compile_kernels(kinematics: str = "opw") -> None:
-    """Compile the kernels for a kinematic family before the first run, and print that."""
+def compile_kernels(kinematics: str | None = None) -> None:
+    """Compile the kernels before the first run, and print that.
+
+    Parameters
+    ----------
+    kinematics : str, optional
+        The kinematic family of the robot of a job that this process plans; kernels that only bounds
+        need are then compiled while it plans. Default: all for the usual family, for processes to
+        come.
+    """
+    from kerfpath.compiling import FOR_BOUNDS
     from kerfpath.job import is_compiled, warm_up
+
+    later = () if kinematics is None else FOR_BOUNDS
+    kinematics = kinematics or "opw"
 
     if is_compiled(kinematics):
         return
     if not (quiet.is_set() or errors.is_terminal):
         errors.print("kerfpath: compiling the kernels, first run only")
     with busy("compiling the kernels, first run only"):
-        warm_up(kinematics)
+        warm_up(kinematics, later=later)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from kerfpath.certificate import Certify
 from kerfpath.certifier import certify
+from kerfpath.compiling import finish_compiling
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
 
@@ -39,6 +40,7 @@ def with_bound(
         return replace(made, settings=settings)
     if phase is not None:
         phase("certificate")
+    finish_compiling()
     found = certify(
         made, gap=asked.gap, seconds=asked.seconds, checkable=asked.keep, progress=progress
     )

@@ -8,6 +8,7 @@ from math import sqrt
 import numpy as np
 
 from kerfpath.certifier import MotionTest
+from kerfpath.compiling import finish_compiling
 from kerfpath.errors import NoFeasiblePath, Relaxation
 from kerfpath.limits import rates_of
 from kerfpath.planner._quickest import QuickMotion
@@ -42,6 +43,7 @@ def motion_test(task: PlanningTask) -> MotionTest | None:
     asked = task.settings
     if not task.robot.encloses or asked.tilt is not None or len(task.contour) > MOST_NODES:
         return None
+    finish_compiling()
     frames = task.T_base_part @ task.contour.frames(asked.frames)
     return MotionTest(task.robot, frames, task.T_flange_tip, asked.postures)
 

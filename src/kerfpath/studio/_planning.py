@@ -8,6 +8,7 @@ from threading import Event
 from typing import NamedTuple
 
 from kerfpath.cad import Part
+from kerfpath.compiling import FOR_BOUNDS
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, KerfpathError
 from kerfpath.graph import LayeredGraph
@@ -255,7 +256,7 @@ class Planning:
         kinematics = prepared.job.robot.kinematics
         if not is_compiled(kinematics):
             self._say(ProgressMessage(busy=True, label="compiling the kernels, first run only"))
-            warm_up(kinematics)
+            warm_up(kinematics, later=FOR_BOUNDS)
         run = Run(self._bench, prepared, revision, self._say, stop)
         tried = run.contours(first, partial(self._took, motion_key(job), revision))
         self._look_ahead(prepared, revision, run)
