@@ -127,6 +127,13 @@ def test_accelerations_are_assumed_only_as_asked(folder, tmp_path):
         which_robots(path, **(given | {"robots": ["abb_irb9"]}))
 
 
+def test_what_is_wrong_with_the_job_is_refused_once_and_not_listed_for_each_robot(tmp_path):
+    write_slit_jobs(tmp_path, {"job": SLIT_JOB.replace('pick = "b"', 'pick = "door"')})
+    with pytest.raises(InputError, match="no loop 'door'"):
+        which_robots(tmp_path / "job.toml", store=tmp_path / "store.sqlite", processes=1)
+    assert not (tmp_path / "store.sqlite").exists()
+
+
 def test_a_second_call_computes_nothing(found, folder, monkeypatch):
     def none(*_):
         raise AssertionError("a process was started")

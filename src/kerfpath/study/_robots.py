@@ -15,7 +15,7 @@ from kerfpath.cad import Part
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.front import follows_courses
 from kerfpath.graph import LayeredGraph
-from kerfpath.job import Job, read_job
+from kerfpath.job import Job, prepare, read_job
 from kerfpath.progress import Progress, no_progress
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
 from kerfpath.study._evaluator import (
@@ -144,6 +144,7 @@ def which_robots(
     """
     path = Path(job_file)
     job, known = read_job(path), (NEAREST, *acceleration_ratios())
+    prepare(job, job.read_part())  # what is wrong with the job itself is no property of a robot
     if acceleration_ratio is not None and acceleration_ratio not in known:
         raise InputError(
             f"acceleration_ratio: expected one of {', '.join(known)}, got {acceleration_ratio!r}"
