@@ -48,7 +48,7 @@ def opened(browser: Browser, url: str, width: int, height: int) -> Page:
 def report(browser: Browser, folder: Path) -> None:
     """Show the top of the demo's report."""
     run("demo", "--out", ".", folder=folder)
-    page = opened(browser, (folder / "report.html").as_uri(), 1280, 900)
+    page = opened(browser, (folder / "report.html").as_uri(), 1280, 1200)
     page.screenshot(path=DOCS / "report.png")
 
 
@@ -65,7 +65,8 @@ def studio(browser: Browser, folder: Path) -> None:
         (address,) = re.findall(r"http://\S+", server.stdout.readline())
         page = opened(browser, address, 1600, 900)
         page.wait_for_function(PLANNED, timeout=300_000)
-        page.wait_for_timeout(2000)
+        page.get_by_role("option", name="trim").or_(page.get_by_text("trim", exact=True)).first.click()
+        page.wait_for_timeout(8000)
         page.screenshot(path=DOCS / "studio.png")
     finally:
         server.terminate()
