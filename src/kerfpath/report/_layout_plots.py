@@ -87,7 +87,7 @@ def _plane(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
         x=[o[first] for o in tried], y=[o[second] for o in tried], mode="markers", marker=dots,
         name="tried", hoverinfo="skip",
     )  # fmt: skip
-    _mark(figure, 0.0, 0.0, "as the job has it", "x", INK, 11)
+    _mark(figure, 0.0, 0.0, "placement of the job", "x", INK, 11)
     if entry["best"]:
         at = entry["best"]["offsets"]
         _mark(figure, at[first], at[second], "best", "star", "#ffb000", 19)
@@ -136,7 +136,7 @@ def _line(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
         if any(c["status"] == status for c in drawn["cells"]):
             _add_to_legend(figure, status)
     if entry["shipped"]["value"] is not None:
-        _mark(figure, 0.0, entry["shipped"]["value"], "as the job has it", "x", INK, 11)
+        _mark(figure, 0.0, entry["shipped"]["value"], "placement of the job", "x", INK, 11)
     if entry["best"]:
         best = entry["best"]
         _mark(figure, best["offsets"][name], best["value"], "best", "star", "#ffb000", 19)

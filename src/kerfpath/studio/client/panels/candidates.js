@@ -227,7 +227,7 @@ export function candidates(store, connection, placing, moved) {
       },
       el("i", { class: `dot ${status !== "feasible" ? "none" : value !== null ? "done" : ""}` }),
       el("span", { class: "name" }, words),
-      el("span", { class: "more" }, isOwn(tried) ? "as the job has it" : moves(offsets)),
+      el("span", { class: "more" }, isOwn(tried) ? "placement of the job" : moves(offsets)),
     );
   }
 
