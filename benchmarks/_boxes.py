@@ -21,7 +21,7 @@ Box = tuple[Array, Array]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdicts:
-    """Numbers of poses called clear, of clear ones that overlap, and of refused ones that do not."""
+    """Numbers of poses called clear, of those that overlap, and of refused poses that do not."""
 
     clear: int
     wrong: int
@@ -54,7 +54,7 @@ class Boxes:
         return made
 
     def overlap(self, one: str, two: str, q: Array, depth: float) -> Bools:
-        """Return at which q (B, n) rad two solids overlap, the first made smaller by a depth (m)."""
+        """Return at which q (B, n) rad two solids overlap, the first shrunk by a depth (m)."""
         frames = self.chain.frames(q)
         (i, _, first), (j, _, second) = self.solids[one], self.solids[two]
         hit = np.zeros(len(q), bool)

@@ -23,7 +23,7 @@ __all__ = [
 
 
 class Raw(str):
-    """A text that is written as it is, because JSON has no value for it: too large a number, NaN."""
+    """A text written as it is, because JSON has no value for it: too large a number, NaN."""
 
 
 Path = tuple[str | int, ...]

@@ -1,4 +1,4 @@
-"""Short contours with a narrow range of gamma, so that a dense grid can be searched for the best."""
+"""Short contours with little room for gamma, so that the best path of a dense grid can be found."""
 
 from __future__ import annotations
 

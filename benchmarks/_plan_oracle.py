@@ -26,7 +26,7 @@ HARMLESS = {
     r"limits/acceleration_source$": "free text",
     r"limits/couplings/\d+/note$": "free text",
 }
-"""Places (paths from the top, separated by `/`) where another value of the same type is harmless,
+"""Places (from the top, separated by `/`) where another value of the same type is harmless,
 and why."""
 TURN = 2 * 3.141592653589793
 
