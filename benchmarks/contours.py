@@ -115,7 +115,7 @@ def _in_processes(
 ) -> dict[str, list[_R] | str]:
     """Return the results of each task for all keys in order, or why it did not run.
 
-    Each task has its own `processes`, which are warmed up first; all run at the same time.
+    Each task has `processes` workers, which are warmed up first; all tasks run at the same time.
     """
     pools = {
         name: ProcessPoolExecutor(

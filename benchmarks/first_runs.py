@@ -24,7 +24,7 @@ JOBS = 30
 LARGEST = 0.8
 """m: longer parts are left out, because an arm may not reach all of them."""
 MOST_LOOPS, DOWN = 4, -0.7
-"""Number of loops cut per drawing, the shortest ones; and z of a tool axis that points down."""
+"""Number of loops cut per drawing, the shortest; and the largest z of an axis that points down."""
 TEMPLATE = """\
 [robot]
 model = "abb_irb4600_60_205"

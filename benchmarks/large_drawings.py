@@ -34,7 +34,7 @@ SIDE = 7
 PLATES = (8, 32, 116)
 """Numbers of plates in the assembly; the last gives 82 MB."""
 RATIO, GIGABYTES = 2.0, 3.0
-"""Allowed time and memory of reading: multiple of OCCT's time, and memory."""
+"""Allowed time of reading, as a multiple of OCCT's, and allowed memory, GB."""
 
 HOW = """\
 An assembly of plates of 180 faces, each with {holes} holes, round ones and hexagons, written by

@@ -95,7 +95,8 @@ def is_compiled(kinematics: str = "opw") -> bool:
 def warm_up(kinematics: str = "opw", *, later: Collection[str] = ()) -> bool:
     """Compile the kernels of the main job if the cache lacks them; return whether it did.
 
-    Each stage is compiled in a separate Python process; all of them run at the same time.
+    Each stage is compiled in a separate Python process, all at the same time; those of `later`
+    start when the others are done.
 
     Parameters
     ----------
