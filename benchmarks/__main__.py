@@ -46,7 +46,7 @@ NAMES = (
 
 
 def main() -> None:
-    """Read the arguments, run what they name, print, and write if asked."""
+    """Read the arguments, run the benchmarks named, print them, and write them if asked."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(NAMES)}; all")
     parser.add_argument("--quick", action="store_true", help="small problems, few runs: a try")
@@ -79,7 +79,7 @@ def main() -> None:
 
 
 def _run(name: str, *, quick: bool) -> list[Report]:
-    """Import a benchmark and run it; each brings libraries that the others do without."""
+    """Import a benchmark and run it; each imports libraries that the others do not need."""
     if name == "kinematics":
         from benchmarks import _enclosures, _families, kinematics
 

@@ -20,7 +20,7 @@ def arm() -> Robot:
 
 
 def arm_of_one_turn() -> Robot:
-    """Return the IRB 2400 with plain ranges only, at most one turn a joint, as a URDF has them."""
+    """Return the IRB 2400 with plain ranges of at most one turn per joint, as in a URDF."""
     plain = robot("abb_irb2400_155")
     assert plain.lower is not None
     assert plain.upper is not None
@@ -48,7 +48,7 @@ def chain(of: Robot) -> tuple[Array, Array]:
 
 
 def tool() -> Array:
-    """Return T_flange_tip of a head whose beam leaves the flange axis by 45 deg."""
+    """Return T_flange_tip of a head whose beam is at 45 deg to the flange axis."""
     c = np.sqrt(0.5)
     T = np.eye(4)
     T[:3, :3] = [[c, 0, c], [0, 1, 0], [-c, 0, c]]
@@ -57,7 +57,7 @@ def tool() -> Array:
 
 
 def placement() -> Array:
-    """Return T_base_part of the cylinder that `wave` lies on."""
+    """Return T_base_part of the cylinder of `wave`."""
     T = np.eye(4)
     T[:3, 3] = [1.05, 0.0, 0.35]
     return T

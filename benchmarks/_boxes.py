@@ -1,4 +1,4 @@
-"""Arms and heads made of boxes, whose overlaps a formula tells: an oracle of collision checks."""
+"""Arms and heads made of boxes whose overlaps have a formula: an oracle for collision checks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Box = tuple[Array, Array]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdicts:
-    """Poses called clear, those of them that overlap, and those refused that do not."""
+    """Numbers of poses called clear, of those that overlap, and of refused poses that do not."""
 
     clear: int
     wrong: int
@@ -54,7 +54,7 @@ class Boxes:
         return made
 
     def overlap(self, one: str, two: str, q: Array, depth: float) -> Bools:
-        """Say at which of q (B, n) rad two solids overlap, the first shaved by a depth (m)."""
+        """Return at which q (B, n) rad two solids overlap, the first shrunk by a depth (m)."""
         frames = self.chain.frames(q)
         (i, _, first), (j, _, second) = self.solids[one], self.solids[two]
         hit = np.zeros(len(q), bool)
@@ -66,7 +66,7 @@ class Boxes:
     def verdicts(self, cell: Cell, q: Array) -> Verdicts:
         """Compare a cell's verdicts on q (B, n) rad with the formula, on the pairs it judges.
 
-        Pairs proved clear all round are looked at, too; those that touch by design are not.
+        Pairs proved clear everywhere are checked too; those that touch by design are not.
         """
         clear, hit, near = cell.clear(q), np.zeros(len(q), bool), np.zeros(len(q), bool)
         depths = dict(zip(cell.pair_names, cell.depth.tolist(), strict=True))
@@ -84,9 +84,9 @@ class Boxes:
 def with_collimator(arm: Robot, *, gap: float, behind: float) -> Boxes:
     """Return an arm of boxes with a head, one box of which reaches behind the flange.
 
-    Link 5 ends `gap` (m) before the flange, beyond it where that is negative; the box beside the
-    head starts `behind` (m) before the flange, wide enough out to pass link 5 by its sides but not
-    by its edges.
+    Link 5 ends `gap` (m) before the flange, or beyond it if `gap` is negative; the box beside the
+    head starts `behind` (m) before the flange, far enough out to pass the sides of link 5 but not
+    its edges.
     """
     solids: dict[str, tuple[int, Kind, list[Box]]] = {}
     for body in link_capsules(arm):
@@ -122,7 +122,7 @@ def _between(low: list[float], high: list[float]) -> Box:
 
 
 def _apart(T_a: Array, half_a: Array, T_b: Array, half_b: Array) -> Bools:
-    """Say for boxes at (B, 4, 4) whether any of fifteen axes separates them (Gottschalk 1996)."""
+    """Return whether any of 15 axes separates boxes at poses (B, 4, 4) (Gottschalk 1996)."""
     A, B = T_a[:, :3, :3], T_b[:, :3, :3]
     crossed = np.cross(A[:, :, :, None], B[:, :, None, :], axis=1).reshape(len(A), 3, 9)
     axes = np.concatenate([A, B, crossed], axis=2)

@@ -35,7 +35,7 @@ __all__ = ["Case", "demo", "tessellated", "wave"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """A task with its graph, and the cell it is planned in."""
+    """A task, its graph, and the cell in which it is planned."""
 
     name: str
     contour: Contour
@@ -48,7 +48,7 @@ class Case:
     cell: Cell
 
     def plan(self, *, cell: Cell | None, graph: LayeredGraph | None) -> Plan:
-        """Return the plan, in a cell or without, on a graph kept or built anew."""
+        """Return the plan, with or without a cell, on the given graph or on a new one."""
         return plan(
             self.contour, self.robot, speed=self.speed, graph=graph, cell=cell, tool=self.tool,
             placement=self.placement, gamma_step=self.gamma_step, method="exact",
@@ -58,7 +58,7 @@ class Case:
 def wave(nodes: int, step: float, *, meshes: bool) -> Case:
     """Return the IRB 2400 cutting the wave into a shell, a table below and a post beside it.
 
-    Its links are capsules, or closed meshes of about 2300 triangles each in their place.
+    Its links are capsules, or closed meshes of about 2300 triangles each instead.
     """
     arm, tool, placement = _arm.arm(), _arm.tool(), _arm.placement()
     t = np.linspace(-0.9, 0.9, 61)
@@ -131,7 +131,7 @@ def tessellated(shape: Shape) -> Hull | Mesh:
 
 
 def _prism(m: int) -> Ints:
-    """Return the triangles of a prism over a strip of m corners, there and back again."""
+    """Return the triangles of a prism over a strip of m corners, out and back."""
     a = np.arange(m)
     b = np.roll(a, -1)
     sides = np.vstack([np.c_[a, b, b + m], np.c_[a, b + m, a + m]])

@@ -24,11 +24,11 @@ from kerfpath.plans import Plan
 __all__ = ["GAP", "GRID", "Made", "Task", "Weighed", "in_processes", "weigh"]
 
 GAP = 0.005
-"""(cost - bound) / cost at which a certificate is done."""
+"""Gap, (cost - bound) / cost, at which a certificate is finished."""
 GRID = {"method": "exact", "refine": True, "gamma_step": np.radians(1.0)}
-"""How the grid is asked for: the yardstick of the continuous search."""
+"""Options of the plan on the grid, the yardstick of the continuous search."""
 AT_LIMIT = 0.999
-"""Share of its limit from which an acceleration counts as at it."""
+"""Share of its limit above which an acceleration counts as at its limit."""
 
 _K = TypeVar("_K")
 _R = TypeVar("_R")
@@ -36,7 +36,7 @@ _R = TypeVar("_R")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Made:
-    """What one method made of a task; no plan where it found none."""
+    """The result of one method for a task; without a plan if it found none."""
 
     plan: Plan | None
     graph_seconds: float
@@ -70,11 +70,11 @@ class Task:
     options: PlanOptions
 
     def on_grid(self, **changes: object) -> Task:
-        """Return the task on the grid, by the method that came before."""
+        """Return the task on the grid, by the method used before the continuous one."""
         return replace(self, options=replace(self.options, **(GRID | changes)))
 
     def made(self) -> Made:
-        """Plan it, the graph apart."""
+        """Plan the task, timing the graph separately."""
         start = perf_counter()
         graph = self.graph()
         built = perf_counter()
@@ -92,7 +92,7 @@ class Task:
         )
 
     def planned(self, graph: LayeredGraph | None = None) -> Plan | None:
-        """Return the plan, not certified, on its graph if given; None where none is found."""
+        """Return the plan, not certified, on a graph if given; None if none is found."""
         with suppress(NoFeasiblePath):
             return plan(
                 self.contour,
@@ -108,7 +108,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weighed:
-    """What became of one task by both methods, and what is proved of the continuous plan.
+    """The results of both methods for one task, and what is proved of the continuous plan.
 
     Parameters
     ----------
@@ -116,9 +116,9 @@ class Weighed:
     index : int
     nodes : int
     cost, grid_cost : float or None
-        Of the continuous plan and of the grid's refined one; None where there is none.
+        Of the continuous plan and of the grid's refined one; None if there is none.
     bound, gap : float or None
-        None where nothing is proved.
+        None if nothing is proved.
     seconds, graph_seconds : float s
         Of the continuous search with its refinement, and of its graph.
     grid_seconds, grid_graph_seconds : float s
@@ -153,7 +153,7 @@ class Weighed:
         return self.cost / self.grid_cost - 1
 
     def __str__(self) -> str:
-        """Say which task it is, and what is remarkable about it."""
+        """Return the name of the task, and what is remarkable about it."""
         parts = [f"{self.name} {self.index}"]
         if self.excess is not None:
             parts.append(f"{100 * self.excess:+.2f} % of the grid's")
@@ -200,7 +200,7 @@ def weigh(
 
 
 def in_processes(call: Callable[[_K], _R], keys: Sequence[_K], processes: int) -> list[_R]:
-    """Return what a call makes of each key, in processes of one thread, kernels compiled before."""
+    """Return the result of a call for each key, from single-thread processes with kernels ready."""
     with (
         patch.dict(environ, NUMBA_NUM_THREADS="1"),
         ProcessPoolExecutor(

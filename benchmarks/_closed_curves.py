@@ -1,4 +1,4 @@
-"""Random closed curves, and what an offset of each should be, by GEOS (shapely) in the plane."""
+"""Random closed curves, and the expected offset of each, by GEOS (shapely) in the plane."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ KINDS = ("polygon", "regular", "stairs", "rounded", "spline", "slot")
 CHORD = 2e-6
 """m: chords of arcs and splines, as `Part.contour` samples them by default."""
 EXACT = 0.006
-"""Share of the distance by which an offset may be off: arcs of 10 deg keep 0.996 of it."""
+"""Tolerance of an offset, as a share of the distance: arcs of 10 deg keep 0.996 of it."""
 NOTHING = 0.02
-"""Share of the distance that is no loss: deeper, a place is not reached."""
+"""Share of the distance that counts as no loss; a deeper place is not reached."""
 DEEP = 0.3
-"""Share of the distance from which a place that is not reached, and is no corner, is a fault."""
+"""Share of the distance above which a place that is not reached, and is no corner, is a fault."""
 SURE = 0.03
-"""How much wider or narrower a beam must be for the verdict to be the same, to be demanded."""
+"""Relative change of the beam width, both ways, that must not change a verdict that is required."""
 BLUNT, SHARP = np.radians(20), np.radians(150)
-"""A turn at a node from the first on makes a corner, which no beam reaches; from the second on the
-beam may not fit, and either answer will do."""
+"""A turn at a node above the first is a corner, which no beam reaches; above the second the beam
+may not fit, and either answer is accepted."""
 
 Answer = Literal["offset", "refused", "either"]
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A closed curve in the plane: points (K, 2) m, the first not repeated; a hole's clockwise."""
+    """A closed curve in the plane: points (K, 2) m, the first not repeated; holes are clockwise."""
 
     kind: str
     points: Array
@@ -46,7 +46,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is expected, what came, how far off it is as a share of the distance, and why."""
+    """Expected and actual answer, their difference as a share of the distance, and the reason."""
 
     expected: Answer
     came: Literal["offset", "refused"]
@@ -55,7 +55,7 @@ class Verdict:
 
     @property
     def right(self) -> bool:
-        """Whether the answer may stand."""
+        """Whether the answer is acceptable."""
         if self.expected != "either" and self.came != self.expected:
             return False
         return not self.off > EXACT
@@ -77,7 +77,7 @@ def curve(rng: np.random.Generator) -> Curve:
 
 
 def judge(drawn: Curve, rng: np.random.Generator) -> Verdict:
-    """Return what comes of the offset of a curve that lies anyhow in space."""
+    """Offset a curve in a random plane in space; return the verdict on the result."""
     expected = _expected(drawn)
     turn = Rotation.random(random_state=rng).as_matrix()
     at = rng.uniform(-1, 1, 3)
@@ -98,7 +98,7 @@ def judge(drawn: Curve, rng: np.random.Generator) -> Verdict:
 
 
 def _expected(drawn: Curve) -> Answer:
-    """Return what must come: judged for beams a little wider and narrower, too."""
+    """Return the answer that is required, the same for slightly wider and narrower beams."""
     kinds = {_one(drawn, drawn.distance * share) for share in (1 - SURE, 1.0, 1 + SURE)}
     return kinds.pop() if len(kinds) == 1 else "either"
 
@@ -123,7 +123,7 @@ def _one(drawn: Curve, distance: float) -> Answer:
         near = np.count_nonzero(shapely.distance(corners, piece) < distance / 10)
         if near == 1:
             continue
-        if near:  # a step lower than the beam is wide: lost, or a reason to refuse
+        if near:  # a step lower than the beam width: lost, or a reason to refuse
             answer = "either"
             continue
         if deep:
@@ -150,7 +150,7 @@ def _turns(points: Array) -> Array:
 
 
 def _filled(points: Array, step: float) -> Array:
-    """Return the points with others between them, no further apart than a step."""
+    """Return the points with others inserted, at most a step apart."""
     ends = np.roll(points, -1, axis=0)
     made = []
     for a, b in zip(points, ends, strict=True):

@@ -1,4 +1,4 @@
-"""Drawings whose loops are known: generated at random, of all four formats."""
+"""Random drawings with known loops, in all four formats."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Known:
     sides : int
         How many loops lie on the outer side of a sheet; as many lie on its inner side.
     options : dict
-        How it is to be read.
+        How to read it.
     """
 
     path: Path
@@ -85,7 +85,7 @@ def _dxf(path: Path, unit: str, family: str, draw: Any, loops: Any, **options: A
 
 
 def _outline(space: Modelspace, corners: Sequence[Any], rng: Any) -> None:
-    """Draw an outline by lines in any order and direction, or by one polyline."""
+    """Draw an outline as lines in any order and direction, or as one polyline."""
     if rng.random() < 0.3:
         space.add_lwpolyline(corners, close=True)
         return
@@ -234,7 +234,7 @@ def _drilled(path: Path, unit: str, rng: Any, family: str) -> Known:
 
 
 def _tube(path: Path, unit: str, rng: Any, family: str) -> Known:
-    """Write a tube: its rims are two outer loops of either side."""
+    """Write a tube: its rims are two outer loops on either side."""
     radius, wall, long = (float(v) for v in rng.uniform((20, 1, 80), (50, 3, 200)))
     shape = BRepAlgoAPI_Cut(
         _rod((0, 0, 0), radius, long), _rod((0, 0, -1), radius - wall, long + 2)
@@ -246,7 +246,7 @@ def _tube(path: Path, unit: str, rng: Any, family: str) -> Known:
 
 
 def _touching(path: Path, unit: str, rng: Any, family: str) -> Known:
-    """Plates side by side, of which two more stand on the first."""
+    """Plates side by side, with two more standing on the first."""
     sizes = [(float(rng.uniform(50, 100)), 40.0, 2.0) for _ in range(3)]
     starts = np.concatenate([[0.0], np.cumsum([size[0] for size in sizes])])
     shapes = [_block((x, 0, 0), size) for x, size in zip(starts.tolist(), sizes, strict=False)]

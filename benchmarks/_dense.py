@@ -1,10 +1,10 @@
-"""The yardstick of the search: the first-order recursion over every edge, plainly written.
+"""The yardstick of the search: a plain first-order recursion over every edge.
 
-No windows, no sorting, no acceleration: for each vertex, the cost of all edges into it from the
-whole layer before, and the least of them. Layers lie by joint, the six joints are written out, and
-nothing is stored per edge; which joints are endless, and the metric, are constants of the compiled
-code. What numba makes of it is one predecessor at a time: LLVM does not take its `min` for a
-reduction that could be vectorised.
+It has no windows, no sorting and no acceleration limit: for each vertex it computes the cost of all
+edges into it from the layer before, and takes the least. Layers are stored by joint, the loop over
+the six joints is written out, and nothing is stored per edge; the endless joints and the metric are
+constants of the compiled code. The compiled loop handles one predecessor at a time: LLVM does not
+recognise its `min` as a reduction that could be vectorised.
 """
 
 from __future__ import annotations
@@ -99,8 +99,8 @@ def dense_cost(
 ) -> float:
     """Return the least cost of a path through the layers, inf if there is none.
 
-    Arguments as of `kerfpath.shortest_path`, six joints; the metric "squared" is Descartes' own:
-    the squares of the Euclidean steps.
+    Arguments are those of `kerfpath.shortest_path`, for six joints; the metric "squared" is the one
+    of Descartes, the squares of the Euclidean steps.
     """
     turned = q - 2 * np.pi * np.ceil((q - np.pi) / (2 * np.pi))
     columns = np.ascontiguousarray(np.where(endless, turned, q).T)
@@ -120,7 +120,7 @@ def _second_order(endless: tuple[bool, ...]) -> Callable[..., float]:
     def forward(
         q: Array, start: Ints, weights: Array, most: Array, change: Array, closed: Bools
     ) -> float:
-        """Keep every admissible edge (p, j) as a state, those into one vertex together."""
+        """Keep every admissible edge (p, j) as a state, grouped by the vertex j."""
         edge = 0
         first, d = np.zeros(start[1] + 1, np.int64), np.zeros(0)
         dq, step = np.empty((0, n)), np.empty(n)
@@ -177,9 +177,9 @@ def second_order_cost(
 ) -> float:
     """Return the least Manhattan cost of a path under both limits, inf if there is none; K >= 2.
 
-    The plain second-order recursion: over every pair of vertices of neighbouring layers, and for
-    each admissible one over every admissible edge before it. Arguments as `dense_cost`; which edges
-    are `passable` may be given for each two layers, (from, to).
+    This is the plain second-order recursion: over every pair of vertices of neighbouring layers,
+    and for each admissible pair over every admissible edge before it. Arguments are those of
+    `dense_cost`; `passable` may give the edges that are free between two layers, (from, to).
     """
     forward = _second_order(tuple(bool(e) for e in endless))
     bounds = velocity * dt + SLACK, acceleration * dt**2 + SLACK

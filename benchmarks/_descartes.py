@@ -1,7 +1,7 @@
-"""Tesseract's Descartes planner on the benchmark's poses, in a process of its own.
+"""Tesseract's Descartes planner on the benchmark's poses, in a separate process.
 
-The wheel brings no robots, so a URDF and SRDF of the arm are written here, without geometry unless
-solids are given.
+The wheel contains no robots, so a URDF and SRDF of the arm are written here, without geometry
+unless solids are given.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ __all__ = ["NotRun", "Solid", "Solved", "Task", "solve"]
 
 
 class NotRun(Exception):
-    """The peer did not run; says why."""
+    """The peer did not run; the message gives the reason."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solid:
-    """A closed mesh, vertices (V, 3) m in the base at joint angles zero, that joint i carries."""
+    """A closed mesh carried by a joint, vertices (V, 3) m in the base at joint angles zero."""
 
     name: str
     frame: int
@@ -43,12 +43,12 @@ class Solid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """Tip poses whose z-axis is free, as Descartes takes them.
+    """Tip poses whose rotation about z is free, as Descartes takes them.
 
     Parameters
     ----------
     robot : Robot
-        An arm with plain ranges of at most one turn a joint.
+        An arm with plain ranges of at most one turn per joint.
     tool : (4, 4)
         T_flange_tip.
     frames : (K, 4, 4)
@@ -56,15 +56,15 @@ class Task:
     samples : int
         Samples of gamma in (-pi, pi].
     sizes : sequence of int
-        Vertices of each layer, as kerfpath counts them; tells the memory it will need.
+        Vertices of each layer, as kerfpath counts them, to estimate the memory needed.
     runs : int
-        How often it is solved, after one run that is not measured.
+        Number of runs, after one that is not measured.
     solids : sequence of Solid
-        With any, poses and the straight joint motions between them are checked for collisions.
+        If given, poses and the straight joint motions between them are checked for collisions.
     apart : sequence of (name, name)
-        Which solids may not touch each other.
+        Pairs of solids that may not touch each other.
     longest : float s
-        After which its process counts as hung.
+        Time after which the process counts as hung.
     """
 
     robot: Robot
@@ -80,7 +80,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solved:
-    """What came back: seconds of each run, the path (K, 6) rad, and what it took."""
+    """The result: seconds of each run, the path (K, 6) rad, and the resources used."""
 
     seconds: list[float]
     q: Array
@@ -114,7 +114,7 @@ def solve(task: Task) -> Solved:
 
 
 def _edges_gigabytes(task: Task) -> float:
-    """Return what the stored edges of the layered graph take: 16 bytes each, as seen."""
+    """Return the memory of the stored edges of the layered graph, GB: 16 bytes each, measured."""
     return 16e-9 * sum(a * b for a, b in pairwise(task.sizes))
 
 
@@ -154,7 +154,7 @@ def _solve_here(task: Task) -> Solved:
     busy: list[float] = []
     peak = peak_megabytes(one_plan)
     for _ in range(task.runs):
-        responses.clear()  # an answer may hold on to its graph
+        responses.clear()  # a response may keep its graph in memory
         one_plan()
     response = responses[0]
     if not response.successful:

@@ -1,4 +1,4 @@
-"""A document of JSON: its values and their places, copies with one changed, and its text."""
+"""A JSON document: its values and their places, copies with one value changed, and its text."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = [
 
 
 class Raw(str):
-    """A piece of text that JSON has no value for: a number too large, NaN."""
+    """A text written as it is, because JSON has no value for it: too large a number, NaN."""
 
 
 Path = tuple[str | int, ...]
@@ -84,7 +84,7 @@ def value_at(data: Any, path: Path) -> Any:
 
 
 def written(data: Any) -> str:
-    """Return a document as text, pieces that JSON has no value for as they are."""
+    """Return a document as text, each `Raw` as it is."""
     raws: list[str] = []
 
     def known(value: Any) -> Any:

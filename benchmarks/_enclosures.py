@@ -1,4 +1,4 @@
-"""Proven bounds of the joints on cells of gamma: their time, and how tight they are."""
+"""Proven bounds of the joints on cells of gamma: their computing time and tightness."""
 
 from __future__ import annotations
 

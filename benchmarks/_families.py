@@ -1,4 +1,4 @@
-"""Inverse kinematics of the families beside OPW: the same poses to us and to a library."""
+"""Inverse kinematics of the other families than OPW: the same poses for us and for a library."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ GENERAL = (
     [0.2, 0.3, 0.25, 0.1, 0.15, 0],
     [0.2, 0.1, 0.3, 0.2, 0.1, 0.1],
 )
-"""Denavit and Hartenberg's alpha (rad), a and d (m)."""
+"""Denavit-Hartenberg parameters alpha (rad), a and d (m)."""
 
 
 def run(*, quick: bool) -> Report:
@@ -82,7 +82,7 @@ def _five() -> Robot:
 
 
 def _looped(T: Array) -> int:
-    """Count the solutions of ur-analytic-ik, from a Python loop."""
+    """Count the solutions of ur-analytic-ik, called in a Python loop."""
     return sum(len(ur_analytic_ik.ur10e.inverse_kinematics(one)) for one in T)
 
 

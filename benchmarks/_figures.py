@@ -1,4 +1,4 @@
-"""How figures are taken and shown: runs in turn, medians, peak memory, tables, machine facts."""
+"""Measure and print figures: alternating runs, medians, peak memory, tables, machine facts."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ COLUMNS = ("figure", "median", "min", "max", "runs", "unit", "note")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
-    """One row of a table: the runs of one thing that was measured.
+    """One row of a table: all runs of one measurement.
 
     Parameters
     ----------
     what : str
     values : sequence of float
-        One number per run; empty when it was not run, and then `note` says why.
+        One number per run; empty if it was not run, and then `note` gives the reason.
     unit : str
     note : str
     """
@@ -79,7 +79,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet:
-    """A table with columns of its own, in words; the columns before `words` hold no numbers."""
+    """A table with its own columns, as text; the first `words` columns hold no numbers."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -97,9 +97,9 @@ class Report:
         What is measured, and how.
     figures : list of Figure
     sheets : list of Sheet
-        What does not fit the columns of figures.
+        Tables that do not fit the columns of figures.
     findings : list of str
-        What was checked beside the clock: agreement, errors, ratios.
+        Checks other than times: agreement, errors, ratios.
     """
 
     title: str
@@ -112,10 +112,10 @@ class Report:
 def in_turn(
     calls: Mapping[str, Callable[[], object]], runs: int, *, unmeasured: int = 1
 ) -> dict[str, list[float]]:
-    """Return the seconds of each run of each call, all calls one after the other in every round.
+    """Return the seconds of each run of each call; every round runs all calls one after another.
 
-    Taking turns lets a busy spell of a shared machine fall on all alike; the first rounds, which
-    compile and fill caches, are not measured.
+    Alternating the calls spreads a busy period of a shared machine over all of them; the first
+    rounds, which compile and fill caches, are not measured.
     """
     seconds: dict[str, list[float]] = {name: [] for name in calls}
     for turn in range(unmeasured + runs):
@@ -130,7 +130,7 @@ def in_turn(
 def peak_megabytes(call: Callable[[], object]) -> float:
     """Return by how much resident memory peaks above its level before a call, MB.
 
-    Linux only: free pages are given back and the kernel's high-water mark is set back before.
+    Linux only: free pages are returned and the kernel's high-water mark is reset first.
     """
     ctypes.CDLL(None).malloc_trim(0)
     Path("/proc/self/clear_refs").write_text("5")
@@ -192,14 +192,14 @@ def _sheets(report: Report) -> list[Sheet]:
 
 
 def _is_number(sheet: Sheet, column: int) -> bool:
-    """Say whether a column is set to the right."""
+    """Return whether a column is aligned to the right."""
     return column >= sheet.words and sheet.columns[column] not in ("unit", "note")
 
 
 def markdown(
     reports: Sequence[Report], facts: Mapping[str, str], date: str, before: str = ""
 ) -> str:
-    """Return the text of RESULTS.md; reports that this run did not make are kept from before."""
+    """Return the text of RESULTS.md; sections that this run did not measure are kept."""
     lines = ["# Benchmark results", ""]
     lines += ["Written by `python -m benchmarks --write`; do not edit. The machine and versions of"]
     lines += ["the last run, which made the sections that bear its date:", ""]

@@ -1,8 +1,8 @@
-"""What a course of gamma means in joint space: the yardstick of the planners that search gamma.
+"""The joint motion of a course of gamma, to compare planners that search gamma.
 
-From each posture of the first node a motion follows, at every next node, the nearest of the poses
-that the joint limits admit; the best of these motions counts. Joint angles lie in (-pi, pi]:
-enough where the joints with more than one turn are endless.
+From each posture of the first node a motion takes, at every next node, the nearest of the poses
+that the joint limits admit; the best of these motions counts. Joint angles are in (-pi, pi], which
+suffices if the joints with more than one turn are endless.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ SLACK = 1e-9
 
 
 class Task(NamedTuple):
-    """What the compiled functions need of a cut."""
+    """The data of a cut that the compiled functions need."""
 
     arm: OpwArm
     limits: JointLimits
@@ -142,9 +142,9 @@ def _follow(
 
 @_jit
 def edge_cost(task: Task, mu: int, k0: int, gamma0: float, k1: int, gamma1: float) -> float:
-    """Return the cost of gamma running evenly from node k0 to k1 in one posture.
+    """Return the cost of gamma changing evenly from node k0 to k1 in one posture.
 
-    Infinite if that leads nowhere forwards, leaves the joint limits or breaks (5).
+    It is infinite if k1 is not after k0, or if the motion leaves the joint limits or breaks (5).
     """
     if k1 <= k0:
         return np.inf
@@ -172,10 +172,10 @@ class Followed:
     Parameters
     ----------
     cost : (P,)
-        Objective (14), weights 1 / (velocity dt); inf where no pose of the first node is admitted.
+        Objective (14), weights 1 / (velocity dt); inf if no pose of the first node is admitted.
     excess : (P,)
         Sum of the shares by which (5) and (6) are exceeded, and 1000 for each node without a pose;
-        0 where the motion is feasible.
+        0 if the motion is feasible.
     q : (P, K, 6) rad
     posture : (P, K) int
     """
@@ -187,7 +187,7 @@ class Followed:
 
 
 class Follower:
-    """Turns courses of gamma into joint motions along one cut and weighs them."""
+    """Turn courses of gamma into joint motions along one cut, and rate them."""
 
     def __init__(self, cut: Cut) -> None:
         velocity, acceleration = cut.robot.speed_limits()
@@ -202,7 +202,7 @@ class Follower:
         )
 
     def follow(self, gamma: Array) -> Followed:
-        """Return what the courses gamma (P, K) rad lead to."""
+        """Return the motions of the courses gamma (P, K) rad."""
         P, K = gamma.shape
         cost, excess, q = np.empty(P), np.empty(P), np.zeros((P, K, 6))
         posture = np.full((P, K), -1)
@@ -215,7 +215,7 @@ class Follower:
         return float(cost), excess == 0.0
 
     def admits_throughout(self, posture: int) -> bool:
-        """Say whether every node has poses in a posture (at one gamma of 36 at least)."""
+        """Return whether every node has a pose in a posture, at one of 36 gammas at least."""
         gamma = np.linspace(-np.pi, np.pi, 36, endpoint=False)
         q, ok = np.empty((POSTURES, 6)), np.empty(POSTURES, np.bool_)
 

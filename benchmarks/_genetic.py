@@ -1,4 +1,4 @@
-"""Gamma by a genetic algorithm (Shibata et al. 1997), with pymoo."""
+"""Optimise gamma by a genetic algorithm (Shibata et al. 1997), with pymoo."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["GENERATIONS", "POPULATION", "genetic"]
 GENERATIONS, POPULATION = 200, 100
 CONTROL_POINTS = 12
 SPREAD = np.radians(90.0)
-"""Largest distance of a control point from the course's own level."""
+"""Largest distance of a control point from the level of the course."""
 
 
 class _Course(Problem):  # type: ignore[misc]

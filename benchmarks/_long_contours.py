@@ -1,4 +1,4 @@
-"""Long contours: from the poses to the plan and to its certificate, time and memory."""
+"""Time and memory of long contours, from the poses to the plan and its certificate."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ __all__ = ["run"]
 SPEED = 10 / 60
 """Cutting speed, m/s."""
 STEPPING = 3.0
-"""Multiple of the arm's accelerations at which they bind, and still let gamma step."""
+"""Multiple of the arm's accelerations at which they are active but still let gamma step."""
 GAP = 0.01
-"""Gap that the certificate of the whole plan is asked for."""
+"""Gap at which the certificate of the whole plan is finished."""
 WAYS = ("continuous", "grid", "certified")
 SHORT = 30.0
 """Seconds for the certificate of a long contour."""
@@ -74,7 +74,7 @@ def _task(nodes: int, *, turns: bool, stepping: bool) -> Task:
 
 
 def _measure(nodes: int, way: str, turns: bool, stepping: bool) -> _Run:
-    """Plan in this process, which is a fresh one."""
+    """Plan in this process, which must be a fresh one."""
     seconds = None if stepping else SHORT
     _planned(_task(100, turns=turns, stepping=stepping), way, seconds)
     task = _task(nodes, turns=turns, stepping=stepping)

@@ -1,4 +1,4 @@
-"""Edits of a plan.json that mean something: its contours, times, limits, moves and so on."""
+"""Meaningful edits of a plan.json: of its contours, times, limits, moves and so on."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = [
 
 
 def contour_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
-    """Remove, double, reorder or rename contours; leave none."""
+    """Remove, double, reorder or rename contours, or remove all."""
     data = copy.deepcopy(data)
     contours = data["contours"]
     i = rng.randrange(len(contours))
@@ -47,7 +47,7 @@ def contour_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
 
 
 def time_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
-    """Scale all times, put in a dwell, or shift one node; dt follows, as a careful hand would."""
+    """Scale all times, insert a dwell, or shift one node; dt is changed to match."""
     data = copy.deepcopy(data)
     i = rng.randrange(len(data["contours"]))
     entry = data["contours"][i]
@@ -73,7 +73,7 @@ def time_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
 
 
 def kind_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
-    """Call nodes something else, or ask for another share of the speed."""
+    """Change the kind of nodes, or their share of the speed."""
     data = copy.deepcopy(data)
     i = rng.randrange(len(data["contours"]))
     nodes = data["contours"][i]["nodes"]
@@ -92,7 +92,7 @@ def kind_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
 
 
 def column_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
-    """Change posture, turn, gamma, arc length or joints of many nodes alike."""
+    """Change posture, turn, gamma, arc length or joints of many nodes in the same way."""
     data = copy.deepcopy(data)
     i = rng.randrange(len(data["contours"]))
     nodes = data["contours"][i]["nodes"]
@@ -116,7 +116,7 @@ def column_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
 
 
 def limit_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
-    """Widen or narrow limits together with eta, or say which joints are endless."""
+    """Widen or narrow limits together with eta, or change which joints are endless."""
     data = copy.deepcopy(data)
     limits, share = data["limits"], rng.choice([0.5, 1.2, 2, 10])
     way = rng.randrange(4)
@@ -140,7 +140,7 @@ def limit_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
 
 
 def faster_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
-    """Cut faster, with limits and the record of the audit changed so that all of it agrees."""
+    """Cut faster, with limits and audit record changed so that everything agrees."""
     data = copy.deepcopy(data)
     share = rng.choice([1.05, 2, 10])
     limits = data["limits"]
@@ -160,7 +160,7 @@ def faster_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
 
 
 def job_copy_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
-    """Change a value of the job that the plan repeats, and what repeats it in turn."""
+    """Change a value of the job that the plan repeats, and the other copies of it."""
     data = copy.deepcopy(data)
     path, value = rng.choice(list(leaves(data["job"])))
     if is_number(value):
@@ -177,7 +177,7 @@ def job_copy_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
 
 
 def move_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
-    """Change the moves through the air: corners, times, how many, all of them."""
+    """Change the transfer moves: their corners, times or number, or all of them."""
     data = copy.deepcopy(data)
     sequence = data["sequence"]
     if sequence is None:

@@ -1,4 +1,4 @@
-"""Short contours with little room for gamma, so that a dense grid can be searched for the best."""
+"""Short contours with little room for gamma, so that the best path of a dense grid can be found."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ ROBOTS = (
     "ur_ur5e",
 )
 RATIO = "cybertech_8_to_20kg"
-"""Stands in for accelerations that a maker does not publish."""
+"""Replaces accelerations that a maker does not publish."""
 METRICS: tuple[Metric, ...] = ("manhattan", "euclid", "chebychev")
 STEPS = (0.05, 0.1, 0.2)
 """Steps of gamma of the dense grid, deg, finest first."""
 MOST_VERTICES = 6000
-"""Vertices of a dense grid at most: its search takes a second or two."""
+"""Most vertices of a dense grid: its search takes a second or two."""
 SHARES = (0.3, 0.9)
-"""Range of the speed over the fastest: nearer to it a grid seldom has a path."""
+"""Range of the speed, as a share of the fastest; close to that a grid seldom has a path."""
 GAP, SECONDS = 5e-4, 1.0
-"""What a certificate is asked for, and the time after which it begins no further stage."""
+"""Gap asked of a certificate, and the time after which it begins no further stage."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Narrow:
-    """A bound and what competitors found.
+    """A bound and the motions that competitors found.
 
     Parameters
     ----------
@@ -49,9 +49,9 @@ class Narrow:
     robot, metric : str
     nodes : int
     step : float deg
-        Of the dense grid; 0.0 where none was searched.
+        Of the dense grid; 0.0 if none was searched.
     cost : float
-        Of the continuous plan; of the best competitor's where that finds none.
+        Of the continuous plan; if that finds none, of the best competitor.
     bound : float
     costs : tuple of float
         Of all motions found.
@@ -71,17 +71,17 @@ class Narrow:
 
     @property
     def violations(self) -> int:
-        """How many motions cost less than the bound."""
+        """Number of motions that cost less than the bound."""
         return sum(cost < self.bound for cost in self.costs)
 
     @property
     def shortfall(self) -> float:
-        """How far the bound lies below the least cost, relative."""
+        """Relative distance of the bound below the least cost."""
         return 1 - self.bound / min(self.costs)
 
     @property
     def excess(self) -> float:
-        """How far the plan lies above the least cost, relative."""
+        """Relative distance of the plan above the least cost."""
         return self.cost / min(self.costs) - 1
 
     def __str__(self) -> str:
@@ -93,7 +93,7 @@ class Narrow:
 
 
 def try_narrow(index: int) -> Narrow | None:
-    """Bound a short contour and search for a motion below; None where it has none to begin with."""
+    """Bound a short contour and search for a motion below; None if it has no motion at all."""
     rng = np.random.default_rng([17, index])
     task = narrow_task(rng)
     if task is None:
@@ -132,7 +132,7 @@ def narrow_task(rng: np.random.Generator) -> Task | None:
         machine = robot(name, acceleration_ratio=RATIO)
     assert machine.lower is not None
     assert machine.upper is not None
-    # One turn of each joint: to look for a first plan among all of them takes too long.
+    # One turn of each joint: the search for a first plan among all turns takes too long.
     lower, upper = np.maximum(machine.lower, -np.pi), np.minimum(machine.upper, np.pi)
     machine = machine.with_limits(lower=lower, upper=upper)
     assert machine.reach is not None
@@ -166,7 +166,7 @@ def narrow_task(rng: np.random.Generator) -> Task | None:
 
 
 def _dense(task: Task) -> tuple[list[Plan], float]:
-    """Return the best path of a dense grid and what it is refined to, and its step, deg."""
+    """Return the best path of a dense grid, its refined plan, and the step of the grid, deg."""
     for step in STEPS:
         dense = task.on_grid(gamma_step=np.radians(step), refine=False)
         graph = dense.graph()

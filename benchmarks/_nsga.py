@@ -22,7 +22,7 @@ __all__ = ["by_nsga"]
 
 POPULATION = 20
 SPREAD = np.log(4.0)
-"""Largest logarithm of the factor on a weight: those of the grid."""
+"""Largest logarithm of the factor on a weight, as on the grid."""
 OBJECTIVES, METRICS = get_args(ObjectiveKind), get_args(Metric)
 
 
@@ -52,7 +52,7 @@ class _Runs(Problem):  # type: ignore[misc]
         )
 
     def genes(self, run: Subproblem) -> Array:
-        """Return the genes (n + 4,) of a run, those of `run` but for what is out of bounds."""
+        """Return the genes (n + 4,) of a run, clipped to their bounds."""
         which = [OBJECTIVES.index(run.objective) + 0.5, METRICS.index(run.metric) + 0.5]
         weights = np.log(run.weights / self.first.weights)
         found = np.r_[weights, np.log([run.eta_v, run.eta_a]), which]
@@ -75,7 +75,7 @@ def by_nsga(
 ) -> tuple[Array, int]:
     """Return the losses (P, C) of the front that `budget` runs find, and how many were feasible.
 
-    It begins with `runs`, the first of which has all that is allowed, and random others.
+    It begins with `runs`, the first of which has the full limits, and random others.
     """
     search = _Runs(problem, runs[0])
     population = min(POPULATION, budget)

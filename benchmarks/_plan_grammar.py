@@ -1,4 +1,4 @@
-"""A grammar of edits over plan.json: every value can be edited by every rule that fits it."""
+"""A grammar of edits of plan.json: every value can be edited by every rule that fits it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = ["GROUPS", "Edit", "edits"]
 
 @dataclass(frozen=True)
 class Edit:
-    """One edited plan.json: what kind of edit, where, the text, and whether it is harmless."""
+    """One edited plan.json: kind and place of the edit, the text, and whether it is harmless."""
 
     kind: str
     where: str
@@ -52,11 +52,11 @@ GROUPS: dict[str, Callable[[Any, random.Random], tuple[str, str, Any] | None]] =
 }
 """The rules of the grammar by name."""
 SHARE = {"value": 8, "array": 3, "key": 2}
-"""How often a rule is taken against the others."""
+"""Relative frequency of each rule."""
 
 
 def edits(text: str, count: int, seed: int) -> Iterator[Edit]:
-    """Yield so many edits of the text of a plan.json; the same seed gives the same ones."""
+    """Yield `count` edits of the text of a plan.json; the same seed gives the same ones."""
     data, rng = json.loads(text), random.Random(seed)
     names = [name for name in GROUPS for _ in range(SHARE.get(name, 1))]
     while count:

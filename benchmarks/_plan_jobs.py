@@ -1,4 +1,4 @@
-"""Small jobs whose plan.json is edited: between them they have all that a plan.json can say."""
+"""Small jobs whose plan.json is edited; together they use every field of a plan.json."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ xyz_mm = [1200, -100, 500]
 rpy_deg = [0, 0, 0]
 """
 JOBS = {
-    # Two contours in order with the moves between: lead, kerf, starts, micro joints, slow corners.
+    # Two contours in order with transfer moves: lead, kerf, starts, micro joints, slow corners.
     "part": _HEAD
     + """\
 [[contour]]
@@ -87,7 +87,7 @@ xyz_mm = [1250, 0, 300]
 rpy_deg = [0, 0, 10]
 size_mm = [300, 300, 50]
 """,
-    # A feed that dips.
+    # A feed reduction.
     "dip": _HEAD
     + """\
 [[contour]]

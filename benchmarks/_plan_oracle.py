@@ -1,7 +1,7 @@
-"""An oracle, apart from the audit, of which edits of a plan.json are harmful.
+"""An oracle, independent of the audit, of which edits of a plan.json are harmful.
 
-It does not look at what the audit does; it says of an edit whether what is left still is a plan of
-the job, within what no robot shows, or differs in words alone that say nothing of the motion.
+It does not use the audit. An edit is harmless if the edited plan is still a plan of the job, within
+differences that no robot shows, or differs only in words that do not describe the motion.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from benchmarks._document import Path, is_number, said
 __all__ = ["HARMLESS", "is_harmless"]
 
 WITHIN = 1e-6
-"""A number changed by less than this (relative, or absolute below 1; m, rad, s) is the same: a
-micrometre and a microradian are a hundredth of what a robot repeats."""
+"""A number changed by less than this (relative, or absolute below 1; m, rad, s) counts as the same:
+a micrometre and a microradian are a hundredth of the repeatability of a robot."""
 HARMLESS = {
     r"kerfpath$": "which version wrote the file",
     r"contours/\d+/(proof|optimal|grid_cost)$": "a claim about other motions: not repeated as fact",
@@ -26,13 +26,13 @@ HARMLESS = {
     r"limits/acceleration_source$": "free text",
     r"limits/couplings/\d+/note$": "free text",
 }
-"""Places (from the top, `/` between) at which another value of the same type does no harm, and why.
-"""
+"""Places (from the top, separated by `/`) where another value of the same type is harmless,
+and why."""
 TURN = 2 * 3.141592653589793
 
 
 def is_harmless(before: Any, after: Any) -> bool:
-    """Say whether an edited document differs only where that is harmless."""
+    """Return whether an edited document differs only where that is harmless."""
     return not any(True for _ in _harm(before, after, ()))
 
 
@@ -51,7 +51,7 @@ def _harm(one: Any, two: Any, path: Path) -> Iterator[str]:
         off = abs(two - one)
         if off and "gamma_rad" in path:
             off = min(off % TURN, TURN - off % TURN)
-        # A number may become a whole one of the same value, as JSON knows but one kind.
+        # A number may become an integer of the same value, as JSON has only one kind of number.
         if off > WITHIN * max(1.0, abs(one)) and not _is_free(path):
             yield said(path)
     elif type(one) is not type(two):
@@ -62,6 +62,6 @@ def _harm(one: Any, two: Any, path: Path) -> Iterator[str]:
 
 
 def _is_free(path: Path) -> bool:
-    """Say whether any value does at a place."""
+    """Return whether any value is harmless at a place."""
     where = said(path)
     return any(re.match(pattern, where) for pattern in HARMLESS)

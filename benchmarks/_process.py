@@ -1,7 +1,7 @@
-"""A run of the command in a process of its own, with a clock around the library's calls.
+"""Run the command in a separate process, with clocks around the library's calls.
 
-Run as a module (``python -m benchmarks._process CLOCKS TIMES.json ARGUMENT ...``) this is one run
-of ``kerfpath ARGUMENT ...`` in this process, with the clocks given as JSON.
+As a module (``python -m benchmarks._process CLOCKS TIMES.json ARGUMENT ...``) it runs
+``kerfpath ARGUMENT ...`` in this process, with the clocks given as JSON.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ __all__ = ["Clock", "Clocks", "parts", "seconds"]
 ROOT = Path(__file__).parent.parent
 
 Clocks = Mapping[str, tuple[str, str]]
-"""What is timed: the name by which the caller's module knows each function."""
+"""What is timed: the name of each function in the module of its caller."""
 
 
 def seconds(command: Sequence[str], **environment: str) -> float:
-    """Return the seconds that a command takes; caches are where `environment` says, or usual."""
+    """Return the seconds that a command takes; `environment` may move the caches."""
     usual = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
     start = perf_counter()
     subprocess.run(

@@ -1,4 +1,4 @@
-"""A grammar of edits over the text of robot programs.
+"""A grammar of edits of the text of robot programs.
 
 An edit deletes, doubles, moves, swaps or copies a line, scales or nudges a number, flips a sign or
 a state, or takes another word of the same family.
@@ -20,20 +20,20 @@ FACTORS = (0.0, 0.5, 0.9, 1.1, 2.0, 10.0, 30.0, 100.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Words:
-    """What the grammar has to know of a language.
+    """What the grammar needs to know of a language.
 
     Parameters
     ----------
     remark : str
         Matches lines that no controller acts on.
     idle : tuple of str
-        Each matches lines with a group that no controller moves or switches by.
+        Each matches lines with a group that has no effect on motions and switches.
     families : tuple of str
-        Each matches words that stand for one another.
+        Each matches words that can replace one another.
     orderless : tuple of str
-        Each matches lines whose order among themselves means nothing, twice the same as once.
+        Each matches lines whose order and repetition have no effect.
     held : tuple of str
-        Each matches lines that do nothing but what the reader makes of the moves behind them.
+        Each matches lines whose only effect is what the reader makes of the moves after them.
     """
 
     remark: str
@@ -93,7 +93,7 @@ WORDS = {
                  held=(r"- {positions.*",)),
     "csv": Words(remark=r"", families=(*STATES, r"\b(?:laser|gas)\b", r"\b(?:linear|joint)\b")),
 }  # fmt: skip
-"""By language."""
+"""The words of each language."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,15 +104,15 @@ class Edit:
     ----------
     kind : str
     file, line : str, int
-        Where, the line counted from 1.
+        Place of the edit; lines are counted from 1.
     files : mapping of str to str
-        The program with it.
+        The edited program.
     idle : bool
-        Whether nothing acts on what was changed but by the moves, waits and switches read of it.
+        Whether the changed text acts only by the moves, waits and switches that are read from it.
     remark : bool
-        Whether it is a remark.
+        Whether only a remark was changed.
     said : str
-        What was changed, for people.
+        What was changed, in words.
     """
 
     kind: str
@@ -125,7 +125,7 @@ class Edit:
 
 
 def edits(files: Mapping[str, str], language: str, rng: np.random.Generator) -> Iterator[Edit]:
-    """Yield edits of a program for ever, by a generator of random numbers."""
+    """Yield random edits of a program without end."""
     words = WORDS[language]
     names = [name for name in files if any(line.strip() for line in files[name].splitlines())]
     sizes = np.array([len(files[name].splitlines()) for name in names], dtype=float)
@@ -154,7 +154,7 @@ def edits(files: Mapping[str, str], language: str, rng: np.random.Generator) -> 
 
 
 def _in_remarks(before: str, after: str, words: Words) -> bool:
-    """Return whether two texts are the same but for their remarks, line for line."""
+    """Return whether two texts are the same line by line, except for remarks."""
     one, two = (
         [line.rstrip() for line in text.splitlines() if not re.fullmatch(words.remark, line)]
         for text in (before, after)
@@ -163,11 +163,11 @@ def _in_remarks(before: str, after: str, words: Words) -> bool:
 
 
 Made = tuple[str, int, list[str], bool, str] | None
-"""Kind, line, all lines, whether it is idle, and words."""
+"""Kind of the edit, its line, all lines, whether it is idle, and what was changed in words."""
 
 
 def _numbered(lines: list[str], language: str) -> str:
-    """Return a text as the editor of a controller leaves it: FANUC's numbers its lines anew."""
+    """Return a text as the editor of the controller saves it: FANUC's renumbers the lines."""
     text = "\n".join([*lines, ""])
     if language != "fanuc":
         return text
@@ -183,7 +183,7 @@ def _numbered(lines: list[str], language: str) -> str:
 
 
 def _is_remark(line: str, words: Words) -> bool:
-    """Return whether nothing acts on a line, or only by what the reader makes of the moves."""
+    """Return whether a line has no effect, or only through what the reader makes of the moves."""
     whole = (words.remark, *words.held, *(p for p in words.idle if not p.startswith(".*")))
     return any(re.fullmatch(pattern, line) for pattern in whole)
 
@@ -247,7 +247,7 @@ def _number(
 
 
 def _idle_at(line: str, at: int, words: Words) -> bool:
-    """Return whether nothing acts on what stands at a place of a line."""
+    """Return whether the text at a place of a line has no effect."""
     said = [match for pattern in words.idle if (match := re.fullmatch(pattern, line))]
     return _is_remark(line, words) or any(m.start(1) <= at < m.end(1) for m in said)
 
@@ -272,7 +272,7 @@ def _scale(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
 
 
 def _nudge(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
-    """Add to a number, or turn its sign."""
+    """Add to a number, or change its sign."""
     found = _number(lines, words, rng)
     if found is None:
         return None
@@ -298,7 +298,7 @@ def _other(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
 def _taken(
     kind: str, lines: list[str], words: Words, families: tuple[str, ...], rng: np.random.Generator
 ) -> Made:
-    """Take another word of the same family for one."""
+    """Replace a word by another of the same family."""
     if not families:
         return None
     family = families[int(rng.integers(len(families)))]
@@ -323,7 +323,7 @@ def _taken(
 
 
 def _remark(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
-    """Say something else in a remark."""
+    """Change the text of a remark."""
     remarks = [
         k for k, line in enumerate(lines) if line.strip() and re.fullmatch(words.remark, line)
     ]

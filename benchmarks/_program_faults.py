@@ -1,4 +1,4 @@
-"""Faults of a neutral program by their effect: written out, they are edits in any language."""
+"""Faults of a neutral program by their effect; written out, they become edits in any language."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ OFF = Switch(signal="laser", on=False)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Fault:
-    """A program that does something else than its job asks for.
+    """A program that does not do what its job asks for.
 
     Parameters
     ----------
     kind : str
-        What is wrong, and so what it does to the part, the cell or people.
+        What is wrong, and thus what happens to the part, the cell or people.
     program : Program
     """
 
@@ -35,7 +35,7 @@ class Fault:
 
 
 def faults(program: Program, rng: np.random.Generator) -> Iterator[Fault]:
-    """Yield every fault of a program of two contours or more, the places chosen by `rng`."""
+    """Yield every fault of a program of at least two contours, at places chosen by `rng`."""
     for number in range(len(program.sections)):
         section = program.sections[number]
         found = [
@@ -63,7 +63,7 @@ Steps = tuple[Step, ...]
 
 
 def _section_faults(steps: Sequence[Step], rng: np.random.Generator) -> Iterator[tuple[str, Steps]]:
-    """Yield faults of the steps of one contour, in the layout that `build_program` has."""
+    """Yield faults of the steps of one contour, in the layout of `build_program`."""
     path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
     joint = [k for k, step in enumerate(steps) if isinstance(step, JointMove)]
     start, last, back = path[0], path[-2], path[-1]
@@ -112,7 +112,7 @@ def _section_faults(steps: Sequence[Step], rng: np.random.Generator) -> Iterator
     for k in path[1:-2]:
         if way(k).switches:
             yield "micro joint left out or not ended", changed(k, switches=())
-    # Standing where the beam is on.
+    # Stops where the beam is on.
     wait = Wait(time=float(rng.choice([0.1, 5.0])))
     yield "wait in the cut", (
         *steps[:middle], replace(way(middle), zone=0.0), wait, *steps[middle + 1 :])  # fmt: skip
@@ -140,7 +140,7 @@ def _section_faults(steps: Sequence[Step], rng: np.random.Generator) -> Iterator
     yield "zone larger", changed(middle, zone=0.0003 * float(rng.choice([3, 30, 100])))
     yield "zone in the air", changed(joint[-1], zone=0.01)
     yield "zone after the retract", changed(back, zone=0.01)
-    # Where it goes.
+    # Positions.
     yield "approach from afar", _backed(steps, joint[-1], start, 10)
     yield "start joint moved", changed(joint[-1], q=_nudged(away_from.q, rng, 2.0))
     for kind, times in (("retract into the part", -1), ("retract ten times as far", 10)):
@@ -213,7 +213,7 @@ def _shifted(T: Array, along: float) -> Array:
 
 
 def _backed(steps: Sequence[Step], joint: int, start: int, times: float) -> Steps:
-    """Return steps whose joint move ends so many times as far from the start, joints led evenly."""
+    """Return steps whose joint move ends `times` as far from the start, in joint space."""
     there, here = steps[joint], steps[start]
     assert isinstance(there, JointMove)
     assert isinstance(here, LinearMove)

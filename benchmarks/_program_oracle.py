@@ -1,9 +1,9 @@
 """An oracle for which edits of a program do harm.
 
-It shares nothing with the audit: it compares, step by step, what the reader makes of the text
-before and after. Where that is the same, the edit is harmless only if it touched nothing but what
-the `Words` of the language list as such: whatever else a controller reads and our reader lets pass
-is counted as harm.
+It is independent of the audit: it compares, step by step, what the reader makes of the text before
+and after. If that is the same, the edit is harmless only if it touched nothing but what the `Words`
+of the language list as harmless: any other text that a controller reads and our reader ignores
+counts as harm.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from kerfpath.post import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWa
 __all__ = ["Verdict", "verdict"]
 
 Verdict = Literal["harmful", "harmless", "either"]
-"""Of an edit: it must not pass; it must pass; or it may do either, and is only counted."""
+"""Verdict on an edit: it must not pass; it must pass; or it may do either and is only counted."""
 ALONG, TURNED = 0.25e-3, np.radians(1.5)
-"""How far (m) a node and (rad) its axis move at least to do harm: the job allows 0.1 mm, 1 deg."""
+"""Least motion of a node (m) and of its axis (rad) that does harm: the job allows 0.1 mm, 1 deg."""
 EXACT, SHARP = 2e-5, np.radians(0.02)
-"""The same of targets beside the cut (m) and of joints (rad)."""
+"""The same for targets outside the cut (m) and for joints (rad)."""
 TIME = 2.5e-3
-"""The same of waits and lead times, s: controllers count milliseconds."""
+"""The same for waits and lead times, s: controllers count milliseconds."""
 RATE = 0.025
-"""The same of speeds, as a share."""
+"""The same for speeds, as a share."""
 JUMP = 0.1
-"""How far (m, rad) an external axis goes aside at one node at least to do harm: less may lie within
-its limits, and the arm follows."""
+"""Least deviation of an external axis at one node (m, rad) that does harm: less may be within its
+limits, and the arm follows."""
 
 
 def verdict(edit: Edit, before: ReadProgram, after: ReadProgram) -> Verdict:
-    """Return what the oracle says of an edit, by what the text meant before and after it."""
+    """Return the verdict on an edit, from the meaning of the text before and after it."""
     found = _compared(before, after)
     if found == "same" and edit.idle:
         return "harmless" if edit.remark else "either"
@@ -100,7 +100,7 @@ def _step(a: ReadStep, b: ReadStep, *, cut: bool) -> Literal["same", "either", "
         cosine = float(np.clip(a.T_part_tip[:3, 2] @ b.T_part_tip[:3, 2], -1, 1))
         turned = Rotation.from_matrix(a.T_part_tip[:3, :3].T @ b.T_part_tip[:3, :3]).magnitude()
         found += [_far(0, apart, point), _far(0, np.arccos(cosine), angle)]
-        # About the beam the tool may turn as it likes, within the limits of the joints.
+        # The tool may turn about the beam freely, within the limits of the joints.
         found += [_far(0, float(turned), np.inf if cut else angle)]
     if (a.external is None) != (b.external is None):
         return "harmful"

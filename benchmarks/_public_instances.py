@@ -1,7 +1,7 @@
-"""Draw the instances of the public set: random cuts, drawings, too fast ones, rails, tables.
+"""Draw the instances of the public set: random cuts, drawings, too fast cuts, rails, tables.
 
-The files are the set; this is how they came to be. Speeds are shares of the fastest that kerfpath
-finds on coarse samples, so that most cuts are feasible and hard; names and seed decide the rest.
+The files are the set; this module generated them. Speeds are shares of the fastest that kerfpath
+finds on coarse samples, so that most cuts are feasible and hard; name and seed decide the rest.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ ROBOTS = {
     "ur_ur10e": "cybertech_8_to_20kg",
     "yaskawa_gp25": "cybertech_8_to_20kg",
 }
-"""Robots by id, with the ratio that stands in for accelerations their maker does not publish."""
+"""Robots by id, with the ratio that replaces accelerations that their maker does not publish."""
 COARSE = {"gamma_step": np.radians(5.0)}
-"""Samples by which speeds are drawn."""
+"""Samples on which the speeds are based."""
 SHARES = (0.6, 1.0)
-"""Range of the speed over the fastest on those samples."""
+"""Range of the speed, as a share of the fastest on those samples."""
 TOO_FAST = 1.5
-"""Speed of what is asked for too fast, over the fastest off the grid."""
+"""Speed of the cuts that are too fast, as a multiple of the fastest off the grid."""
 LOOPS = {
     "opening": ("b_pillar.step", "skin/hole6"),
     "slot": ("b_pillar.step", "skin/hole11"),
@@ -52,9 +52,9 @@ LOOPS = {
 }
 """Loops of the shipped drawings."""
 FAMILIES = {"random": 18, "part": len(LOOPS), "too-fast": 4, "out-of-reach": 1}
-"""Instances of each robot, by family."""
+"""Number of instances of each robot, by family."""
 EXTERNAL = {"rail": 12, "table": 12, "rail-and-table": 6}
-"""Instances with external axes, of one robot."""
+"""Number of instances with external axes, of one robot."""
 CARRIED = "abb_irb4600_60_205"
 
 _Drawn = tuple[Robot, Contour, float]
@@ -131,7 +131,7 @@ def _text(name: str, family: str, arm: Robot, cut: Contour, speed: float) -> str
         "points": np.round(cut.points, 9).tolist(),
         "axes": np.round(cut.axes, 9).tolist(),
     }
-    # One line a key, as what lies in a repository is compared by lines.
+    # One line per key, because version control compares lines.
     rows = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in data.items())
     return "{\n" + ",\n".join(rows) + "\n}\n"
 
@@ -163,7 +163,7 @@ def _in_front(rng: np.random.Generator, arm: Robot) -> Contour:
 def _of_part(rng: np.random.Generator, arm: Robot, name: str) -> _Drawn:
     shape, count = _loop(name.rpartition("-")[2]), int(rng.integers(60, 101))
     middle = shape.points.mean(axis=0)
-    # Its own axes straight down on the whole, the part then posed as a random contour is.
+    # Its axes point straight down on average; the part is then posed like a random contour.
     down = -shape.axes.mean(axis=0)
     level = _levelled(down / np.linalg.norm(down))
 
@@ -185,7 +185,7 @@ def _loop(what: str) -> Contour:
 
 
 def _levelled(up: Array) -> Array:
-    """Return the rotation (3, 3) that takes a unit vector to z, the shortest way."""
+    """Return the shortest rotation (3, 3) that takes a unit vector to z."""
     turn, _ = Rotation.align_vectors([[0.0, 0.0, 1.0]], [up])
     return np.asarray(turn.as_matrix())
 

@@ -1,4 +1,4 @@
-"""The planners of this package on the public set: instances as its own types, answers as files."""
+"""Run the planners of this package on the public set, and return their answers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["PLANNERS", "Task", "answer", "task_of"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Task:
-    """An instance as this package takes it: a contour with its times, placed by the identity."""
+    """An instance in the types of this package: a timed contour, placed by the identity."""
 
     contour: Contour
     robot: Robot
@@ -40,11 +40,11 @@ PLANNERS: Mapping[str, tuple[str, PlanOptions]] = {
         PlanOptions(method="paper", certify=None),
     ),
 }
-"""Options of each planner, and what they are in words."""
+"""Options of each planner, and their description."""
 
 
 def task_of(given: Instance) -> Task:
-    """Return an instance as this package takes it; AssertionError where the two robots differ."""
+    """Return an instance in the types of this package; AssertionError if the two robots differ."""
     arm = len(given.turns)
     plain, endless = robot(given.model), given.endless[:arm]
     assert plain.lower is not None
@@ -82,7 +82,7 @@ _AXIS = ("name", "kind", "carries", "axis", "point")
 
 
 def answer(planner: str, name: str) -> dict[str, Any]:
-    """Return what a planner of this package answers to an instance."""
+    """Return the answer of a planner of this package to an instance."""
     words, options = PLANNERS[planner]
     given = instance(name)
     task = task_of(given)

@@ -1,4 +1,4 @@
-"""The tables of the public set's page: what each planner makes of each family of instances."""
+"""The tables of the public set's page: results of each planner for each family of instances."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ORDER = ("kerfpath", "grid", "paper", "ipopt", "pink", "descartes")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """What became of an instance: its cost over the best known, or the faults of the motion."""
+    """The result for an instance: its cost over the best known, or the faults of the motion."""
 
     family: str
     seconds: float
@@ -31,7 +31,7 @@ class Judged:
 
 
 def written(page: str, answers: Path) -> str:
-    """Return a page with its tables made anew from the answers."""
+    """Return a page with its tables made again from the answers."""
     before, _, rest = page.partition(BEGIN)
     _, _, after = rest.partition(END)
     lines = [*_set(), "", *_planners(answers)]
@@ -97,7 +97,7 @@ def _planners(answers: Path) -> Iterator[str]:
 def _row(planner: str, family: str, mine: Sequence[Judged]) -> str:
     feasible = sum(j.feasible for j in mine)
     over = [j.over for j in mine if j.over is not None]
-    # A cost that is the best known but for rounding is +0.0 %, not -0.0.
+    # A cost that differs from the best known only by rounding is +0.0 %, not -0.0.
     percent = [round(100 * share, 1) + 0.0 for share in over]
     shown = f"{median(percent):+.1f} %, {max(percent):+.1f} %" if over else "-"
     broken = sum(bool(j.faults) for j in mine)

@@ -1,4 +1,4 @@
-"""Random smooth 3-D contours in front of a robot, each with the speed at which it is to be cut."""
+"""Random smooth 3-D contours in front of a robot, each with its cutting speed."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ ROBOTS = {
     "kuka_kr16_r1610_2": None,
     "staubli_tx2_90xl": "payload_up_to_20kg_agilus",
 }
-"""Robots by id, with the ratio that stands in for accelerations their maker does not publish."""
+"""Robots by id, with the ratio that replaces accelerations that their maker does not publish."""
 
 GAMMA_STEP = np.radians(1.0)
 """Step of gamma on the graphs that are searched."""
 COARSE = np.radians(3.0)
-"""Step of gamma on the graphs that the speeds are drawn by; each third sample of the others."""
+"""Step of gamma on the graphs for the speeds; they have every third sample of the others."""
 SHARES = (0.75, 1.35)
-"""Range of the speed over the fastest on the coarse graph: some cuts turn out infeasible."""
+"""Range of the speed, as a share of the fastest on the coarse graph; some cuts are infeasible."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cut:
-    """A contour in the robot base, its layered graph, and the speed asked of it.
+    """A contour in the robot base, its layered graph, and its cutting speed.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Cut:
 
     @property
     def options(self) -> dict[str, Any]:
-        """What `plan` and `layered_graph` are told beside contour, robot and speed."""
+        """The options of `plan` and `layered_graph` besides contour, robot and speed."""
         return {"tool": self.tool, "placement": np.eye(4), "gamma_step": GAMMA_STEP}
 
     @property
@@ -69,7 +69,7 @@ class Cut:
 
 
 def head() -> Array:
-    """Return T_flange_tip of a head whose beam leaves the flange axis by 45 deg."""
+    """Return T_flange_tip of a head whose beam is at 45 deg to the flange axis."""
     c = np.sqrt(0.5)
     T = np.eye(4)
     T[:3, :3] = [[c, 0, c], [0, 1, 0], [-c, 0, c]]

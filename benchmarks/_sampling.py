@@ -1,10 +1,10 @@
 """Gamma by sampling-based planning under an end-effector constraint (Yao and Gupta 2007), by OMPL.
 
-The constraint of the beam leaves two coordinates: where along the contour, and gamma. In one
-posture after the other, RRT* grows trees through them, forwards only. An edge is gamma running
-evenly from node to node; it must keep (5) and costs its part of (14). (6) is no property of an
+The constraint of the beam leaves two coordinates: the place along the contour, and gamma. In one
+posture after another, RRT* grows trees in them, forwards only. Along an edge gamma changes evenly
+from node to node; the edge must keep (5) and costs its part of (14). (6) is not a property of an
 edge: each path found is smoothed by Gaussian filters of several widths, and the best motion that
-keeps (6) too is returned.
+also keeps (6) is returned.
 """
 
 from __future__ import annotations
@@ -23,33 +23,33 @@ from kerfpath.kernels.kinematics import POSTURES
 __all__ = ["EDGES", "sampled", "start_generators"]
 
 EDGES = 80_000
-"""Different edges that are tried per cut; in place of a time limit, so that runs repeat."""
+"""Number of different edges tried per cut, instead of a time limit, so that runs are repeatable."""
 NODES_PER_RADIAN = 7.0
-"""How many nodes count as far as one radian of gamma when neighbours are looked for."""
+"""Number of nodes that count as one radian of gamma in the search for neighbours."""
 RANGE = 40.0
-"""Longest edge, in nodes or the like in gamma."""
+"""Longest edge, in nodes or the equivalent in gamma."""
 STARTS = 30
-"""Start states, at random gamma."""
+"""Number of start states, at random gamma."""
 WIDTHS = (0, 1, 1.5, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 """Widths of the smoothing filters, nodes; 0 leaves the path alone."""
 
 
 @cache
 def start_generators(seed: int) -> None:
-    """Seed OMPL's random generators, which one process can do once."""
+    """Seed OMPL's random generators, which is possible once per process."""
     util.setLogLevel(util.LogLevel.LOG_ERROR)
     util.RNG.setSeed(seed)
 
 
 class _Edges:
-    """The costs of edges, each computed once, and how many may still be."""
+    """The costs of edges, each computed once, and the number that may still be computed."""
 
     def __init__(self, follower: Follower, posture: int, budget: int) -> None:
         self.task, self.posture, self.left = follower.task, posture, budget
         self.known: dict[tuple[int, float, int, float], float] = {}
 
     def cost(self, a: Sequence[float], b: Sequence[float]) -> float:
-        """Return the cost of an edge from state a to state b, inf where it is not admitted."""
+        """Return the cost of an edge from state a to state b, inf if it is not admissible."""
         key = (round(a[0]), a[1] / NODES_PER_RADIAN, round(b[0]), b[1] / NODES_PER_RADIAN)
         if key not in self.known:
             self.left -= 1
@@ -69,7 +69,7 @@ class _Motions(base.MotionValidator):  # type: ignore[misc]
 
 
 class _Cost(base.OptimizationObjective):  # type: ignore[misc]
-    """The sum (14); an edge has no cost the other way round."""
+    """The sum (14); edges have a cost in one direction only."""
 
     def __init__(self, space: base.SpaceInformation, edges: _Edges) -> None:
         super().__init__(space)
@@ -110,8 +110,8 @@ class _End(base.GoalSampleableRegion):  # type: ignore[misc]
 def sampled(follower: Follower, *, seed: int, edges: int = EDGES) -> Array | None:
     """Return the best course of gamma (K,) found that keeps (5) and, if any does, (6); or None.
 
-    The same on every run if `start_generators` was called at the start of the process and the
-    calls before were the same.
+    The result is the same on every run if `start_generators` was called at the start of the
+    process and the calls before were the same.
     """
     rng = np.random.default_rng(seed)
     postures = [mu for mu in range(POSTURES) if follower.admits_throughout(mu)]

@@ -1,4 +1,4 @@
-"""The wave cell given to Tesseract's Descartes, its edge checks on, beside plans in the cell."""
+"""Tesseract's Descartes with edge checks in the wave cell, beside our plans in the cell."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ given up after 2 minutes."""
 
 
 def against_descartes(*, quick: bool) -> Report:
-    """Measure plans with edge checks, of both."""
+    """Measure plans with edge checks, theirs and ours."""
     report = Report(title="Plans in a cell beside Tesseract's Descartes", how=HOW)
     for nodes, degrees in ((20, 30),) if quick else ((20, 30), (40, 20)):
         case = wave(nodes, np.radians(degrees), meshes=True)
@@ -90,5 +90,5 @@ def _task(case: Case, *, runs: int, longest: float) -> Task:
 
 
 def _name(body: str) -> str:
-    """Return a name that none of the arm's own frames has."""
+    """Return a name that differs from all frames of the arm."""
     return "body_" + body.replace(" ", "_")

@@ -1,4 +1,4 @@
-"""What the shipped jobs need between their nodes: with narrow zones, as shipped, and guaranteed."""
+"""Limits that the shipped jobs need between nodes: with narrow zones, as shipped, guaranteed."""
 
 from __future__ import annotations
 

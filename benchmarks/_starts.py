@@ -1,4 +1,4 @@
-"""Motions found from many starts: what a plan has to be measured by where valleys are many."""
+"""Motions found from many starts, to compare a plan with where there are many local optima."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ __all__ = ["from_grids", "shaken"]
 GRIDS = ((2.0, 0.0), (2.0, 1 / 3), (1.0, 0.0), (1.0, 1 / 3), (0.5, 0.0))
 """Steps of gamma, deg, and the share of a step by which the samples are moved."""
 SHAKES = (0.02, 0.05, 0.1, 0.2, 0.4)
-"""By how much gamma is moved at most, rad."""
+"""Largest change of gamma, rad."""
 WAVES = 4
-"""Cosines that a shake is the sum of."""
+"""Number of cosines in the sum of a random change."""
 
 
 def from_grids(task: Task) -> Iterator[Plan]:
@@ -33,7 +33,7 @@ def from_grids(task: Task) -> Iterator[Plan]:
 
 
 def shaken(plan: Plan, rng: np.random.Generator) -> Iterator[Plan]:
-    """Yield what is better, refined from smooth random changes of gamma of the best so far."""
+    """Yield better plans, refined from smooth random changes of gamma of the best so far."""
     for size in SHAKES:
         moved = replace(plan, gamma=plan.gamma + _smooth(rng, len(plan.q), size))
         found = refine(moved, first=size)
@@ -43,7 +43,7 @@ def shaken(plan: Plan, rng: np.random.Generator) -> Iterator[Plan]:
 
 
 def _smooth(rng: np.random.Generator, nodes: int, size: float) -> Array:
-    """Return a sum of slow cosines (K,), at most so large."""
+    """Return a sum of slow cosines (K,), at most `size` in absolute value."""
     t = np.linspace(0, np.pi, nodes)
     waves = sum(
         rng.normal() / (1 + m) * np.cos(m * t + rng.uniform(0, 2 * np.pi)) for m in range(WAVES)
@@ -52,7 +52,7 @@ def _smooth(rng: np.random.Generator, nodes: int, size: float) -> Array:
 
 
 def _about_beam(angle: float) -> Array:
-    """Return a turn about z."""
+    """Return a rotation about z."""
     c, s = np.cos(angle), np.sin(angle)
     T = np.eye(4)
     T[:2, :2] = [[c, -s], [s, c]]

@@ -1,4 +1,4 @@
-"""What came of many cuts by several methods: how often feasible, how far from the optimum."""
+"""Results of several methods for many cuts: how often feasible, how far from the optimum."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ COLUMNS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What one method made of one cut.
+    """The result of one method for one cut.
 
     Parameters
     ----------
     robot : str
     index : int
-        Which of the robot's cuts.
+        Number of the cut of this robot.
     method : str
     seconds : float
     cost : float or None
-        Objective (14) of a motion that keeps (5) and (6); None when the method led to none.
+        Objective (14) of a motion that keeps (5) and (6); None if the method found none.
     """
 
     robot: str
@@ -53,9 +53,9 @@ class Outcome:
 def sheet(outcomes: Iterable[Outcome], methods: Sequence[str]) -> Sheet:
     """Return the table: a row for each robot and method, and for all robots together.
 
-    "missed": cuts that have a path on the grid, but the method led to no feasible motion; "beyond
-    the grid": a feasible motion where the grid is proved to have none. The excess over the proved
-    optimum of the grid is taken over the cuts where both are feasible.
+    "missed" counts cuts that have a path on the grid, but for which the method found no feasible
+    motion; "beyond the grid" counts feasible motions where the grid is proved to have none. The
+    excess over the proved optimum of the grid is taken over the cuts where both are feasible.
     """
     by = {(o.robot, o.index, o.method): o for o in outcomes}
     robots = list(dict.fromkeys(key[0] for key in by))

@@ -1,6 +1,6 @@
-"""What Descartes of Tesseract needs to run from its wheel, which brings no robots or plugin lists.
+"""What Tesseract's Descartes needs to run from its wheel, which has no robots or plugin lists.
 
-It needs no more than the wheel and numpy, so that planners of the public set can use it, too.
+It needs only the wheel and numpy, so that planners of the public set can also use it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def plugins(
     offsets: Sequence[float],
     signs: Sequence[float],
 ) -> str:
-    """Write the plugin lists of an OPW arm from base to tip; return what names them in an SRDF.
+    """Write the plugin lists of an OPW arm from base to tip; return their SRDF entries.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def plugins(
 
 
 def environment(urdf: str, srdf: str) -> Any:
-    """Return the environment of a robot; None where it refuses the descriptions."""
+    """Return the environment of a robot; None if it refuses the descriptions."""
     made = environments.Environment()
     return made if made.init(urdf, srdf, common.GeneralResourceLocator()) else None
 
@@ -66,7 +66,7 @@ def request(
     samples: int,
     collisions: bool = False,
 ) -> Any:
-    """Return what a planner is asked for: tip poses (4, 4) whose z-axis is free."""
+    """Return the request to a planner: tip poses (4, 4), free to rotate about z."""
     info = common.ManipulatorInfo()
     info.manipulator, info.manipulator_ik_solver = "manipulator", "OPWInvKin"
     info.working_frame, info.tcp_frame = base, tip
@@ -76,10 +76,10 @@ def request(
     profile.target_pose_fixed = False
     profile.target_pose_sample_axis = np.array([0.0, 0.0, 1.0])
     profile.target_pose_sample_min, profile.target_pose_sample_max = -np.pi, np.pi
-    # Both ends are sampled: one sample more than asked for, the last the same as the first.
+    # Both ends are sampled: one more sample than requested, the last the same as the first.
     profile.target_pose_sample_resolution = 2 * np.pi / samples * (1 + 1e-9)
     profile.enable_collision = profile.enable_edge_collision = collisions
-    # Else poses that nobody checked count as colliding.
+    # Otherwise poses that are not checked count as colliding.
     profile.allow_collision = not collisions
     profiles = language.ProfileDictionary()
     profiles.addProfile(NAMESPACE, PROFILE, descartes.cast_DescartesPlanProfileD(profile))
@@ -118,7 +118,7 @@ def waypoints(response: Any) -> Array:
 
 
 def _libraries(pattern: str) -> str:
-    """Return the libraries that match, whose names carry a hash, and where they lie, for a list."""
+    """Return the libraries that match (their names contain a hash) and their folder, for a list."""
     folder = Path(tesseract_robotics.__file__).parent.parent / "tesseract_robotics.libs"
     found = sorted(folder.glob(f"libtesseract_{pattern}.so"))
     if not found:

@@ -1,4 +1,4 @@
-"""Edits of any document of JSON: of one value, of an array, of the keys of a table."""
+"""Edits of any JSON document: of one value, of an array, of the keys of a table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["array_edit", "key_edit", "leaf_edit"]
 
 
 def number(value: Any, rng: random.Random) -> tuple[str, Any]:
-    """Return a number scaled, shifted, turned in sign, exchanged for an odd one."""
+    """Return a number scaled, shifted, with its sign changed, or replaced by an odd one."""
     way = rng.choice(["scaled", "scaled", "shifted", "shifted", "sign", "zero", "nudged"])
     if way == "scaled":
         return "number scaled", value * rng.choice([0.1, 0.5, 0.99, 1.001, 1.01, 1.1, 2, 10, 100])
@@ -32,7 +32,7 @@ ODD: list[Any] = [
 
 
 def typed(value: Any, rng: random.Random) -> tuple[str, Any]:
-    """Return something of another type in place of a value."""
+    """Return a value of another type."""
     if is_number(value) and rng.random() < 0.3:
         return "typed otherwise", rng.choice([str(value), bool(value), [value]])
     return "typed otherwise", rng.choice(ODD)
@@ -46,7 +46,7 @@ def word(value: str, rng: random.Random) -> tuple[str, Any]:
 
 
 def leaf_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
-    """Edit one value anywhere, each place as likely as any other of its kind."""
+    """Edit one value anywhere; all places of a kind are equally likely."""
     path, value = _anywhere(data, rng)
     if not path:
         return None
@@ -70,7 +70,7 @@ def leaf_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
 
 
 def _anywhere(data: Any, rng: random.Random) -> tuple[Path, Any]:
-    """Go down from the top, each branch as likely as the next, large or small."""
+    """Return a random place: go down from the top, all branches equally likely."""
     path: Path = ()
     while isinstance(data, dict | list) and data:
         step = rng.choice(list(data) if isinstance(data, dict) else range(len(data)))
@@ -79,7 +79,7 @@ def _anywhere(data: Any, rng: random.Random) -> tuple[Path, Any]:
 
 
 def array_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
-    """Shorten, turn round, rotate, empty an array, or double or swap elements of it."""
+    """Shorten, reverse, rotate or empty an array, or double or swap its elements."""
     arrays = [(path, array) for path, array in containers(data) if isinstance(array, list)]
     columns = [
         (path, array) for path, array in arrays
@@ -110,7 +110,7 @@ def array_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
 
 
 def key_edit(data: Any, rng: random.Random) -> tuple[str, str, Any] | None:
-    """Add a key that nobody knows, remove one with all below it, or exchange two values."""
+    """Add an unknown key, remove one with everything below it, or exchange two values."""
     path, table = rng.choice([(p, c) for p, c in containers(data) if isinstance(c, dict) and c])
     way = rng.randrange(3)
     if way == 0:

@@ -25,11 +25,11 @@ from kerfpath.cad import read
 __all__ = ["run"]
 
 PITCH = 20.0
-"""Between the holes, mm."""
+"""Distance between the holes, mm."""
 COLUMNS, ROWS = 32, 16
-"""Holes: enough for two megabytes of STEP."""
+"""Number of holes, enough for two megabytes of STEP."""
 LIMIT = 5.0
-"""What reading and all contours of one side may take, s."""
+"""Time allowed for reading and for all contours of one side, s."""
 
 HOW = """\
 A perforated sheet, {holes} holes, written by OCCT as STEP ({step:.1f} MB) and IGES ({iges:.1f} MB).

@@ -1,4 +1,4 @@
-"""Certificates of many kinds of plans, proved again by the audit."""
+"""Certificates of many kinds of plans, checked again by the audit."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ PROCESSES = 2
 STEP = np.radians(4.0)
 """Step of gamma; the plans are refined off it."""
 SHARES = (0.2, 0.97)
-"""Of the fastest speed: wide windows of (5) and narrow ones."""
+"""Shares of the fastest speed: wide windows of (5) and narrow ones."""
 METRICS: tuple[Metric, ...] = ("manhattan", "manhattan", "euclid", "manhattan", "chebychev")
 KINDS = ("arc", "arc", "random", "random", "cobot")
 COLUMNS = (
@@ -64,7 +64,7 @@ medians but for the last, processes of one thread, two at a time."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Audited:
-    """What became of one plan; no gap where there is no plan."""
+    """The result for one plan; no gap if there is no plan."""
 
     index: int
     kind: str
@@ -217,7 +217,7 @@ def _arc(
     lean: float,
     nodes: tuple[int, int],
 ) -> Contour:
-    """Return part of a circle on a dome, up to `end` rad; `lean` of the axes at most."""
+    """Return part of a circle on a dome, up to `end` rad; `lean` bounds the tangent of the lean."""
     t, r, leant = np.linspace(0, end, 2001), rng.uniform(*radii), rng.uniform(0, lean)
     points = np.c_[r * np.cos(t), r * np.sin(t), 0.02 * rng.uniform() * np.cos(2 * t)]
     axes = np.c_[-leant * np.cos(t), -leant * np.sin(t), -np.ones_like(t)]

@@ -116,7 +116,7 @@ def _lazy(cases: list[Case], sample: int, small: Case | None) -> Report:
     counts, seconds = [], []
     for case in cases:
         rng = np.random.default_rng(2)
-        for cell in (None, case.cell):  # compiled, and loaded, before the clock runs
+        for cell in (None, case.cell):  # compile and load before the clock starts
             case.plan(cell=cell, graph=case.graph)
         blind_s, blind = _timed(partial(case.plan, cell=None, graph=case.graph))
         before = case.cell.queries
@@ -145,7 +145,7 @@ def _lazy(cases: list[Case], sample: int, small: Case | None) -> Report:
 
 
 def _audits(cases: Sequence[Case]) -> Report:
-    """Count what the audit of a plan in a cell asks for."""
+    """Count the collision checks of the audit of a plan in a cell."""
     report, rows = Report(title="Audits in a cell", how=AUDITS), []
     for case in cases:
         made = case.plan(cell=case.cell, graph=case.graph)
@@ -162,7 +162,7 @@ def _audits(cases: Sequence[Case]) -> Report:
 
 
 def _exhaustive(case: Case) -> str:
-    """Compare the lazy optimum with that of checking every vertex and every edge."""
+    """Compare the optimum of lazy checks with that of checking every vertex and edge."""
     lazy_s, made = _timed(partial(case.plan, cell=case.cell, graph=case.graph))
     velocity, acceleration = case.robot.speed_limits()
     q, start, began = case.graph.q, case.graph.start, perf_counter()
@@ -210,7 +210,7 @@ def _maps(cases: list[Case], sample: int) -> Report:
 
 
 def _verdicts(arms: Sequence[str], poses: int) -> Report:
-    """Compare verdicts with those of a formula for boxes."""
+    """Compare verdicts with a formula for boxes."""
     report, rows, wrong = Report(title="Verdicts beside a formula", how=TOLD), [], 0
     rng = np.random.default_rng(4)
     for name, gap, meshes in product(arms, (0.012, 0.0, -0.004), (False, True)):
@@ -238,7 +238,7 @@ def _timed(call: Callable[[], T]) -> tuple[float, T]:
 
 
 def _told(made: Plan) -> tuple[int, int, int, int, int]:
-    """Return the counts that the plan's proof states."""
+    """Return the counts in the plan's proof."""
     words = made.proof.statement.replace(";", "").replace(",", "").split()
     looked, vertices, motions, searches, measured, *_ = (int(w) for w in words if w.isdigit())
     return looked, vertices, motions, searches, measured

@@ -17,7 +17,7 @@ from kerfpath.job import Job, read_job
 __all__ = ["run"]
 
 QUICK = ("hole 30 left", "hole 10")
-"""Contours of the demo for a try."""
+"""Contours of the demo in a quick run."""
 STEPPED = ("access opening", "hole 25", "slot", "hole 20")
 """Contours that are planned from several steps of gamma."""
 STEPS = (10.0, 5.0, 2.0, 1.0, 0.5)

@@ -1,4 +1,4 @@
-"""Plans near the fastest speed beside many starts, and bounds beside strong competitors."""
+"""Compare plans near the fastest speed with many starts, and bounds with strong competitors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from kerfpath import PlanOptions, fastest_speed
 __all__ = ["Fast", "bounds", "near_fastest", "run", "try_fast"]
 
 SHARE = 0.97
-"""Share of the fastest speed that is asked for."""
+"""Requested share of the fastest speed."""
 TASKS = 10
 """Tasks of each robot near the fastest speed."""
 INSTANCES = 2000
@@ -28,9 +28,9 @@ PROCESSES = 2
 SECONDS = 60.0
 """Time after which a certificate near the fastest speed begins no further stage."""
 NEAR = 0.01
-"""Relative cost beyond the best known that is aimed at."""
+"""Target for the relative cost over the best known."""
 NAMED = 40
-"""Pieces that are named at most, of each kind."""
+"""Most pieces listed of each kind."""
 FAST = (
     "robot",
     "cut",
@@ -82,7 +82,7 @@ cost that is known."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fast:
-    """What came of one task near the fastest speed."""
+    """The result for one task near the fastest speed."""
 
     name: str
     index: int
@@ -98,7 +98,7 @@ class Fast:
 
     @property
     def excess(self) -> float | None:
-        """Relative cost beyond the least that is known."""
+        """Relative cost over the least that is known."""
         known = [c for c in (self.cost, self.best) if c is not None]
         return None if self.cost is None else self.cost / min(known) - 1
 
@@ -118,7 +118,7 @@ def run(*, quick: bool) -> list[Report]:
 
 
 def near_fastest(made: Sequence[Fast]) -> Report:
-    """Return what came of tasks near the fastest speed as a table."""
+    """Return the results of tasks near the fastest speed as a table."""
     rows = [_fast_row(w) for w in made]
     planned = [w for w in made if w.excess is not None]
     excess = [100 * w.excess for w in planned if w.excess is not None]
@@ -200,7 +200,7 @@ def _is_above(bound: float | None, *costs: float | None) -> bool:
 
 
 def bounds(tried: Sequence[Narrow | None]) -> Report:
-    """Return what came of narrow pieces, None of those without a motion, as a table."""
+    """Return the results of narrow pieces, None for those without a motion, as a table."""
     made = [one for one in tried if one is not None]
     families = {name: [m for m in made if m.robot == name] for name in {m.robot: 0 for m in made}}
     rows = [_bound_row(name, of) for name, of in (families | {"all": made}).items()]

@@ -1,4 +1,4 @@
-"""Random contours at half as much again as their fastest speed: for which gamma is it refuted."""
+"""Random contours at 1.5 times their fastest speed: for which gammas it is refuted."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from kerfpath import NoFeasiblePath, PlanOptions, fastest_speed, plan
 __all__ = ["Refused", "report", "run", "try_too_fast"]
 
 FACTOR = 1.5
-"""What is asked for, as a multiple of the fastest speed found."""
+"""Requested speed, as a multiple of the fastest found."""
 NAMED = 40
-"""Cuts that are named at most, of each kind."""
+"""Most cuts listed of each kind."""
 VERDICTS = {
     "every gamma": "proved for every gamma",
     "grid": "proved on the grid only",
     "undecided": "undecided",
     "planned": "planned after all",
 }
-"""What may become of a task, and its column."""
+"""Possible results of a task, and the column of each."""
 COLUMNS = ("robot", "tasks", *VERDICTS.values(), "seconds", "fastest speed s")
 
 HOW = f"""\
@@ -41,22 +41,22 @@ the contour to this answer, and of finding the fastest speed; processes of one t
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refused:
-    """What became of one cut that was asked for too fast.
+    """The result for one cut that was requested too fast.
 
     Parameters
     ----------
     name : str
     index : int
     verdict : str
-        Of `VERDICTS`.
+        One of `VERDICTS`.
     where : str
-        Why there is no motion at any gamma, where that is proved.
+        Why there is no motion at any gamma, if that is proved.
     speed : float m/s
-        The fastest found; what is asked for is `FACTOR` times as fast.
+        The fastest found; the request is `FACTOR` times as fast.
     ceiling : float m/s or None
-        No motion is as fast; None where that is not proved, or was not asked for.
+        Speed that no motion reaches; None if not proved or not requested.
     seconds, fastest_seconds : float s
-        Of planning, and of finding the fastest speed.
+        Time of planning, and of finding the fastest speed.
     """
 
     name: str
@@ -88,7 +88,7 @@ def run(*, quick: bool) -> list[Report]:
 
 
 def try_too_fast(key: tuple[str, int]) -> Refused:
-    """Ask for one cut faster than it can be made, and read why it is refused."""
+    """Plan one cut faster than it can be made, and read why it is refused."""
     drawn = cut(*key)
     task = (drawn.contour, drawn.robot)
     asked: dict[str, Any] = {"graph": drawn.graph, "refine": True, **drawn.options}
@@ -121,7 +121,7 @@ def try_too_fast(key: tuple[str, int]) -> Refused:
 
 
 def report(made: Sequence[Refused]) -> Report:
-    """Return what became of the cuts as a table, those named that ask for a look."""
+    """Return the results of the cuts as a table, and list the remarkable ones."""
     robots = {name: [r for r in made if r.name == name] for name in ROBOTS}
     refused = [r for r in made if r.verdict != "planned"]
     proved = [r for r in refused if r.verdict == "every gamma"]

@@ -20,11 +20,11 @@ PROCESSES = 2
 SAME = 1e-3
 """Relative difference up to which two costs count as the same."""
 WIDE = 0.02
-"""Gap from which a plan is named."""
+"""Gap above which a plan is listed."""
 LONG = 30.0
-"""Seconds from which a certificate is named."""
+"""Seconds above which a certificate is listed."""
 NAMED = 40
-"""Cuts that are named at most, of each kind."""
+"""Most cuts listed of each kind."""
 COSTS = (
     "robot",
     "cuts",
@@ -70,7 +70,7 @@ def run(*, quick: bool) -> list[Report]:
 
 
 def report(made: Sequence[Weighed]) -> Report:
-    """Return what became of cuts as tables, those named that ask for a look."""
+    """Return the results of the cuts as tables, and list the remarkable ones."""
     robots = {name: [w for w in made if w.name == name] for name in ROBOTS}
     rows = [_row(name, weighed) for name, weighed in (robots | {"all": made}).items()]
     return Report(
@@ -139,7 +139,7 @@ def _of(
 
 
 def _findings(made: Sequence[Weighed]) -> list[str]:
-    """Name the cuts that ask for a look."""
+    """List the remarkable cuts."""
     over = [w for w in made if w.bound is not None and _cheapest(w) < w.bound]
     kinds = {
         "a bound above a cost": over,

@@ -27,10 +27,10 @@ __all__ = ["run"]
 COUNTS = (134, 133, 133)
 """Cuts of each robot."""
 SUBSET = 8
-"""Cuts of each robot, the first ones, that the comparators are given too."""
+"""Number of cuts of each robot, from the first, that the comparators also get."""
 PROCESSES = 2
 FREE = 1e6
-"""Multiple of the accelerations that never binds."""
+"""Multiple of the accelerations that is never active."""
 
 METHODS = ("paper", "first-order", "exact", "refined")
 
@@ -71,7 +71,7 @@ _R = TypeVar("_R")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Searched:
-    """What the library made of one cut, and what its graph is like."""
+    """The library's results for one cut, and the properties of its graph."""
 
     outcomes: list[Outcome]
     graph_seconds: float
@@ -113,9 +113,9 @@ def run(*, quick: bool) -> list[Report]:
 def _in_processes(
     tasks: dict[str, Callable[[_Key], _R]], keys: Sequence[_Key], processes: int
 ) -> dict[str, list[_R] | str]:
-    """Return what each task makes of all keys in order, or why it did not run.
+    """Return the results of each task for all keys in order, or why it did not run.
 
-    Each task has so many processes of its own, which are warmed up first; all run at once.
+    Each task has `processes` workers, which are warmed up first; all tasks run at the same time.
     """
     pools = {
         name: ProcessPoolExecutor(
@@ -140,7 +140,7 @@ def _in_processes(
 
 
 def _warm_up(task: Callable[[_Key], object], key: _Key) -> None:
-    """Compile what a task needs; what it needs and has not, it says when it runs."""
+    """Compile what a task needs; a missing requirement is reported when it runs."""
     with suppress(ImportError):
         task(key)
 
@@ -203,7 +203,7 @@ def _sampled(key: _Key) -> Outcome:
 
 
 def _course(key: _Key, method: str, search: Callable[[Follower], Array | None]) -> Outcome:
-    """Return what a search for the course of gamma makes of a cut."""
+    """Return the outcome of a search for the course of gamma for a cut."""
     follower = Follower(cut(*key))
     start = perf_counter()
     gamma = search(follower)
@@ -215,7 +215,7 @@ def _course(key: _Key, method: str, search: Callable[[Follower], Array | None]) 
 def _outcome(
     key: _Key, follower: Follower, method: str, seconds: float, q: Array | None
 ) -> Outcome:
-    """Weigh a motion, all methods by the same yardstick."""
+    """Rate a motion, in the same way for all methods."""
     cost, feasible = (np.inf, False) if q is None else follower.weigh(q)
     return Outcome(
         robot=key[0],
@@ -227,7 +227,7 @@ def _outcome(
 
 
 def _facts(searched: Sequence[_Searched]) -> list[str]:
-    """Say what the graphs are like."""
+    """Describe the graphs."""
     stepping = [s.steps for s in searched if s.steps is not None]
     return [
         f"{median(s.layer for s in searched):.0f} vertices a layer (median); graph "

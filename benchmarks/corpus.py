@@ -1,4 +1,4 @@
-"""A corpus of drawings with known loops: the share that is read right."""
+"""A corpus of drawings with known loops: the share that is read correctly."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from kerfpath.errors import InputError
 __all__ = ["faults_of", "run"]
 
 SEEDS = 8
-"""Drawings of each family and format: 136 in all."""
+"""Number of drawings of each family and format: 136 in all."""
 LENGTH = 1e-6
-"""Share of its length by which a loop may be read longer or shorter: files keep 7 digits at least
-of what lies hundreds of mm from their origin."""
+"""Tolerance of a loop's length, as a share of it: files keep at least 7 digits of coordinates
+hundreds of mm from the origin."""
 
 HOW = """\
 {count} drawings from a generator, {seeds} of each family: rectangles and circles within each
@@ -33,7 +33,7 @@ have been to cut is left out."""
 
 
 def run(*, quick: bool = False) -> Report:
-    """Return how many drawings of each family and format are read right."""
+    """Return how many drawings of each family and format are read correctly."""
     Message.DefaultMessenger_s().ChangePrinters().Clear()
     all_of, right, faults = Counter[tuple[str, str]](), Counter[tuple[str, str]](), list[str]()
     with tempfile.TemporaryDirectory() as folder:
@@ -57,7 +57,7 @@ def run(*, quick: bool = False) -> Report:
 
 
 def faults_of(known: Known) -> str:
-    """Return what of a drawing is not read as it is known to be, "" if all is."""
+    """Return how a drawing as read differs from what is known of it, "" if it does not."""
     try:
         part = read(known.path, **known.options)
     except InputError as error:
@@ -80,6 +80,6 @@ def faults_of(known: Known) -> str:
 
 
 def _loops_of(part: Part) -> list[tuple[str, float]]:
-    """Return kind and length (mm) of each loop, of single faces where there are any."""
+    """Return kind and length (mm) of each loop, of single faces if there are any."""
     loops = [loop for loop in part.loops if loop.surface != "skin"]
     return sorted((str(loop.kind), loop.length * 1e3) for loop in loops)

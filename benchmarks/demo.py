@@ -1,4 +1,4 @@
-"""The demo: seconds from the command to the audited program, cold and warm, and where they go."""
+"""The demo: seconds from the command to the audited program, cold and warm, total and by part."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PARTS = ("import", *CLOCKS, "other")
 
 
 def run(*, quick: bool) -> Report:
-    """Run the demo cold and warm, by itself and in parts."""
+    """Run the demo cold and warm, in total and by part."""
     warm_runs, cold_runs = (2, 1) if quick else (5, 3)
     command = str(Path(sys.executable).parent / "kerfpath")
     _whole([command, "demo", "--out"], cold=False)

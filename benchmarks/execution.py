@@ -1,4 +1,4 @@
-"""What joints need between the nodes where a controller rounds corners: narrow and wide zones."""
+"""Demands on the joints between nodes where a controller rounds corners: narrow and wide zones."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COUNTS = (134, 133, 133)
 """Cuts of each robot."""
 PROCESSES = 2
 BEYOND = 0.2
-"""rad: plans may end at a joint limit, where no tool backs off; the programs here may go beyond."""
+"""rad: plans may end at a joint limit, where no tool can retract; programs here may exceed it."""
 ZONES: tuple[Zone, ...] = (0.0003, "auto")
 COLUMNS = (
     "zones",
@@ -39,9 +39,9 @@ COLUMNS = (
     "tip mm",
 )
 ERRORS = (1e-4, 1e-2)
-"""m: by how much the tip may pass a node where plans are held to less; the latter: as it comes."""
+"""m: largest distance of the tip from a node when limits are lowered; the second is no limit."""
 DENSER = 50
-"""Samples to the interval between nodes, where it is looked whether limits are kept."""
+"""Samples per interval between nodes at which the limits are checked."""
 KEPT_COLUMNS = (
     "zone error",
     "plans",
@@ -77,7 +77,7 @@ a controller would slow down. Tip: by how much it passes a node at most."""
 
 
 class Peaks(NamedTuple):
-    """Of one plan with one kind of zones: shares of limits, and by how much nodes are passed, m."""
+    """Shares of limits, and distances from the nodes (m), of one plan with one kind of zones."""
 
     robot: str
     zone: Zone
@@ -103,7 +103,7 @@ def run(*, quick: bool) -> list[Report]:
 
 
 def zones_of_cut(key: tuple[str, int]) -> list[Peaks]:
-    """Plan a cut, and return what its program needs with each kind of zones."""
+    """Plan a cut, and return the demands of its program with each kind of zones."""
     made, found = _planned(key), []
     if made is None:
         return []
@@ -123,7 +123,7 @@ def zones_of_cut(key: tuple[str, int]) -> list[Peaks]:
 
 
 class Brought(NamedTuple):
-    """What came of holding a plan to less at its nodes."""
+    """The result of planning with lower limits at the nodes."""
 
     error: float
     done: bool
@@ -135,7 +135,7 @@ class Brought(NamedTuple):
 
 
 def kept_of_cut(key: tuple[str, int]) -> list[Brought]:
-    """Plan a cut, and hold it to less where its program needs more, for each error of zones."""
+    """Plan a cut, and lower its limits where its program exceeds them, for each zone error."""
     made, found = _planned(key), []
     if made is None:
         return []
@@ -156,7 +156,7 @@ def kept_of_cut(key: tuple[str, int]) -> list[Brought]:
 
 
 class Timed(NamedTuple):
-    """How long a plan takes by its program, by `timing_of` and by toppra, s."""
+    """Duration of the program of a plan, by `timing_of` and by toppra, s."""
 
     programmed: float
     predicted: float
@@ -179,7 +179,7 @@ def timed_cut(key: tuple[str, int]) -> list[Timed]:
 
 
 def _by_toppra(run: Executed, program: Program) -> float:
-    """Return how long toppra says that a run takes, s; NaN where it is not installed."""
+    """Return the duration of a run by toppra, s; NaN if it is not installed."""
     try:
         import toppra
     except ImportError:
@@ -243,7 +243,7 @@ def _program(error: float, made: Plan) -> Program:
 
 
 def _densest(run: Executed, program: Program) -> float:
-    """Return the largest share of a limit that dense sampling by inverse kinematics shows."""
+    """Return the largest share of a limit found by dense sampling with inverse kinematics."""
     robot, end = program.robot, float(run.course.time[-1])
     step = end / (len(run.course.T) * DENSER)
     time, d = np.arange(step, end - step, step), step / 10
@@ -255,7 +255,7 @@ def _densest(run: Executed, program: Program) -> float:
     )
     velocity, acceleration = robot.speed_limits()
     fast = np.abs((after - before) / (2 * d) / velocity).max()
-    # Differences over d lose digits: joints are good to 1e-13 rad.
+    # Differences over d lose digits: joints are accurate to 1e-13 rad.
     sharp = np.abs((after - 2 * here + before) / d**2) - 4e-13 / d**2
     return float(max(fast, (sharp / acceleration).max()))
 

@@ -1,4 +1,4 @@
-"""Rails and tables: what they bring, how long planning takes, and how near to a dense search."""
+"""Rails and tables: what they gain, planning times, and distance from a dense search."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ __all__ = ["run"]
 POINT = np.array([1.3, 0.0, 0.6])
 """m: a point of the chuck's axis, in the robot base."""
 SPEED = 0.1
-"""m/s, of the tube."""
+"""Cutting speed of the tube, m/s."""
 STEP = np.radians(3)
-"""Of gamma."""
+"""Step of gamma."""
 WIDE_STEP = np.radians(10)
-"""Of gamma, where the fastest speed is searched, on a grid first."""
+"""Step of gamma in the search for the fastest speed, on a grid first."""
 
 HOW = """\
 Tube: once around a tube of 80 mm radius that lies along y, a wave of 30 mm along it, 400 nodes, at
@@ -87,7 +87,7 @@ def _tube(*, quick: bool) -> Sheet:
         ("rail and chuck", _chucked(_railed(arm)), None),
     ):
         speed, took = _fastest(contour, each, external)
-        # What is much too fast for an arm alone takes a search of many minutes to refuse.
+        # To refuse a speed that is much too fast for the arm alone takes many minutes.
         possible = speed >= SPEED
         cost, seconds = _planned(contour, each, external) if possible else ("none", "-")
         peak = f"{getrusage(RUSAGE_SELF).ru_maxrss / 1e6:.2f}"
@@ -110,7 +110,7 @@ def _planned(contour: Contour, each: Robot, external: Array | None) -> tuple[str
 
 
 def _fastest(contour: Contour, each: Robot, external: Array | None) -> tuple[float, str]:
-    """Return the fastest speed, m/s, 0 where there is none, and the seconds it took."""
+    """Return the fastest speed, m/s, 0 if there is none, and the seconds it took."""
     begin = perf_counter()
     try:
         found = fastest_speed(
@@ -147,7 +147,7 @@ def _random(*, quick: bool) -> Sheet:
 
 
 def _cost(contour: Contour, each: Robot, options: PlanOptions) -> float:
-    """Return the cost of a plan, NaN where there is none."""
+    """Return the cost of a plan, NaN if there is none."""
     try:
         made = plan(contour, each, tool=_tool(), placement=_placement(), speed=0.2, options=options)
     except NoFeasiblePath:

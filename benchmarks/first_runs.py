@@ -1,4 +1,4 @@
-"""Jobs of drawings that nobody tuned to: the share that become programs at the first run."""
+"""Jobs of drawings without any tuning: the share that becomes a program at the first run."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ __all__ = ["run"]
 
 JOBS = 30
 LARGEST = 0.8
-"""m: parts that are longer are left out, as an arm may not reach all of them."""
+"""m: longer parts are left out, because an arm may not reach all of them."""
 MOST_LOOPS, DOWN = 4, -0.7
-"""Loops of a drawing that are cut, the shortest; and the height of a tool axis that points down."""
+"""Number of loops cut per drawing, the shortest; and the largest z of an axis that points down."""
 TEMPLATE = """\
 [robot]
 model = "abb_irb4600_60_205"
@@ -83,7 +83,7 @@ def run(*, quick: bool = False) -> Report:
 
 
 def _in_turn(folder: Path) -> Iterator[tuple[Known, list[str]]]:
-    """Yield drawings that are no larger than a robot reaches, and which loops are cut."""
+    """Yield drawings that are within a robot's reach, and the loops to cut."""
     for known in corpus(folder, 8):
         part = read(known.path, **known.options)
         if np.ptp(part.bounding_box, axis=0).max() < LARGEST and (loops := _loops(part)):

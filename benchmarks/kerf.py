@@ -12,7 +12,7 @@ __all__ = ["run"]
 
 COUNT = 10_000
 NAMED = 12
-"""Wrong answers that are named at most."""
+"""Most wrong answers listed."""
 HOW = f"""\
 `offset` of random closed curves that lie anyhow in space, 0.01 to 1 mm to the scrap side: polygons,
 regular polygons, stairs, rectangles with rounded corners, splines, slots, 2 to 100 mm, with nodes

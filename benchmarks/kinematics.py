@@ -1,4 +1,4 @@
-"""Inverse kinematics in bulk: solutions per second, beside py-opw-kinematics and EAIK."""
+"""Batched inverse kinematics: solutions per second, beside py-opw-kinematics and EAIK."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ rows (`is_LS`) are dropped. Two cores: two threads over halves (ours), the libra
 (the others)."""
 
 NO_BRANCH = [(10.0, 11.0)] * 6
-"""Joint limits (rad) outside (-pi, pi]: no branch meets them."""
+"""Joint limits (rad) outside (-pi, pi]: no branch reaches them."""
 
 
 def run(*, quick: bool) -> Report:

@@ -1,4 +1,4 @@
-"""Large STEP files: how long reading takes beside OCCT's own, and how much memory."""
+"""Large STEP files: time and memory of reading, beside OCCT's own reader."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from kerfpath.cad import _read, read
 __all__ = ["run"]
 
 PITCH = 20.0
-"""Between the holes, mm."""
+"""Distance between the holes, mm."""
 SIDE = 7
-"""Holes along a side of a plate: every other is round, the rest are hexagons."""
+"""Number of holes along a side of a plate: round holes and hexagons alternate."""
 PLATES = (8, 32, 116)
-"""In the assembly; the last make 82 MB."""
+"""Numbers of plates in the assembly; the last gives 82 MB."""
 RATIO, GIGABYTES = 2.0, 3.0
-"""What reading may take: times OCCT's own, and of memory."""
+"""Allowed time of reading, as a multiple of OCCT's, and allowed memory, GB."""
 
 HOW = """\
 An assembly of plates of 180 faces, each with {holes} holes, round ones and hexagons, written by
@@ -90,7 +90,7 @@ def _worker() -> int:
 
 
 def _peak(process: str) -> float:
-    """Return the gigabytes that a process has held at most."""
+    """Return the peak memory of a process, GB."""
     lines = Path(f"/proc/{process}/status").read_text(encoding="ascii").splitlines()
     return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) * 1e-6
 

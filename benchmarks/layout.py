@@ -1,4 +1,4 @@
-"""Layout: what a better place for the demo part gains, and what the cheap tests save."""
+"""Layout: the gain of a better placement of the demo part, and the savings of the cheap tests."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ evaluations = 64
 
 
 class Case(NamedTuple):
-    """A layout that is looked for in both ways."""
+    """A layout that is searched in both ways."""
 
     name: str
     job: Path
@@ -74,7 +74,7 @@ class Case(NamedTuple):
 
 
 def run(*, quick: bool = False) -> Report:
-    """Lay out parts over continuous gamma and on the grid, and hold bounds against exact values."""
+    """Lay out parts over continuous gamma and on the grid, and compare bounds with exact values."""
     warm_up()
     figures: list[Figure] = []
     findings: list[str] = []
@@ -88,7 +88,7 @@ def run(*, quick: bool = False) -> Report:
 
 
 def _cases(folder: Path, *, quick: bool) -> list[Case]:
-    """Return the layouts to look for."""
+    """Return the layouts to search."""
     two = _job(folder, quick=True)
     if quick:
         return [Case("slot and hole", two, "speed", 16)]
@@ -102,7 +102,7 @@ def _cases(folder: Path, *, quick: bool) -> list[Case]:
 
 
 def _both(case: Case, figures: list[Figure], findings: list[str]) -> Layout:
-    """Look for the best placement over continuous gamma and on the grid; return the latter."""
+    """Search the best placement over continuous gamma and on the grid; return the latter."""
     text = case.job.read_text(encoding="utf-8")
     grid = case.job.with_name(f"grid_{case.job.name}")
     grid.write_text(text.replace("[plan]", '[plan]\nmethod = "exact"'), encoding="utf-8")
@@ -152,13 +152,13 @@ def _both(case: Case, figures: list[Figure], findings: list[str]) -> Layout:
 
 
 def _busy() -> float:
-    """Return the time of this process and of those that ended, s."""
+    """Return the processor time of this process and of its ended children, s."""
     spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(each.ru_utime + each.ru_stime for each in spent)
 
 
 def _planned(case: Case, placed: Layout) -> float:
-    """Return what the best placement is worth over continuous gamma, or that of the job."""
+    """Return the value of the best placement over continuous gamma, or of that of the job."""
     offsets = {} if placed.best is None else dict(placed.best.offsets)
     data = evaluate_placements(
         job=str(case.job), digest=digest(case.job), goal=case.goal, places=[offsets],
@@ -201,7 +201,7 @@ def _bounds(found: Layout, contours: Sequence[SampledContour], placements: int) 
     middle, rng = middle_of(found.job, nodes_of(contours)), np.random.default_rng(5)
     over: dict[str, list[float]] = {}
     share: dict[str, list[float]] = {}
-    _timed(found.job, contours[0], np.arange(len(contours[0].nodes)))  # what is loaded once
+    _timed(found.job, contours[0], np.arange(len(contours[0].nodes)))  # load and compile once
     for _ in range(placements):
         at = {name: float(rng.uniform(*span)) for name, span in found.ranges.items()}
         job = move_job(found.job, numbers_of(found.job, at, middle))
@@ -223,7 +223,7 @@ def _bounds(found: Layout, contours: Sequence[SampledContour], placements: int) 
 
 
 def _timed(job: Job, contour: SampledContour, nodes: Any) -> tuple[float, float]:
-    """Return the least interval over some nodes, s, and how long it took to find."""
+    """Return the least interval over some nodes, s, and the time to find it."""
     begun = perf_counter()
     graph = job.graph(contour.nodes, replace(job.options, comfort=None), only=nodes)
     problem = SearchProblem(

@@ -1,4 +1,4 @@
-"""The Pareto set: adaptive runs against a grid of weights and NSGA-II, and what 200 plans take."""
+"""The Pareto set: adaptive runs beside a grid of weights and NSGA-II, and the time of 200 plans."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ TARGET = 120.0
 
 
 def run(*, quick: bool) -> Report:
-    """Compare the two searches, and take the time."""
+    """Compare the two searches, and measure the time."""
     nodes, options = _task()
     runs, few = (12, 4) if quick else (200, 40)
     figures, rows, beyond, findings = [], [], [], []
@@ -133,7 +133,7 @@ def _swept(runs: int, processes: int) -> float:
 
 
 def _task() -> tuple[Contour, dict[str, Any]]:
-    """Return the demo's trim line, and how it is planned, its graph and all."""
+    """Return the demo's trim line and its planning options, with its graph."""
     job = read_job(JOB)
     part = job.read_part()
     task = next(task for task in job.contours if task.name == "trim")
@@ -151,7 +151,7 @@ def _off_grid(
     grid: ParetoSet,
     figures: list[Figure],
 ) -> tuple[str, ...]:
-    """Take the time of as many runs, half of them off the grid, and return their row."""
+    """Measure the same number of runs, half of them off the grid, and return their row."""
     start = perf_counter()
     found = pareto(nodes, **options, criteria=criteria, runs=grid.tried)
     what = f"{grid.tried} runs, every second over continuous gamma: {', '.join(criteria)}"
@@ -196,7 +196,7 @@ def _nsga(
     budget: int,
     figures: list[Figure],
 ) -> tuple[str, ...]:
-    """Take the time of NSGA-II, and return its row: the same first runs, box and budget as ours."""
+    """Measure NSGA-II, and return its row: it has the same first runs, box and budget as ours."""
     robot = options["robot"]
     asked = PlanOptions(gamma_step=options["gamma_step"], frames=options["frames"])
     problem = ParetoProblem(

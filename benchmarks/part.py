@@ -1,4 +1,4 @@
-"""A whole part: seconds from STEP to program, and the time that order and air moves save."""
+"""A whole part: seconds from STEP to program, and the time saved by order and transfer moves."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ Pairs = Sequence[tuple[int, int]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sequenced:
-    """An order of cutting: seconds through the air, on the contours and of all, and its moves."""
+    """A cutting order: seconds of transfer moves, on the contours and in total, and its moves."""
 
     air: float
     cutting: float
@@ -225,7 +225,7 @@ def _nearest(job: Job, plans: Sequence[Plan], before: Pairs, cell: Cell | None) 
 
 
 def nearest_first(time: Array, before: Pairs) -> list[int]:
-    """Return the contours in the order in which each is the nearest of those that may come.
+    """Return the contours in the order in which each is the nearest of those allowed next.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 EDITS = 3000
-"""Of each of the jobs."""
+"""Number of edits of each job."""
 SEED = 14
 HOW = (
     "Every value of four small plan.json files, and values of their jobs, edited by a seeded "
@@ -75,7 +75,7 @@ JOB_EDITS: tuple[tuple[str, str], ...] = (
     ("abb_irb4600_60_205", "abb_irb4600_45_205"),
     ("[plan]", '[[contour]]\npick = "0/hole1"\nname = "again"\nspeed_m_min = 1\n[plan]'),
 )
-"""What in a job is exchanged for what, after it was planned: none of it leaves the plan its own."""
+"""Replacements in a job after it was planned; with any of them the plan no longer fits the job."""
 
 
 class Tally:
@@ -99,11 +99,11 @@ class Tally:
             self.alarms.append(f"{kind} at {where}: {verdict}")
 
     def total(self, what: str) -> int:
-        """Return how many edits of all kinds came to `what`."""
+        """Return how many edits of all kinds had the result `what`."""
         return sum(count[what] for count in self.counts.values())
 
     def rows(self) -> Iterator[str]:
-        """Yield a line for each kind: edits, then what came of them."""
+        """Yield a line for each kind: the number of edits, then their results."""
         for kind, count in sorted(self.counts.items()):
             told = ", ".join(f"{what} {n}" for what, n in sorted(count.items()))
             yield f"{kind}: {count.total()} edits: {told}"
@@ -121,18 +121,18 @@ def _passes_of(job: Path, plan: Path) -> bool:
 
 
 def judged(judge: Judge, plan: Path) -> str:
-    """Return what an audit makes of a plan.json: passed, caught, refused or broke."""
+    """Return the result of an audit of a plan.json: passed, caught, refused or broke."""
     try:
         return "passed" if judge(plan) else "caught"
     except InputError as error:
         said = str(error)
         return f"refused: {said}" if "\n" not in said else f"broke: several lines: {said}"
-    except Exception as error:  # any other one is what this looks for
+    except Exception as error:  # any other exception is what this benchmark looks for
         return f"broke: {type(error).__name__}: {error}"
 
 
 def edited_plans(tally: Tally, judge: Judge, plan: Path, count: int, seed: int) -> None:
-    """Judge so many edits of a plan.json, beside which the edited file is written."""
+    """Judge `count` edits of a plan.json; the edited file is written next to it."""
     file = plan.with_name(f"edited-{plan.name}")
     for edit in edits(plan.read_text(encoding="utf-8"), count, seed):
         file.write_text(edit.text, encoding="utf-8")
@@ -140,7 +140,7 @@ def edited_plans(tally: Tally, judge: Judge, plan: Path, count: int, seed: int) 
 
 
 def edited_jobs(job: Path) -> Iterator[tuple[str, Path]]:
-    """Yield the job with each of the edits that fit it: what was done, and where it stands."""
+    """Yield the job with each edit that fits it: what was changed, and the path of the file."""
     text, file = job.read_text(encoding="utf-8"), job.with_name(f"edited-{job.name}")
     for before, after in JOB_EDITS:
         if before in text:
@@ -149,12 +149,12 @@ def edited_jobs(job: Path) -> Iterator[tuple[str, Path]]:
 
 
 def campaign(folder: Path, names: Iterable[str], count: int, seed: int) -> Tally:
-    """Plan jobs, judge so many edits of each one's plan.json, and all edits of the jobs."""
+    """Plan jobs, judge `count` edits of each plan.json, and all edits of the jobs."""
     return judged_all([planned(folder, name) for name in names], count, seed)
 
 
 def judged_all(made: Iterable[tuple[Path, Path]], count: int, seed: int) -> Tally:
-    """Judge so many edits of each plan.json of jobs and their plans, and all edits of the jobs."""
+    """Judge `count` edits of each plan.json, given with its job, and all edits of the jobs."""
     tally = Tally()
     for job, plan in made:
         name = job.stem

@@ -1,4 +1,4 @@
-"""The audit of programs, tried with thousands of edits: how many that do harm it lets pass."""
+"""The audit of programs against thousands of edits: how many harmful ones it lets pass."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ __all__ = ["Outcome", "Subject", "Tally", "run", "subjects"]
 COLUMNS = (
     "harm: caught", "refused", "passed", "harmless: passed", "not", "not of our making", "either",
 )  # fmt: skip
-"""Of the tables: what does harm, what is harmless, what no reader takes, and what may do either."""
+"""Columns of the tables: edits that do harm, harmless ones, unreadable ones, and undecided ones."""
 EDITS = 300
-"""Of the text, in every language."""
+"""Number of edits of the text in every language."""
 ARMS = {"inform": "yaskawa_gp25", "urscript": "ur_ur10e"}
-"""Robots of languages that cannot say the axes of the one below."""
+"""Robots for languages that cannot express the axes of the one below."""
 ARM = "abb_irb4600_60_205"
 ACCELERATION = [300, 300, 400, 1000, 1000, 1500]
 """deg/s^2"""
@@ -141,7 +141,7 @@ class Subject:
     language : Language
     settings : LanguageSettings
     program : Program
-        What the language can say of it.
+        What the language can express of it.
     files : mapping of str to str
     """
 
@@ -156,11 +156,11 @@ class Subject:
         return self.language.formatter(program, self.settings).files()
 
     def read(self, files: Mapping[str, str]) -> ReadProgram:
-        """Return what files say."""
+        """Return the program as read from the files."""
         return read_program(files, self.language.name, self.program.robot, self.settings)
 
     def outcome(self, files: Mapping[str, str]) -> tuple[Outcome, str]:
-        """Return what comes of the audit of files, and the first finding."""
+        """Return the outcome of the audit of files, and the first finding."""
         try:
             found = self.audit.audited(self.read(files), self.language, self.settings, "job")
         except InputError as error:
@@ -174,15 +174,15 @@ class Subject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tally:
-    """How many edits were tried, by language, kind, what the oracle says and what came of them.
+    """How many edits were tried, by language, kind, verdict of the oracle and outcome.
 
     Parameters
     ----------
     counts : Counter of (language, kind, verdict, outcome)
     wrong : list of str
-        What passed and does harm, and what was caught and is harmless.
+        Harmful edits that passed, and harmless ones that were caught.
     told : Counter of "told" or "elsewhere"
-        Whether a finding names the line of the edit, or one beside it.
+        Whether a finding names the line of the edit or one next to it, or another.
     """
 
     counts: Counter[tuple[str, str, str, str]] = field(default_factory=Counter)
@@ -193,7 +193,7 @@ class Tally:
         self, subject: Subject, kind: str, said: str, judged: str, files: Mapping[str, str],
         at: tuple[str, int] | None = None,
     ) -> None:  # fmt: skip
-        """Audit an edited program, and count it, and whether its line is told where it is known."""
+        """Audit and count an edited program, and whether the finding names its line if known."""
         outcome, first = subject.outcome(files)
         if at is not None and judged == "harmful" and outcome != "passed":
             near = any(f"{at[0]}, line {at[1] + k}" in first for k in (-1, 0, 1))
@@ -206,12 +206,12 @@ class Tally:
             self.wrong.append(f"{subject.language.name}: {word}: {kind}: {said} {first}")
 
     def only(self, kind: str) -> Tally:
-        """Return what was counted of one kind."""
+        """Return the counts of one kind."""
         counts = Counter({key: n for key, n in self.counts.items() if key[1] == kind})
         return Tally(counts=counts)
 
     def of(self, judged: str, outcome: str | None = None, language: str | None = None) -> int:
-        """Return how many the oracle judged so, of an outcome, in a language."""
+        """Return how many edits have a verdict of the oracle, an outcome and a language."""
         return sum(
             n
             for (lang, _, said, came), n in self.counts.items()
@@ -222,21 +222,21 @@ class Tally:
         self, subject: Subject, rng: np.random.Generator, *, every: int = 1, first: int = 0,
         only: str = "",
     ) -> None:  # fmt: skip
-        """Write every fault of the program out, or `every` so manyth, and audit it.
+        """Write out and audit the program's faults of the kinds that begin with `only`.
 
-        Of a kind that begins with `only`.
+        Only one fault in `every` is tried, from number `first` on.
         """
         found = (f for f in faults(subject.program, rng) if f.kind.startswith(only))
         for fault in islice(found, first % every, None, every):
             try:
                 files = subject.written(fault.program)
             except InputError:
-                continue  # which the language cannot say
+                continue  # the language cannot express it
             if files != subject.files:
                 self.add(subject, fault.kind, "", "harmful", files)
 
     def try_edits(self, subject: Subject, rng: np.random.Generator, count: int) -> None:
-        """Make edits of the text, and audit each."""
+        """Make `count` edits of the text, and audit each."""
         before = subject.read(subject.files)
         for edit in islice(edits(subject.files, subject.language.name, rng), count):
             try:
@@ -255,13 +255,13 @@ def subjects(
     Parameters
     ----------
     folder : Path
-        Where job and drawing are written to.
+        Folder to which job and drawing are written.
     only : tuple of str
         Names of languages; default: all.
     more : str
         Lines of [program].
     external : bool
-        Whether the robot has a rail and the part a table; in the languages that can say them.
+        Whether the robot has a rail and the part a table, in the languages that can express them.
     """
     _draw(folder / "points.csv")
     plans = {}
@@ -304,7 +304,7 @@ def _draw(path: Path) -> None:
 
 
 def run(*, quick: bool = False) -> Report:
-    """Return what came of faults and edits, by language and by kind."""
+    """Return the results of faults and edits, by language and by kind."""
     count = 50 if quick else EDITS
     others = " and ".join(f"{arm} ({name})" for name, arm in ARMS.items())
     all_of_them, rows = Tally(), []
@@ -344,7 +344,7 @@ def run(*, quick: bool = False) -> Report:
 
 
 def _row(tally: Tally) -> list[int]:
-    """Return the figures of `COLUMNS`."""
+    """Return the figures for `COLUMNS`."""
     fine = tally.of("harmless", "passed")
     return [
         *(tally.of("harmful", outcome) for outcome in ("caught", "refused", "passed")),

@@ -29,13 +29,13 @@ __all__ = ["run"]
 
 TARGETS, SECTIONS = 50_000, 25
 LIMIT = 5.0
-"""What writing, and reading back, may take, s."""
+"""Time allowed for writing, and for reading back, s."""
 UNDIVIDED = ("urscript", "ros", "csv")
 """Languages whose programs are one file."""
 ONE_FILE = 1_000_000
-"""Lines allowed to them."""
+"""Number of lines that these files may have."""
 SWING = 0.12
-"""How far each joint swings about its place, rad."""
+"""Amplitude of the swing of each joint, rad."""
 STEP = 0.004
 """Share of a swing from target to target."""
 
@@ -85,7 +85,7 @@ def _write(chosen: Language, program: Program, settings: LanguageSettings) -> No
 
 
 def _arm(chosen: Language) -> Robot:
-    """Return a robot of the library that the language is for."""
+    """Return a robot of the library for the language."""
     for name in robot_ids():
         arm = robot(name)
         if not chosen.doubt(arm) and not chosen.refusal(arm):
@@ -94,7 +94,7 @@ def _arm(chosen: Language) -> Robot:
 
 
 def _program(arm: Robot, count: int) -> Program:
-    """Return a program of contours of so many linear targets each."""
+    """Return a program of contours with `count` linear targets each."""
     limits = arm.joint_limits()
     middle = np.clip((limits.lower + limits.upper) / 2, -0.5, 0.5)
     middle[4] = 0.9

@@ -1,4 +1,4 @@
-"""The public benchmark set: draw it, let planners answer, keep the best known, tell the results.
+"""The public benchmark set: draw it, run planners, keep the best known, write the results.
 
     python -m benchmarks.public_set draw [NAMES BEGIN WITH]
     python -m benchmarks.public_set run kerfpath|grid|paper
@@ -6,8 +6,8 @@
     python -m benchmarks.public_set known
     python -m benchmarks.public_set results
 
-Answers lie in build/public-set/PLANNER; a run goes on where one was left. The planners of other
-projects run by an interpreter that has requirements/planners.txt.
+Answers are in build/public-set/PLANNER; an interrupted run continues. The planners of other
+projects need an interpreter with requirements/planners.txt.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from kerfpath._writing import write_whole
 
 ANSWERS = Path(__file__).parents[1] / "build" / "public-set"
 LONGEST = 300.0
-"""s that a planner has for an instance."""
+"""Time limit of a planner per instance, s."""
 
 
 def main() -> None:
-    """Read the arguments, and do what they say."""
+    """Read the arguments, and run the command."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.public_set",
         description=__doc__,
@@ -71,7 +71,7 @@ README = Path(__file__).parent / "public" / "README.md"
 
 
 def _run(planner: str, python: str, only: str) -> None:
-    """Let a planner answer what it has not answered yet."""
+    """Run a planner on the instances that it has not answered yet."""
     folder = ANSWERS / planner
     folder.mkdir(parents=True, exist_ok=True)
     left = [n for n in names() if n.startswith(only) and not (folder / f"{n}.json").exists()]
@@ -99,7 +99,7 @@ def _inside(planner: str, left: list[str]) -> Iterator[dict[str, Any]]:
 
 
 def _outside(planner: str, python: str, left: list[str]) -> Iterator[dict[str, Any]]:
-    """Yield the answers of a planner of another project, each from a process of its own."""
+    """Yield the answers of a planner of another project, each from a separate process."""
     environ = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1]), "OMP_NUM_THREADS": "1"}
     for name in left:
         command = [python, "-W", "ignore", "-m", "benchmarks.public.outside", planner, name]
@@ -118,7 +118,7 @@ def _outside(planner: str, python: str, left: list[str]) -> Iterator[dict[str, A
 
 
 def _silent(planner: str, name: str, settings: str, why: str) -> dict[str, Any]:
-    """Return what is kept of a planner that gave no answer."""
+    """Return the record of a planner that gave no answer."""
     return {
         "instance": name,
         "planner": planner,
@@ -130,7 +130,7 @@ def _silent(planner: str, name: str, settings: str, why: str) -> dict[str, Any]:
 
 
 def _keep_best() -> None:
-    """Write the best known motion of every instance, its bound, or why there is none."""
+    """Write the best known motion and bound of every instance, or why there is no motion."""
     KNOWN.mkdir(exist_ok=True)
     for name in names():
         file = KNOWN / f"{name}.json"
@@ -145,7 +145,7 @@ def _best(name: str, known: dict[str, Any]) -> dict[str, Any]:
         said = json.loads(file.read_text())
         by = _named(said["planner"])
         if said["q"] is not None and not (verdict := check(task, said["q"])).faults:
-            # A bound of the same plan on another machine differs by rounding.
+            # The bound of the same plan on another machine may differ by rounding.
             if best["cost"] is None or verdict.cost < best["cost"] - 1e-9:
                 q = np.round(said["q"], 12)
                 best |= {"cost": check(task, q).cost, "by": by, "q": q.tolist()}
@@ -162,14 +162,14 @@ def _best(name: str, known: dict[str, Any]) -> dict[str, Any]:
 
 
 def _named(planner: str) -> str:
-    """Return a planner's name, with the version of this package for one of its own."""
+    """Return a planner's name, with the version if it is a planner of this package."""
     if planner not in PLANNERS:
         return planner
     return f"kerfpath {version('kerfpath')}" + (f", {planner}" if planner != "kerfpath" else "")
 
 
 def _lines(data: dict[str, Any]) -> str:
-    """Return JSON with a key a line, of the motion a node a line."""
+    """Return JSON with one key per line and, in the motion, one node per line."""
     rows = []
     for key, value in data.items():
         text = json.dumps(value)

@@ -1,4 +1,4 @@
-"""The refinement: whether it comes to the same from every grid, and what whole plans take."""
+"""The refinement: whether it gives the same result from every grid, and the time of whole plans."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ STEPS = (8.0, 4.0, 2.0, 1.0, 0.5)
 SPEED = 10 / 60
 """Cutting speed of the whole plan, m/s."""
 FREE = 1e6
-"""Multiple of the accelerations that never binds."""
+"""Multiple of the accelerations that is never active."""
 STEPPING = 3.0
-"""Multiple of the arm's accelerations at which they bind, and still let gamma step."""
+"""Multiple of the arm's accelerations at which they are active but still let gamma step."""
 COLUMNS = (
     "contour",
     "nodes",
@@ -46,7 +46,7 @@ COLUMNS = (
     "refine s",
 )
 PEER_STEP = 2.0
-"""Step of gamma that Descartes is given, deg; at 1 deg its graph takes four times the memory."""
+"""Step of gamma for Descartes, deg; at 1 deg its graph takes four times the memory."""
 
 HOW_STEPS = """\
 The trim line and two holes of the shipped demo job (`kerfpath/demo/b_pillar.toml`, IRB 4600-60,
@@ -95,7 +95,7 @@ def _steps(*, quick: bool) -> Report:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Row:
-    """What one grid leads to; costs and seconds of the refinement are None without a plan."""
+    """The results from one grid; costs and seconds of the refinement are None without a plan."""
 
     step: float
     vertices: int
@@ -107,7 +107,7 @@ class _Row:
     refine_seconds: float | None = None
 
     def cells(self, name: str, nodes: int) -> tuple[str, ...]:
-        """Return the row in words, by `COLUMNS`."""
+        """Return the row as text, by `COLUMNS`."""
         costs = (_words(cost, "{:.4f}") for cost in (self.grid, self.refined, self.free))
         seconds = (self.graph_seconds, self.search_seconds, self.refine_seconds)
         return (
@@ -156,7 +156,7 @@ def _step_row(job: Job, nodes: Contour, speed: float, step: float) -> _Row:
 
 
 def _spread(name: str, rows: list[_Row]) -> str:
-    """Say how far the refined costs and the grids' optima of one contour lie apart."""
+    """Return the spread of the refined costs and of the grids' optima of one contour, as text."""
     found = [(row.grid, row.refined) for row in rows if row.grid and row.refined]
     if not found:
         return f"{name}: no grid has a path"
@@ -231,7 +231,7 @@ def _whole(*, quick: bool) -> Report:
 
 
 def _ours(name: str, wave: _Wave, runs: int) -> tuple[list[Figure], str]:
-    """Return the times of a whole plan and of its parts, and what the graph is like."""
+    """Return the times of a whole plan and of its parts, and a description of the graph."""
     whole = in_turn({name: wave.plan}, runs)[name]
     graph = wave.graph()
     made, refined = wave.plan(graph, refine=False), wave.plan(graph)
@@ -254,7 +254,7 @@ def _ours(name: str, wave: _Wave, runs: int) -> tuple[list[Figure], str]:
 
 
 def _peer(contour: Contour, step: float, ours: list[float]) -> tuple[Figure, str]:
-    """Return Descartes' times on the same poses, and how they compare."""
+    """Return Descartes' times on the same poses, and the comparison with ours."""
     robot, samples = _arm.arm_of_one_turn(), round(360 / step)
     frames: Array = np.ascontiguousarray(_arm.placement() @ contour.frames("rotation-minimising"))
     graph = layered_graph(

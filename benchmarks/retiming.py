@@ -35,7 +35,7 @@ VELOCITY, ACCELERATION = np.full(6, 2.5), np.radians([320, 270, 420, 1300, 1400,
 
 
 def run(*, quick: bool) -> list[Report]:
-    """Measure a coarse and a fine division of the same path."""
+    """Measure the same path in coarse and in fine intervals."""
     return [_measured(count, quick=quick) for count in ((250,) if quick else (1000, 4000))]
 
 

@@ -1,4 +1,4 @@
-"""How the exact search grows: beside a brute second-order recursion, again and again, and far."""
+"""How the exact search scales: beside a brute second-order recursion, repeated, on long paths."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SPEED = 10 / 60
 """Cutting speed, m/s."""
 
 SHARES = (3.0, 1.0, 0.3, 0.1)
-"""Shares of the acceleration limits: from one that lets gamma step to one that seldom does."""
+"""Shares of the acceleration limits, from one that lets gamma step to one that seldom does."""
 
 HOW_BRUTE = """\
 The closed wavy contour of the other searches, all postures, axes 4 and 6 endless, 10 m/min, with
@@ -175,7 +175,7 @@ def _far(sizes: tuple[int, ...]) -> Report:
 
 
 def _whole_plan(nodes: int) -> tuple[float, float, float, int]:
-    """Return the seconds on the wall and of all cores of a plan, the peak memory, the vertices."""
+    """Return wall time and processor time (s) of a plan, peak memory, and number of vertices."""
     task = partial(
         plan,
         robot=_arm.arm(),

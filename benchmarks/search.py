@@ -22,10 +22,10 @@ __all__ = ["run"]
 SPEED = 10 / 60
 """Cutting speed, m/s."""
 FREE = 1e6
-"""A limit, rad/s or rad/s^2 times 1e6, that never binds."""
+"""A limit, rad/s or rad/s^2 times 1e6, that is never active."""
 
 STEPPING = 3.0
-"""Multiple of the arm's accelerations at which they bind, and still let gamma step."""
+"""Multiple of the arm's accelerations at which they are active but still let gamma step."""
 
 HOW_LIMITED = """\
 A closed wavy contour on a cylinder, IRB 2400, all postures, axes 4 and 6 endless, 10 m/min,
@@ -53,7 +53,7 @@ Searched = Literal["manhattan", "euclid"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Problem:
-    """A layered graph and what a search of it is given."""
+    """A layered graph and the arguments of its search."""
 
     robot: Robot
     graph: LayeredGraph
@@ -231,7 +231,7 @@ def _peer(nodes: int, samples: int, *, quick: bool) -> Report:
 
 
 def _drop(value: object) -> None:
-    """Make of a call that returns something one that does not."""
+    """Drop the value that a call returns."""
 
 
 def _ratio(seconds: dict[str, list[float]], above: str, below: str) -> float:

@@ -1,4 +1,4 @@
-"""The studio: from start to the first picture, from a slider to a new course, and its memory."""
+"""The studio: time from start to the first picture and from a slider to a new course, memory."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ clock. Random edits: of the step of gamma and of a share of the limits, every te
 
 STARTS, STEPS, RESTS, EDITS = 3, 60, 6, 150
 PATIENCE = 0.3
-"""s: how long a run waits after the last change."""
+"""s: waiting time of a run after the last change."""
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
 class _Page:
-    """A server and the page's side of its WebSocket."""
+    """A server and the client end of its WebSocket."""
 
     def __init__(self, process: subprocess.Popen[str], socket: ClientConnection) -> None:
         self.process, self._socket, self.revision = process, socket, 1
@@ -59,7 +59,7 @@ class _Page:
                 return message
 
     def rests(self) -> None:
-        """Wait until nothing is computed any more."""
+        """Wait until nothing is being computed."""
         self.until(lambda m: m["type"] == "outcome" and m["revision"] == self.revision)
         self.until(lambda m: m["type"] == "progress" and not m["busy"])
 
@@ -117,7 +117,7 @@ def _start(job: Path) -> tuple[list[float], list[float]]:
 
 
 def _slide(page: _Page, weights: list[float], steps: int) -> tuple[Figure, Figure, str]:
-    """Move a weight, and return how long its course took to come."""
+    """Move a weight, and return the time until its course arrived."""
     seconds, processor, drafts = [], [], 0
     for step in range(steps):
         up = 1 if step // 15 % 2 == 0 else -1
@@ -138,7 +138,7 @@ def _slide(page: _Page, weights: list[float], steps: int) -> tuple[Figure, Figur
 
 
 def _rest(page: _Page, weights: list[float], rests: int) -> tuple[Figure, str]:
-    """Return how long plans take once the slider rests, and how far drafts are from them."""
+    """Return the time of plans once the slider rests, and the distance of drafts from them."""
     seconds, above = [], []
     for step in range(rests):
         page.rests()
@@ -157,11 +157,11 @@ def _rest(page: _Page, weights: list[float], rests: int) -> tuple[Figure, str]:
 
 
 def _memory(page: _Page, edits: int) -> str:
-    """Say what random edits do to the memory of the server."""
+    """Report the effect of random edits on the memory of the server."""
     rng, levels, step = np.random.default_rng(0), [], 1
     for k in range(edits):
         if rng.random() < 0.3:
-            step = step % 6 + 1  # another one: what changes nothing is no revision
+            step = step % 6 + 1  # a different step: an edit without a change makes no revision
             page.edit(["plan", "gamma_step_deg"], float(step))
         else:
             page.edit(["plan", "eta_velocity"], float(rng.uniform(0.8, 1.0)))
@@ -177,7 +177,7 @@ def _memory(page: _Page, edits: int) -> str:
 
 
 def run(*, quick: bool = False) -> Report:
-    """Start studios, move their sliders and measure what comes of it."""
+    """Start studios, move their sliders and measure the response."""
     share = 10 if quick else 1
     with tempfile.TemporaryDirectory() as folder:
         for name in ("b_pillar.toml", "b_pillar.step"):

@@ -37,7 +37,7 @@ answer."""
 
 MINUTES, PAGES, PAGE_MINUTES = 10.0, 20, 5.0
 WARM = 15
-"""s: until the first plans are there."""
+"""s: time limit for the first plans."""
 SWITCHES = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
 SWITCHES += ["--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
 USED = """() => {
@@ -76,7 +76,7 @@ KEYS = ("Space", "ArrowLeft", "ArrowRight", "Shift+ArrowRight", "f", "Escape", "
 
 
 class Served:
-    """`kerfpath studio` in a process of its own."""
+    """`kerfpath studio` in a separate process."""
 
     def __init__(self, job: Path) -> None:
         command = [sys.executable, "-m", "kerfpath", "studio", str(job), "--port", "0"]
@@ -101,7 +101,7 @@ class Served:
         return int(re.findall(r"VmRSS:\s+(\d+)", text)[0]) / 1024
 
     def stop(self) -> None:
-        """End it."""
+        """Stop the process."""
         self.process.terminate()
         self.process.wait(timeout=30)
         self._reading.join()
@@ -110,12 +110,12 @@ class Served:
 
 
 class Gestures:
-    """Random gestures on a page of the studio, and what they leave.
+    """Random gestures on a page of the studio, and their effects.
 
     Parameters
     ----------
     page : Page
-        Of Playwright, on the studio.
+        A page of Playwright, on the studio.
     seed : int
     """
 
@@ -129,7 +129,7 @@ class Gestures:
         page.on("console", lambda m: self.wrong.append(m.text) if m.type == "error" else None)
 
     def go_on(self, seconds: float, served: Served, text: str, *, samples: int) -> None:
-        """Make gestures for so long; memory is measured so many times, the job put back as often.
+        """Make gestures; measure memory and restore the job `samples` times.
 
         Parameters
         ----------
@@ -137,7 +137,7 @@ class Gestures:
         served : Served
             The server.
         text : str
-            Of the job.
+            Text of the job.
         samples : int
         """
         session = self._page.context.new_cdp_session(self._page)
@@ -187,14 +187,14 @@ class Gestures:
 
 
 def _heap(session: CDPSession) -> float:
-    """Return what the page keeps, MB, its garbage collected."""
+    """Return the heap of the page after a garbage collection, MB."""
     session.send("HeapProfiler.collectGarbage")
     return float(session.send("Runtime.getHeapUsage")["usedSize"]) / 1e6
 
 
 @contextmanager
 def browser_page(address: str) -> Iterator[Page]:
-    """Yield a page of a browser of its own on the studio."""
+    """Yield a page on the studio in a separate browser."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -206,7 +206,7 @@ def browser_page(address: str) -> Iterator[Page]:
 
 
 def many_pages(served: Served, *, pages: int, seconds: float, seed: int) -> list[str]:
-    """Have many pages change a job for so long; return what went wrong, in the server too."""
+    """Let many pages change a job; return what went wrong, also in the server."""
     wrong: list[str] = []
     end = monotonic() + seconds
 
@@ -232,7 +232,7 @@ def many_pages(served: Served, *, pages: int, seconds: float, seed: int) -> list
 
 
 def _hear(socket: Any, wrong: list[str], until: float) -> None:
-    """Read what the server says for a while."""
+    """Read the messages of the server for a while."""
     while (left := until - monotonic()) > 0:
         try:
             message = json.loads(socket.recv(timeout=left))
@@ -243,13 +243,13 @@ def _hear(socket: Any, wrong: list[str], until: float) -> None:
 
 
 def _levels(values: list[float]) -> tuple[float, float]:
-    """Return the medians of the second and of the last quarter: the first one warms up."""
+    """Return the medians of the second and of the last quarter; the first is for warming up."""
     quarter = max(1, len(values) // 4)
     return float(np.median(values[quarter : 2 * quarter])), float(np.median(values[-quarter:]))
 
 
 def two_holes(folder: Path) -> Path:
-    """Write a job of two holes of the demo, of which nothing is proved, and return its path."""
+    """Write a job of two holes of the demo, without certificates, and return its path."""
     demo, path = files("kerfpath") / "demo", folder / "job.toml"
     head, _, rest = (demo / "b_pillar.toml").read_text().partition("[plan]")
     first, *tables = head.split("[[contour]]")
@@ -261,7 +261,7 @@ def two_holes(folder: Path) -> Path:
 
 
 def run(*, quick: bool = False) -> Report:
-    """Use a studio for a long time, and say what that leaves."""
+    """Use a studio for a long time, and report the effects."""
     share = 0.1 if quick else 1.0
     with tempfile.TemporaryDirectory() as folder:
         job = two_holes(Path(folder))

@@ -1,4 +1,4 @@
-"""Sweeps: what the engine costs per task, and what is left after it was killed again and again."""
+"""Sweeps: the overhead of the engine per task, and what is stored after repeated kills."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ WORKERS = 2
 NODES = 31
 SLEEPERS = {"workers": 4, "threads": 50}
 NAPS = {0.05: 6000, 0.4: 4000}
-"""How long tasks sleep, s, and how many there are."""
+"""Seconds that each task sleeps, and the number of tasks."""
 
 
 def payload(x: int) -> dict[str, str]:
-    """Return 1 kB that only `x` gives, so that a torn or foreign record shows."""
+    """Return 1 kB that depends on `x`, so that a torn or foreign record is noticed."""
     return {"text": hashlib.sha256(str(x).encode()).hexdigest() * 16}
 
 
@@ -56,7 +56,7 @@ def _arm() -> kerfpath.Robot:
 
 
 def slit(height_m: float) -> dict[str, object]:
-    """Plan and audit a small slit in a wall at a height; return what a study would keep of it."""
+    """Plan and audit a small slit in a wall at a height; return the record a study would keep."""
     points = np.linspace((0.0, -0.03, height_m), (0.0, 0.03, height_m), NODES)
     tool, placement = np.eye(4), np.eye(4)
     tool[:3, :3] = [[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]
@@ -89,7 +89,7 @@ def nap(x: int, seconds: float) -> dict[str, object]:
 
 
 def sweep_aloud(store: str, count: int) -> None:
-    """Sweep over `count` tasks and print how many are done, for who waits to kill it."""
+    """Sweep over `count` tasks and print how many are done, for the process that will kill it."""
     sweep.run(
         payload,
         [{"x": x} for x in range(count)],
@@ -102,7 +102,7 @@ def sweep_aloud(store: str, count: int) -> None:
 def run(*, quick: bool = False) -> Report:
     """Measure overhead per task, and kill a sweep many times."""
     tasks, kills, runs, plans = (1000, 4, 1, 200) if quick else (10_000, 20, 3, 1000)
-    from kerfpath.job import warm_up  # what else workers import would count as the engine's start
+    from kerfpath.job import warm_up  # otherwise the workers' imports would count as overhead
 
     warm_up()
     figures, findings = [], list[str]()
@@ -150,7 +150,7 @@ def _timed(store: Path, count: int, scheduler: str | None) -> tuple[float, float
 
 
 def _planned(what: str, store: Path, count: int, scheduler: str | None) -> list[Figure]:
-    """Return what small plans take themselves, what the engine adds, and what it keeps."""
+    """Return the time of small plans, the overhead of the engine, and the size of its records."""
     clock: list[tuple[int, float]] = []
     results = sweep.run(
         slit,
@@ -182,7 +182,7 @@ def _planned(what: str, store: Path, count: int, scheduler: str | None) -> list[
 
 
 def _slept(store: Path, seconds: float, count: int, scheduler: str) -> Figure:
-    """Return at which rate sleepers are served, and which there would be without waiting."""
+    """Return the rate at which sleeping tasks are done, and the rate without any overhead."""
     clock: list[tuple[int, float]] = []
     sweep.run(
         nap,
@@ -231,7 +231,7 @@ def _cluster(folder: Path, *, workers: int = WORKERS, threads: int = 1) -> Itera
 
 
 def _killed(store: Path, tasks: int, kills: int) -> str:
-    """Kill a sweep at random moments, resume it, and say what its store holds at the end."""
+    """Kill a sweep at random moments, resume it, and report what its store holds at the end."""
     code = "import sys; from benchmarks.sweeps import sweep_aloud as s; s(sys.argv[1], {})"
     moments = sorted(np.random.default_rng(0).integers(0, tasks - 200, kills).tolist())
     begun = perf_counter()

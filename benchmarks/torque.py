@@ -1,4 +1,4 @@
-"""Torque limits on the grid: against every pair of edges, and what they cost in time."""
+"""Torque limits on the grid: compared with every pair of edges, and their cost in time."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from kerfpath.urdf import ChainInertia
 __all__ = ["run"]
 
 MASSES = np.array([110.0, 70.0, 60.0, 15.0, 5.0, 1.0])
-"""kg: assumed of an IRB 2400, whose maker states 380 kg in all."""
+"""kg: assumed for an IRB 2400, whose maker states 380 kg in total."""
 SIZE = 0.12
-"""m: radius of gyration of every link, and how far off its joint its mass is."""
+"""m: radius of gyration of every link, and distance of its mass from its joint."""
 LOAD = Load(mass=15.0, centre=np.array([0.05, 0.0, 0.15]))
 SPEED, STEPPING = 10 / 60, 3.0
 """m/s; and the multiple of the accelerations at which gamma may step, as in `benchmarks.search`."""
 SHARES = (0.95, 1.001, 1.3, 1.6, 2.0)
-"""Of what the best path without torque limits asks of a joint: what small graphs may use. Not 1:
+"""Torque limits of small graphs, as shares of what the best path without them needs. 1 is left out:
 two dynamics need not agree to the last digit of a limit."""
 SAME = 1e-10
-"""Relative difference of costs that are sums of the same numbers in another order."""
+"""Relative difference up to which costs are equal: sums of the same numbers in another order."""
 HOW_EXACT = """\
 Small graphs at random, 3 to 7 layers of 2 to 8 vertices about a drifting pose of the IRB 2400, its
 links of assumed masses, a load of 15 kg; limits on velocity, acceleration and torque of which many
@@ -49,7 +49,7 @@ the path, and the search has more to look at, as with any limit that binds."""
 
 
 class _Graph(NamedTuple):
-    """A small layered graph, and what its edges are held to."""
+    """A small layered graph, and the limits of its edges."""
 
     q: Array
     start: Ints
@@ -79,7 +79,7 @@ def _arm_with_masses() -> Robot:
 
 def _against_brute(robot: Robot, count: int) -> Report:
     rng, seen, seconds = np.random.default_rng(19), Counter[str](), np.zeros(2)
-    for limit in (None, robot.torque_limit()):  # compiles what is measured
+    for limit in (None, robot.torque_limit()):  # compile what is measured
         _searched(_random_graph(rng), limit)
     for _ in range(count):
         graph = _random_graph(rng)
@@ -130,7 +130,7 @@ def _random_graph(rng: np.random.Generator) -> _Graph:
 def _searched(
     graph: _Graph, torque: TorqueLimit | None
 ) -> tuple[tuple[float, Array] | None, float]:
-    """Return cost and joints of the best path, if there is one; and how long it took, s."""
+    """Return cost and joints of the best path, if there is one, and the time it took, s."""
     q, start, dt, velocity, acceleration = graph
     begun = perf_counter()
     try:
@@ -155,7 +155,7 @@ def _limit(
 
 
 def _brute(robot: Robot, graph: _Graph, limit: TorqueLimit) -> float:
-    """Return the least cost of all paths under the limits, every pair of edges tried."""
+    """Return the least cost of all paths under the limits, by trying every pair of edges."""
     arm = LagrangeArm.of(robot)
     assert arm is not None
     layers = [graph.q[a:b] for a, b in itertools.pairwise(graph.start)]
@@ -175,7 +175,7 @@ def _brute(robot: Robot, graph: _Graph, limit: TorqueLimit) -> float:
 def _may_follow(
     arm: LagrangeArm, limit: TorqueLimit, graph: _Graph, q: Array, before: Array, after: Array
 ) -> Bools:
-    """Return which increments (l, p, n) to vertices (p, n) and (p, j, n) from them may meet."""
+    """Return which increments (l, p, n) to vertices (p, n) and (p, j, n) from them may follow."""
     most = graph.acceleration * graph.dt**2 + 1e-9
     ok: Bools = np.asarray((np.abs(after[None] - before[:, :, None]) <= most).all(-1))
     i, p, j = np.nonzero(ok)

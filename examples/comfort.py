@@ -1,4 +1,4 @@
-"""A cut in a wall, near the wrist singularity: how near a plan comes, and what more distance costs.
+"""A cut in a wall near the wrist singularity: how near a plan comes, and the cost of more distance.
 
 Run it with `python examples/comfort.py`; it prints a table and writes docs/comfort.svg.
 """
@@ -25,7 +25,7 @@ WISHES = {
 
 
 def plans() -> dict[str, kerfpath.Plan]:
-    """Return the plan of each wish: a straight cut in a wall in front of the robot."""
+    """Return the plans of a straight cut in a wall in front of the robot, one per setting."""
     t = np.linspace(0, 1, 501)
     points = np.c_[0 * t, 0.5 * t - 0.25, 0.3 * t - 0.15]
     axes = np.tile([1.0, 0.0, -0.2], (501, 1))

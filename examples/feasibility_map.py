@@ -1,8 +1,8 @@
 """The picture of the README: the feasibility map of the demo's trim line.
 
-Shows how to work with the rooms of kerfpath one by one: read a job and its part, build the layered
-graph, plan, and draw. Writes docs/feasibility-map.html beside the README and, where Chromium is
-installed, the same as a PNG.
+It shows how to use the parts of kerfpath one by one: read a job and its part, build the layered
+graph, plan, and draw. It writes docs/feasibility-map.html for the README and, if Chromium is
+installed, the same picture as a PNG.
 """
 
 from __future__ import annotations

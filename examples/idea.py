@@ -137,7 +137,7 @@ def cut() -> dict[str, Any]:
 
 
 def poses(task: dict[str, Any], posture: int) -> None:
-    """Picture 1: at one node the arm may stand in a circle of poses."""
+    """Picture 1: at one node the arm can be in a circle of poses."""
     graph = layered_graph(**task, gamma_step=np.radians(15))
     k = 20
     here = slice(graph.start[k], graph.start[k + 1])
@@ -178,7 +178,7 @@ def graph_of_all(task: dict[str, Any], posture: int) -> None:
 
 
 def windows(task: dict[str, Any], plan: kerfpath.Plan) -> None:
-    """Picture 3: what velocity and acceleration leave of the next node."""
+    """Picture 3: the part of the next node that velocity and acceleration limits allow."""
     graph = layered_graph(**task, gamma_step=np.radians(1))
     dt = node_interval(task["contour"], SPEED)
     velocity, acceleration = task["robot"].speed_limits()
@@ -191,7 +191,7 @@ def windows(task: dict[str, Any], plan: kerfpath.Plan) -> None:
         near = (np.abs(step) <= velocity * dt).all(axis=1)
         return gamma, near, near & (np.abs(step - before) <= acceleration * dt**2).all(axis=1)
 
-    # The node where the limits leave least, but more than the way that the plan goes.
+    # The node where the limits leave least, but more than the plan's own step.
     counts = [(int(left(k)[2].sum()), k) for k in range(1, len(plan.q) - 1)]
     k = min((count, k) for count, k in counts if count >= 3)[1]
     gamma, fast, kept = left(k)
@@ -275,7 +275,7 @@ def _map(K: int) -> Drawing:
 
 
 def _seen(points: Array) -> Array:
-    """Return what is seen of points (n, 3) from the side, a little from above."""
+    """Return the view (n, 2) of points (n, 3) from the side, a little from above."""
     return np.asarray(points @ np.array([[0.85, -0.12], [0.45, 0.22], [0.0, 0.95]]))
 
 

@@ -5,17 +5,17 @@ posture, no test of velocity or acceleration) and with the proposed one, over ma
 shares eta_v and eta_a. It claims that tuning the weights of the known technique "can barely
 produce acceptable results", that most of its solutions tend to "undesirable oscillations in the
 orientation axis", and that the proposed one gives "smooth solutions with the balanced values of
-the partial criteria". The task of 2004 is not published in what we have, so the task here is ours:
+the partial criteria". The papers that we have do not contain the task of 2004, so the task is ours:
 a flat sheet whose outline has round corners and a notch, cut at constant speed by an IRB 4600 with
-a head that stands at 45 degrees to the flange. The accelerations are assumed (ABB publishes none).
+a head at 45 degrees to the flange. The accelerations are assumed (ABB publishes none).
 
 Every weight vector is planned by both techniques on the same layered graph. A plan is acceptable
 when the peak velocity and acceleration shares are at most 1 and the audit finds nothing. The head's
 heading is its direction in the plane of the sheet, free of the task frames; it oscillates when it
 turns back by `TURN_BACK` or more, and its shake is the sum of all changes of its node-to-node step.
 
-With full shares every choice is planned a third time, over continuous gamma, with the bound that is
-proved for it: what both techniques leave to be had, and how near to the best motion that is.
+With full shares every choice is planned a third time, over continuous gamma, with a proved bound:
+it shows what both techniques leave to gain, and how near to the best motion that plan is.
 
 Run: python examples/known_against_proposed.py [--out DIR] [--html] [--quick]
 """
@@ -51,12 +51,12 @@ HERE = Path(__file__).with_suffix("")
 ASSUMED_ACCELERATION_DEG_S2 = (320, 270, 420, 1300, 1400, 2000)
 CORNER_RADIUS = 0.025
 TURN_BACK = 2.0
-"""deg: the heading turns back when it returns by so much; more than one or two grid steps."""
+"""deg: the heading turns back if it returns by this much; more than one or two grid steps."""
 TECHNIQUES = ("known", "proposed")
 CONTINUOUS = "continuous"
 METHODS: dict[str, PlanMethod] = {"known": "known", "proposed": "paper", CONTINUOUS: "continuous"}
 CERTIFY = Certify(gap=0.01, seconds=10.0)
-"""How far plans over continuous gamma are certified."""
+"""How closely plans over continuous gamma are certified."""
 OBJECTIVES: tuple[ObjectiveKind, ...] = ("sum", "max")
 ETAS: tuple[Eta, ...] = tuple((v, a) for v in (1.0, 0.3) for a in (1.0, 0.9, 0.8, 0.7))
 COLOURS = ("#0061cc", "#f4a918", "#0ea069", "#df5ac2", "#f05d16", "#55bdff", "#1d2530")
@@ -155,7 +155,7 @@ def pose(x: float, z: float, about_y_deg: float) -> Array:
 
 
 def setting(task: Task) -> tuple[Contour, dict[str, Any]]:
-    """Return the nodes of a task, and what their layered graph is built by."""
+    """Return the nodes of a task, and the arguments of their layered graph."""
     arm = robot("abb_irb4600_60_205").with_limits(
         acceleration=np.radians(ASSUMED_ACCELERATION_DEG_S2), endless=[0, 0, 0, 1, 0, 1]
     )
@@ -243,7 +243,7 @@ def measures(p: Plan | None) -> dict[str, str]:
 
 
 def pairs_of(rows: Sequence[Row]) -> list[Pair]:
-    """Choose what is shown, by rule: the typical and the worst of the main task, and the coarse."""
+    """Choose the runs to show, by rule: typical and worst of the main task, and the coarse task."""
     place = {
         tuple(row[key] for key in KEYS): i for i, row in enumerate(rows) if row["found"] == "yes"
     }
@@ -324,7 +324,7 @@ def svg(heads: Sequence[str], plans: Sequence[Plan]) -> str:
 
 
 def verdict(rows: Sequence[Row], task: Task) -> Iterator[str]:
-    """Say of each of the paper's claims whether it shows: in the medians, by more than a tenth."""
+    """Yield, for each of the paper's claims, whether the medians show it by more than a tenth."""
     known, new = (_some(rows, task.name, technique) for technique in TECHNIQUES)
     counts = [_count(side, "acceptable") for side in (known, new)]
     yield f"\n**Task {task.name} ({task}), {len(known)} choices of weights and objective:**\n"
@@ -386,7 +386,7 @@ def readme(tasks: Sequence[Task], rows: Sequence[Row]) -> str:
 
 
 def beyond_the_grid(task: Task, proposed: Sequence[Row], best: Sequence[Row]) -> str:
-    """Return the line of a task that says what continuous gamma saves, and how near that is."""
+    """Return the line of a task on the savings of continuous gamma, and its gap to the bound."""
     cells = [task.name, f"{_count(best, 'acceptable')} of {len(best)}"]
     for objective in OBJECTIVES:
         more = [
@@ -402,7 +402,7 @@ def beyond_the_grid(task: Task, proposed: Sequence[Row], best: Sequence[Row]) ->
 
 
 def title(row: Row) -> str:
-    """Say what was planned."""
+    """Return what was planned, as a title."""
     return "{technique} technique: {objective}, weights {weights}".format(**row)
 
 
@@ -435,7 +435,7 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
 
 
 def options_of(arguments: Sequence[str] | None, doc: str, here: Path) -> argparse.Namespace:
-    """Return the options of an example: where it writes to, and whether it is a quick one."""
+    """Return the options of an example: the folder to write to, and whether the run is quick."""
     parser = argparse.ArgumentParser(description=doc.partition("\n")[0])
     parser.add_argument("--out", type=Path, default=here, help="folder to write to")
     parser.add_argument("--quick", action="store_true", help="one coarse task, few weights")

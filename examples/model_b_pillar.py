@@ -51,9 +51,9 @@ FILE = Path(__file__).parents[1] / "src" / "kerfpath" / "demo" / "b_pillar.step"
 LENGTH = 1200.0
 WALL = 1.5
 JOIN = 3e-3
-"""Edges closer than this, mm, are one."""
+"""Edges closer than this, mm, count as one."""
 FLANGE = 26.0
-"""From the middle of the hat's side wall to the trim line, mm."""
+"""Distance from the middle of the hat's side wall to the trim line, mm."""
 V_TRIM = 150.0
 """Surface parameter v of the nominal trim line; u is x in mm."""
 
@@ -241,7 +241,7 @@ def wire(pieces: list[Array], surface: Geom_Surface) -> tuple[TopoDS_Wire, list[
 
 
 def lay(edge: TopoDS_Edge, uv: Array, surface: Geom_Surface) -> None:
-    """Tell `edge` its curve in (u, v) of `surface`, on the same parameter as its curve in space."""
+    """Give `edge` its curve in (u, v) of `surface`, with the parameter of its curve in space."""
     spline = interpolate(uv)
     poles = Array1_gp_Pnt2d(1, len(spline.c))
     for k, pole in enumerate(_rounded(spline.c), start=1):

@@ -2,7 +2,7 @@
 
     python examples/model_drawings.py [FOLDER]
 
-Writes bracket.step, tube.step, beam.step and blank.dxf beside their jobs in examples/parts; all
+It writes bracket.step, tube.step, beam.step and blank.dxf next to their jobs in examples/parts. All
 lengths are in mm, as in the files.
 """
 
@@ -36,7 +36,7 @@ from OCP.TopoDS import TopoDS_Edge, TopoDS_Shape
 FOLDER = Path(__file__).parent / "parts"
 
 LEG, HEIGHT, WIDTH, WALL, BEND = 58.0, 43.0, 40.0, 2.0, 5.0
-"""Of the bracket: its flat lengths, its width, its sheet, and the inner radius of its bend."""
+"""Of the bracket: flat lengths, width, sheet thickness, and inner radius of the bend."""
 
 
 def line(a: tuple[float, float], b: tuple[float, float]) -> TopoDS_Edge:

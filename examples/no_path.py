@@ -19,7 +19,7 @@ def corner() -> kerfpath.Contour:
 
 
 def main() -> None:
-    """Plan the corner at 0.15 m/s in every way that there is."""
+    """Plan the corner at 0.15 m/s in every available way."""
     robot = kerfpath.robot("abb_irb4600_60_205", acceleration_ratio="iontec_20_to_70kg")
     robot = robot.with_limits(endless=np.isin(np.arange(1, 7), (4, 6)))
     tool, placement = np.eye(4), np.eye(4)

@@ -1,4 +1,4 @@
-"""Every operation on contours, drawn: the pictures of docs/operations.md.
+"""Draw every operation on contours: the pictures of docs/operations.md.
 
 Run it with `python examples/operations.py`; it writes docs/operations/*.svg.
 """
@@ -163,7 +163,7 @@ def hole(x: float = 0.0) -> Contour:
 
 
 def around(*holes: Contour) -> Array:
-    """Return the sheet (4, 3) m that holes are in."""
+    """Return the sheet (4, 3) m around holes."""
     points = np.vstack([h.points for h in holes])
     (x0, y0, _), (x1, y1, _) = points.min(axis=0) - 0.006, points.max(axis=0) + 0.006
     return np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y1, 0]])
@@ -179,7 +179,7 @@ def on_plate(made: Contour, *, arrow: float = 0.05) -> Picture:
 
 
 def in_holes(*made: tuple[Contour, Contour]) -> Picture:
-    """Return a picture of holes and the cuts of them."""
+    """Return a picture of holes and their cuts."""
     picture = Picture()
     picture.material(around(*(h for h, _ in made)), *(h.points for h, _ in made))
     for h, cut in made:
@@ -189,7 +189,7 @@ def in_holes(*made: tuple[Contour, Contour]) -> Picture:
 
 
 def start() -> Picture:
-    """Start in a corner, moved amid the longest smooth stretch."""
+    """Start in a corner, moved to the middle of the longest smooth stretch."""
     begun = start_at(plate(), 0.04)
     picture = on_plate(start_at(begun, smoothest_start(begun)), arrow=0.1)
     picture.dot(begun.points[0], "white", 5, f"stroke='{DRAWN}' stroke-width='2'")

@@ -1,9 +1,9 @@
-"""Photograph the pages that the documentation shows: report, studio, layout and Pareto set.
+"""Take screenshots of the pages in the documentation: report, studio, layout and Pareto set.
 
     python examples/screenshots.py [report] [studio] [layout] [pareto]
 
 Every page is made by the command that users run, on the shipped B-pillar, and opened in the
-Chromium of the machine. Without names all four are made, in some ten minutes on two cores.
+installed Chromium. Without names all four are made, in about ten minutes on two cores.
 """
 
 from __future__ import annotations

@@ -1,16 +1,16 @@
-"""Techniques by their fronts: the known one, the paper's procedure, the exact search, and ours.
+"""Compare the fronts of four techniques: known, the paper's procedure, the exact search, and ours.
 
 The paper's section 4 says that its technique "simplifies obtaining smooth solutions with the
-balanced values of the partial criteria". `known_against_proposed` looks at single plans of one
-planar task; here are whole fronts of three tasks: that sheet, and the trim lines of two shipped
-parts as their jobs have them, in the open. Each is cut at shares of the fastest constant speed
-at which its grid has a path at all, so that limits bind and there is something to find.
+balanced values of the partial criteria". `known_against_proposed` compares single plans of one
+planar task; this example compares the fronts of three tasks: that sheet, and the trim lines of two
+shipped parts as in their jobs, without a cell. Each is cut at shares of the fastest constant speed
+at which its grid has a path, so that the limits are active and matter.
 
-Every technique has as many runs. Known (one posture, limits untested), paper (the procedure, greedy
-on acceleration) and exact (the optimum) have the same grid of objective, metric and weights; paper
-and exact have the same eta_v and eta_a, too: 1 or halfway to the least with which there is a path.
-Ours is `kerfpath.pareto`: exact as well, but its runs are placed where the front is sparse, with
-windows; all of them on the grid of gamma. A plan is acceptable when its peak velocity and
+Every technique has the same number of runs. Known (one posture, limits untested), paper (the
+procedure, greedy on acceleration) and exact (the optimum) have the same grid of objective, metric
+and weights; paper and exact also have the same eta_v and eta_a: 1, or halfway to the least with a
+path. Ours is `kerfpath.pareto`: also exact, but its runs are placed where the front is sparse, with
+windows. All plans are on the grid of gamma. A plan is acceptable if its peak velocity and
 acceleration shares are at most 1 and the audit finds nothing. README.md and the figure are made
 from table.csv.
 
@@ -53,13 +53,13 @@ from known_against_proposed import (
 )
 
 Made = tuple[Contour, dict[str, Any]]
-"""Nodes, and what their layered graph is built by."""
+"""Nodes, and the arguments of their layered graph."""
 Case = tuple[str, str]
 """Task, and the share of its fastest speed."""
 Choice = tuple[ObjectiveKind, Metric, str]
 """Objective, metric, and the name of the weights."""
 Wish = tuple[Choice, Eta]
-"""What a run is asked for."""
+"""What a run optimises, and its shares of the limits."""
 
 HERE = Path(__file__).with_suffix("")
 CASE = ("task", "share", "speed_m_min", "technique")
@@ -72,9 +72,9 @@ CRITERIA = {
 }
 PAIRS = (("displacement", "velocity"), ("displacement", "range"))
 MARGIN = 0.1
-"""Of the fronts' extent, by which the reference box is larger: their ends count, too."""
+"""Margin of the reference box, as a share of the fronts' extent, so that their ends count."""
 LESS = 0.9
-"""A claim on a measure shows where it falls to less than this share of what it was."""
+"""A claim holds if its measure falls below this share of its earlier value."""
 CLAIMS = {
     "simplifies: acceptable plans, under half before and over half after": ("acceptable", "d"),
     "smooth: unrest of the joints": ("unrest", ".2f"),
@@ -84,16 +84,16 @@ CLAIMS = {
     "a better front: hypervolume": ("hypervolume", ".2f"),
 }
 LEFT, TOP, WIDE, HIGH, GAP = 62, 54, 300, 240, 32
-"""px, of the figure: beside and above the panels, from panel to panel, and between two rows."""
+"""px: margins left of and above the panels, pitches of columns and rows, and the gap between."""
 SMALL = "font-size='11' fill='#5b6675'"
 COLOURS = {"known": "#d95f02", "paper": "#1b6fb5", "exact": "#c02a9a", "ours": "#0a8a5f"}
 TECHNIQUES = tuple(COLOURS)
 RADII = {"known": 5.5, "paper": 4.4, "exact": 3.3, "ours": 2.2}
-"""px: equal plans of several techniques are drawn on top of each other, all to be seen."""
+"""px: equal plans of several techniques are drawn on top of each other, and all remain visible."""
 
 
 def of_job(file: Path, name: str) -> Made:
-    """Return a contour of a job as the job shapes and samples it, without its cell."""
+    """Return a contour of a job, shaped and sampled as in the job, without its cell."""
     job = read_job(file)
     part = job.read_part()
     task = next(task for task in job.tasks(part) if task.name == name)
@@ -171,7 +171,7 @@ def _asked(choice: Choice, eta: Eta) -> dict[str, str]:
 
 
 def _audited(found: list[Plan], made: Plan) -> Sequence[object]:
-    """Keep every plan that a Pareto set is chosen from, and audit it."""
+    """Keep every candidate plan of a Pareto set, and audit it."""
     found.append(made)
     return audit(made)
 
@@ -226,12 +226,12 @@ def box(sides: Mapping[str, Sequence[Row]]) -> tuple[Array, Array]:
 
 
 def coverage(a: Array, b: Array) -> float:
-    """Return the share of the front b that some plan of a is as good as: Zitzler and Thiele's C."""
+    """Return the share of front b that plans of a weakly dominate: Zitzler and Thiele's C."""
     return float((a[:, None] <= b).all(axis=2).any(axis=0).mean()) if len(b) else np.nan
 
 
 def judged(sides: Mapping[str, Sequence[Row]]) -> dict[str, dict[str, float]]:
-    """Return the figures of each technique in one case; NaN where there is no plan to take."""
+    """Return the figures of each technique in one case; NaN where there is no plan."""
     low, high = box(sides)
     fronts = {name: front(values(rows)) for name, rows in sides.items()}
     told: dict[str, dict[str, float]] = {}
@@ -256,7 +256,7 @@ def _median(rows: Sequence[Row], key: str) -> float:
 
 
 def shows(key: str, before: Mapping[str, float], after: Mapping[str, float]) -> bool:
-    """Say whether the claim on a figure holds between two techniques in one case."""
+    """Return whether the claim on a figure holds between two techniques in one case."""
     if key == "acceptable":
         return before[key] < before["runs"] / 2 < after[key]
     if key == "hypervolume":
@@ -302,7 +302,7 @@ def panel(sides: Mapping[str, Sequence[Row]], axes: list[int]) -> Iterator[str]:
     low = low - 0.06 * (high - low)
 
     def place(points: Array) -> Array:
-        """Return where points (P, 2) are drawn, from those that lie in the frame."""
+        """Return the pixels of those points (P, 2) that are in the frame."""
         inside = points[((points >= low) & (points <= high)).all(axis=1)]
         return np.asarray((inside - low) / (high - low) * [1, -1] * size + [0, size[1]])
 
@@ -332,7 +332,7 @@ def panel(sides: Mapping[str, Sequence[Row]], axes: list[int]) -> Iterator[str]:
 
 
 def ticks(low: float, high: float) -> list[tuple[str, float]]:
-    """Return round values between two ends, about four, as text and where they are from 0 to 1."""
+    """Return about four round values between two ends, as text and as positions from 0 to 1."""
     raw = (high - low) / 5
     power = 10.0 ** np.floor(np.log10(raw))
     step = next(m * power for m in (1, 2, 5, 10) if m * power >= raw)

@@ -1,1 +1,1 @@
-"""The public benchmark set: instances, the best motions known, and a checker on numpy alone."""
+"""The public benchmark set: instances, best known motions, and a checker that needs only numpy."""

@@ -1,14 +1,14 @@
-"""Check motions of a robot along a cut: the rules of the benchmark set, on numpy alone.
+"""Check motions of a robot along a cut by the rules of the benchmark set; needs only numpy.
 
     python check.py ANSWER.json [ANSWER.json ...]
 
-An answer names its instance and has the joints at every node, one row a node:
+An answer names its instance and has the joints at every node, one row per node:
 
     {"instance": "random-abb_irb2600_12_165-00", "planner": "mine 1.0", "seconds": 3.2,
      "q": [[0.1, ...], ...]}
 
-"q" is null where the planner gives none. The file imports nothing else of the repository: copy it
-and the instances. Angles are in rad, lengths in m, times in s.
+"q" is null if the planner finds none. This file imports nothing else from the repository: you can
+copy it with the instances. Angles are in rad, lengths in m, times in s.
 """
 
 from __future__ import annotations
@@ -41,47 +41,47 @@ INSTANCES = Path(__file__).parent / "instances"
 KNOWN = Path(__file__).parent / "known"
 
 TIP = 1e-6
-"""m: how far the tip may be from its point."""
+"""m: largest distance of the tip from its point."""
 AXIS = 1e-6
-"""rad: how far the beam may lean from its axis."""
+"""rad: largest angle between the beam and its axis."""
 RANGE = 1e-9
-"""rad or m: rounding of a joint at the end of its range."""
+"""rad or m: tolerance for rounding of a joint at the end of its range."""
 SHARE = 1e-6
-"""Rounding of a velocity or acceleration at its limit, as a share of the limit."""
+"""Tolerance for rounding of a velocity or acceleration at its limit, as a share of the limit."""
 
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """A robot, a cut, and how fast it is made; n joints, those of the arm first, K nodes.
+    """A robot, a cut and its timing; n joints, those of the arm first, and K nodes.
 
     Parameters
     ----------
     name, family : str
     model : str
-        What robot it is.
+        Name of the robot.
     origins : (m, 4, 4)
-        Frame of each joint of the arm at zero, in the frame of the joint before it; the first in
-        the robot base.
+        Frame of each joint of the arm at zero, in the frame of the joint before it; the first is
+        in the robot base.
     turns : (m, 3)
-        Unit vector that each joint of the arm turns about, in its own frame.
+        Unit vector about which each joint of the arm turns, in its own frame.
     flange, tool : (4, 4)
         Flange in the frame of the last joint; tip, beam along z, in the frame of the flange.
     closed_form : dict
-        "family" of the arm ("opw", "ur"), "lengths", "offset" and "sign" of its joints, for those
-        who solve its inverse kinematics in closed form; the chain says the same.
+        "family" of the arm ("opw", "ur"), "lengths", "offset" and "sign" of its joints, to solve
+        its inverse kinematics in closed form; the chain describes the same arm.
     external : list of dict
-        Axes that carry the robot or the part, one on the other in this order: "name", "kind"
-        ("linear" or "rotary"), "carries" ("robot" or "part"), "axis" and "point" in the robot base
-        where all are at zero.
+        Axes that carry the robot or the part, stacked in this order: "name", "kind" ("linear" or
+        "rotary"), "carries" ("robot" or "part"), "axis" and "point" in the robot base with all
+        external axes at zero.
     lower, upper : (n,)
-        Ranges; infinite where a joint is endless.
+        Ranges; infinite for endless joints.
     velocity, acceleration : (n,)
         Limits.
     points, axes : (K, 3)
-        Where the tip and the beam shall be, in the robot base where all external axes are at zero;
-        they go with the part.
+        Required tip and beam, in the robot base with all external axes at zero; they move with the
+        part.
     closed : bool
-        Whether the last point is the first again; the joints there may differ.
+        Whether the last point equals the first; the joints there may differ.
     interval : float
         Time from node to node.
     """
@@ -106,13 +106,13 @@ class Instance:
 
     @property
     def endless(self) -> NDArray[np.bool_]:
-        """Which joints turn without end, (n,); of these only the angle within a turn counts."""
+        """The endless joints, (n,); only their angle within a turn counts."""
         return np.isinf(self.upper)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a motion does, at its worst.
+    """The worst values of a motion.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class Verdict:
 
     @property
     def faults(self) -> list[str]:
-        """Which rules are broken, by how much."""
+        """The rules that are broken, and by how much."""
         rules = {
             f"tip {self.tip * 1e3:.3g} mm off": self.tip <= TIP,
             f"beam {np.degrees(self.axis):.3g} deg off": self.axis <= AXIS,
@@ -183,7 +183,7 @@ def names(folder: Path = INSTANCES) -> list[str]:
 
 
 def forward(task: Instance, q: Array) -> Array:
-    """Return where the tip is against the part, (K, 4, 4), at joints q (K, n)."""
+    """Return the pose of the tip relative to the part, (K, 4, 4), at joints q (K, n)."""
     T = {what: np.tile(np.eye(4), (len(q), 1, 1)) for what in ("robot", "part")}
     arm = len(task.turns)
     for axis, x in zip(task.external, q[:, arm:].T, strict=True):
@@ -204,7 +204,7 @@ def forward(task: Instance, q: Array) -> Array:
 
 
 def check(task: Instance, q: Array) -> Verdict:
-    """Return what a motion q (K, n) does; ValueError where it is not an array of that shape."""
+    """Return the verdict on a motion q (K, n); ValueError if it is not an array of that shape."""
     q = np.asarray(q, dtype=float)
     shape = (len(task.points), len(task.velocity))
     if q.shape != shape or not np.isfinite(q).all():
@@ -237,7 +237,7 @@ def turned(axis: Array, angle: Array) -> Array:
 
 
 def main() -> int:
-    """Check the answers named; 0 where all that have a motion keep every rule."""
+    """Check the answers named; return 0 if all that have a motion keep every rule."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

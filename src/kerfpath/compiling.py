@@ -1,4 +1,4 @@
-"""The kernels of the main job, compiled before the first run by processes side by side."""
+"""Compile the kernels of the main job before the first run, in parallel processes."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from kerfpath.search import compile_search
 __all__ = ["FOR_BOUNDS", "compile_stage", "finish_compiling", "is_compiled", "warm_up"]
 
 EXAMPLES = {"opw": "abb_irb4600_60_205", "ur": "ur_ur10e"}
-"""A robot of each kinematic family whose kernels are compiled in advance."""
+"""One robot of each kinematic family whose kernels are compiled in advance."""
 
 
 def _example(kinematics: str) -> tuple[Robot, Contour]:
-    """Return a robot of the family, and a closed contour of four nodes in its reach, m."""
+    """Return a robot of the family, and a closed contour of four nodes (m) in its reach."""
     corners = np.array([[1.0, 0.0, 0.4], [1.0, 0.001, 0.4], [1.001, 0.001, 0.4], [1.001, 0.0, 0.4]])
     axes = np.tile([0.0, 0.0, -1.0], (4, 1))
     return robot(EXAMPLES[kinematics]), Contour(corners, axes, closed=True)
 
 
 def _compile_poses(kinematics: str) -> None:
-    """Compile what makes frames, poses and their layered graph, and what measures a path."""
+    """Compile the kernels of frames, poses, their layered graph, and the measures of a path."""
     arm, contour = _example(kinematics)
     for kind in FRAME_KINDS:
         frames = contour.frames(kind)
@@ -45,7 +45,7 @@ def _compile_poses(kinematics: str) -> None:
 
 
 def _compile_cells(kinematics: str) -> None:
-    """Compile what encloses the joints on cells of gamma."""
+    """Compile the kernels that enclose the joints on cells of gamma."""
     arm, contour = _example(kinematics)
     node, gamma = np.zeros(1, np.int64), np.zeros(1)
     arm.enclose(contour.frames(), node, gamma, np.full(1, 0.1), np.eye(4))
@@ -57,17 +57,17 @@ STAGES: dict[str, Callable[[str], None]] = {
     "bound": lambda _: compile_bound(),
     "cells": _compile_cells,
 }
-"""What compiles the kernels of each stage of the main job; they share next to none."""
+"""The functions that compile the kernels of each stage of the main job; they share almost none."""
 
 FOR_BOUNDS = frozenset({"bound", "cells"})
 """The stages whose kernels only the certified bound needs."""
 
 _running: dict[str, tuple[str, subprocess.Popen[bytes]]] = {}
-"""What is being compiled: by stage, the kinematic family and the process."""
+"""Stages that are being compiled: the kinematic family and the process of each."""
 
 
 def _note(stage: str, kinematics: str) -> Path:
-    """Return the file that says that the kernels of a stage are in the cache."""
+    """Return the file that marks the kernels of a stage as present in the cache."""
     return CACHE / f"{stage}-{kinematics}.compiled"
 
 
@@ -78,16 +78,16 @@ def _missing(kinematics: str) -> list[str]:
 
 
 def compile_stage(stage: str, kinematics: str) -> None:
-    """Compile the kernels of a stage in this process, and note in the cache that they are there."""
+    """Compile the kernels of a stage in this process, and mark them as present in the cache."""
     STAGES[stage](kinematics)
     CACHE.mkdir(parents=True, exist_ok=True)
     _note(stage, kinematics).touch()
 
 
 def is_compiled(kinematics: str = "opw") -> bool:
-    """Return whether the kernels of the main job are compiled, or are being so, for a robot.
+    """Return whether the kernels of the main job are compiled, or being compiled, for a robot.
 
-    A family that is not among the `EXAMPLES` compiles its kernels when they are first called.
+    Families that are not in `EXAMPLES` compile their kernels at the first call.
     """
     return all(stage in _running for stage in _missing(kinematics))
 
@@ -95,15 +95,16 @@ def is_compiled(kinematics: str = "opw") -> bool:
 def warm_up(kinematics: str = "opw", *, later: Collection[str] = ()) -> bool:
     """Compile the kernels of the main job if the cache lacks them; return whether it did.
 
-    Each stage is compiled by a Python process of its own, as many at a time as there are.
+    Each stage is compiled in a separate Python process, all at the same time; those of `later`
+    start when the others are done.
 
     Parameters
     ----------
     kinematics : str
         The kinematic family of the robot, as `Robot.kinematics` names it.
     later : collection of str
-        Stages that are still compiled when this function returns: `FOR_BOUNDS` or none. Before the
-        first bound `kerfpath.plan` waits for them.
+        Stages that may still be compiling when this function returns: `FOR_BOUNDS` or none.
+        `kerfpath.plan` waits for them before the first bound.
     """
     missing = [stage for stage in _missing(kinematics) if stage not in _running]
     for stages in ([s for s in missing if s not in later], [s for s in missing if s in later]):
@@ -120,7 +121,7 @@ def _started(stage: str, kinematics: str) -> subprocess.Popen[bytes]:
 
 
 def finish_compiling(stages: Collection[str] = tuple(STAGES)) -> None:
-    """Wait for stages that are being compiled; compile one here, with its error, if that failed."""
+    """Wait for stages that are being compiled; compile a failed one here, to raise its error."""
     for stage in stages:
         if stage in _running:
             kinematics, process = _running.pop(stage)

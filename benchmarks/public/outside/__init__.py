@@ -1,4 +1,4 @@
-"""Planners of other projects on the set, each in an environment without kerfpath.
+"""Planners of other projects on the set, in an environment without kerfpath.
 
-The environment is `requirements/planners.txt`; only what is imported here and numpy is needed.
+The environment is `requirements/planners.txt`; nothing else is needed.
 """

@@ -1,4 +1,4 @@
-"""Let a planner of another project answer an instance, and print the answer as JSON."""
+"""Run a planner of another project on an instance, and print the answer as JSON."""
 
 from __future__ import annotations
 

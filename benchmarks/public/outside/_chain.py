@@ -1,4 +1,4 @@
-"""One chain from the part to the tip: what planners that know no external axes are given."""
+"""One chain from the part to the tip, for planners that do not know external axes."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from benchmarks.public.check import Array, Instance, check, turned
 __all__ = ["Joint", "followed", "joints", "least_bad", "put_right", "ranges", "starts", "urdf"]
 
 ENDLESS = 3 * np.pi
-"""rad: what an endless joint may turn either way, for planners that know no such joints."""
+"""rad: range of an endless joint either way, for planners that do not know endless joints."""
 MOST_ERROR = 1e-12
-"""m and rad: where Newton's method is at its point."""
+"""m and rad: error below which Newton's method stops."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Joint:
 
 @cache
 def joints(task: Instance) -> list[Joint]:
-    """Return the joints from the part to the tip; what carries the part is turned round."""
+    """Return the joints from the part to the tip; axes that carry the part are reversed."""
     arm, places = len(task.turns), list(enumerate(task.external))
     part = [(i, axis) for i, axis in places if axis["carries"] == "part"][::-1]
     chain, at = [], np.zeros(3)
@@ -51,7 +51,7 @@ def joints(task: Instance) -> list[Joint]:
 
 
 def urdf(task: Instance) -> str:
-    """Return the chain as a description: links part, l0, l1, ... and tip, joints j0, j1, ..."""
+    """Return the chain as a URDF with links part, l0, l1, ... and tip, and joints j0, j1, ..."""
     lower, upper = ranges(task)
     rows, parent = ['<link name="part"/>'], "part"
     for i, joint in enumerate(joints(task)):
@@ -91,7 +91,7 @@ def starts(task: Instance, count: int, rng: np.random.Generator) -> Array:
 def followed(task: Instance, q: Array) -> Array:
     """Return motions (B, K, n) from joints (B, n) at node 0, each step the shortest.
 
-    By Newton's method; those that it does not bring to the end are left out.
+    Motions that Newton's method cannot follow to the end are left out.
     """
     rows, kept = [q], np.ones(len(q), np.bool_)
     for point, axis in zip(task.points[1:], task.axes[1:], strict=True):
@@ -102,13 +102,13 @@ def followed(task: Instance, q: Array) -> Array:
 
 
 def put_right(task: Instance, q: Array) -> Array:
-    """Return a motion (K, n) whose nodes are moved onto their points, where that converges."""
+    """Return a motion (K, n) whose nodes are moved onto their points, if that converges."""
     moved, there = _newton(task, q, task.points, task.axes)
     return np.where(there[:, None], moved, q)
 
 
 def least_bad(task: Instance, motions: Sequence[Array]) -> Array | None:
-    """Return the cheapest valid motion of some; else the one that breaks limits by least."""
+    """Return the cheapest valid motion; if none is valid, the one that breaks limits least."""
 
     def badness(q: Array) -> tuple[bool, float]:
         verdict = check(task, q)
@@ -123,7 +123,7 @@ def _newton(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return joints near q (B, n) with the tip at points and axes, (B, 3) or (1, 3).
 
-    And where that converges within the ranges, (B,).
+    Also returns which of them converged within the ranges, (B,).
     """
     lower, upper = ranges(task)
     for _ in range(30):
@@ -140,9 +140,9 @@ def _newton(
 
 
 def _error(task: Instance, q: Array, points: Array, axes: Array) -> tuple[Array, Array, Array]:
-    """Return what is left, tip (3) and beam (3), as (B, 6); how it changes; and the beam.
+    """Return the error of tip (3) and beam (3), (B, 6); its Jacobian; and the beam.
 
-    It changes by (B, 6, n) with the joints q (B, n).
+    The Jacobian (B, 6, n) is by the joints q (B, n).
     """
     R, p = np.tile(np.eye(3), (len(q), 1, 1)), np.zeros((len(q), 3))
     passed = []

@@ -22,7 +22,7 @@ SETTINGS = (
 
 
 def plan(task: Instance, _: np.random.Generator) -> tuple[Array | None, str]:
-    """Return its path, and a word on it."""
+    """Return its path, and a remark."""
     if task.external or task.closed_form["family"] != "opw":
         return None, "not run: it has inverse kinematics of OPW arms alone"
     form, ends = task.closed_form, {"base": "part", "tip": "flange"}

@@ -1,4 +1,4 @@
-"""IPOPT: the whole motion as one nonlinear program, written down with CasADi, from many starts."""
+"""IPOPT: the whole motion as one nonlinear program, built with CasADi, from many starts."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SETTINGS = (
 
 
 def plan(task: Instance, rng: np.random.Generator) -> tuple[Array | None, str]:
-    """Return the best motion of all starts, and a word on it."""
+    """Return the best motion of all starts, and a remark."""
     first = starts(task, STARTS, rng)
     motions = list(followed(task, first))
     motions.sort(key=lambda q: _need(task, q))
@@ -40,7 +40,7 @@ def _need(task: Instance, q: Array) -> float:
 
 
 def _program(task: Instance) -> Any:
-    """Return what improves a motion (K, n)."""
+    """Return the function that improves a motion (K, n)."""
     K, n = len(task.points), len(task.velocity)
     q = casadi.SX.sym("q", n)
     tip, across = _forward(task, q)
@@ -93,7 +93,7 @@ def _program(task: Instance) -> Any:
 
 
 def _forward(task: Instance, q: Any) -> tuple[Any, Any]:
-    """Return the tip, and its two axes across the beam (3, 2), against the part."""
+    """Return the tip, and its two axes across the beam (3, 2), relative to the part."""
     R, p = casadi.SX.eye(3), casadi.SX.zeros(3)
     for joint in joints(task):
         p, R = p + R @ joint.origin[:3, 3], R @ joint.origin[:3, :3]

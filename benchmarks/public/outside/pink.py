@@ -15,7 +15,7 @@ __all__ = ["SETTINGS", "plan"]
 
 STARTS = 24
 PARTS = 5
-"""Programs in every interval."""
+"""Number of quadratic programs per interval."""
 SETTINGS = (
     f"pin-pink, daqp; {STARTS} starts, {PARTS} programs an interval, turning about the beam free; "
     "limits of range, velocity and acceleration in every program; nodes put right by Newton's "
@@ -24,14 +24,14 @@ SETTINGS = (
 
 
 def plan(task: Instance, rng: np.random.Generator) -> tuple[Array | None, str]:
-    """Return the best motion of all starts, and a word on it."""
+    """Return the best motion of all starts, and a remark."""
     motions = [_tracked(task, q) for q in starts(task, STARTS, rng)]
     whole = [put_right(task, q) for q in motions if len(q) == len(task.points)]
     return least_bad(task, whole), f"{len(whole)} of {len(motions)} starts come to the end"
 
 
 def _tracked(task: Instance, first: Array) -> Array:
-    """Return the nodes (k, n) that are passed before a program has no solution."""
+    """Return the nodes (k, n) that are reached before a program has no solution."""
     model = pinocchio.buildModelFromXML(urdf(task))
     columns = [joint.column for joint in joints(task)]
     at = Configuration(model, model.createData(), first[columns])
@@ -61,7 +61,7 @@ def _tracked(task: Instance, first: Array) -> Array:
 
 
 def _target(tip: pinocchio.SE3, point: Array, axis: Array) -> pinocchio.SE3:
-    """Return where the tip shall be: its beam turned onto the axis the shortest way, no more."""
+    """Return the target pose of the tip: its beam is turned onto the axis the shortest way."""
     z = tip.rotation[:, 2]
     turn = pinocchio.Quaternion.FromTwoVectors(z, axis / np.linalg.norm(axis)).toRotationMatrix()
     return pinocchio.SE3(turn @ tip.rotation, point)

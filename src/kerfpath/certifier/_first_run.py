@@ -1,4 +1,4 @@
-"""A small stage that compiles the kernels of the certified bound."""
+"""Compile the kernels of the certified bound by a small stage."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["compile_bound"]
 
 
 def compile_bound() -> None:
-    """Solve a stage of three nodes with a cell each, which compiles the kernels of `certify`."""
+    """Compile the kernels of `certify` by a stage of three nodes with one cell each."""
     nodes, joints = 3, 6
     none = np.zeros((nodes, joints))
     cells = CellSet(

@@ -1,6 +1,6 @@
-"""The paper in numba (Dolgui and Pashkevich 2008), one module a subject.
+"""The paper in numba (Dolgui and Pashkevich 2008), one module per subject.
 
-Notation of this package, the paper's throughout:
+The package uses the notation of the paper:
 
 ====================  ===============================================================
 K, k                  number of nodes (n + 1 in the paper), and one of them
@@ -37,4 +37,4 @@ EQUATIONS = {
     15: "kerfpath.kernels.metric:maximum_distance",
     16: "kerfpath.kernels.search:path_planning",
 }
-"""Where each numbered equation of the paper lives; a test holds the two together."""
+"""Where each numbered equation of the paper is implemented; a test checks the list."""

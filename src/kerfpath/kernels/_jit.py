@@ -1,7 +1,7 @@
-"""How kernels are compiled, and where the compiled code is kept.
+"""Compile the kernels, and keep the compiled code in a cache.
 
-Numba's cache does not notice an edited helper in another file, so the cache folder is named by the
-content of all kernels and of the codes that they use: an edit anywhere starts a new folder. It lies
+Numba's cache does not notice an edited helper in another file, so the name of the cache folder is
+a hash of all kernels and of the codes that they use: an edit anywhere starts a new folder. It is
 in the user's cache, so that a new version, checkout or environment with the same kernels uses it.
 """
 
@@ -42,9 +42,9 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 VECTOR_FLAGS = {"nnan", "nsz"}
-"""Floating-point freedoms that let the least of many vectorise: no NaN, which the border refuses,
-and no care for the sign of zero. Infinity stays, and sums keep their order: the same to the bit,
-however many numbers an instruction takes."""
+"""Fast-math flags that let a minimum over an array vectorise. They assume that there is no NaN
+(callers refuse it) and ignore the sign of zero. Infinity is kept and sums keep their order, so that
+the result is the same to the bit at every vector width."""
 
 
 def _cache_folder() -> Path:
@@ -63,7 +63,7 @@ def _cache_folder() -> Path:
 
 
 CACHE = _cache_folder()
-"""Where the compiled kernels of exactly these sources are kept (or NUMBA_CACHE_DIR, if set)."""
+"""Folder of the compiled kernels of exactly these sources (or NUMBA_CACHE_DIR, if set)."""
 
 
 class Locator(InTreeCacheLocator):
@@ -86,12 +86,12 @@ def _compiled(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
 
 
 variable = cast("Callable[[int], int]", np.int64)
-"""Makes an int whose type is that of a variable: for a literal argument numba compiles a callee
-again, once for each literal."""
+"""Convert a literal int to the type of a variable: numba compiles a callee again for each literal
+argument."""
 
 
 class _Part(Generic[_P, _R]):
-    """A kernel that only kernels call: numba sees its type, and Python has no way in."""
+    """A kernel that only other kernels can call: Python cannot."""
 
     def __init__(self, function: Callable[_P, _R], **options: Any) -> None:
         compiled: Any = _compiled(
@@ -111,33 +111,33 @@ def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def jit_part(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile `function` as `jit` does, for kernels alone: Python cannot call it.
+    """Compile `function` as `jit` does, but only for calls from kernels: Python cannot call it.
 
-    Without the code that takes Python's objects apart, compiling takes a fifth less time.
+    Without the wrapper that converts Python objects, compiling takes a fifth less time.
     """
     return _Part(function)
 
 
 def jit_inline(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile `function` as `jit_part` does, to become part of what calls it; it makes no array.
+    """Compile `function` as `jit_part` does, inlined into its callers; it must not create arrays.
 
-    For what inner loops call. Handing over a tuple of arrays takes a hundred moves, and taking an
-    array out of one counts a reference, at twenty times the cost of a multiplication; without the
-    runtime that could make an array, nothing is counted.
+    It is for functions that inner loops call. Passing a tuple of arrays takes a hundred moves, and
+    taking an array out of one counts a reference, at twenty times the cost of a multiplication.
+    Without the runtime that could create arrays, references are not counted.
     """
     return _Part(function, forceinline=True, _nrt=False)
 
 
 def jit_equation(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile `function` as `jit_inline` does, for an equation that Python evaluates, too."""
+    """Compile `function` as `jit_inline` does, for an equation that Python also evaluates."""
     return _compiled(function, forceinline=True, _nrt=False)
 
 
 def jit_vector(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile `function` as `jit_inline` does, with `VECTOR_FLAGS`; for the innermost loops.
+    """Compile `function` as `jit_inline` does, with `VECTOR_FLAGS`, for the innermost loops.
 
-    They vectorise where no index is signed (it would count from the end if negative), where the
-    number of joints is a constant of the caller's, and where nothing jumps.
+    A loop vectorises if no index is signed (a negative one would count from the end), if the
+    number of joints is a constant in the caller, and if there are no jumps.
     """
     return _Part(function, fastmath=VECTOR_FLAGS, forceinline=True, _nrt=False)
 
@@ -145,8 +145,8 @@ def jit_vector(function: Callable[_P, _R]) -> Callable[_P, _R]:
 def _of_two(name: str) -> Callable[[float, float], float]:
     """Return the LLVM intrinsic `name` of two floats.
 
-    Python's min and max become comparisons, which LLVM does not take for a reduction and leaves
-    as they are, one number at a time; these vectorise. Of NaN they know nothing.
+    Python's min and max become comparisons, which LLVM does not recognise as a reduction and runs
+    one number at a time. The intrinsics vectorise; they do not handle NaN.
     """
 
     @intrinsic
@@ -167,7 +167,7 @@ smaller = _of_two("llvm.minnum")
 """The smaller of two floats, in loops that are to vectorise."""
 
 trailing_zeros = cast("Callable[[np.uint64], np.int64]", numbers.trailing_zeros)
-"""How many bits of an unsigned integer are 0 below the lowest 1."""
+"""The number of 0 bits of an unsigned integer below its lowest 1."""
 
 larger = _of_two("llvm.maxnum")
 """The larger of two floats, in loops that are to vectorise."""
@@ -175,5 +175,5 @@ larger = _of_two("llvm.maxnum")
 
 @jit_vector
 def either(condition: bool, a: float, b: float) -> float:
-    """Return a if the condition holds, else b; both are worked out, so that nothing jumps."""
+    """Return a if the condition holds, else b; both are evaluated, which avoids a jump."""
     return a if condition else b

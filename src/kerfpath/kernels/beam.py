@@ -1,9 +1,9 @@
-"""Paths over continuous gamma under (5) and (6), found by keeping a few of each layer.
+"""Beam search for paths over continuous gamma under (5) and (6): a few states of each layer stay.
 
-A state is a point between two samples and the increment that led there. From each state steps lead,
-on every target within its box of (5) and (6), to where cost and value are least, and to both ends
-of what the box admits: as slow down and as speed up as may be. Of all, those of least cost so far
-and value to come are kept, and of those alike one.
+A state is a point between two samples and the increment that led there. From each state, and for
+each target within its box of (5) and (6), three steps are tried: to the point of least cost and
+value, and to both ends of what the box admits. The states with the least sum of cost so far and
+value to come are kept, one of those that are alike.
 """
 
 from __future__ import annotations
@@ -31,31 +31,31 @@ __all__ = ["Alike", "Beam", "advance"]
 
 
 class Alike(NamedTuple):
-    """Up to where two states on the same target are alike, so that the better one will do."""
+    """When two states on the same target count as alike, so that only the better one is kept."""
 
     share: float
-    """Of the target that they are apart;"""
+    """Largest distance between them, as a share of the target."""
     change: float
-    """of what (6) lets the increment change by, by which that of any joint differs."""
+    """Difference of their increments, as a share of the change that (6) allows, largest joint."""
 
 
 class Beam(NamedTuple):
     """The states kept of every layer."""
 
     at: Ints
-    """(K, B): target; of the first layer the vertex."""
+    """(K, B): target; in the first layer the vertex."""
     share: Array
-    """(K, B): where on it."""
+    """(K, B): place on the target, as a share of it."""
     parent: Ints
     """(K, B): state of the layer before."""
     cost: Array
-    """(K, B): of the way there, sorted with the value to come."""
+    """(K, B): cost so far; states are sorted by its sum with the value to come."""
     size: Ints
-    """(K,): states of each layer."""
+    """(K,): number of states of each layer."""
 
 
 class _Offers(NamedTuple):
-    """Steps that the states of a layer offer: what all come to, and where they lead."""
+    """Steps that the states of a layer offer: their total cost, and where they lead."""
 
     total: Array
     cost: Array
@@ -73,8 +73,9 @@ def advance(
 ) -> int:  # fmt: skip
     """Fill the beam from vertices `first` of the first layer; returns the layers reached.
 
-    cost (N,) is what visiting a vertex costs, tail (N,) the value function, its own included.
-    Where no step keeps (6), those that keep the least multiple of it in `RELAXED` are taken.
+    cost (N,) is the cost of visiting a vertex, tail (N,) the value function, which includes it.
+    Where no step keeps (6), the limit is relaxed to the least multiple in `RELAXED` that a step
+    keeps.
     """
     (K, B), n = out.at.shape, len(acceleration)
     x, before, change = np.empty((B, n)), np.zeros((B, n)), np.empty(n)
@@ -162,8 +163,8 @@ def _offer(
 def _sift(heap: Ints, total: Array, root: int, size: int) -> None:
     """Let the entry at `root` of a binary heap sink to its place: least total first, then index.
 
-    A heap, because only the first few of thousands are taken; and numpy's sorting, compiled here,
-    would cost the first run seconds.
+    A heap suffices because only the first few of thousands are taken; compiling numpy's sorting
+    would add seconds to the first run.
     """
     while True:
         least = root
@@ -182,7 +183,7 @@ def _keep(
     offers: _Offers, made: int, acceleration: Array, k: int, x: Array, before: Array,
     alike: Alike, out: Beam,
 ) -> None:  # fmt: skip
-    """Keep the best offers of those that are not alike as the states of layer k."""
+    """Keep the best offers as the states of layer k, one of those that are alike."""
     B, n = x.shape
     from_x, kept = x.copy(), 0
     heap = np.arange(made)

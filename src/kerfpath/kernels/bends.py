@@ -1,7 +1,7 @@
-"""The least that motions cost through each step from cell to cell, of pairs of steps that keep (6).
+"""The least cost of motions through each step from cell to cell, if pairs of steps keep (6).
 
-The state is the step: what is known of it up to its end is the least over the steps before that may
-precede it by (6). Those are looked at in the order of what they cost, until the first that may.
+The state is the step: its least cost up to its end is the minimum over the earlier steps that may
+precede it by (6). They are tested in the order of their cost, until the first that may.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ def cross_on(
     begin: Ints, to: Ints, origin: Ints, sorted_in: Ints, in_begin: Ints,
     cost: Array, rest: Array, most: float, out_behind: Array,
 ) -> int:  # fmt: skip
-    """Fill what motions cost up to the end of each step from cells first..last-1; count the tests.
+    """Fill the least cost up to the end of each step from cells first..last-1; count the tests.
 
-    The steps that end in cell b are sorted_in[in_begin[b - first]..], cheapest first, by
-    ``out_behind`` (E,), which is known of them. Steps that cost over ``most`` with the
-    ``rest`` (C,) get infinity.
+    The steps that end in cell b are sorted_in[in_begin[b - first]..], cheapest first by their
+    ``out_behind`` (E,), which is already filled. Steps whose cost with the ``rest`` (C,) exceeds
+    ``most`` get infinity.
     """
     D, tests = np.empty((2, len(bound))), 0
     for b in range(first, last):
@@ -50,10 +50,10 @@ def cross_back(
     to: Ints, origin: Ints, sorted_on: Ints, on_begin: Ints, steps_in: Ints,
     cost: Array, behind: Array, most: float, out_ahead: Array,
 ) -> int:  # fmt: skip
-    """Fill what motions cost from the end of each of the ``steps_in`` on; count the tests.
+    """Fill the least cost from the end of each of the ``steps_in`` on; count the tests.
 
-    The steps that begin in cell b are sorted_on[on_begin[b - first]..], cheapest first by cost and
-    ``out_ahead`` (E,), which is known of them.
+    The steps that begin in cell b are sorted_on[on_begin[b - first]..], cheapest first by the sum
+    of cost and ``out_ahead`` (E,), which is already filled for them.
     """
     D, tests = np.empty((2, len(bound))), 0
     for i in steps_in:

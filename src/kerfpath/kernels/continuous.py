@@ -1,13 +1,13 @@
 """The first-order problem over continuous gamma, solved backwards (a semi-Lagrangian scheme).
 
-Recursion (16) from the last layer to the first, where a step may lead to any point between two
-neighbouring samples of gamma: there joints and costs to come are interpolated,
+Recursion (16) runs from the last layer to the first. A step may lead to any point between two
+neighbouring samples of gamma, where joints and costs to come are interpolated:
 
     V_k(i) = c_k(i) + min over targets (j, l), t in [0, 1] of
              rho(q_j + t (q_l - q_j) - q_i) + V_{k+1}(j) + t (V_{k+1}(l) - V_{k+1}(j)),
 
-over the part of t where the increment is within (5). What is minimised is convex in t by every
-metric, by (14) and by (15): two tangents bound it from below, and where they meet is the next t.
+over the part of t where the increment is within (5). This function is convex in t for every metric,
+for (14) and for (15): two tangents bound it from below, and the next t is where they meet.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from kerfpath.kernels.search import first_from
 __all__ = ["OVER_CAP", "Targets", "fill_keys", "join_samples", "values_to_go"]
 
 SAME_VALUE = 1e-9
-"""Relative gap between a value and its bound below which a minimum over t has been found."""
+"""Relative gap between a value and its bound below which a minimum over t counts as found."""
 MOST_TANGENTS = 24
-"""Tangents to a step's cost; by the Manhattan and Chebychev metrics it has fewer pieces."""
+"""Most tangents to a step's cost; with the Manhattan and Chebychev metrics it has fewer pieces."""
 OVER_CAP = 20.0
-"""Price of what a distance is over the cap, on top of its own."""
+"""Price per unit of distance over the cap, added to the distance."""
 RELAXED = (1.0, 1.05, 1.2, 1.5, 2.5, 5.0, np.inf)
-"""Multiples of (6) that a step forward is tried with, one after the other."""
+"""Multiples of (6) that a forward step is tried with, in this order."""
 
 
 class Targets(NamedTuple):
-    """Where the steps of each layer may lead: between neighbouring samples, and to lone vertices.
+    """Targets of the steps of each layer: between neighbouring samples, and lone vertices.
 
-    Sorted in each layer by the angle of one joint half way.
+    Each layer is sorted by the angle of one joint at the middle of the target.
     """
 
     q: Array
@@ -46,28 +46,28 @@ class Targets(NamedTuple):
     start: Ints
     """(K+1,): layer k is q[start[k]:start[k+1]]."""
     one: Ints
-    """(T,): vertex that a target begins at;"""
+    """(T,): vertex at which a target begins."""
     other: Ints
-    """(T,): where it ends: the same for a lone vertex."""
+    """(T,): vertex at which it ends, the same for a lone vertex."""
     begin: Ints
-    """(K+1,): layer k has the targets begin[k] to begin[k+1] - 1."""
+    """(K+1,): layer k has the targets begin[k]..begin[k+1]-1."""
     key: Array
-    """(T,) rad: joint `joint` half way; in (-pi, pi] if it is endless."""
+    """(T,) rad: joint `joint` at the middle of the target; in (-pi, pi] if it is endless."""
     half: Array
-    """(K,) rad: most that this joint moves from half way to an end, by layers."""
+    """(K,) rad: largest motion of this joint from the middle of a target to an end, by layer."""
     joint: int
     endless: Bools
 
 
 class Steps(NamedTuple):
-    """What a step is to minimise, and the box that its increment lies in."""
+    """What a step minimises, and the box that its increment must lie in."""
 
     weight: Array
     """(n,) 1/rad."""
     metric: int
     minimax: bool
     cap: float
-    """Distance from which on a step costs more, see `OVER_CAP`."""
+    """Distance above which a step costs more, see `OVER_CAP`."""
     low: Array
     """(n,) rad"""
     high: Array
@@ -81,8 +81,9 @@ def join_samples(
 ) -> None:  # fmt: skip
     """Join each vertex with that of the next sample on its branch; lone ones with themselves.
 
-    Of the same layer, variant and posture, the nearest, if no joint moves by more than `widest`
-    rad. A layer is ordered by variant and sample. There are no more targets than vertices.
+    The partner is the nearest vertex of the same layer, variant and posture, if no joint moves by
+    more than `widest` rad. A layer is ordered by variant and sample. There are no more targets
+    than vertices.
     """
     count, joined = 0, np.zeros(len(q), np.bool_)
     place = np.empty(len(q), np.int64)
@@ -144,8 +145,8 @@ def course_within(
 ) -> tuple[float, float]:
     """Part of t in [0, 1] where the increment a + t d from joints x to target s is in low..high.
 
-    Fills a and d (n,), endless joints the short way, as far as the part is not empty: then it ends
-    before it begins.
+    Fills a and d (n,), endless joints the short way. An empty part ends before it begins; a and d
+    may then be incomplete.
     """
     j, w = targets.one[s], targets.other[s]
     first, last = 0.0, 1.0
@@ -193,7 +194,7 @@ def _length(a: Array, d: Array, t: float, weight: Array, metric: int) -> tuple[f
 def step_value(
     a: Array, d: Array, t: float, begin: float, rise: float, steps: Steps
 ) -> tuple[float, float]:
-    """Cost of the step a + t d with what is still to come, begin + t rise; and a slope by t."""
+    """Cost of the step a + t d joined with the cost to come, begin + t rise; and a slope by t."""
     length, slope = _length(a, d, t, steps.weight, steps.metric)
     if length > steps.cap:
         length, slope = length + OVER_CAP * (length - steps.cap), (1.0 + OVER_CAP) * slope
@@ -208,7 +209,7 @@ def least_value(
     a: Array, d: Array, first: float, last: float, begin: float, rise: float,
     steps: Steps, ceiling: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """Least value over t in first..last, and that t; any that is no less than `ceiling`, if so."""
+    """Least value over t in first..last, and its t; not exact if it is at or above `ceiling`."""
     low, slope_low = step_value(a, d, first, begin, rise, steps)
     if slope_low >= 0.0 or first == last:
         return low, first
@@ -240,8 +241,8 @@ def _offered(
 ) -> tuple[float, float]:  # fmt: skip
     """Least value of a step from joints x to target s, and where on it; infinite beyond `ceiling`.
 
-    Next to a vertex from which nothing leads on, only the other end of a target remains. a, d (n,)
-    are room to work in.
+    If nothing leads on from one end of a target, only the other end remains. a, d (n,) are
+    scratch arrays.
     """
     begin, end = tail[targets.one[s]], tail[targets.other[s]]
     if min(begin, end) >= ceiling:
@@ -260,9 +261,9 @@ def _offered(
 def _best_step(
     targets: Targets, tail: Array, steps: Steps, k: int, x: Array, hint: int, a: Array, d: Array
 ) -> tuple[float, int, float]:
-    """Best step from joints x into layer k: its value, its target, and where on it; -1: none.
+    """Best step from joints x into layer k: its value, its target (-1: none), and where on it.
 
-    Only targets whose key may come within the box are looked at, those about `hint` first.
+    Only targets whose key may lie within the box are tested, those around `hint` first.
     """
     best, at, where = np.inf, -1, 0.0
     first, last = targets.begin[k], targets.begin[k + 1]
@@ -293,11 +294,11 @@ def _joined(minimax: bool, cost: float, to_go: float) -> float:
 
 @jit
 def values_to_go(targets: Targets, steps: Steps, cost: Array, out_tail: Array) -> int:
-    """Fill V (N,): least cost from each vertex to the end, its own included; infinite if no way.
+    """Fill V (N,): least cost from each vertex to the end, its own included; infinite if no path.
 
-    cost (N,) is what visiting a vertex costs, infinite where it is closed. The last layer is given:
-    what ends there cost, infinite where no path may end. Returns the first layer from which paths
-    reach the end.
+    cost (N,) is the cost of visiting a vertex, infinite where it is closed. The last layer is
+    given: the cost of ending at a vertex, infinite where no path may end. Returns the first layer
+    from which paths reach the end.
     """
     K, n = len(targets.start) - 1, len(steps.low)
     a, d = np.empty(n), np.empty(n)

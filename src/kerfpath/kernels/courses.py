@@ -1,4 +1,4 @@
-"""Steps between coarse samples of external axes and gamma, about in the velocity limits (5)."""
+"""Steps between coarse samples of external axes and gamma, roughly within the limits (5)."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ from kerfpath.kernels.metric import increment
 __all__ = ["CoarseLayer", "Nearby", "best_steps"]
 
 MOST, OVER = 3.0, 20.0
-"""Shares of its span that a joint moves at most, and the price of one beyond the whole: samples are
-coarse, and the motion between them may need less."""
+"""`MOST` is how many of its spans a joint may move; `OVER` is the price of the excess over one. A
+joint may exceed its span because samples are coarse, and the motion between them may need less."""
 
 
 class CoarseLayer(NamedTuple):
-    """The arm's joints at every place of the external axes, gamma and posture of one node."""
+    """The arm's joints at one node, for all external axes, gammas and postures."""
 
     q: Array
     """(X, m, P, n) rad."""
     ok: Bools
-    """(X, m, P): within reach and limits."""
+    """(X, m, P): whether they are within reach and limits."""
 
 
 class Nearby(NamedTuple):
-    """Where a step may come from, and what it costs."""
+    """Where a step may start, and what it costs."""
 
     place: Ints
-    """(X, W): places of the external axes near each; -1: none."""
+    """(X, W): nearby samples of the external axes for each of them; -1: none."""
     cost: Array
-    """(W,): what moving the external axes from there costs."""
+    """(W,): cost of moving the external axes from there."""
     turns: int
-    """Samples of gamma that a step may turn by, either way."""
+    """Number of samples of gamma that a step may turn by, either way."""
     span: Array
-    """(n,) rad: what each joint can move in the time of a step."""
+    """(n,) rad: the farthest that each joint can move in the time of a step."""
     wraps: Bools
     """(n,): joints that go the short way round."""
     weight: Array
-    """(n,): cost of a whole span of each joint;"""
+    """(n,): cost of a full span of each joint."""
     square: float
-    """and of the square of the share of a span that is moved."""
+    """Cost of the square of the share of a span that a joint moves."""
 
 
 @jit_inline
 def _arm_cost(a: Array, b: Array, near: Nearby, most: float) -> float:
-    """Return what the arm's step from joints a to b (n,) costs; infinite far beyond (5)."""
+    """Return the cost of the arm's step from joints a to b (n,); infinite far beyond (5)."""
     cost = 0.0
     for j in range(len(a)):
         share = abs(increment(b[j] - a[j], near.wraps[j])) / near.span[j]
@@ -63,7 +63,7 @@ def best_steps(
     before: CoarseLayer, value: Array, here: CoarseLayer, near: Nearby,
     out_value: Array, out_from: Ints,
 ) -> None:  # fmt: skip
-    """Fill what reaching each sample (X, m, P) costs, and the sample before it, flat; -1: none."""
+    """Fill the cost to reach each sample (X, m, P), and its predecessor's flat index; -1: none."""
     X, m, P = here.ok.shape
     for x in range(X):
         for g in range(m):

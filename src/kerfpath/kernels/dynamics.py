@@ -1,8 +1,8 @@
-"""Torques of an arm: tau = M(q) q'' + C(q, q') q' + g(q), by the recursion of Newton and Euler.
+"""Torques of an arm: tau = M(q) q'' + C(q, q') q' + g(q), by the recursive Newton-Euler algorithm.
 
-Luh, Walker and Paul 1980; Featherstone 2008, section 5.3. All vectors are along the axes of the
-robot base, so that the geometry of a posture is found once and serves every motion through it.
-Rigid links: no friction, no inertia of rotors.
+Luh, Walker and Paul 1980; Featherstone 2008, section 5.3. All vectors are in the axes of the
+robot base, so that the geometry of a posture is computed once for every motion through it.
+Links are rigid, without friction and rotor inertia.
 """
 
 from __future__ import annotations
@@ -19,46 +19,46 @@ __all__ = ["ArmBodies", "Posed", "fill_torque", "pose_arm", "room_for", "torques
 
 
 class ArmBodies(NamedTuple):
-    """The rigid bodies of an arm, one on each joint, and where its joints are."""
+    """The rigid bodies of an arm, one on each joint, and the joint frames."""
 
     rotation: Array
-    """(n, 3, 3): joint frames at angle zero, in the frame of the joint before,"""
+    """(n, 3, 3): axes of the joint frames at angle zero, in the frame of the joint before."""
     position: Array
-    """(n, 3) m, and where they are there."""
+    """(n, 3) m: origins of the joint frames, in the frame of the joint before."""
     axis: Array
-    """(n, 3): unit axes in their own frames."""
+    """(n, 3): unit joint axes, each in its own frame."""
     mass: Array
-    """(n,) kg."""
+    """(n,) kg: masses."""
     centre: Array
     """(n, 3) m: centres of mass in the turned joint frames."""
     tensor: Array
-    """(n, 3, 3) kg m^2: inertias about them."""
+    """(n, 3, 3) kg m^2: inertias about the centres of mass."""
     gravity: Array
-    """(3,) m/s^2: in the robot base."""
+    """(3,) m/s^2: gravity in the robot base."""
 
 
 class Posed(NamedTuple):
-    """The bodies where a joint vector puts them, in the robot base; and room for the recursion."""
+    """The bodies posed by a joint vector, in the robot base, with scratch for the recursion."""
 
     frame: Array
-    """(n+1, 3, 3): the base, then the turned joint frames,"""
+    """(n+1, 3, 3): the base, then the turned joint frames."""
     axis: Array
-    """(n, 3): axes,"""
+    """(n, 3): joint axes."""
     step: Array
-    """(n, 3) m: from the joint before to this one,"""
+    """(n, 3) m: from the joint before to this one."""
     lever: Array
-    """(n, 3) m: from the joint to the centre of mass,"""
+    """(n, 3) m: from the joint to the centre of mass."""
     tensor: Array
     """(n, 3, 3) kg m^2: inertias."""
     force: Array
-    """(n, 3) N: on each body,"""
+    """(n, 3) N: force on each body."""
     moment: Array
-    """(n, 3) N m: about its joint."""
+    """(n, 3) N m: moment about its joint."""
 
 
 @jit_part
 def room_for(n: int) -> Posed:
-    """Return room for an arm of n joints."""
+    """Return scratch arrays for an arm of n joints."""
     frame = np.empty((n + 1, 3, 3))
     frame[0] = np.eye(3)
     return Posed(
@@ -69,7 +69,7 @@ def room_for(n: int) -> Posed:
 
 @jit_inline
 def _turn(frame: Array, i: int, axis: Array, angle: float) -> None:
-    """Turn a frame (of n, 3, 3) about an axis of its own: R <- R rot(axis, angle), Rodrigues."""
+    """Turn frame i of (n, 3, 3) about one of its axes: R <- R rot(axis, angle), Rodrigues."""
     s, c = sin(angle), cos(angle)
     u, v, w = axis[0], axis[1], axis[2]
     d = 1.0 - c
@@ -83,7 +83,7 @@ def _turn(frame: Array, i: int, axis: Array, angle: float) -> None:
 
 @jit_inline
 def _apply(frame: Array, i: int, vector: Array, row: int, out: Array) -> None:
-    """Fill a row of out (n, 3) with the same row of `vector` (n, 3), of frame i, in the base."""
+    """Turn a row of `vector` (n, 3) from frame i into the base, into the same row of out (n, 3)."""
     for r in range(3):
         total = 0.0
         for x in range(3):
@@ -93,7 +93,7 @@ def _apply(frame: Array, i: int, vector: Array, row: int, out: Array) -> None:
 
 @jit_inline
 def pose_arm(arm: ArmBodies, q: Array, out: Posed) -> None:
-    """Put the bodies where the joints q (n,) rad bring them."""
+    """Pose the bodies by the joints q (n,) rad."""
     for i in range(len(arm.mass)):
         _apply(out.frame, i, arm.position, i, out.step)
         for r in range(3):
@@ -155,7 +155,7 @@ def _times(tensor: Array, i: int, v: tuple[float, ...]) -> tuple[float, float, f
 def fill_torque(arm: ArmBodies, at: Posed, dq: Array, ddq: Array, out_tau: Array) -> None:
     """Fill the torques (n,) N m of velocities dq rad/s and accelerations ddq rad/s^2, (n,) each.
 
-    Gravity is an acceleration of the base the other way.
+    Gravity enters as an opposite acceleration of the base.
     """
     n = len(arm.mass)
     w, dw = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)

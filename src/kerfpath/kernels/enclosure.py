@@ -1,12 +1,12 @@
-"""Where the joints of an OPW arm may be while gamma runs over a cell: proven bounds.
+"""Proven bounds of the joints of an OPW arm while gamma runs over a cell.
 
-The closed form of `kinematics`, with jets for numbers (`intervals`): what comes out holds every
-solution of a posture, at every gamma of the cell, rounding included. Angles are formed from their
-cosine or tangent and differentiated without the branch; an angle that a singularity leaves free
-has a full turn. Cells are gamma = m + t, |t| <= h.
+The closed form of `kinematics` is evaluated with jets as numbers (`intervals`): the result encloses
+every solution of a posture, at every gamma of the cell, rounding included. Angles are computed from
+their cosine or tangent and differentiated without the branch; an angle that a singularity leaves
+free has a full turn. Cells are gamma = m + t, |t| <= h.
 
-Where a rotation matrix is orthogonal to its rounding only, the nearest rotation is meant: the radii
-of `Frames` hold it, the matrix itself and its inverse.
+A rotation matrix that is orthogonal only up to rounding stands for the nearest rotation: the radii
+of `Frames` enclose that rotation, the matrix itself and its inverse.
 """
 
 from __future__ import annotations
@@ -60,13 +60,13 @@ __all__ = [
 ]
 
 NONE, SMOOTH, BOX = 0, 1, 2
-"""Status of a posture on a cell: it has no solution there; curves; boxes."""
+"""Status of a posture on a cell: it has no solution there; it has curves; it has boxes only."""
 ANGLE_ERROR = 1e-14
-"""What the offset (of 1 rad) and the removal of whole turns add to an error, rad: the model's
-angles are below 16 rad, and each of three operations errs by half a unit in the last place."""
+"""Error that the offset (of 1 rad) and the removal of full turns add, rad: the model's angles are
+below 16 rad, and each of three operations errs by half a unit in the last place."""
 
 X, Y, Z, CENTER = variable(0), variable(1), variable(2), variable(3)
-"""Rows and columns of a frame."""
+"""Indices of the rows and columns of a frame."""
 
 
 class Frames(NamedTuple):
@@ -95,7 +95,7 @@ class Curves(NamedTuple):
 
 @jit_inline
 def turned(frames: Frames, node: int, i: int, j: int, k: float, s: float, h: float) -> Jet:
-    """Return row i of base . R_z(gamma + t) . end's column j, k and s cosine and sine of gamma.
+    """Return row i of base . R_z(gamma + t) . end's column j; k, s are cosine and sine of gamma.
 
     The translation of the base is left out.
     """
@@ -156,7 +156,7 @@ def side(rr: Jet, d: Jet, b: float, front: float, h: float) -> Jet:
 def lean(c2: float, k: float, bend: Jet, reach: Jet, h: float) -> Jet:
     """Angle atan2(k sin bend, c2 + k cos bend) of a link k, bent by 0 to pi, behind a link c2.
 
-    Its rate is w bend', w = 1/2 + (k^2 - c2^2) / (2 reach), reach the square of the third side.
+    Its rate is w bend', w = 1/2 + (k^2 - c2^2) / (2 reach); reach is the square of the third side.
     """
     low = (reach.v - reach.rv) * DOWN
     x, y = c2 + k * cos(bend.v), k * sin(bend.v)
@@ -185,13 +185,13 @@ def lean(c2: float, k: float, bend: Jet, reach: Jet, h: float) -> Jet:
 
 @jit_part
 def _wrap(angle: float) -> float:
-    """Bring an angle into (-pi, pi], to rounding."""
+    """Bring an angle into (-pi, pi], up to rounding."""
     return angle - 2.0 * pi * ceil((angle - pi) / (2.0 * pi))
 
 
 @jit_inline
 def _known(f: Jet, h: float) -> bool:
-    """Whether curve and curvature of an angle say more than its box."""
+    """Whether curve and curvature of an angle are known better than by its box."""
     reach = h * (abs(f.d) + f.ed + 0.5 * h * (abs(f.s) + f.rs))
     return reach <= 2.0 * f.rv + ANGLE_ERROR
 
@@ -200,7 +200,7 @@ def _known(f: Jet, h: float) -> bool:
 def _write(
     out: Curves, cell: int, posture: int, joint: int, f: Jet, sign: float, offset: float, h: float
 ) -> None:
-    """Write the model's angle f as the robot's joint: sign * (f + offset); the status is set."""
+    """Write the model's angle f as the robot's joint, sign * (f + offset), by the status set."""
     at = (cell, posture, joint)
     error = ANGLE_ERROR * (1.0 + abs(offset))
     out.center[at] = _wrap(sign * (f.v + offset))
@@ -239,9 +239,9 @@ def write_posture(
 
 @jit_part
 def wrist_sine(c: Jet, x: Jet, y: Jet) -> tuple[float, float, float, float]:
-    """Sine of the angle in [0, pi] with cosine c where x^2 + y^2 is its square.
+    """Sine of the angle in [0, pi] with cosine c, where x^2 + y^2 is the square of the sine.
 
-    Returns it, its error in the middle, its spread over the cell, and its least value there.
+    Returns the sine, its error at the middle, its spread over the cell, and its least value there.
     """
     s = sqrt(x.v * x.v + y.v * y.v)
     es = (sqrt(x.ev * x.ev + y.ev * y.ev) + 4.0 * EPS * s) * UP + TINY
@@ -270,8 +270,8 @@ def _postures(
 ) -> None:
     """Write both wrist postures for a forearm given by q1 to q3.
 
-    `columns` are x of the flange's axes and y of its z-axis in the frame turned by q1, `thirds`
-    their z. R = R_z(q1) R_y(q2 + q3) R_z(q4) R_y(q5) R_z(q6).
+    In the frame turned by q1, `columns` are the x of the flange's axes and the y of its z-axis;
+    `thirds` are the z of the axes. R = R_z(q1) R_y(q2 + q3) R_z(q4) R_y(q5) R_z(q6).
     """
     q23 = add(q2, q3)
     k, s = cosine_of(q23, h), sine_of(q23, h)

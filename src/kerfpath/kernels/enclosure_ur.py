@@ -1,7 +1,7 @@
-"""Where the joints of an arm of the Universal Robots type may be on a cell of gamma: proven bounds.
+"""Proven bounds of the joints of an arm of the Universal Robots type on a cell of gamma.
 
-The closed form of `ur` with jets for numbers, as `enclosure` has it for OPW arms. Near the wrist
-singularity, where the sum of joints 2 to 4 is free, all that a free sum leaves is held.
+The closed form of `ur` is evaluated with jets as numbers, as in `enclosure` for OPW arms. Near the
+wrist singularity the sum of joints 2 to 4 is free, and the bounds hold for every value of it.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def _elbows(
     first: int,
     out: Curves,
 ) -> None:
-    """Write both elbow postures, rows `first` and the next but one, for axis 4 at (x, y).
+    """Write both elbow postures, rows `first` and `first` + 2, for axis 4 at (x, y).
 
     `ends` are joint 1, the sum of joints 2 to 4, joint 5 and joint 6.
     """
@@ -114,7 +114,7 @@ def _enclose(
         else:
             q1 = shift(ray, 0.0 if ahead > 0.0 else pi, LIBM)
         k1, s1 = cosine_of(q1, h), sine_of(q1, h)
-        # The flange's axes along axis 2 (across), its z-axis ahead in the plane of the arm.
+        # The flange's axes along axis 2 (across), and its z-axis ahead in the plane of the arm.
         across_x = add(mul(s1, x0, h), scale(mul(k1, x1, h), -1.0, 0.0))
         across_y = add(mul(s1, y0, h), scale(mul(k1, y1, h), -1.0, 0.0))
         across_z = add(mul(s1, z0, h), scale(mul(k1, z1, h), -1.0, 0.0))

@@ -1,14 +1,14 @@
 """Recursion (16) made exact under the acceleration limit (6), and under torque limits.
 
-The procedure of section 3.2 tests the acceleration against the best predecessor alone and can lose
-the optimum. Here the state is an edge (p, j): (5) is then a test on a state and (6) one on two
+The procedure of section 3.2 tests the acceleration against the best predecessor only and can lose
+the optimum. Here the state is an edge (p, j): (5) is then a test of a state and (6) a test of two
 neighbouring states, and the recursion
 
     d(p, j) = rho(p, j) + min over l of d(l, p), with (6) for l, p, j
 
 is exact. Torques at p are functions of the same two states, see `kerfpath.kernels.torque`. The
-first-order problem solved backwards is a bound h(j) on what is still to come: with a bound on the
-cost, only states with d + h inside it are ever kept.
+first-order problem solved backwards gives a bound h(j) on the cost to come: given a bound on the
+cost, only states with d + h within it are kept.
 """
 
 from __future__ import annotations
@@ -44,30 +44,30 @@ from kerfpath.kernels.torque import TorqueRoom, torque_excess, torque_room
 __all__ = ["RecursionResult", "count_closing", "recursion", "trace"]
 
 LEAPT = -2
-"""Parent of a state that a step beyond `aim.velocity` has reached, from anywhere."""
+"""Parent of a state that was reached by a step beyond `aim.velocity`, from any vertex."""
 
 
 class RecursionResult(NamedTuple):
-    """What a recursion under a bound came to."""
+    """The result of a recursion under a bound on the cost."""
 
     layers: int
     """Number of layers that some state reached."""
     cost: float
     """Cost of the best path, infinite if none kept the bound."""
     lowest: float
-    """Least cost bound among what was dropped for its cost; infinite if nothing was."""
+    """Least d + h of the states dropped for their cost; infinite if none was."""
     best: Ints
     """(K,): the best state of each layer, -1 if none."""
     offset: Ints
-    """(K+1,): states of layer k in the record are offset[k]:offset[k+1]."""
+    """(K+1,): the states of layer k in the record are offset[k]:offset[k+1]."""
     vertex: NDArray[np.int32]
-    """The record: vertex of every state kept,"""
+    """Record: the vertex of every state kept."""
     parent: NDArray[np.int32]
-    """and its parent within the layer before."""
+    """Record: the parent of every state kept, its place in the layer before."""
     last: States
     """The states of the last layer that some state reached."""
     recorded: bool
-    """The record is whole."""
+    """Whether the record is complete."""
 
 
 @jit_part
@@ -76,7 +76,7 @@ def _begin(
 ) -> tuple[States, float]:
     """States of layer k, one per vertex, with no edge before them; and the least cost dropped.
 
-    `cost` is that of what came before.
+    `cost` is the cost up to there.
     """
     a, count, lowest = layers.start[k], 0, np.inf
     m = layers.start[k + 1] - a
@@ -98,7 +98,7 @@ def _begin(
 def _breaks(
     layers: SortedLayers, aim: Aim, p: int, dq_before: Array, dq: Array, room: TorqueRoom
 ) -> bool:
-    """Whether (6) or a torque limit forbids to go on from dq_before to dq at vertex p."""
+    """Whether (6) or a torque limit forbids the increment dq after dq_before at vertex p."""
     if acceleration_excess(dq, dq_before, aim.acceleration) >= 0:
         return True
     return torque_excess(aim.torque, layers.given, p, dq_before, dq, room) >= 0
@@ -109,10 +109,10 @@ def _predecessor(
     layers: SortedLayers, aim: Aim, states: States, a: int, b: int, p: int, step: float, dq: Array,
     rest: float, bound: float, room: TorqueRoom,
 ) -> tuple[int, float, float]:  # fmt: skip
-    """Find which of the states a..b of p, cheapest first, goes on by dq at the least cost.
+    """Find which of the states a..b of p, cheapest first, continues by dq at the least cost.
 
-    `step` is the cost of the step on its own, `rest` that of what is to come. Returns the state, -1
-    if none keeps the bound; the cost up to and with the step; and the least one over the bound.
+    `step` is the cost of the step, `rest` the cost to come. Returns the state, -1 if none keeps the
+    bound; the cost up to and with the step; and the least cost over the bound.
     """
     if aim.timed:
         return _quickest(states, a, b, aim, step, dq, rest, bound)
@@ -130,7 +130,7 @@ def _predecessor(
 def _quickest(
     states: States, a: int, b: int, aim: Aim, step: float, dq: Array, rest: float, bound: float
 ) -> tuple[int, float, float]:
-    """As `_predecessor`, where a change asks for time."""
+    """As `_predecessor`, where a change of the increment takes time."""
     best, best_d, over, paid = -1, np.inf, np.inf, 0.0
     if aim.lost.penalty > 0:
         paid = late_cost(aim.lost, aim.lost.stretch * velocity_time(dq, aim.velocity))
@@ -158,7 +158,7 @@ def _quickest(
 
 @jit_inline
 def _braking_time(dq: Array, aim: Aim) -> float:
-    """Least time that the change between dq and any step beyond `aim.velocity` asks for."""
+    """Least time, in node intervals, for the change between dq and any step over `aim.velocity`."""
     least = np.inf
     for i in range(len(dq)):
         least = min(least, max(0.0, aim.velocity[i] - abs(dq[i])) / aim.acceleration[i])
@@ -172,7 +172,7 @@ def _add_leaps(
 ) -> tuple[States, float]:  # fmt: skip
     """Add to the states of layer k those that steps beyond `aim.velocity` may lead to.
 
-    They cost no more than any such step from the states before, wherever from and to.
+    They cost no more than any such step from any of the states before.
     """
     a, b, d, lowest = layers.start[k], layers.start[k + 1], np.inf, np.inf
     paid = late_cost(aim.lost, aim.lost.stretch)
@@ -194,7 +194,7 @@ def _fill_from(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, k: int, states: States,
     i: int, count: int, scratch: Scratch, out: States,
 ) -> tuple[int, float]:  # fmt: skip
-    """Append the states that leave vertex i of layer k; their number so far, least cost dropped."""
+    """Append the states that leave vertex i of layer k; return the count and least cost dropped."""
     a, b, p, lowest = states.first[i], states.first[i + 1], layers.start[k] + i, np.inf
     if a == b:
         return count, lowest
@@ -212,7 +212,7 @@ def _fill_from(
             lowest = min(lowest, f)
             continue
         first, last = shut_edges(layers, p)
-        if is_shut(layers.shut, first, last, j):  # looked at last: few come so far
+        if is_shut(layers.shut, first, last, j):  # tested last: few edges get here
             continue
         fill_increment(layers, p, j, dq)
         if closes and _breaks(layers, aim, j, dq, seam, scratch.torque):
@@ -234,7 +234,7 @@ def _fill_states(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, k: int, states: States,
     i: int, count: int, scratch: Scratch, out: States,
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Append what leaves vertex i of layer k and those after it, while there is room for one more.
+    """Append the states that leave vertices i, i + 1, ... of layer k while there is room.
 
     Returns the vertex to go on with, the number of states so far and the least cost dropped.
     """
@@ -260,7 +260,7 @@ def _extend(
     room = 2 * (end - begin)
     vertex, parent = np.empty(room, np.int64), np.empty(room, np.int64)
     out = States(vertex, np.empty(room), np.empty((room, n)), parent, first)
-    i = count = int(first[0])  # 0; a plain 0 would be a type of its own
+    i = count = int(first[0])  # 0; a literal 0 would have a different numba type
     while i < len(first) - 1:
         if count + end - begin > room:
             room *= 2
@@ -284,7 +284,7 @@ def _next(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, k: int, states: States,
     least: Array, width: int,
 ) -> tuple[States, float]:  # fmt: skip
-    """States of layer k + 1, also leapt to or beginning anew; and the least cost dropped.
+    """States of layer k + 1, with leaps and new beginnings; and the least cost dropped.
 
     least (K,) is the least cost of a state of each layer so far.
     """
@@ -303,12 +303,12 @@ def _next(
 def recursion(
     layers: SortedLayers, aim: Aim, h: Array, bound: float, seam: Array, room: int, width: int
 ) -> RecursionResult:
-    """Best path whose cost keeps `bound`, exactly, under (5), (6) and `aim.torque`.
+    """Best path whose cost is within `bound`, exactly, under (5), (6) and `aim.torque`.
 
-    h (N,) is `cost_to_go`; seam (n,) is the increment that the last one must go on to by (6), or
-    (0,). The states of all layers are recorded for `trace` as long as they are no more than `room`.
-    Of the states of each vertex the `width` cheapest are kept; with fewer than `EVERY` the path
-    found need not be the best.
+    h (N,) is `cost_to_go`; seam (n,) is the increment that must be able to follow the last one by
+    (6), or it is (0,). The states of all layers are recorded for `trace` as long as there are at
+    most `room` of them. The `width` cheapest states of each vertex are kept; with a `width` below
+    `EVERY` the path found need not be the best.
     """
     K = len(layers.start) - 1
     offset, best, least = np.zeros(K + 1, np.int64), np.full(K, -1), np.full(K, np.inf)
@@ -342,8 +342,8 @@ def recursion(
 def trace(layers: SortedLayers, found: RecursionResult, out_path: Ints) -> None:
     """Read the best path (K,) back from a record, as vertices of the sorted graph.
 
-    Layers that it does not go through, between breaking off and beginning anew, get -1; before a
-    leap the path is not known: -1.
+    Layers that the path skips, between breaking off and beginning again, get -1; so do the layers
+    before a leap, where the path is not known.
     """
     out_path[:] = -1
     k = len(out_path) - 1
@@ -362,11 +362,12 @@ def trace(layers: SortedLayers, found: RecursionResult, out_path: Ints) -> None:
 
 @jit
 def count_closing(layers: SortedLayers, aim: Aim, states: States, k: int) -> tuple[Ints, int]:
-    """Count, for ways from the states of layer k-1 into layer k, what forbids them.
+    """Count the limits that forbid ways from the states of layer k-1 into layer k, by joint i.
 
-    Row 0: edges whose first velocity excess (5) is at joint i; row 1: of the others that are not
-    shut, the pairs of state and edge whose first acceleration excess (6) is at joint i; row 2: of
-    the others, those whose first torque excess is. Also returns how many edges are shut.
+    Row 0 counts edges whose first velocity excess (5) is at joint i. Row 1 counts, for the other
+    edges that are not shut, the pairs of state and edge whose first acceleration excess (6) is at
+    joint i; row 2, among the other pairs, those whose first torque excess is. Also returns the
+    number of shut edges.
     """
     n, shut = len(layers.endless), 0
     counts, dq, room = np.zeros((3, n), np.int64), np.empty(n), torque_room(len(aim.torque.bound))

@@ -1,22 +1,22 @@
-"""Inverse kinematics of five-axis arms: tool tip and tool axis given, no free rotation left.
+"""Inverse kinematics of five-axis arms: tool tip and tool axis are given, no rotation is free.
 
 The arm is that of `kinematics` without axis 6: three axes to the forearm, axis 4 along it, axis 5
-square to axis 4 and meeting it in the wrist centre, the head rigid behind. Solved as the OPW arm
-whose sixth angle is held at zero: turn the tool about its own axis by psi, and of the forearm that
-then belongs to the wrist centre ask
+square to axis 4 and meeting it in the wrist centre, the head rigid behind. It is solved as an OPW
+arm whose sixth angle is zero: turn the tool about its own axis by psi, and require of the forearm
+that belongs to this wrist centre
 
     g(psi) = y_end . z_forearm = sin q5 sin q6 = 0 .
 
 Where the tool axis passes through the wrist centre, that centre stays where it is and g is a sine
-with two zeros, the two wrist postures. With an offset the centre runs on a circle, of which parts
-may be out of reach; the zeros are bracketed on a grid of psi and the ends of what is in reach.
+with two zeros, the two wrist postures. With an offset the centre runs on a circle, parts of which
+may be out of reach; the zeros are bracketed on a grid of psi and the ends of the arcs in reach.
 
 Posture mu = 4 * shoulder + 2 * elbow + wrist as in `kinematics`, but the wrist is plus where axis
-5 is beyond the angle at which the tool axis is nearest to the forearm's, minus where it is before.
-With an offset, near the stretched wrist, g has up to four zeros: more than one of a kind are the
-third and fourth, mu = 8 + 4 * shoulder + 2 * elbow and one more; four of a kind take the row of
-the other. Zeros within a grid step of the stretched or folded elbow, where the arc in reach ends,
-may be missed.
+5 is beyond the angle at which the tool axis is nearest to the forearm's, and minus below it. With
+an offset, near the stretched wrist, g has up to four zeros: further zeros of the same kind become
+the third and fourth, mu = 8 + 4 * shoulder + 2 * elbow and one more; a fourth of the same kind
+takes the row of the other kind. Zeros within a grid step of the stretched or folded elbow, where
+the arc in reach ends, may be missed.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ __all__ = ["forward_all", "inverse_all", "inverse_nodes"]
 
 ROWS = 2 * POSTURES
 SAMPLES = 96
-"""Grid of psi. Two zeros inside one step are found from the dip that g makes there."""
+"""Grid of psi. Two zeros inside one step are found from the minimum that g has there."""
 HALVINGS = 40
-"""Bisections of a grid step towards the end of reach: 6e-14 rad are left."""
+"""Bisections of a grid step towards the end of reach; the step left is 6e-14 rad."""
 STEPS = 60
 """Most steps of the bracketing iteration; a dozen are usual."""
 ZERO = 1e-15
@@ -46,7 +46,7 @@ ZERO = 1e-15
 def _turned(
     arm: OpwArm, H: Array, T_tip_end: Array, psi: float, L: Array, T: Array, q: Array, reach: Bools
 ) -> None:
-    """Solve the OPW arm for the tool turned by psi: q (8, 6), reach (8,); L and T are room."""
+    """Solve the OPW arm for the tool turned by psi: q (8, 6), reach (8,); L and T are scratch."""
     location(H, cos(psi), sin(psi), L)
     for r in range(3):
         for c in range(4):
@@ -75,9 +75,9 @@ def _zero(
     gb: float,
     room: tuple[Array, Array, Array, Bools],
 ) -> bool:
-    """Find the zero of g between a and b (regula falsi, Illinois); its solutions are left in room.
+    """Find the zero of g between a and b (regula falsi, Illinois); leave its solutions in `room`.
 
-    False where the branch ends on the way.
+    Returns False if the branch ends in between.
     """
     L, T, q, reach = room
     for _ in range(STEPS):
@@ -130,7 +130,7 @@ def _dip(
     sign: float,
     room: tuple[Array, Array, Array, Bools],
 ) -> tuple[float, float]:
-    """Return psi between a and b where sign g is least, or has changed its sign, and g there."""
+    """Return psi between a and b where sign g is least, or has become negative, and g there."""
     L, T, q, reach = room
     psi, g = 0.5 * (a + b), sign
     for _ in range(HALVINGS):
@@ -160,7 +160,7 @@ def _keep(
     q4 = row[3]
     q5 = arm.sign[4] * row[4] - arm.offset[4]
     if abs(sin(q5)) < ON_AXIS:
-        # Axes 4 and 6 in line: what axis 6 would turn, axis 4 turns.
+        # Axes 4 and 6 are in line: axis 4 takes over the turn of axis 6.
         q6 = q[branch, 5] if cos(q5) > 0.0 else -q[branch, 5]
         q4, q5 = wrap(q[branch, 3] + arm.sign[3] * q6), arm.sign[4] * q[branch, 4] - arm.offset[4]
         row = q[branch]
@@ -186,7 +186,7 @@ def _solve(arm: OpwArm, H: Array, T_tip_end: Array, out_q: Array, out_reach: Boo
     step = 2.0 * pi / SAMPLES
     out_q[:] = 0.0
     out_reach[:] = False
-    for j in range(SAMPLES + 2):  # around once, and a step more for a dip at the seam
+    for j in range(SAMPLES + 2):  # once around, and one step more for a minimum at the seam
         psi = step * j
         _turned(arm, H, T_tip_end, psi, L, T, q, reach)
         now, here = reach.copy(), q.copy()
@@ -238,7 +238,7 @@ def inverse_nodes(
 ) -> None:
     """All postures (K, 1, 16, 5) that bring tip and tool axis to task frames H (K, 4, 4).
 
-    `gamma` (1,) is there for the likeness with other families: nothing is free to turn.
+    `gamma` (1,) keeps the signature of the other families: no rotation is free.
     """
     for k in range(len(H)):
         _solve(arm, H[k], T_tip_end, out_q[k, 0], out_reach[k, 0])

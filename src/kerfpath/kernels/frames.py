@@ -23,7 +23,7 @@ def _dot(a: Array, b: Array) -> float:
 
 @jit
 def tangent_x(p: Array, n: Array, closed: bool, out_x: Array) -> int:
-    """Project the unit directions a_k on the planes normal to n_k; return -1, or the bad node.
+    """Project the unit directions a_k on the planes normal to n_k; return the bad node, or -1.
 
     a_k points from p_k to p_{k+1}; the last node takes a_n = a_0 on a closed contour (section
     2.1) and the previous direction on an open one.
@@ -48,7 +48,7 @@ def tangent_x(p: Array, n: Array, closed: bool, out_x: Array) -> int:
 
 @jit_inline
 def _reflect(x: Array, v: Array, vv: float) -> None:
-    """Reflect x at the plane normal to v, of the square vv."""
+    """Reflect x at the plane normal to v; vv is v . v."""
     share = 2.0 * _dot(v, x) / vv
     for i in range(3):
         x[i] -= share * v[i]
@@ -56,7 +56,7 @@ def _reflect(x: Array, v: Array, vv: float) -> None:
 
 @jit
 def rotation_minimising_x(n: Array, out_x: Array) -> int:
-    """Carry out_x[0] along the axes n_k without rotation about them; return -1, or the bad node.
+    """Carry out_x[0] along the axes n_k without rotation about them; return the bad node, or -1.
 
     Double reflection (Wang, Juettler, Zheng and Liu, ACM Trans. Graph. 27(1), 2008) on the curve
     whose tangent is the tool axis: reflect at the plane normal to n_k + n_{k+1}, then at the plane
@@ -96,7 +96,7 @@ def closing_twist(n: Array, x: Array) -> float:
 def location(H: Array, cos_gamma: float, sin_gamma: float, out_L: Array) -> None:
     """Turn a task frame about its own z-axis, L_k = H_k R_z(gamma) (Eq. 2).
 
-    Column vectors: the paper prints R_z . H_k and means the rotation about z_k.
+    Vectors are columns; the paper prints R_z . H_k and means the rotation about z_k.
     """
     for i in range(3):
         x, y = H[i, 0], H[i, 1]

@@ -1,15 +1,15 @@
 """Kinematics of any six-axis arm from the lines that its joints turn about.
 
-Forward is the product of the rotations about those lines as they lie at angle zero. There is no
-closed form for the inverse: a solver elsewhere brings candidates, and here each is brought onto its
-pose by Newton's method, refused where it does not get there, and numbered.
+Forward kinematics is the product of the rotations about those lines at angle zero. The inverse has
+no closed form: a solver elsewhere supplies candidates; here Newton's method brings each onto its
+pose, drops those that do not get there, and gives the others a posture number.
 
-Posture mu = 4 * shoulder + 2 * elbow + wrist, + 8: with W the point of axis 5 that lies nearest to
-axis 4, shoulder is the sign of the volume of axes 1, 2 and the way from axis 1 to W, shoulder times
-elbow that of the speeds which joints 1 to 3 give W, wrist that of the directions of axes 4 to 6. Of
-an arm whose wrist is almost spherical these are its shoulder, elbow and wrist. Where the
-determinant of all six joints is not of the sign of the last two, as a spherical wrist has it, a
-solution is one of 8 to 15; two of a kind take whichever row is free.
+Posture mu = 4 * shoulder + 2 * elbow + wrist, + 8. Let W be the point of axis 5 nearest to axis 4.
+Shoulder is the sign of the volume of axes 1, 2 and the vector from axis 1 to W; shoulder times
+elbow is that of the speeds that joints 1 to 3 give W; wrist is that of the directions of axes 4 to
+6. For an almost spherical wrist these are the usual shoulder, elbow and wrist. With a spherical
+wrist the determinant of all six joints has the sign of the product of the last two; a solution
+where it has the other sign is one of 8 to 15. Two with the same number take whichever row is free.
 """
 
 from __future__ import annotations
@@ -28,33 +28,33 @@ __all__ = ["EXACT", "POSTURES", "GeneralArm", "follow_all", "forward_all", "sort
 POSTURES = 16
 """Most solutions of a pose (Primrose 1986)."""
 EXACT = 1e-9
-"""m, and entries of a rotation: how far a solution may be from its pose."""
+"""Largest distance of a solution from its pose: m, and entries of a rotation."""
 CLOSED = 1e-12
-"""Where Newton's method has nothing more to gain."""
+"""Pose error below which Newton's method stops."""
 STEPS = 12
-"""Most steps; one or two are usual, near a singularity each halves what is left."""
+"""Most Newton steps; one or two are usual, and near a singularity each halves the error."""
 DAMPING = 1e-14
 """Added to the squares of the Jacobian, so that a singular one can be solved."""
 SAME = 1e-5
-"""rad: solutions nearer than this are one, found twice at a singularity."""
+"""rad: solutions nearer than this count as one, found twice at a singularity."""
 NOTHING = 1e-9
-"""A volume this small has no sign."""
+"""Volume below which it has no sign."""
 
 
 class GeneralArm(NamedTuple):
     """The joint axes at angle zero, in the base, and the tip."""
 
     place: Array
-    """(6, 3) m: a point of each axis; of the fifth, the one nearest to the fourth."""
+    """(6, 3) m: a point of each axis; on the fifth, the one nearest to the fourth."""
     along: Array
-    """(6, 3): directions."""
+    """(6, 3): unit directions of the axes."""
     tip: Array
-    """(4, 4) m."""
+    """(4, 4) m: tip pose at angle zero."""
 
 
 @jit_part
 def _turn(v: Array, along: Array, s: float, c: float) -> None:
-    """Turn the vector v (3,) about a direction by the angle of this sine and cosine."""
+    """Turn the vector v (3,) about a direction by an angle with sine s and cosine c."""
     x, y, z = v
     a, b, e = along
     d = (1.0 - c) * (a * x + b * y + e * z)
@@ -89,7 +89,7 @@ def _chain(arm: GeneralArm, q: Array, out_place: Array, out_along: Array, out_T:
 
 @jit_part
 def _jacobian(place: Array, along: Array, T: Array, out_J: Array) -> None:
-    """Speeds (6, 6) of the tip, linear over angular, that each joint gives it."""
+    """Fill the Jacobian (6, 6): speed of the tip by each joint, linear above angular."""
     for i in range(6):
         for r in range(3):
             y, z = (r + 1) % 3, (r + 2) % 3
@@ -100,7 +100,7 @@ def _jacobian(place: Array, along: Array, T: Array, out_J: Array) -> None:
 
 @jit_part
 def _pose_error(T: Array, now: Array, out_e: Array) -> float:
-    """Largest entry by which a pose is off T, and the way there (6,), linear over angular."""
+    """Largest entry of the error of a pose against T; fills the twist to T (6,), linear first."""
     off = 0.0
     out_e[3:] = 0.0
     for r in range(3):
@@ -115,7 +115,7 @@ def _pose_error(T: Array, now: Array, out_e: Array) -> float:
 
 @jit_part
 def _solve_pose(arm: GeneralArm, T: Array, q: Array, place: Array, along: Array, J: Array) -> bool:
-    """Bring q (6,) onto the pose T (4, 4); whether it got there. Axes and Jacobian are left."""
+    """Bring q (6,) onto the pose T (4, 4); return whether it got there, leave axes and Jacobian."""
     now, e = np.empty((4, 4)), np.empty(6)
     for step in range(STEPS):
         _chain(arm, q, place, along, now)
@@ -132,7 +132,7 @@ def _solve_pose(arm: GeneralArm, T: Array, q: Array, place: Array, along: Array,
 
 @jit_part
 def _posture(place: Array, along: Array, J: Array) -> int:
-    """Posture 0 to 15 of an arm whose axes (6, 3) lie so."""
+    """Posture 0 to 15 of an arm with these axes (6, 3)."""
     speeds = np.empty((3, 3))
     for i in range(3):
         speeds[i] = np.cross(along[i], place[4] - place[i])
@@ -146,7 +146,7 @@ def _posture(place: Array, along: Array, J: Array) -> int:
 
 @jit_part
 def _known(q: Array, rows: Array, reach: Bools) -> bool:
-    """Whether q (6,) is among the rows (P, 6) that are solutions."""
+    """Whether q (6,) is already among the rows (P, 6) that are solutions."""
     for mu in range(len(rows)):
         apart = 0.0
         for i in range(6):
@@ -160,9 +160,9 @@ def _known(q: Array, rows: Array, reach: Bools) -> bool:
 def sort_in(
     arm: GeneralArm, T: Array, q: Array, pose: Ints, out_q: Array, out_reach: Bools
 ) -> None:
-    """Write candidates q (N, 6) of poses T[pose] that are solutions in the rows of their posture.
+    """Write those candidates q (N, 6) of poses T[pose] that are solutions to their posture's row.
 
-    Fills out_q (B, 16, 6), in (-pi, pi], and out_reach (B, 16); no solution is there twice.
+    Fills out_q (B, 16, 6), in (-pi, pi], and out_reach (B, 16); no solution is written twice.
     """
     place, along, J = np.empty((6, 3)), np.empty((6, 3)), np.empty((6, 6))
     out_q[:] = 0.0

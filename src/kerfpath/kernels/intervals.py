@@ -1,14 +1,14 @@
-"""Numbers that hold every value a function of gamma may take on a cell: balls and jets.
+"""Numbers that enclose every value a function of gamma may take on a cell: balls and jets.
 
-A ball (m, r) holds the reals from m - r to m + r. A jet holds a function f of t on the cell
+A ball (m, r) is the set of reals from m - r to m + r. A jet encloses a function f of t on the cell
 |t| <= h: f(0) in v +- ev, f'(0) in d +- ed, and for every t of the cell f in v +- rv, f' in
-d +- rd, f'' in s +- rs. A radius that is infinite or NaN says that nothing is known.
+d +- rd, f'' in s +- rs. A radius that is infinite or NaN means that nothing is known.
 
-Rounding is in the radii. A sum or product of floats errs by at most half a unit in the last place,
-so that EPS times the size of its terms covers a middle; UP covers up to 31 roundings of a radius,
-TINY what underflows. Assumed of the machine's library: sin, cos and atan2 err by at most 4 units
-in the last place; sqrt is exact to half a unit (IEEE 754). Rule of products and quotients: Rump,
-"Fast and parallel interval arithmetic" (BIT 39, 1999).
+The radii include rounding. A sum or product of floats errs by at most half a unit in the last
+place, so that EPS times the size of its terms covers a middle; UP covers up to 31 roundings of a
+radius, and TINY covers underflow. The machine's library is assumed to compute sin, cos and atan2
+within 4 units in the last place; sqrt is exact to half a unit (IEEE 754). Products and quotients
+follow Rump, "Fast and parallel interval arithmetic" (BIT 39, 1999).
 """
 
 from __future__ import annotations
@@ -51,13 +51,13 @@ UP = 1.0 + 2.0**-48
 DOWN = 1.0 - 2.0**-48
 TINY = 1e-300
 LIBM = 4.0 * EPS
-"""Error of a sine or cosine; that of an angle in (-pi, pi] is twice as large at most."""
+"""Error of a sine or cosine; that of an angle in (-pi, pi] is at most twice as large."""
 SMALL = 1e-16
-"""Length (m) or sine below which nothing is divided by."""
+"""Length (m) or sine below which no division is made."""
 
 
 class Jet(NamedTuple):
-    """A function on a cell; see the head of this module."""
+    """A function on a cell; see the docstring of this module."""
 
     v: float
     ev: float
@@ -102,13 +102,13 @@ def settled(f: Jet, h: float) -> Jet:
 
 @jit_inline
 def constant(m: float, r: float) -> Jet:
-    """Return a number known to r as a jet."""
+    """Return the ball (m, r) as a constant jet."""
     return Jet(m, r, 0.0, 0.0, r, 0.0, 0.0, 0.0)
 
 
 @jit_inline
 def boxed(low: float, high: float) -> Jet:
-    """Return a function of which no more is known than its least and greatest value."""
+    """Return a jet of which only the least and the greatest value are known."""
     m = 0.5 * (low + high)
     r = (0.5 * (high - low) + EPS * (abs(low) + abs(high))) * UP
     return Jet(m, r, 0.0, inf, r, inf, 0.0, inf)
@@ -210,7 +210,7 @@ def least_norm(x: Jet, y: Jet) -> float:
 
 @jit_inline
 def spread(distance: float, size: float) -> float:
-    """Angle at most between two vectors, one of length `size`, that differ by `distance`."""
+    """Largest angle between two vectors, one of length `size`, that differ by `distance`."""
     if distance < 0.5 * size:
         return 1.0473 * distance / size  # asin x <= (pi / 3) x up to 1/2
     return 0.5 * pi * UP * distance / size if distance < size else pi * UP
@@ -291,7 +291,7 @@ def _arccos(c: float) -> float:
 
 @jit_part
 def arc_between(c: Jet, h: float) -> Jet:
-    """Angle in [0, pi] whose cosine is c, where c is inside [-1, 1]; beyond, its nearest end."""
+    """Angle in [0, pi] whose cosine is c; c is clipped to [-1, 1]."""
     first = _arccos(max(-1.0, min(1.0, (c.v + c.rv) + EPS))) - 2.0 * LIBM
     last = _arccos(min(1.0, max(-1.0, (c.v - c.rv) - EPS))) + 2.0 * LIBM
     most = (abs(c.v) + c.rv) * UP
@@ -309,7 +309,7 @@ def arc_between(c: Jet, h: float) -> Jet:
 
 @jit_part
 def _circular(k: float, s: float, q: Jet, h: float) -> Jet:
-    """Return f with f(0) = k, f' = -s q' and f'' = -s q'' - f q'^2: k, s = cos, sin or so."""
+    """Return f with f(0) = k, f' = -s q' and f'' = -s q'' - f q'^2; k, s are cos, sin or alike."""
     if not q.rv < 1.0:
         return Jet(0.0, 1.0, 0.0, inf, 1.0, inf, 0.0, inf)
     e, r = q.ev + LIBM, q.rv + LIBM

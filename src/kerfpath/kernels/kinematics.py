@@ -1,10 +1,10 @@
-"""Forward and inverse kinematics of ortho-parallel arms with a spherical wrist (OPW), in bulk.
+"""Forward and inverse kinematics of ortho-parallel arms with a spherical wrist (OPW), batched.
 
 Geometry and names a1..c4 after Brandstoetter, Angerer and Hofbaur, "An analytical solution of the
 inverse kinematics problem of industrial serial manipulators with an ortho-parallel basis and a
-spherical wrist" (2014). Sines and cosines are carried algebraically, so that a posture costs
-arctangents only, and the sixth angle follows from the fourth, so that poses near the wrist
-singularity keep full accuracy.
+spherical wrist" (2014). Sines and cosines are computed algebraically, so that a posture needs only
+arctangents, and the sixth angle follows from the fourth, so that poses near the wrist singularity
+keep full accuracy.
 
 Posture mu = 4 * shoulder + 2 * elbow + wrist: shoulder front 0, rear 1; elbow up 0, down 1; wrist
 plus 0, minus 1 (sign of the model's fifth angle).

@@ -1,4 +1,4 @@
-"""Velocity and acceleration limits as bounds on finite differences, (5) and (6)."""
+"""Velocity limit (5) and acceleration limit (6) as bounds on finite differences."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LIMIT_TOLERANCE = 1e-9
 
 @jit_inline
 def exceeds(size: float, bound: float) -> bool:
-    """Whether an increment, or a change of one, of this size is over its bound; both rad."""
+    """Whether the size of an increment, or of its change, exceeds its bound; both rad."""
     return size > bound + LIMIT_TOLERANCE
 
 
@@ -52,7 +52,7 @@ def acceleration_excess(dq: Array, dq_before: Array, bound: Array) -> int:
 
 @jit_inline
 def velocity_time(dq: Array, bound: Array) -> float:
-    """Node intervals in which (5) would hold: largest |dq_i| over its bound, both (n,) rad."""
+    """Time, in node intervals, in which (5) holds: largest |dq_i| over its bound, both (n,) rad."""
     least = 0.0
     for i in range(len(dq)):
         least = max(least, abs(dq[i]) / bound[i])
@@ -61,7 +61,7 @@ def velocity_time(dq: Array, bound: Array) -> float:
 
 @jit_inline
 def acceleration_time(dq: Array, dq_before: Array, bound: Array) -> float:
-    """Node intervals in which (6) would hold: the root of the largest change over its bound.
+    """Time, in node intervals, in which (6) holds: root of the largest change over its bound.
 
     dq, dq_before (n,) are successive increments, bound (n,) is that of their change, all rad.
     """

@@ -37,10 +37,11 @@ EUCLID, MANHATTAN, CHEBYCHEV = 0, 1, 2
 
 
 def _short(dq: _X) -> _X:
-    """Return the short way round, of a number or an array.
+    """Return an increment, a number or an array, taken the short way round.
 
-    Half a turn is as long either way, but not to (6). It goes the way that the values go, and is
-    then the same in reverse; between values more than a turn apart, the way from the even turn.
+    Half a turn is equally long either way, but (6) makes a difference. It goes the way that the
+    values go, so that it is the same in reverse; between values more than a turn apart it goes the
+    way from the even turn.
     """
     short: _X = dq - 2.0 * pi * np.rint(dq / (2.0 * pi))
     return short
@@ -82,21 +83,21 @@ def increments(q: Array, endless: Bools) -> Array:
 def apart(difference: float, turn: float) -> float:
     """Size of the increment between two wrapped angles, from the size of their difference.
 
-    turn is 2 pi of an endless joint, infinity of another. It vectorises.
+    turn is 2 pi for an endless joint, infinity for another. It vectorises.
     """
     return smaller(difference, turn - difference)
 
 
 @jit_vector
 def extend(total: float, part: float, metric: int) -> float:
-    """Take one more weighted increment into what `finish` makes a distance of. It vectorises."""
+    """Add one weighted increment to the total that `finish` turns into a distance; vectorises."""
     euclid = either(metric == EUCLID, total + part * part, larger(total, part))
     return either(metric == MANHATTAN, total + part, euclid)
 
 
 @jit_vector
 def finish(total: float, metric: int) -> float:
-    """Return the distance rho_a that all weighted increments of a step come to."""
+    """Return the distance rho_a of a step from the total of its weighted increments."""
     return either(metric == EUCLID, sqrt(total), total)
 
 
@@ -143,7 +144,7 @@ def largest_increment(dq: Array) -> Array:
 def coordinate_range(dq: Array) -> Array:
     """Range J_i^(Delta) that each joint sweeps, rad (Eq. 9); dq (K-1, n).
 
-    Taken along the motion, so that an endless joint turning through pi does not jump.
+    It is taken along the motion, so that an endless joint turning through pi does not jump.
     """
     travelled = np.vstack([np.zeros_like(dq[:1]), np.cumsum(dq, axis=0)])
     return np.asarray(np.ptp(travelled, axis=0))

@@ -1,17 +1,18 @@
-"""An outer approximation of all motions: which steps, and pairs of steps, cells of gamma admit.
+"""An outer approximation of all motions: the steps and pairs of steps that cells of gamma admit.
 
 On a cell the joints are q(t) = c + s t + [k] t^2 / 2 +- r (`kernels.reduced`). A step from cell
 a to b keeps (5) only if, for any factor f and joints i and r,
 
     |D_i - f D_r| <= v_i + |f| v_r + w(a) + w(b),    D = c_b - c_a,
 
-w the most by which q_i - f q_r may differ from its value in the middle of the cell; two steps from
-a over b to c keep (6) only if
+where w is the most by which q_i - f q_r may differ from its value in the middle of the cell. Two
+steps from a over b to c keep (6) only if
 
     |B_i - f B_r| <= a_i + |f| a_r + w(a) + 2 w(b) + w(c),    B = D_bc - D_ab.
 
-With f = 0 both are tests of one joint. With f = s_i / s_r, r the joint that gamma moves most, what
-is not known of gamma drops out except for curvature: they show what no choice of gamma can mend.
+With f = 0 both are tests of one joint. With f = s_i / s_r, where r is the joint that gamma moves
+most, the unknown gamma drops out except for curvature: these tests find what no choice of gamma can
+repair.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def _factor(cells: Cells, b: int, i: int, r: int) -> float:
 
 @jit_inline
 def _dear(cells: Cells, step: Step, a: int, b: int, D: Array) -> bool:
-    """Return whether every step from cell a to b, D from centre to centre, costs more than most."""
+    """Return whether every step from cell a to b, D between centres, costs over `step.most`."""
     if step.most == inf:
         return False
     total = 0.0
@@ -67,7 +68,7 @@ def _dear(cells: Cells, step: Step, a: int, b: int, D: Array) -> bool:
 
 @jit_inline
 def _steps(cells: Cells, step: Step, lead: Ints, a: int, b: int, out_D: Array) -> bool:
-    """Fill D; return whether a step from cell a to b may keep (5) and cost no more than it may."""
+    """Fill D; return whether a step from cell a to b may keep (5) and cost at most `step.most`."""
     status = near(cells, step, a, b, out_D)
     if status != 1:
         return status > 0
@@ -87,7 +88,7 @@ def _steps(cells: Cells, step: Step, lead: Ints, a: int, b: int, out_D: Array) -
 
 @jit_inline
 def _increment(cells: Cells, step: Step, a: int, b: int, i: int) -> tuple[float, bool]:
-    """Return D_i from cell a to b, endless joints the short way, and whether that is the way."""
+    """Return D_i from cell a to b, endless joints the short way, and whether the way is certain."""
     d = increment(cells.center[b, i] - cells.center[a, i], step.endless[i])
     return d, not step.endless[i] or abs(d) + cells.box[a, i] + cells.box[b, i] <= pi
 
@@ -96,9 +97,9 @@ def _increment(cells: Cells, step: Step, a: int, b: int, i: int) -> tuple[float,
 def bent_by(
     cells: Cells, step: Step, bound: Array, lead: Ints, a: int, b: int, c: int, D: Array
 ) -> int:
-    """Return a joint that keeps two steps from cell a over b to c from (6); -1 where none does.
+    """Return a joint that breaks (6) in the two steps from cell a over b to c; -1 if none does.
 
-    ``D`` (2, n) is room for the bends and for whether they are the ones meant.
+    ``D`` (2, n) is scratch for the bends and for whether their direction is certain.
     """
     n = len(bound)
     for i in range(n):
@@ -140,7 +141,7 @@ def count_steps(cells: Cells, step: Step, lead: Ints, k: int, live: Bools, out_c
 def list_steps(
     cells: Cells, step: Step, lead: Ints, k: int, live: Bools, begin: Ints, out_to: Ints
 ) -> None:
-    """Fill the cells that the steps counted by `count_steps` lead to, begin (C_k + 1,) by cell."""
+    """Fill the cells that the steps counted by `count_steps` lead to; begin is (C_k + 1,)."""
     run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
     first = cells.start[k]
     for a in range(first, cells.start[k + 1]):
@@ -159,9 +160,10 @@ def keep_on(
     cells: Cells, step: Step, bound: Array, lead: Ints, k: int,
     begin: Ints, to: Ints, kept: Bools, begin_on: Ints, to_on: Ints, out_kept: Bools,
 ) -> int:  # fmt: skip
-    """Mark the steps from layer k + 1 that keep (6) after some kept step from k; return the tests.
+    """Mark the steps from layer k + 1 that keep (6) after some kept step from k; count the tests.
 
-    ``begin``, ``to``, ``kept`` are of the steps from layer k, ``begin_on``, ``to_on`` of those on.
+    ``begin``, ``to``, ``kept`` describe the steps from layer k, ``begin_on``, ``to_on`` those from
+    layer k + 1.
     """
     first, second, tests = cells.start[k], cells.start[k + 1], 0
     D, missing = np.empty((2, len(bound))), np.diff(begin_on)
@@ -184,7 +186,7 @@ def keep_back(
     cells: Cells, step: Step, bound: Array, lead: Ints, k: int,
     begin: Ints, to: Ints, begin_on: Ints, to_on: Ints, kept_on: Bools, out_kept: Bools,
 ) -> int:  # fmt: skip
-    """Drop the steps from layer k that keep (6) before no kept step on; return the tests."""
+    """Drop the steps from layer k that break (6) with every kept step on; count the tests."""
     first, second, tests = cells.start[k], cells.start[k + 1], 0
     D = np.empty((2, len(bound)))
     for a in range(first, second):
@@ -204,7 +206,7 @@ def keep_back(
 
 @jit
 def blame_steps(cells: Cells, step: Step, k: int, live: Bools, out_blame: Ints) -> None:
-    """Count the steps from live cells of layer k that break (5), by the joint most over."""
+    """Count the steps from live cells of layer k that break (5), by the joint with most excess."""
     for a in range(cells.start[k], cells.start[k + 1]):
         if not live[a]:
             continue

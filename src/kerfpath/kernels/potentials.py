@@ -1,7 +1,7 @@
-"""The potential of a stage, backwards: what a motion still costs at least, by cells of gamma.
+"""The potential of a stage, computed backwards: the least cost to come, by cells of gamma.
 
 The slopes of a cut come from the step that seems best from one end of the cell (a guess, which
-may be wrong); its level is what is then proved, the least over all cells that a step can lead to.
+may be wrong); its level is then proved: the least over all cells that a step can lead to.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ def _proved(
     enough: float,
     other: Array,
 ) -> float:
-    """Return what a step from cell a to b costs at least, with V there and the slopes y here.
+    """Return a lower bound of the cost of a step from cell a to b, with V at b and slopes y at a.
 
-    By the slopes y alone if that is enough; else the best of what other slopes prove as well. A
-    joint that may go either way round has no increment that a slope could be set against: 0 then.
+    The slopes y alone are used if they prove ``enough``; else the best of several slopes counts. A
+    joint that may go either way round has no definite increment, and its slope is then 0.
     """
     best = -np.inf
     if way == 1:
@@ -79,7 +79,7 @@ def _either_way(cells: Cells, step: Step, a: int, b: int, i: int, d: float) -> b
 
 @jit_inline
 def _along(D: Array, y: Array) -> float:
-    """Return y . D, rounded towards less."""
+    """Return y . D, rounded down."""
     total, size = 0.0, 0.0
     for i in range(len(y)):
         x = y[i] * D[i]
@@ -92,7 +92,7 @@ def _along(D: Array, y: Array) -> float:
 def _turned(
     cells: Cells, potential: Potential, step: Step, a: int, b: int, D: Array, y: Array, z: Array
 ) -> float:
-    """Return what slopes z prove of the step, the cut at cell a having slopes y."""
+    """Return the bound that slopes z prove for the step; the cut at cell a has slopes y."""
     still = True
     for i in range(len(z)):
         still = still and z[i] == 0.0
@@ -116,9 +116,9 @@ def _level(
     other: Array,
     out_proved: Array,
 ) -> float:
-    """Return the level of a cut of cell a with slopes y; fill what each step from it costs.
+    """Return the level of a cut of cell a with slopes y; fill the least cost of each step from it.
 
-    The step that seems best goes first, so that of most others a glance is enough.
+    The step that seems best is tested first, so that a quick test suffices for most others.
     """
     least, price = np.inf, beyond(y, step)
     for i in range(len(y)):
@@ -142,7 +142,7 @@ def _level(
 
 @jit_inline
 def _apart(cells: Cells, step: Step, a: int, b: int, D: Array) -> float:
-    """Return the least distance of cell a from cell b, and what its tilt may take off it."""
+    """Return the least distance of cell a from cell b, less what the tilt may take off it."""
     total, tilted = 0.0, 0.0
     for i in range(len(D)):
         wide = cells.box[a, i] + cells.box[b, i]
@@ -155,7 +155,7 @@ def _apart(cells: Cells, step: Step, a: int, b: int, D: Array) -> float:
 
 @jit_inline
 def _flat_level(potential: Potential, step: Step, ahead: Ints, other: Array) -> float:
-    """Return the level of a cut without slopes: the least of what is ahead."""
+    """Return the level of a cut without slopes, from the least of the cells ahead."""
     for i in range(len(other)):
         other[i] = 0.0
     least = np.inf
@@ -166,7 +166,7 @@ def _flat_level(potential: Potential, step: Step, ahead: Ints, other: Array) -> 
 
 @jit_inline
 def close_cut(cells: Cells, potential: Potential, a: int, none: Array) -> None:
-    """Fill what the cuts of cell a come to along its curve, and the least of them on it."""
+    """Fill the slopes of the cuts of cell a along its curve, and their least value on the cell."""
     for m in range(2):
         along, bent = 0.0, 0.0
         for i in range(cells.slope.shape[1]):
@@ -184,7 +184,7 @@ def reach_cells(
 ) -> None:
     """Count the live cells of layer k + 1 that a step from cells first..last-1 of layer k reaches.
 
-    A cell is live where its level (C, 2) is finite: from others no motion goes on to the end.
+    A cell is live if its level (C, 2) is finite: from others no motion leads to the end.
     """
     run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
     for a in range(first, last):
@@ -198,7 +198,7 @@ def reach_cells(
 
 @jit
 def link_cells(cells: Cells, step: Step, k: int, out_after: Bools, out_before: Bools) -> None:
-    """Mark the cells of layer k that a step leads on from, and those of layer k + 1 it leads to."""
+    """Mark the cells of layer k from which a step leads on, and those of layer k + 1 it reaches."""
     run, D = np.empty(2, np.int64), np.empty(len(step.velocity))
     for a in range(cells.start[k], cells.start[k + 1]):
         window(cells, step, a, k, run)
@@ -222,8 +222,8 @@ def lay_potential(
 ) -> None:
     """Lay the potential over cells first..last-1 of layer k; fill the reduced costs of their steps.
 
-    The steps of cell a are begin[a]..begin[a+1]-1: out_to says which cell each leads to. Those that
-    cost more than `care` beyond the cheapest may be given less than could be proved of them.
+    The steps of cell a are begin[a]..begin[a+1]-1; out_to has the cell that each leads to. Steps
+    that cost more than `care` beyond the cheapest may get a smaller bound than could be proved.
     """
     n, most = len(step.velocity), 0
     for a in range(first, last):
@@ -275,9 +275,9 @@ def lay_potential(
 def cross_cells(
     start: Ints, begin: Ints, to: Ints, cost: Array, out_ahead: Array, out_behind: Array
 ) -> None:
-    """Fill the least of the reduced costs up to each cell and from it on, (C,) each.
+    """Fill the least sum of reduced costs up to each cell and from it on, (C,) each.
 
-    ``out_behind`` holds, for the cells of the first layer, what the potential is there at least;
+    On entry ``out_behind`` has the least value of the potential on the cells of the first layer;
     ``out_ahead`` is zero at the last layer. Cells that no motion passes get infinity.
     """
     last = len(start) - 2

@@ -1,8 +1,8 @@
-"""Where the states of a vertex can go on to: what (5) and (6) leave of the next layer.
+"""The part of the next layer that the states of a vertex can reach under (5) and (6).
 
-The increments that (6) allows after any of the states that end in a vertex lie in a box, and with
-(5) in a smaller one. A look at which vertices lie in it takes several at once and leaves few for
-the tests that take one by one.
+The increments that (6) allows after any of the states that end in a vertex lie in a box, which (5)
+makes smaller. The test of which vertices lie in the box takes several at once, and leaves few for
+the tests of single vertices.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ def _fill_reach(
     layers: SortedLayers, aim: Aim, states: States, a: int, b: int, p: int,
     out_to: Array, out_by: Array,
 ) -> None:  # fmt: skip
-    """Fill the box, middle (n,) and half width (n,) rad, that the states a..b of p can go on to.
+    """Fill the box, middle (n,) and half width (n,) rad, that the states a..b of p can reach.
 
-    Within it lies all that (5) and, for any of these states, (6) allow.
+    It contains every vertex that (5) and, for any of these states, (6) allow.
     """
     free = aim.timed
     for s in range(a, b):
@@ -54,7 +54,7 @@ def _inside(layers: SortedLayers, to: Array, by: Array, a: int, m: int) -> np.ui
 
 @jit_vector
 def _inside_of(q: Array, turn: Array, to: Array, by: Array, a: int, m: int, n: int) -> np.uint64:
-    """As `_inside`, of n joints: a straight line of code that vectorises."""
+    """As `_inside`, for n joints: branch-free code that vectorises."""
     mask, begin = np.uint64(0), np.uintp(a)
     for v in range(np.uintp(m)):
         over = -np.inf
@@ -69,9 +69,9 @@ def fill_candidates(
     layers: SortedLayers, aim: Aim, states: States, a: int, b: int, k: int, p: int,
     out: Scratch,
 ) -> int:  # fmt: skip
-    """Fill the vertices that lie in the box that the states a..b of p can go on to; their number.
+    """Fill the vertices in the box that the states a..b of p can reach; return their number.
 
-    All that (5) and (6) allow are among them, and few others.
+    They include every vertex that (5) and (6) allow, and few others.
     """
     _fill_reach(layers, aim, states, a, b, p, out.to, out.by)
     count, end = 0, layers.start[k + 2]

@@ -1,16 +1,16 @@
 """Reduced costs: the least that a step from cell to cell costs, measured by a potential.
 
 Over a cell the joints are q(t) = c + s t + [k] t^2 / 2 +- r, |t| <= h (`kernels.enclosure`). A
-potential V has two cuts a cell, V(q) = max_m level_m - y_m . (q - c). For a step u = q' - q with
+potential V has two cuts per cell, V(q) = max_m level_m - y_m . (q - c). For a step u = q' - q with
 |u| <= v, and any vector y,
 
     rho(u) + mu . u >= y . u - P(y),    P(y) the most by which y . u can exceed it,
 
-so that the step from cell c to c' costs, with V' at its end and V at its beginning, at least
+so that the step from cell c to c', with V' at its end and V at its beginning, costs at least
 
     y . D - P(y) + min_t' [y . (q' - c') + V'(q')] + min_t [(y_m - y) . (q - c)] - level_m,
 
-D = c' - c: the two minima are over one cell each. All sums are rounded towards less.
+with D = c' - c. Each of the two minima is over one cell. All sums are rounded down.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ __all__ = [
 ]
 
 SLACK = 1e-14
-"""Share of the terms of a sum of a few dozen that rounding may cost, with room."""
+"""Relative rounding error of a sum of a few dozen terms, with a margin."""
 
 
 class Cells(NamedTuple):
     """Cells of gamma, node after node; within a node by the joint `key`.
 
-    ``start`` (K+1,); ``center``, ``slope``, ``bend`` (middle of the curvature), ``spread`` (what
-    is not known of the joint, rad) and ``box`` (how far a joint may be from its centre) (C, n);
-    ``half`` (C,) rad; ``widest`` (K,) the largest box of the joint ``key`` in each layer.
+    ``start`` is (K+1,). ``center``, ``slope``, ``bend`` (middle of the curvature), ``spread``
+    (uncertainty of the joint, rad) and ``box`` (how far a joint may be from its centre) are (C, n).
+    ``half`` is (C,) rad; ``widest`` (K,) is the largest box of the joint ``key`` in each layer.
     """
 
     start: Ints
@@ -64,7 +64,7 @@ class Cells(NamedTuple):
 class Potential(NamedTuple):
     """Levels (C, 2) and slopes (C, 2, n) of the cuts, and the slopes along s and k, (C, 2).
 
-    ``least`` (C,): no more than V is anywhere on the cell.
+    ``least`` (C,) is a lower bound of V on the cell.
     """
 
     level: Array
@@ -75,9 +75,9 @@ class Potential(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What a step costs and may be: weights, tilt mu, velocity bound v (n,), metric, endless.
+    """Cost and limits of a step: weights, tilt mu, velocity bound v (n,), metric, endless.
 
-    ``most``: what it may cost, infinite where there is no such limit.
+    ``most`` is the largest cost allowed, infinite if there is no such limit.
     """
 
     weight: Array
@@ -90,9 +90,9 @@ class Step(NamedTuple):
 
 @jit_inline
 def near(cells: Cells, step: Step, a: int, b: int, out_D: Array) -> int:
-    """Fill D = c_b - c_a, endless joints the short way; 0 where no step within (5) joins the cells.
+    """Fill D = c_b - c_a, endless joints the short way; return 0 if no step within (5) joins them.
 
-    1 where the increments are the ones of D, 2 where an endless joint may go either way round.
+    Returns 1 if the increments are those of D, 2 if an endless joint may go either way round.
     """
     status = 1
     for i in range(len(out_D)):
@@ -108,7 +108,7 @@ def near(cells: Cells, step: Step, a: int, b: int, out_D: Array) -> int:
 
 @jit_inline
 def window(cells: Cells, step: Step, a: int, k: int, out_run: Ints) -> None:
-    """Fill the run of layer k + 1 in which all cells lie that a step from cell a may lead to."""
+    """Fill the run of layer k + 1 that contains all cells that a step from cell a may lead to."""
     first, last = cells.start[k + 1], cells.start[k + 2]
     key, keys, x = cells.key, cells.center[:, cells.key], cells.center[a, cells.key]
     wide = step.velocity[key] + cells.box[a, key] + cells.widest[k + 1]
@@ -162,7 +162,7 @@ def beyond(y: Array, step: Step) -> float:
     norm, size, free = 0.0, 0.0, 0.0
     for i in range(n):
         z = abs(y[i] - step.tilt[i])
-        if step.weight[i] == 0.0:  # its motion costs nothing that y could be set against
+        if step.weight[i] == 0.0:  # its motion costs nothing to balance y
             free += z * step.velocity[i]
             continue
         size += z * step.velocity[i]
@@ -194,7 +194,7 @@ def lean(cells: Cells, a: int, y: Array, z: Array) -> float:
 
 @jit_inline
 def least_ahead(cells: Cells, potential: Potential, b: int, y: Array) -> float:
-    """Return a lower bound of y . (q - c) + V(q) over cell b: the larger of two lines, bent."""
+    """Return a lower bound of y . (q - c) + V(q) over cell b: the larger of two bent lines."""
     slope, bend, off0, off1 = 0.0, 0.0, 0.0, 0.0
     for i in range(len(y)):
         slope += y[i] * cells.slope[b, i]

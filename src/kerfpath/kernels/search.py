@@ -1,7 +1,7 @@
 """The path planning procedure of section 3.2: recursion (16) with the tests (5) and (6).
 
-A layered graph arrives sorted: within each layer by one key (a joint, or the posture), so that the
-vertices of the layer before that can pass the velocity test lie in one or two short runs.
+The layered graph is sorted within each layer by one key (a joint, or the posture), so that the
+vertices of the next layer that can pass the velocity test are one or two short runs.
 """
 
 from __future__ import annotations
@@ -38,70 +38,70 @@ __all__ = [
 
 
 class SortedLayers(NamedTuple):
-    """A layered graph as the kernels take it: vertices by column, sorted in each layer."""
+    """A layered graph in the form of the kernels: vertices are columns, sorted in each layer."""
 
     q: Array
     """(n, N) rad, endless joints wrapped to (-pi, pi]."""
     given: Array
-    """(n, N) rad, not wrapped: what increments are taken of; q itself where nothing is wrapped."""
+    """(n, N) rad, not wrapped: increments are taken of these; q itself if no joint is wrapped."""
     start: Ints
     """(K+1,): layer k is q[:, start[k]:start[k+1]]."""
     cost: Array
-    """(N,): what visiting a vertex costs, finite."""
+    """(N,): cost of visiting a vertex, finite."""
     rank: Ints
-    """(N,): place of each vertex in its layer as the user gave it; breaks ties."""
+    """(N,): index of each vertex in its layer in the order given by the user; breaks ties."""
     low: Ints
-    """(N,): edges from vertex p can lead to the vertices low[p]..high[p]-1 of the next layer;"""
+    """(N,): edges from vertex p can lead to the vertices low[p]..high[p]-1 of the next layer."""
     high: Ints
-    """(N,): where high[p] < low[p], the run goes on at the beginning of that layer."""
+    """(N,): if high[p] < low[p], the run continues at the beginning of that layer."""
     endless: Bools
     turn: Array
     """(n,): 2 pi for endless joints, infinity for the others."""
     after: Ints
-    """(K,): a path may break off at layer after[k], an earlier one, and begin again at layer k, for
-    the cost up to there; -1: it may not."""
+    """(K,): a path may break off at the earlier layer after[k] and begin again at layer k, with the
+    cost up to after[k]; -1: it may not."""
     shut_from: Ints
-    """(N+1,): edges that are shut lead from vertex p to shut[shut_from[p]:shut_from[p+1]];"""
+    """(N+1,): the shut edges from vertex p lead to shut[shut_from[p]:shut_from[p+1]]."""
     shut: Ints
-    """(S,): vertices, those of one p in growing order. Both are empty where no edge is shut."""
+    """(S,): vertices, ascending for each p. Both arrays are empty if no edge is shut."""
 
 
 class LostTime(NamedTuple):
-    """What the time costs that steps ask for beyond their node interval."""
+    """The cost of time that steps take beyond their node interval."""
 
     penalty: float = 0.0
-    """Cost of one node interval of lost time; 0 where time has no price."""
+    """Cost of one node interval of lost time; 0 if time has no price."""
     stretch: float = 1.0
-    """`Aim.velocity` is this many times what a step covers without losing time,"""
+    """`Aim.velocity` divided by the increment that a step covers without losing time."""
     leap: float = np.inf
-    """and a step beyond it costs this or more; infinite if there are none."""
+    """Least cost of a step beyond `Aim.velocity`; infinite if there are none."""
 
 
 class Aim(NamedTuple):
-    """What (14) or (15) puts together, and the bounds (5) and (6) on increments, and on torques."""
+    """The objective (14) or (15), the bounds (5) and (6) on increments, and bounds on torques."""
 
     weight: Array
     """(n,) 1/rad."""
     metric: int
     minimax: bool
-    """(15), not (14)."""
+    """Whether the objective is (15) instead of (14)."""
     velocity: Array
     """(n,) rad: largest increment of each joint."""
     acceleration: Array
     """(n,) rad: largest change of its increment."""
     cap: float = np.inf
-    """Largest distance, and largest cost of a vertex, that is allowed."""
+    """Largest distance, and largest cost of a vertex, allowed."""
     timed: bool = False
-    """(6) does not forbid a change: it asks for the node intervals in which it would hold, which
-    are costs by (15), and by (14) cost what `lost` says."""
+    """Whether (6), instead of forbidding a change, takes the node intervals in which it would hold:
+    with (15) they are the cost, with (14) they cost what `lost` says."""
     lost: LostTime = LostTime()
     torque: TorqueTest = NO_TORQUE
-    """Held by the exact recursion, where nothing is timed."""
+    """Torque limits, kept by the exact recursion if it is not `timed`."""
 
 
 @jit
 def count_within(here: Array, there: Array, bound: Array, endless: Bools, out_count: Ints) -> None:
-    """Add to out_count (n,), joint by joint, the pairs of vertices within its bound; q (m, n)."""
+    """Add to out_count (n,), for each joint, the pairs of vertices within its bound; q (m, n)."""
     for p in range(len(here)):
         for j in range(len(there)):
             for i in range(len(bound)):
@@ -133,11 +133,11 @@ def arrange(
 def windows(
     key: Array, start: Ints, width: float, circular: bool, out_low: Ints, out_high: Ints
 ) -> None:
-    """Find the edges that may be admissible, from each vertex a run of the next layer (Eq. 12).
+    """Find the edges that may be admissible: for each vertex a run of the next layer (Eq. 12).
 
-    Each layer is sorted by `key` (N,), and along an admissible edge the key changes by `width` at
-    most (modulo 2 pi if `circular`): all other edges of (12) break the velocity limit. As the key
-    grows, both ends of the run move on, and start again where the circle closes.
+    Each layer is sorted by `key` (N,), and along an admissible edge the key changes by at most
+    `width` (modulo 2 pi if `circular`): all other edges of (12) break the velocity limit. As the
+    key grows, both ends of the run advance, and start again where the circle closes.
     """
     for k in range(len(start) - 2):
         a, b = start[k + 1], start[k + 2]
@@ -170,7 +170,7 @@ def runs(
 
 @jit_inline
 def shut_edges(layers: SortedLayers, p: int) -> tuple[int, int]:
-    """Return where in `shut` the edges from vertex p stand, a..b; a == b where none is shut."""
+    """Return the range a..b of `shut` with the edges from vertex p; a == b if none is shut."""
     if len(layers.shut) == 0:
         return 0, 0
     return layers.shut_from[p], layers.shut_from[p + 1]
@@ -178,7 +178,7 @@ def shut_edges(layers: SortedLayers, p: int) -> tuple[int, int]:
 
 @jit_inline
 def first_from(key: Array | Ints, a: int, b: int, x: float) -> int:
-    """First of a..b whose key is not below x, keys ascending; b where there is none."""
+    """First index of a..b whose key is not below x, keys ascending; b if there is none."""
     while a < b:
         middle = (a + b) // 2
         if key[middle] < x:
@@ -210,13 +210,13 @@ def distance(layers: SortedLayers, aim: Aim, p: int, j: int) -> float:
 
 @jit_inline
 def combined(minimax: bool, a: float, b: float) -> float:
-    """Costs put together: added by (14), or the larger by (15)."""
+    """Combine two costs: their sum for (14), the larger for (15)."""
     return max(a, b) if minimax else a + b
 
 
 @jit_inline
 def late_cost(lost: LostTime, time: float) -> float:
-    """Price of a step that asks for `time` node intervals."""
+    """Price of a step that takes `time` node intervals."""
     return lost.penalty * max(0.0, time - 1.0)
 
 
@@ -234,7 +234,7 @@ def _offer(
 ) -> None:  # fmt: skip
     """Offer vertex p of layer k as predecessor to the vertices its edges lead to, step (2b).
 
-    out_free keeps the best offer whatever its acceleration; dq, dq_before (n,) are room to work in.
+    out_free keeps the best offer regardless of acceleration; dq, dq_before (n,) are scratch arrays.
     """
     if k > 0:
         fill_increment(layers, out_before[p], p, dq_before)
@@ -262,7 +262,7 @@ def _step(
     layers: SortedLayers, aim: Aim, k: int, dq: Array, dq_before: Array,
     out_dist: Array, out_before: Ints, out_free: Array,
 ) -> tuple[bool, bool]:  # fmt: skip
-    """Step (2) from layer k to the next: whether any vertex was reached, and any turned away."""
+    """Step (2) from layer k to the next: whether any vertex was reached, and any was refused."""
     for p in range(layers.start[k], layers.start[k + 1]):
         if out_dist[p] < np.inf:
             _offer(layers, aim, k, p, dq, dq_before, out_dist, out_before, out_free)
@@ -282,7 +282,7 @@ def path_planning(
 
     Steps (1) and (2) of the procedure, with (5) in (2b-beta) and, greedily, (6) in (2b-gamma): the
     acceleration is tested against the best predecessor of p only. Returns the number of layers
-    reached, and whether the greedy test ever turned away a better edge (if not, the recursion was
+    reached, and whether the greedy test ever refused a better edge (if not, the recursion was
     exact).
     """
     n, K, turned_away = len(layers.endless), len(layers.start) - 1, False

@@ -1,6 +1,6 @@
-"""Slopes of a potential, guessed: from the step that seems best from one end of a cell.
+"""Guess the slopes of a potential from the step that seems best from one end of a cell.
 
-A guess may be wrong: what it is worth is proved after (`kernels.potentials`).
+A guess may be wrong; `kernels.potentials` then proves what it is worth.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from kerfpath.kernels.reduced import Cells, Potential, Step, tangent
 __all__ = ["flatten", "guess_slopes"]
 
 PENALTY = 10.0
-"""Price of an increment beyond (5), in weights: a guess looks for the way back."""
+"""Price of an increment beyond (5), in weights: it leads a guess back within (5)."""
 STILL = 1e-10
-"""rad: a joint that moves less stands still."""
+"""rad: a joint that moves less counts as still."""
 HALVINGS = 30
-"""Steps of the search along a cell for metrics that are not linear."""
+"""Steps of the search along a cell for metrics that are not Manhattan."""
 UNSURE = 0.03
-"""rad: a joint known no better on a cell makes a slope worth less than it costs wherever what leads
-to the cell was not laid with the same one."""
+"""rad: a joint that is less certain than this on a cell gets no slope. The slope would lose more
+than it gains wherever the cells that lead there do not have the same slope."""
 
 
 @jit_inline
 def _price(
     D: Array, cells: Cells, potential: Potential, step: Step, b: int, t: float, penalty: float
 ) -> float:
-    """Return what a step by D, and on to t in cell b, is guessed to cost from there to the end."""
+    """Return the estimated cost to the end of a step by D and on to t in cell b."""
     total, tilted, over = 0.0, 0.0, 0.0
     for i in range(len(D)):
         u = D[i] + cells.slope[b, i] * t
@@ -49,7 +49,7 @@ def _price(
 def _best_along(
     D: Array, cells: Cells, potential: Potential, step: Step, b: int
 ) -> tuple[float, float]:
-    """Return where in cell b a step is guessed to cost least, and what."""
+    """Return the t in cell b where a step is estimated to cost least, and that cost."""
     h = cells.half[b]
     if step.metric != MANHATTAN:
         low, high = -h, h
@@ -88,7 +88,7 @@ def _balance(
 ) -> None:
     """Fill slopes (n,) of the cost of the step to t in cell b that balance those of V there.
 
-    Where a joint stands still, or is at its velocity limit, its slope may be any in a range.
+    The slope of a joint that is still, or at its velocity limit, may have any value in a range.
     """
     level0 = potential.level[b, 0] - potential.along[b, 0] * t
     level1 = potential.level[b, 1] - potential.along[b, 1] * t
@@ -139,7 +139,7 @@ def guess_slopes(
     floor: Array,
     out_y: Array,
 ) -> int:
-    """Fill the slopes of the step that seems best from t in cell a; return which of the ahead."""
+    """Fill the slopes of the step that seems best from t in cell a; return its index in `ahead`."""
     first, least = -1, np.inf
     for p in range(len(ahead)):
         b, reach = ahead[p], 0.0
@@ -169,10 +169,10 @@ def guess_slopes(
 
 @jit_inline
 def flatten(cells: Cells, a: int, out_y: Array) -> None:
-    """Take the slopes (n,) of joints out that are hardly known on cell a.
+    """Set the slopes (n,) of joints that are hardly known on cell a to zero.
 
-    Beside a singularity a joint may be almost anywhere on a cell, and a cut that slopes with it
-    lies far below its level somewhere: steps that cannot follow the slope look cheap by as much.
+    Near a singularity a joint may be almost anywhere on a cell, and a cut with a slope in that
+    joint is far below its level somewhere: steps that cannot follow the slope then look too cheap.
     """
     for i in range(len(out_y)):
         if cells.spread[a, i] > UNSURE:

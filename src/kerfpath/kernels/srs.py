@@ -1,15 +1,15 @@
-"""Forward and inverse kinematics of seven-axis arms of type S-R-S, with joint 3 given, in bulk.
+"""Forward and inverse kinematics of seven-axis arms of type S-R-S, with joint 3 given, batched.
 
-Shoulder (axes 1 to 3) and wrist (axes 5 to 7) are spherical, between them is the elbow (axis 4).
-With all angles at zero the arm stands upright, its axes alternately along z and y: the shoulder c1
-above the foot, the elbow c2 further, the wrist centre c3 and the end c4. A pose leaves one number
-free. Often that is the angle of the elbow's plane; here it is joint 3, whose limits then are those
-of the free number itself (compare M. Shimizu, H. Kakuya, W.-K. Yoon, K. Kitagaki and K. Kosuge,
-"Analytical inverse kinematic computation for 7-DOF redundant manipulators with joint limits and its
-application to redundancy resolution", IEEE Transactions on Robotics 24(5), 2008).
+Shoulder (axes 1 to 3) and wrist (axes 5 to 7) are spherical; the elbow (axis 4) is between them.
+With all angles at zero the arm is upright, its axes alternately along z and y: the shoulder is c1
+above the foot, the elbow c2 further, then the wrist centre c3 and the end c4. A pose leaves one
+parameter free. It is often the angle of the elbow's plane; here it is joint 3, so that the limits
+of joint 3 are those of the free parameter (compare M. Shimizu, H. Kakuya, W.-K. Yoon, K. Kitagaki
+and K. Kosuge, "Analytical inverse kinematic computation for 7-DOF redundant manipulators with joint
+limits and its application to redundancy resolution", IEEE Transactions on Robotics 24(5), 2008).
 
-Posture mu = 4 * shoulder + 2 * elbow + wrist: the wrist centre ahead of axis 1 (front) 0, behind it
-(rear) 1; joint 4 bent forwards in front and backwards in the rear (up) 0, or else (down) 1; wrist
+Posture mu = 4 * shoulder + 2 * elbow + wrist: wrist centre ahead of axis 1 (front) 0, behind it
+(rear) 1; joint 4 bent forwards in front or backwards in the rear (up) 0, else (down) 1; wrist
 plus 0, minus 1 (sign of the model's sixth angle). With joint 3 at zero they are the postures of
 an ortho-parallel arm (`kernels.kinematics`).
 """
@@ -121,7 +121,7 @@ def inverse(arm: SrsArm, T: Array, q3: float, out_q: Array, out_reach: Bools) ->
         front = 1.0 if shoulder == 0 else -1.0
         for elbow in range(2):
             s4 = (front if elbow == 0 else -front) * bend
-            # The wrist centre seen from joint 2; what joint 2 does to it, and then joint 1.
+            # The wrist centre in the frame of joint 2; then turned by joint 2, and by joint 1.
             ux, uy, uz = arm.c3 * s4 * k3, arm.c3 * s4 * s3, arm.c2 + arm.c3 * k4
             rr, vv = ux * ux + uz * uz, ww - uy * uy
             if vv < -REACH * reach:

@@ -1,4 +1,4 @@
-"""The states of the exact recursion in one layer, and how they are kept and put in order."""
+"""The states of the exact recursion in one layer, and how they are stored and sorted."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ __all__ = ["EVERY", "Scratch", "States", "group_by_vertex", "joined_states", "wi
 _T = TypeVar("_T", bound="np.generic[Any]")
 
 EVERY = 2**62
-"""States of a vertex that are kept: all."""
+"""A width that keeps all states of a vertex."""
 LONG = 32
-"""Edges into one vertex from which on sorting them one by one takes longer than by halves."""
+"""Number of edges into one vertex above which merge sort is faster than insertion sort."""
 
 
 class States(NamedTuple):
-    """The edges into one layer that are kept, by the vertex they lead to, cheapest first."""
+    """The edges kept into one layer, grouped by the vertex they lead to, cheapest first."""
 
     vertex: Ints
     """(S,): the vertex j that the edge leads to."""
@@ -31,28 +31,28 @@ class States(NamedTuple):
     dq: Array
     """(S, n): increment along the edge."""
     parent: Ints
-    """(S,): place, among the states of the layer before, of the edge that comes before."""
+    """(S,): index of the preceding edge among the states of the layer before."""
     first: Ints
-    """(m+1,): states of vertex start[k] + i are first[i]:first[i+1]."""
+    """(m+1,): the states of vertex start[k] + i are first[i]:first[i+1]."""
 
 
 class Scratch(NamedTuple):
-    """Room to work in, made once a layer."""
+    """Scratch arrays, created once per layer."""
 
     vertex: Ints
     """(m,): vertices of the next layer."""
     dq: Array
     """(n,): an increment."""
     to: Array
-    """(n,): middle of the box,"""
+    """(n,): middle of the box."""
     by: Array
-    """(n,): and its half width."""
+    """(n,): half width of the box."""
     torque: TorqueRoom
 
 
 @jit_part
 def with_more_room(old: NDArray[_T]) -> NDArray[_T]:
-    """Return a copy with room for as many again."""
+    """Return a copy with twice the room."""
     new = np.empty((2 * len(old), *old.shape[1:]), old.dtype)
     new[: len(old)] = old
     return new
@@ -60,7 +60,7 @@ def with_more_room(old: NDArray[_T]) -> NDArray[_T]:
 
 @jit_part
 def joined_states(one: States, two: States) -> States:
-    """Return the states of the one and then those of the other, not in order."""
+    """Return the states of both, not sorted."""
     return States(
         np.concatenate((one.vertex, two.vertex)),
         np.concatenate((one.d, two.d)),
@@ -72,9 +72,9 @@ def joined_states(one: States, two: States) -> States:
 
 @jit_part
 def group_by_vertex(states: States, a: int, b: int, width: int) -> States:
-    """Group states by their vertex a..b-1, cheapest first; ties keep the order of their making.
+    """Group states by their vertex a..b-1, cheapest first; ties keep their order.
 
-    Of each vertex only the `width` cheapest are kept.
+    Only the `width` cheapest of each vertex are kept.
     """
     vertex, d = states.vertex, states.d
     first = np.zeros(b - a + 1, np.int64)

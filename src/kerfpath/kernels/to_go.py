@@ -1,7 +1,7 @@
-"""The first-order problem solved backwards: a bound h(j) on what a path still costs.
+"""The first-order problem solved backwards: a bound h(j) on the cost to come.
 
-Recursion (16) from the last layer to the first, with (5) and without (6): never more than what is
-really to come, and all that the exact search needs to leave out what cannot be part of the best.
+Recursion (16) runs from the last layer to the first, with (5) and without (6). The bound never
+exceeds the true cost to come, so that the exact search can drop what cannot be part of the best.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from kerfpath.kernels.search import Aim, SortedLayers, combined, shut_edges
 __all__ = ["LANES", "SIX", "cost_to_go"]
 
 LANES = 8
-"""Numbers that one instruction works on; runs are made whole multiples of it where they can be."""
+"""Numbers per vector instruction; runs are lengthened to multiples of it where possible."""
 SIX = 6
-"""Joints of a robot arm; with a constant number of them the loop over them is written out."""
+"""Joints of a robot arm; a constant number lets the compiler unroll the loop over them."""
 
 
 @jit
 def cost_to_go(layers: SortedLayers, aim: Aim, allowed: Bools, out_h: Array) -> None:
-    """First-order bound h (N,): least cost from each vertex to the last layer, its own left out.
+    """First-order bound h (N,): least cost from each vertex to the last layer, without its own.
 
     Vertices that are not allowed, or from which no edges within (5) lead to the end, get infinity.
     """
@@ -48,9 +48,9 @@ def cost_to_go(layers: SortedLayers, aim: Aim, allowed: Bools, out_h: Array) -> 
 def _join(
     minimax: bool, cost: Array, allowed: Bools, anew: float, out_h: Array, out_tail: Array
 ) -> float:
-    """Close the vertices that are not allowed, and join what is to come with their own cost.
+    """Close the vertices that are not allowed, and join the cost to come with their own cost.
 
-    Returns the least of what has been joined.
+    Returns the least of the joined costs.
     """
     least = np.inf
     for v in range(len(cost)):
@@ -65,10 +65,10 @@ def _join(
 def _layer_to_go(
     layers: SortedLayers, aim: Aim, slowness: Array, k: int, tail: Array, out_h: Array
 ) -> None:
-    """For each vertex p of layer k the least of its distance to a next vertex joined with its tail.
+    """Fill, for each vertex p of layer k, the least of distance and tail of a next vertex, joined.
 
-    A run is lengthened to whole `LANES`: what it takes in breaks (5), or it would be in the run.
-    While p is looked at, the tails that its shut edges lead to are infinite.
+    A run is lengthened to full `LANES`: the vertices added break (5), or they would be in the run.
+    While p is processed, the tails at the ends of its shut edges are infinite.
     """
     first, last = layers.start[k + 1], layers.start[k + 2]
     for p in range(layers.start[k], layers.start[k + 1]):
@@ -93,11 +93,11 @@ def _least(
 ) -> float:
     """Least of the distances from vertex p to the vertices a..a+m-1, joined with their tails.
 
-    With a penalty, the price of the time that the step asks for counts with the distance. What is
-    handed on as a constant is not in the loop.
+    With a penalty, the price of the time that the step takes is added to the distance. Arguments
+    passed as constants keep their branches out of the loop.
     """
     n = len(slowness)
-    none = aim.cap + np.inf  # infinity: a constant would be folded into jumps
+    none = aim.cap + np.inf  # infinity, not as a constant, which would be compiled into jumps
     if aim.lost.penalty > 0:
         if n == SIX:
             return _least_of(layers, aim, slowness, p, a, m, tail, True, SIX, none)
@@ -112,9 +112,9 @@ def _least_of(
     layers: SortedLayers, aim: Aim, slowness: Array, p: int, a: int, m: int, tail: Array,
     priced: bool, n: int, none: float,
 ) -> float:  # fmt: skip
-    """As `_least`, of n joints: the innermost loop of the first-order problem.
+    """As `_least`, for n joints: the innermost loop of the first-order problem.
 
-    The distance is that of `distance`, to the bit, in one straight line of code that vectorises.
+    The distance is the same to the bit as that of `distance`, in branch-free code that vectorises.
     """
     best, begin, q = np.inf, np.uintp(a), layers.q
     for v in range(np.uintp(m)):

@@ -1,9 +1,9 @@
-"""Torque limits as a test on a pair of edges, beside (6).
+"""Torque limits as a test of a pair of edges, in addition to (6).
 
-At the node between two edges the joints are q, and the increments before and after it say the
+At the node between two edges the joints are q, and the increments before and after it give the
 velocity, (dq + dq') / (2 dt), and the acceleration, (dq' - dq) / dt^2: central differences. The
-torques of the arm in that state are held to their bounds. Friction left out, they are the same
-with time reversed: what holds of a path holds of its reverse.
+torques of the arm in that state must be within their bounds. Without friction they are the same
+with time reversed, so that a path keeps its limits if its reverse does.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ __all__ = [
 ]
 
 TORQUE_TOLERANCE = 1e-9
-"""Slack on torque limits, as a share of them: far above rounding, far below any measurement."""
+"""Slack on torque limits, as a share of them: far above rounding, far below what is measurable."""
 
 
 class TorqueTest(NamedTuple):
-    """The bounds on torques, and what they are the torques of."""
+    """The bounds on torques, and the arm that they apply to."""
 
     arm: ArmBodies
     bound: Array
-    """(n,) N m; (0,) where torques are not limited."""
+    """(n,) N m; (0,) if torques are not limited."""
     dt: float
-    """s from node to node."""
+    """s: time from node to node."""
 
 
 def _nothing() -> TorqueTest:
@@ -47,28 +47,28 @@ def _nothing() -> TorqueTest:
 
 
 NO_TORQUE = _nothing()
-"""Torques are not limited."""
+"""A test without limits on torques."""
 
 
 class TorqueRoom(NamedTuple):
-    """Room to work in; it remembers at which vertex the arm was put last."""
+    """Scratch arrays, with the vertex at which the arm was posed last."""
 
     at: Posed
     vertex: Ints
-    """(1,): -1 before the first."""
+    """(1,): index of that vertex, -1 before the first."""
     q: Array
-    """(n,): joints,"""
+    """(n,): joints."""
     v: Array
-    """(n,): velocities,"""
+    """(n,): velocities."""
     a: Array
-    """(n,): accelerations,"""
+    """(n,): accelerations."""
     tau: Array
-    """(n,): and torques."""
+    """(n,): torques."""
 
 
 @jit_part
 def torque_room(n: int) -> TorqueRoom:
-    """Return room for an arm of n joints."""
+    """Return scratch arrays for an arm of n joints."""
     vertex = np.full(1, -1)
     return TorqueRoom(room_for(n), vertex, np.empty(n), np.empty(n), np.empty(n), np.empty(n))
 
@@ -77,9 +77,9 @@ def torque_room(n: int) -> TorqueRoom:
 def torque_excess(
     test: TorqueTest, given: Array, p: int, dq_before: Array, dq: Array, room: TorqueRoom
 ) -> int:
-    """First joint whose torque at vertex p, q = given[:, p], is over its bound, or -1.
+    """First joint whose torque at vertex p, q = given[:, p], exceeds its bound, or -1.
 
-    dq_before, dq (n,) are the increments to and from it, rad.
+    dq_before, dq (n,) are the increments to and from p, rad.
     """
     n = len(test.bound)
     if n == 0:
@@ -101,6 +101,6 @@ def torque_excess(
 
 @jit
 def exceeds_torque(test: TorqueTest, given: Array, p: int, dq_before: Array, dq: Array) -> bool:
-    """Whether any torque at a vertex is over its bound; the arguments are as of `torque_excess`."""
+    """Whether any torque at a vertex exceeds its bound; arguments as for `torque_excess`."""
     room = torque_room(len(test.bound))
     return torque_excess(test, given, p, dq_before, dq, room) >= 0

@@ -1,11 +1,11 @@
 """Admissible turns of a posture: joint limits q_min <= q <= q_max over I_q (section 2.2).
 
-A joint with a finite range admits every representative q + 2 pi t inside it, each a vertex of its
-own; an endless joint has one representative, compared modulo 2 pi by (13).
+A joint with a finite range admits every representative q + 2 pi t inside it, each as a separate
+vertex; an endless joint has one representative, compared modulo 2 pi by (13).
 
-Reason codes are places in `Robot.reasons`: the `Loss` where a pose is admitted or unreachable,
-LOW + 2 i and HIGH + 2 i for bound i, the couplings after the n joints, and one more than the last
-of these where the posture is not wanted.
+Reason codes are indices into `Robot.reasons`: the `Loss` if a pose is admitted or unreachable,
+LOW + 2 i and HIGH + 2 i for bound i, with the couplings after the n joints, and the next code if
+the posture is not wanted.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ ADMITTED, UNREACHABLE = int(Loss.ADMITTED), int(Loss.UNREACHABLE)
 LOW, HIGH = int(Loss.LOW), int(Loss.HIGH)
 
 EDGE = 1e-9
-"""Slack on joint limits, rad, so that rounding does not drop a pose that sits on a limit."""
+"""Slack on joint limits, rad, so that rounding does not drop a pose that is on a limit."""
 
 MOST_TURNS = 4096
-"""Room for the combinations of turns of one posture; six joints of 4 turns each."""
+"""Room for the combinations of turns of one posture: six joints with 4 turns each."""
 
 
 class JointLimits(NamedTuple):
-    """Ranges of the joints and of linear couplings of them, rad."""
+    """Ranges of the joints and of their linear couplings, rad."""
 
     lower: Array
     """(n,)"""
@@ -117,9 +117,9 @@ def count_admissible(
     out_count: Ints,
     out_reason: NDArray[np.uint8],
 ) -> None:
-    """Count the turns of q (K, m, P, n) per node, out_count (K,), and why poses drop, (K, m, P).
+    """Count the turns of q (K, m, P, n) per node, out_count (K,); fill out_reason (K, m, P).
 
-    wanted (P,) says which postures may be used.
+    out_reason is the reason why a pose is dropped; wanted (P,) marks the postures that may be used.
     """
     K, m, P, n = q.shape
     turn = np.empty((MOST_TURNS, n), np.int64)

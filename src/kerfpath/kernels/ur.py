@@ -1,14 +1,15 @@
-"""Forward and inverse kinematics of arms of the Universal Robots type, in bulk.
+"""Forward and inverse kinematics of arms of the Universal Robots type, batched.
 
 Axes 2, 3 and 4 are parallel, axis 1 is square to them and meets axis 2, axis 5 is square to axis 4
 and meets it, axis 6 is square to axis 5 and meets it. Lengths d1, a2, a3, d4, d5, d6 are the
-Denavit-Hartenberg parameters as the maker publishes them (alpha = 90, 0, 0, 90, -90, 0 deg). The
-order of solution is Hawkins, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10
+Denavit-Hartenberg parameters that the maker publishes (alpha = 90, 0, 0, 90, -90, 0 deg). The
+order of solution follows Hawkins, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10
 arms" (Georgia Tech, 2013): joint 1, joint 5, the sum of joints 2 to 4, the elbow. As in
-`kinematics`, sines and cosines are carried algebraically, and joint 6 follows from that sum, so
+`kinematics`, sines and cosines are computed algebraically, and joint 6 follows from that sum, so
 that poses near the wrist singularity keep full accuracy.
 
-In the plane of the arm, square to axis 2, x points ahead at q = 0 turned by joint 1 and y upwards.
+In the plane of the arm, square to axis 2, x is the direction ahead at q = 0, turned by joint 1, and
+y points upwards.
 
 Posture mu = 4 * shoulder + 2 * elbow + wrist: shoulder front 0 (axis 4 on the side of axis 1 that
 the arm reaches to at q2 = 0), rear 1; elbow up 0, down 1; wrist plus 0, minus 1 (sign of sin q5).
@@ -74,8 +75,8 @@ def forward(arm: UrArm, q: Array, out_T: Array) -> None:
 def _free_wrist(arm: UrArm, x: float, y: float, side: float) -> tuple[float, float]:
     """Return sine and cosine of theta where axes 4 and 6 are parallel and theta is free.
 
-    Axis 5 is taken square to the line from shoulder to wrist (x, y), on the `side` asked for, or
-    as near to that as brings axis 4 within reach of the two links.
+    Axis 5 is taken square to the line from shoulder to wrist (x, y), on the given `side`, or as
+    near to that as keeps axis 4 within reach of the two links.
     """
     D = sqrt(x * x + y * y)
     if D < ON_AXIS or abs(arm.d5) < ON_AXIS:

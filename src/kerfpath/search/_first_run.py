@@ -1,4 +1,4 @@
-"""A small search that compiles the kernels of the search over continuous gamma."""
+"""Compile the kernels of the search over continuous gamma by a small search."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["compile_search"]
 
 
 def compile_search() -> None:
-    """Search three nodes of four samples each, which compiles the kernels of `ContinuousSearch`."""
+    """Compile the kernels of `ContinuousSearch` by a search of three nodes with 4 samples each."""
     nodes, samples, joints = 3, 4, 6
     sample = np.tile(np.arange(samples), nodes)
     q = np.zeros((nodes * samples, joints))
