@@ -65,7 +65,7 @@ def studio(browser: Browser, folder: Path) -> None:
         (address,) = re.findall(r"http://\S+", server.stdout.readline())
         page = opened(browser, address, 1600, 900)
         page.wait_for_function(PLANNED, timeout=300_000)
-        page.get_by_role("option", name="trim").or_(page.get_by_text("trim", exact=True)).first.click()
+        page.get_by_text("trim", exact=True).first.click()
         page.wait_for_timeout(8000)
         page.screenshot(path=DOCS / "studio.png")
     finally:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from kerfpath import apart
+from kerfpath import apart, compiling
 from kerfpath.certificate import USUAL
 from kerfpath.certifier import _certify, _largest, _nopath
 from kerfpath.contour import Contour
@@ -49,6 +49,13 @@ _closed.MOST_BINDING = 2
 _largest.FAILED = 2
 USUAL_CEILING = _nopath.MOST_STEPS, _nopath.MOST_PAIRS
 _nopath.MOST_STEPS, _nopath.MOST_PAIRS = 200_000, 3_000_000
+
+
+def pytest_sessionstart(session):
+    """Compile the kernels of the main job once, before several workers each do so."""
+    if getattr(session.config.option, "numprocesses", None):  # of workers it is not set
+        for kinematics in compiling.EXAMPLES:
+            compiling.warm_up(kinematics)
 
 
 WITHOUT_KERNELS = {"cad", "sweep", "urdf", "test_apart.py"}

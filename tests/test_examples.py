@@ -29,6 +29,7 @@ def rows_of(folder):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_the_reduced_example_writes_a_table_an_account_and_pictures(written):
     assert {f.name for f in written.iterdir()} == {
         "README.md",

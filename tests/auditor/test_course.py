@@ -50,6 +50,7 @@ def middles(arm, course, q):
     return arm.nearest(course.poses(time), np.tile(q, (len(time), 1)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arcs", [False, True])
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", ARMS)

@@ -155,11 +155,13 @@ def with_stage(certificate, number, stage):
     return replace(certificate, stages=tuple(stages))
 
 
+@pytest.mark.slow
 def test_the_honest_certificate_proves_its_bound(honest):
     proved = judged(honest, honest.proof.certificate, honest.proof.bound)
     assert honest.proof.bound <= proved <= honest.cost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", HARMFUL)
 def test_what_leaves_motions_out_is_refused_in_every_stage(honest, kind):
     certificate, rng = honest.proof.certificate, np.random.default_rng(1)
@@ -170,6 +172,7 @@ def test_what_leaves_motions_out_is_refused_in_every_stage(honest, kind):
         assert judged(honest, spoilt, honest.proof.bound) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", DRAWN)
 def test_no_fault_proves_more_than_a_motion_costs(honest, kind):
     # The plan is said to cost more than it does: what is proved is then the certificate's alone.

@@ -45,6 +45,7 @@ def moved(point: np.ndarray, how: gp_Trsf) -> np.ndarray:
     return np.array([p.X(), p.Y(), p.Z()]) / 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sunk_from", ["", "left", "right"])
 @pytest.mark.parametrize("name", PROFILES)
 def test_the_outer_side_is_that_of_the_shape(tmp_path: Path, name: str, sunk_from: str) -> None:

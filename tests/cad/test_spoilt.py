@@ -40,6 +40,7 @@ def made(tmp_path_factory):
     return make
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", READERS)
 def test_a_spoilt_file_is_read_or_refused_in_one_line(made, name, capfd):
     wholes, sound = made(name)
@@ -150,5 +151,5 @@ def test_a_device_is_no_file(tmp_path, suffix):
     path = tmp_path / f"endless{suffix}"
     path.symlink_to("/dev/zero")
     reading = {".toml": read_job, ".urdf": Robot.from_urdf}.get(suffix, read)
-    with pytest.raises(InputError, match=f"endless{suffix}: is (no|not a regular) file"):
+    with pytest.raises(InputError, match=f"endless{suffix}: is not a (regular )?file"):
         reading(path)

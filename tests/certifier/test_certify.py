@@ -236,6 +236,7 @@ def test_nodes_where_a_plan_turns(made):
     assert np.diff(more).max() <= 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("metric", METRICS)
 def test_of_the_largest_step_the_bound_is_below_every_motion(metric, arc, arm, tool, placement):
     asked = {"tool": tool, "placement": placement, "speed": 0.3, "metric": metric}

@@ -137,6 +137,7 @@ def test_no_motion_is_ruled_out_by_limits_that_it_keeps(arm, tool, placement, wi
     assert done >= 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_no_plan_reaches_the_ceiling_of_the_speed(seed, arm, tool, placement):
     nodes = drawn(seed)

@@ -47,6 +47,7 @@ def course_of(one, gap=0.1):
     return course._Course(one, course._steps_of(one), gap, np.inf, False, lambda *_: None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("metric", METRICS)
 @pytest.mark.parametrize("size", [0.0, 1.0, 30.0])
 def test_any_multipliers_bound_no_motion_too_high(metric, size, planned, others, monkeypatch):
@@ -65,6 +66,7 @@ def test_any_multipliers_bound_no_motion_too_high(metric, size, planned, others,
     assert 0 <= bound <= min(best.cost, *others[metric])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("metric", ["manhattan", "euclid"])
 def test_the_multipliers_of_a_plan_bound_it_closer(metric, planned, others, monkeypatch):
     best = planned(metric=metric)

@@ -187,6 +187,7 @@ def test_a_part_out_of_reach_is_reported_without_a_program(folder):
     assert run("post", "far-plan/plan.json", cwd=folder).returncode == 1
 
 
+@pytest.mark.slow
 def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder, fastest):
     (folder / "fast.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = 30", 1))
     result = run("plan", "fast.toml", cwd=folder)
@@ -299,6 +300,7 @@ def test_an_older_program_in_the_folder_is_pointed_out(folder):
     assert "is from an earlier run and does not belong to this plan" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_refusal_says_that_no_rotation_would_do(folder, fastest):
     asked = f"speed_m_min = {1.3 * fastest['impossible_from_m_min']}"
     (folder / "never.toml").write_text(SMALL.replace("speed_m_min = 3", asked, 1))
@@ -313,6 +315,7 @@ def test_a_refusal_says_that_no_rotation_would_do(folder, fastest):
     assert float(said[1]) == pytest.approx(fastest["impossible_from_m_min"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_speed_names_the_fastest_and_what_binds(folder, fastest):
     result = run("speed", "small.toml", cwd=folder)
     assert result.returncode == 0, result.stderr

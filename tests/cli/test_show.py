@@ -43,6 +43,7 @@ def shown(text):
     return "".join(text.split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["plan", "tight", "audit", "speed", "check"])
 def test_names_and_verdicts_are_there_at_any_width(folder, width, name):
     arguments = {

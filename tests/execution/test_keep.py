@@ -136,6 +136,7 @@ def test_a_guarantee_is_refused_by_what_cannot_give_it(by, circle, arm, tool, pl
         by(circle, arm, tool=tool, placement=placement, speed=0.1, options=asked)
 
 
+@pytest.mark.slow
 def test_the_example_of_the_page_runs(capsys):
     page = (ROOT / "docs" / "programs.md").read_text()
     (code,) = [c for c in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "keep_limits" in c]

@@ -445,6 +445,7 @@ def test_the_same_run_comes_back_from_its_data(found, off_grid):
         np.testing.assert_array_equal(again.window, run.window)
 
 
+@pytest.mark.slow
 def test_the_page_on_pareto_sets_runs(capsys):
     page = (ROOT / "docs" / "pareto.md").read_text()
     for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):

@@ -94,6 +94,7 @@ def scripted(folder, text):
     return job, script
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text", [QUICK, FEATURES, CELLED, TURNED], ids=["plain", "features", "cell", "external"]
 )

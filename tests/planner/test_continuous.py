@@ -246,6 +246,7 @@ def test_a_motion_that_is_just_missed_is_looked_for_on_half_the_step():
     assert not audit(made)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("closure", "many"), [("free", 800), ("periodic", 800), ("free", 50)])
 def test_it_goes_around_what_is_in_the_way(task, arm, tool, placement, closure, many, monkeypatch):
     monkeypatch.setattr(_thinned, "MANY", many)  # intervals: there are 60
@@ -298,6 +299,7 @@ def test_feed_and_pieces_go_on_from_it(task, arm, tool, placement):
     assert any("continuous rotation" in piece.proof.statement for piece in pieces)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.2, 0.4])
 def test_a_feed_reduction_is_no_slower_for_paths_between_the_samples(
     monkeypatch, arm, tool, placement, speed

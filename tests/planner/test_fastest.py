@@ -48,6 +48,7 @@ def task(nodes, arm, tool, placement, speed=0.5, **options):
     return task_of(nodes, arm, asked, tool=tool, placement=placement, speed=speed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["continuous", "exact"])
 @pytest.mark.parametrize("seed", range(3))
 def test_at_the_fastest_speed_and_below_there_is_a_plan(seed, method, arm, space):
@@ -105,6 +106,7 @@ def test_the_fastest_speed_is_that_of_the_quickest_motion(arm, tool, placement, 
     assert told.on_grid == fastest_speed(nodes, arm, **space).speed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("share", [1.02, 3.0, 20.0])
 def test_a_refusal_says_with_what_a_motion_was_found(seed, share, arm, space):

@@ -134,6 +134,7 @@ def test_a_course_of_joint_3_may_be_given_and_is_refined(lbr):
         plan(cut, lbr, method="exact", **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interpolation", ["linear", "joint"])
 def test_it_rides_a_rail_and_in_a_cell(lbr, interpolation):
     rides = lbr.on_rail([0, 1, 0], lower=-1.0, upper=1.0, velocity=1.0, acceleration=2.0)

@@ -123,6 +123,7 @@ def test_signs_and_offsets_of_a_ur_are_kept():
     np.testing.assert_allclose(chain_of(r).forward(q), r.forward(q), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_ur_is_planned_and_audited_like_any_other():
     arm = robot("ur_ur10e", acceleration_ratio="cybertech_8_to_20kg")
     t = np.linspace(0, 2 * np.pi, 2001)

@@ -99,6 +99,7 @@ def by_sampling(q, start, samples, cost, weights, metric, objective, velocity, e
     return V
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", ["sum", "max"])
 @pytest.mark.parametrize("metric", METRICS)
 def test_the_values_are_those_of_dense_sampling(metric, objective):

@@ -136,6 +136,7 @@ def test_uneven_nodes_have_one_speed_the_same_for_both(uneven, arm, tool, placem
         plan(uneven, arm, speed=on_grid * 1.001, **options)
 
 
+@pytest.mark.slow
 def test_off_the_grid_it_is_faster_and_the_motion_keeps_the_limits(circle, arm, tool, placement):
     cell = {"tool": tool, "placement": placement, "gamma_step": np.radians(4)}
     on_grid = fastest_speed(circle, arm, **cell)

@@ -24,6 +24,7 @@ def heard(tmp_path_factory):
         yield path, page.heard[:]
 
 
+@pytest.mark.slow
 def test_the_nearest_pair_is_that_of_the_cell(heard):
     path, messages = heard
     cell = prepare(read_job(path)).cell

@@ -52,6 +52,7 @@ def heard(folder):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_it_is_the_set_that_kerfpath_pareto_finds(heard, folder):
     write_job(folder, heard["path"].read_text(), "again.toml")
     found = pareto_of_job(

@@ -72,6 +72,7 @@ def pose_of(numbers):
     return np.reshape(numbers, (4, 4))
 
 
+@pytest.mark.slow
 def test_what_is_out_of_reach_is_what_has_no_pose(heard, path):
     job = read_job(path)
     prepared = prepare(job, job.read_part())

@@ -54,6 +54,7 @@ def test_every_triangle_is_of_the_face_that_it_lies_on(job, part):
         assert (corners <= high + 0.06).all()
 
 
+@pytest.mark.slow
 def test_a_loop_becomes_a_contour_that_is_planned_in_one_step(tmp_path):
     path = write_job(tmp_path)
     with serving(path) as client, talking(client) as page:

@@ -65,4 +65,4 @@ def test_the_script_of_the_job_is_exported_under_its_name(tmp_path):
         assert answer.status_code == 200
         assert "job.py" in answer.headers["content-disposition"]
         compile(answer.text, "job.py", "exec")
-        assert "What job.toml asks for" in answer.text
+        assert "The job job.toml" in answer.text

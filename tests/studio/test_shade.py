@@ -60,6 +60,7 @@ def codes_of_vertices(found, graph, key="values"):
     return np.array([codes[int(mu)][k, i] for k, i, mu in places])
 
 
+@pytest.mark.slow
 def test_a_map_says_what_it_can_be_shaded_by(celled, winding):
     for (page, *_), more in ((celled, {"clearance"}), (winding, {"turns"})):
         page.say("map", contour="slot")

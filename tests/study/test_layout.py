@@ -64,6 +64,7 @@ def middle(path, goal="speed"):
     return middle_of(read_job(path), nodes_of(contours_of(str(path), digest(path), goal)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("goal", ["speed", "margin", "motion"])
 @pytest.mark.parametrize("which", ["plain", "slow", "in_cell"])
 def test_no_bound_is_below_what_the_exact_search_finds(which, goal, request):

@@ -65,6 +65,7 @@ def rows(store):
         return base.execute("SELECT count(*), count(value) FROM result").fetchone()
 
 
+@pytest.mark.slow
 def test_the_front_is_that_of_the_planner_itself(job, studied):
     read = read_job(job)
     part = read_drawing(read.part_file)

@@ -209,7 +209,7 @@ def test_bad_input_of_the_command_is_one_line(folder):
 
     (folder / "file").write_text("")
     options = ("--goal", "speed", "--map-points", 0)
-    assert "leave out --goal, --map-points" in said("--robots", *options)
+    assert "remove --goal, --map-points" in said("--robots", *options)
     assert "only with --robots" in said("--acceleration-ratio", "nearest")
     assert ", got 'heavy'" in said("--robots", "--acceleration-ratio", "heavy")
     assert "expected a folder, but file is a file" in said("--robots", "--out", "file")

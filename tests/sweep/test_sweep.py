@@ -287,7 +287,7 @@ def test_a_full_disk_ends_in_one_line_and_what_was_kept_stays(tmp_path, monkeypa
         patch.setattr(
             _store.sqlite3, "connect", lambda *a, **given: connect(*a, factory=Small, **given)
         )
-        with pytest.raises(InputError, match="s: the disk is full; the results so far are kept"):
+        with pytest.raises(InputError, match="s: the disk is full; the results so far are stored"):
             sweep.run(sweep_tasks.square, numbers(2000), store=tmp_path / "s", processes=1)
     assert query(tmp_path / "s", "PRAGMA integrity_check") == [("ok",)]
     ((count,),) = query(tmp_path / "s", "SELECT count(*) FROM result")

@@ -36,7 +36,7 @@ def _line(number: int) -> str:
     """Return the summary of what an equation is, without its number, its code and its tests."""
     module, _, name = kernels.EQUATIONS[number].partition(":")
     found = reduce(getattr, name.split("."), import_module(module))
-    function = getattr(found, "py_func", found)  # what numba has compiled
+    function = inspect.unwrap(getattr(found, "py_func", found))  # what numba has compiled
     summary = (inspect.getdoc(function) or "").partition("\n\n")[0]
     said = plain(re.sub(r"\s*\(Eq\. \d+\)", "", summary).replace("\n", " "))
     where = _link(f"{module}.{name}", Path(inspect.getsourcefile(function) or ""))

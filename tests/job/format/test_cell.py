@@ -152,6 +152,7 @@ def test_a_blocked_contour_says_that_it_is_collision(folder):
     assert entry["fastest_speed_m_s"] is None
 
 
+@pytest.mark.slow
 def test_the_fastest_speed_in_a_cell_is_clear_and_no_higher(folder):
     coarse = SMALL.replace("spacing_mm = 1", "spacing_mm = 3")
     free = coarse[: coarse.index("[cell]")] + NO_PROGRAM
@@ -407,6 +408,7 @@ def test_a_posture_in_words_is_one_of_the_robot_s_family(folder):
         read_job(job(folder, text.replace("third", "fifth")))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell", [False, True])
 def test_a_described_robot_plans_what_the_library_s_own_does(folder, arm, cell):
     described(folder, replace(arm, T_base_foot=np.eye(4)))  # writes arm.urdf

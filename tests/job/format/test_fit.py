@@ -171,6 +171,7 @@ CHANGES = [
 """Settings of [program]: arcs, zones, leads, gas, waits, files, digits."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "language", "change"),
     [

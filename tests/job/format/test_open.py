@@ -85,6 +85,7 @@ def test_an_open_line_is_planned_first_inside_its_trim_and_audited(folder):
     assert (folder / "out" / "job.mod").exists()
 
 
+@pytest.mark.slow
 def test_the_other_commands_take_open_lines(folder):
     job = read_job(job_of(folder, HEAD + LINE + PLAN, "line.toml"))
     (start,) = check_job(job).starts

@@ -41,6 +41,7 @@ def test_no_harmful_edit_of_a_plan_passes(made):
     assert len(tally.alarms) < EDITS / 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["part", "cell", "dip", "pieces"])
 def test_no_job_edited_since_passes(made, name):
     job, plan = made(name)

@@ -406,6 +406,7 @@ spacing_mm = 2
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [120.0, 150.0, 170.0])
 def test_a_line_of_few_points_with_sharp_corners_is_no_way_back(tmp_path, turn):
     """Near a corner both legs are close to a target: it stands on the one that it came by."""

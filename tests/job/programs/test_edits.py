@@ -33,6 +33,7 @@ def subjects(tmp_path_factory):
     return {subject.language.name: subject for subject in program_edits.subjects(folder)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_no_fault_and_no_edit_that_does_harm_passes(subjects, language):
     subject = subjects[language]

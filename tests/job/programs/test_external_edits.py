@@ -31,6 +31,7 @@ def test_there_is_one_in_every_language_that_says_external_axes(subjects):
     assert (np.ptp(q[:, 6:], axis=0) > [0.05, 0.05]).all()  # m and rad: both move
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_no_fault_and_no_edit_that_does_harm_passes(subjects, language):
     subject = subjects[language]
@@ -42,6 +43,7 @@ def test_no_fault_and_no_edit_that_does_harm_passes(subjects, language):
     assert tally.wrong == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_value_that_jumps_leaves_the_range_or_moves_beside_the_cut_is_found(subjects, language):
     subject, tally = subjects[language], program_edits.Tally()

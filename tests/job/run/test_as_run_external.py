@@ -66,6 +66,7 @@ def test_a_chuck_that_turns_while_it_is_cut_is_guaranteed_and_so_is_the_text(tmp
         assert read[own.code].title == own.title
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("said", "why"),
     [

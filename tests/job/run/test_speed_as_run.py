@@ -29,6 +29,7 @@ def at(speeds):
     return first.join(parts[:2]) + second + parts[2]
 
 
+@pytest.mark.slow
 def test_at_the_speed_as_run_the_job_is_guaranteed_at_that_of_the_nodes_not(tmp_path):
     found = fastest_speeds(read(tmp_path, GUARANTEED))
     speeds = [each.as_run for each in found]

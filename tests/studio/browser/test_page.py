@@ -109,6 +109,7 @@ def test_a_rotation_is_taken_into_one_turn(modules):
         assert found == pytest.approx(expected, abs=1e-12)  # one turn taken off, rounded once
 
 
+@pytest.mark.slow
 @THEMES
 def test_a_planned_job_is_shown_without_a_serious_fault(page, studio, first):
     studio.open(*first)
