@@ -7,6 +7,7 @@ import re
 from functools import cache, reduce
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from kerfpath import kernels
 from reference.markdown import code, plain
@@ -35,7 +36,7 @@ def page() -> str:
 def _line(number: int) -> str:
     """Return the summary of what an equation is, without its number, its code and its tests."""
     module, _, name = kernels.EQUATIONS[number].partition(":")
-    found = reduce(getattr, name.split("."), import_module(module))
+    found: Any = reduce(getattr, name.split("."), import_module(module))
     function = inspect.unwrap(getattr(found, "py_func", found))  # what numba has compiled
     summary = (inspect.getdoc(function) or "").partition("\n\n")[0]
     said = plain(re.sub(r"\s*\(Eq\. \d+\)", "", summary).replace("\n", " "))

@@ -102,7 +102,7 @@ class _Part(Generic[_P, _R]):
         update_wrapper(self, function)
 
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _R:
-        raise TypeError(f"{self._name} is called by kernels alone")
+        raise TypeError(f"{self._name}: only kernels can call it")
 
 
 def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:
