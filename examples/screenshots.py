@@ -2,8 +2,9 @@
 
     python examples/screenshots.py [report] [studio] [layout] [pareto]
 
-Every page is made by the command that users run, on the shipped B-pillar, and opened in the
-installed Chromium. Without names all four are made, in about ten minutes on two cores.
+The command that users run makes each page from the shipped B-pillar, and the Chromium of the machine
+opens it. Report and studio take a minute or two, the layout ten minutes, and the Pareto set, every
+second plan of which is over continuous rotation, up to half an hour on two cores.
 """
 
 from __future__ import annotations
