@@ -2,7 +2,7 @@
 
     python examples/screenshots.py [report] [studio] [layout] [pareto]
 
-The command that users run makes each page from the shipped B-pillar, and the Chromium of the machine
+The command that users run makes each page from the shipped B-pillar, and the installed Chromium
 opens it. Report and studio take a minute or two, the layout ten minutes, and the Pareto set, every
 second plan of which is over continuous rotation, up to half an hour on two cores.
 """
