@@ -62,7 +62,7 @@ WITHOUT_KERNELS = {"cad", "sweep", "urdf", "test_apart.py"}
 
 
 def pytest_collection_modifyitems(items):
-    """Order modules for two workers that start with a half each, and with no kernel compiled.
+    """Order modules for two workers that start with a half each, and with few kernels compiled.
 
     Those with long tests come first, so that none is left to wait for at the end. The second half
     begins with what needs no kernels: while one worker compiles them, the other need not.

@@ -94,6 +94,14 @@ def test_a_stage_whose_process_fails_is_compiled_here(stages, monkeypatch):
     assert compiling.is_compiled("opw")
 
 
+def test_who_wants_all_waits_for_what_was_left_to_compile_later(stages, monkeypatch):
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    compiling.warm_up("opw", later={"bound"})
+    compiling.warm_up("opw")
+    assert stages == ["opw", "opw"]
+    assert compiling.is_compiled("opw")
+
+
 def test_families_without_an_example_compile_as_they_go(stages):
     assert compiling.is_compiled("general")
     assert not compiling.warm_up("general")

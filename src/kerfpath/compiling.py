@@ -110,7 +110,7 @@ def warm_up(kinematics: str = "opw", *, later: Collection[str] = ()) -> bool:
     for stages in ([s for s in missing if s not in later], [s for s in missing if s in later]):
         for stage in stages:
             _running[stage] = kinematics, _started(stage, kinematics)
-        finish_compiling(set(stages) - set(later))
+        finish_compiling(set(STAGES) - set(later))
     return bool(missing)
 
 

@@ -226,6 +226,17 @@ def test_every_turn_inside_the_limits_is_a_solution_of_its_own():
     assert ((base > -np.pi - 1e-9) & (base <= np.pi + 1e-9)).all()
 
 
+def test_a_joint_of_a_thousand_turns_has_each_of_them():
+    r = robot("staubli_tx60")
+    upper = np.array([*r.upper[:5], 1000 * 2 * np.pi])
+    found = r.with_limits(lower=np.array([*r.lower[:5], 0.0]), upper=upper).inverse(
+        r.forward(np.full(6, 0.3))
+    )
+    assert found.turn[:, 5].max() > 900
+    base = found.q - 2 * np.pi * found.turn
+    assert ((base > -np.pi - 1e-9) & (base <= np.pi + 1e-9)).all()
+
+
 def test_turns_agree_with_trying_them_all():
     rng = np.random.default_rng(5)
     every = np.indices([7] * 6).reshape(6, -1).T - 3

@@ -55,12 +55,15 @@ def solutions_within(q: Array, reach: Bools, limits: turns.JointLimits) -> Solut
     count, reason = np.empty(B, np.int64), np.empty(reach.shape, np.uint8)
     turns.count_admissible(q, reach, freeze(np.ones(P, np.bool_)), limits, count, reason)
     total = int(count.sum())
-    found, turn = np.empty((total, n)), np.empty((total, n), np.int8)
+    found, small = np.empty((total, n)), np.empty((total, n), np.int8)
     sample, posture = np.empty(total, np.int32), np.empty(total, np.int8)
-    turns.fill_admissible(q, reason, limits, found, sample, posture, turn)
+    turns.fill_admissible(q, reason, limits, found, sample, posture, small)
+    # One joint alone may have more turns than the small integers of a graph can count.
+    pose = np.repeat(np.arange(B), count)
+    turn = np.rint((found - q[pose, 0, posture]) / (2 * np.pi))
     return Solutions(
         q=freeze(found),
-        pose=freeze(np.repeat(np.arange(B), count)),
+        pose=freeze(pose),
         posture=freeze(posture.astype(np.int64)),
         turn=freeze(turn.astype(np.int64)),
     )
