@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
@@ -13,12 +14,14 @@ from kerfpath.post._read import MoveKind, ReadHandshake, ReadMove, ReadStep, Rea
 from kerfpath.post._settings import LanguageSettings, handshakes
 from kerfpath.robots import Robot
 
-__all__ = ["END_OF_FILE", "LineReader", "only", "patterns", "statements"]
+__all__ = ["END_OF_FILE", "LineReader", "only", "patterns", "program_lines", "statements"]
 
 SHOWN = 60
 """Characters of a line that a message shows."""
 END_OF_FILE = "the end of the file"
 """Text of the row after the last one."""
+NOT_TEXT = re.compile(r"[\0-\x08\v\f\x0e-\x1f\x7f-\x9f\u2028\u2029]|\r(?!\n)")
+"""Control characters and separators of lines, without the tab and the ends of lines."""
 
 
 def patterns(by_kind: Mapping[str, str]) -> dict[str, re.Pattern[str]]:
@@ -29,6 +32,33 @@ def patterns(by_kind: Mapping[str, str]) -> dict[str, re.Pattern[str]]:
 def only(by_kind: Mapping[str, re.Pattern[str]], *kinds: str) -> dict[str, re.Pattern[str]]:
     """Return the regular expressions of some kinds of lines."""
     return {kind: by_kind[kind] for kind in kinds}
+
+
+def program_lines(file: str, text: str, first: int = 1) -> list[str]:
+    """Return the lines of a program, which end with LF or CR LF as for a controller.
+
+    All readers split their texts here. `str.splitlines` alone also ends a line at characters that
+    do not end it for a controller, for which the rest is still part of a remark.
+
+    Parameters
+    ----------
+    file, text : str
+    first : int
+        Number of the first line in its file.
+
+    Raises
+    ------
+    InputError
+        The text has a control character or another separator of lines; with line and character.
+    """
+    if found := NOT_TEXT.search(text):
+        line = first + text.count("\n", 0, found.start())
+        what = f"U+{ord(found[0]):04X} {unicodedata.name(found[0], '')}".rstrip()
+        raise InputError(
+            f"{file}, line {line}: a program must not contain the character {what}; its lines end "
+            "with LF or CR LF"
+        )
+    return text.splitlines()
 
 
 def statements(lines: Iterable[str], comment: str, first: int = 1) -> list[tuple[int, str]]:

@@ -1,4 +1,4 @@
-"""Check that texts of programs have no absurdly large numbers, for all languages."""
+"""Check texts of programs, for all languages: no control characters, no absurdly large numbers."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from kerfpath.errors import InputError
+from kerfpath.post._line_reader import program_lines
 
 __all__ = ["CheckedTexts"]
 
@@ -20,14 +21,14 @@ REMARK = re.compile(r"\s*(?:\d+:\s*)?(?:!|;|//|'|#) ", re.ASCII)
 
 
 class CheckedTexts(Mapping[str, str]):
-    """Texts by name; a text with a number that is too large is refused with its line."""
+    """Texts by name; a control character or a number too large is refused with its line."""
 
     def __init__(self, files: Mapping[str, str]) -> None:
         self.files = files
 
     def __getitem__(self, name: str) -> str:
         text = self.files[name]
-        for number, line in enumerate(text.splitlines(), start=1):
+        for number, line in enumerate(program_lines(name, text), start=1):
             if not LONG.search(line) or REMARK.match(line):
                 continue
             for found in NUMBER.finditer(line):

@@ -67,7 +67,7 @@ def job_message(
 
 def faults_of(error: InputError, text: str) -> list[Fault]:
     """Return the errors of a job, each with the key that its message names, if any."""
-    lines = text.splitlines()
+    lines = text.split("\n")
     return [_fault(said, lines) for said in (str(error), *error.others)]
 
 

@@ -76,7 +76,7 @@ def without_contour(job: Job, index: int) -> str:
         raise InputError(f"job: expected a contour from 0 to {len(tables) - 1}, got {index}")
     if len(tables) == 1:
         raise InputError("job: the only contour cannot be removed; add another one first")
-    lines = job.text.splitlines(keepends=True)
+    lines = _lines(job.text)
     begin, end = _blocks(lines, len(tables))[index]
     after = end
     while after < len(lines) and not lines[after].strip():
@@ -86,6 +86,11 @@ def without_contour(job: Job, index: int) -> str:
     del lines[begin:after]
     del tables[index]
     return _required("".join(lines), job.source, tables)
+
+
+def _lines(text: str) -> list[str]:
+    """Return lines with their ends; only a line feed ends a line of TOML."""
+    return re.findall(r".*\n|.+", text)
 
 
 def _is_trim(loop: Loop) -> bool:
@@ -158,7 +163,7 @@ def _blocks(lines: Sequence[str], count: int) -> list[tuple[int, int]]:
 
 def _inserted(text: str, at: int, block: str) -> str:
     """Return a text with one more [[contour]] table, the `at`-th from 0 on."""
-    lines = text.splitlines(keepends=True)
+    lines = _lines(text)
     blocks = _blocks(lines, sum(bool(_CONTOUR.match(line)) for line in lines))
     if not blocks:
         raise _unwritten()

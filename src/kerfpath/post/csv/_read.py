@@ -10,7 +10,7 @@ import numpy as np
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._external import from_said
-from kerfpath.post._line_reader import LineReader
+from kerfpath.post._line_reader import LineReader, program_lines
 from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import MOVE_KINDS, ReadProgram, ReadSection, ReadStep
@@ -26,7 +26,7 @@ _KINDS = (*MOVE_KINDS, "via", "wait")
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: CsvSettings) -> ReadProgram:
     """Return the program in a table that `Csv` wrote; see `kerfpath.post.Reader`."""
-    header, *lines = files[main].splitlines() or [""]
+    header, *lines = program_lines(main, files[main]) or [""]
     if header != ",".join(columns(robot)):
         names, got = columns(robot), header.split(",")
         first = next(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from kerfpath.post._line_reader import LineReader
+from kerfpath.post._line_reader import LineReader, program_lines
 from kerfpath.post.fanuc._external import leads
 from kerfpath.post.fanuc._settings import FanucSettings
 from kerfpath.robots import Robot
@@ -37,7 +37,7 @@ class Listing(LineReader):
     too_early = "the listing ends too early; /END is missing"
 
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
-        rows = [(n, row.rstrip()) for n, row in enumerate(text.splitlines(), 1)]
+        rows = [(n, row.rstrip()) for n, row in enumerate(program_lines(file, text), 1)]
         super().__init__(file, robot, settings, rows)
         self.name = ""
 

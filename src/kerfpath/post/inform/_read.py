@@ -12,7 +12,7 @@ from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._called import off_name
 from kerfpath.post._frames import faceplate, from_euler, world
-from kerfpath.post._line_reader import LineReader, patterns
+from kerfpath.post._line_reader import LineReader, patterns, program_lines
 from kerfpath.post._program import Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection
 from kerfpath.post.inform._axes import joints_at, joints_from_axes
@@ -86,7 +86,7 @@ class _Text(LineReader):
     too_early = "the job ends too early; END is missing"
 
     def __init__(self, file: str, text: str, robot: Robot, settings: InformSettings) -> None:
-        rows = [(n, row.rstrip()) for n, row in enumerate(text.splitlines(), 1)]
+        rows = [(n, row.rstrip()) for n, row in enumerate(program_lines(file, text), 1)]
         super().__init__(file, robot, settings, rows)
         self.name = file.rpartition("/")[2].removesuffix(SUFFIX)
         self.external = ExternalPulses(robot, settings)

@@ -11,7 +11,7 @@ from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._external import carrier_frame
 from kerfpath.post._frames import from_euler
-from kerfpath.post._line_reader import LineReader, only, patterns, statements
+from kerfpath.post._line_reader import LineReader, only, patterns, program_lines, statements
 from kerfpath.post._program import Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection, ReadStep
 from kerfpath.post.krl._axes import joints_from_axes
@@ -112,7 +112,7 @@ class _File(LineReader):
         *,
         before: int = 0,
     ) -> None:
-        lines = files[file].splitlines()
+        lines = program_lines(file, files[file])
         super().__init__(file, robot, settings, statements(lines, ";"))
         self.files, self.name = files, file.removesuffix(".src")
         self.is_main, self.opening, self.head = bool(opening), opening, list(HEAD)
@@ -161,7 +161,7 @@ class _File(LineReader):
         if self.is_main and SWITCH_OFF not in self.routines:
             raise self.fault(f"{SWITCH_OFF} is missing")
         data = f"{self.name}.dat"
-        lines = [line.strip() for line in self.files[data].splitlines()]
+        lines = [line.strip() for line in program_lines(data, self.files[data])]
         first = next((m[1] for line in lines if (m := _FIRST.fullmatch(line))), "0")
         begin = int(first) if self.is_main else None
         for number, line in enumerate(data_list(self.name, others, begin)[:-1], 1):

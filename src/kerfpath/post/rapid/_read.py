@@ -11,7 +11,7 @@ import numpy as np
 
 from kerfpath._arrays import Array
 from kerfpath.post._external import carrier_frame
-from kerfpath.post._line_reader import statements
+from kerfpath.post._line_reader import program_lines, statements
 from kerfpath.post._program import Switch
 from kerfpath.post._read import ReadMove, ReadProgram, ReadSection, ReadStep
 from kerfpath.post.rapid._aggregates import Aggregates
@@ -76,7 +76,7 @@ class _Reader(Aggregates):
 
     def read_module(self, file: str) -> None:
         self.file, self.ended, self.name = file, False, ""
-        lines = self.files[file].splitlines()
+        lines = program_lines(file, self.files[file])
         for self.line, line in statements(lines, "!"):
             self.read_line(line)
         self.line = len(lines) + 1

@@ -9,7 +9,7 @@ import numpy as np
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
-from kerfpath.post._line_reader import LineReader, patterns
+from kerfpath.post._line_reader import LineReader, patterns, program_lines
 from kerfpath.post._orientations import pose_of
 from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import ReadProgram, ReadSection, ReadStep
@@ -53,9 +53,9 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: RosSetting
     return _Events(events, files[events], robot, settings, points).program()
 
 
-def _lines(text: str) -> list[tuple[int, str]]:
+def _lines(file: str, text: str) -> list[tuple[int, str]]:
     """Return lines with their numbers, without empty lines and comments."""
-    numbered = [(n, line.rstrip()) for n, line in enumerate(text.splitlines(), 1)]
+    numbered = [(n, line.rstrip()) for n, line in enumerate(program_lines(file, text), 1)]
     return [(n, line) for n, line in numbered if line and not line.startswith("#")]
 
 
@@ -74,7 +74,7 @@ class _Points:
 
     def __init__(self, file: str, text: str, robot: Robot, settings: RosSettings) -> None:
         self.file, self.step_time = file, settings.step_ms * 1e-3
-        lines = _lines(text)
+        lines = _lines(file, text)
         n = robot.joints
         expected = head(joint_names(robot, settings))
         for (number, line), word in zip([*lines, (0, "nothing")], expected, strict=False):
@@ -120,7 +120,7 @@ class _Events(LineReader):
     def __init__(
         self, file: str, text: str, robot: Robot, settings: RosSettings, points: _Points
     ) -> None:
-        super().__init__(file, robot, settings, _lines(text))
+        super().__init__(file, robot, settings, _lines(file, text))
         self.points = points
         self.last = -1
         self.tips = np.empty((0, 3))

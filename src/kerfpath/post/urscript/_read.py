@@ -10,7 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath._arrays import Array, freeze
 from kerfpath.post._axes import offset_near
-from kerfpath.post._line_reader import END_OF_FILE, LineReader, patterns, statements
+from kerfpath.post._line_reader import (
+    END_OF_FILE,
+    LineReader,
+    patterns,
+    program_lines,
+    statements,
+)
 from kerfpath.post._program import SIGNALS, Switch
 from kerfpath.post._read import MoveKind, ReadProgram, ReadSection, ReadStep
 from kerfpath.post._settings import outputs
@@ -62,7 +68,7 @@ class _Reader(LineReader):
     settings: URScriptSettings
 
     def __init__(self, file: str, text: str, robot: Robot, settings: URScriptSettings) -> None:
-        super().__init__(file, robot, settings, statements(text.splitlines(), "#"))
+        super().__init__(file, robot, settings, statements(program_lines(file, text), "#"))
         self.signals: list[str] = []
         self.can_wait = False
         self.ahead: dict[str, tuple[tuple[str, ...], float, str]] = {}

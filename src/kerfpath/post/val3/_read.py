@@ -12,7 +12,7 @@ import numpy as np
 from kerfpath._arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post._frames import faceplate, world
-from kerfpath.post._line_reader import LineReader, patterns, statements
+from kerfpath.post._line_reader import LineReader, patterns, program_lines, statements
 from kerfpath.post._program import PARTNERS, Partner, Switch
 from kerfpath.post._read import MoveKind, ReadMove, ReadProgram, ReadSection, ReadStep
 from kerfpath.post.val3._read_data import Val3Data
@@ -152,14 +152,15 @@ class _Project:
         program.take(name=name, access="public")
         (code,) = program.only("Code")
         code.take()
-        lines = code.text.split("\n")
-        if code.children or lines[0].strip() != "begin" or lines[-1].strip() != "end":
+        lines = program_lines(file, code.text, code.line)  # XML may spell out any character
+        ends = [line.strip() for line in (*lines[:1], *lines[-1:])]
+        if code.children or ends != ["begin", "end"]:
             raise code.fault("expected code from begin to end")
         return code
 
     def statements(self, code: Element) -> list[tuple[int, str]]:
         """Return the lines of a routine without comments, with their numbers."""
-        return statements(code.text.split("\n")[1:-1], "//", code.line + 1)
+        return statements(program_lines(code.file, code.text, code.line)[1:-1], "//", code.line + 1)
 
     def calls(self, start: Element) -> list[tuple[int, str, str]]:
         """Return what start() calls: line, alias of the library or nothing, routine."""
