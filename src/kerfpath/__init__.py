@@ -5,10 +5,10 @@ Names load when they are first used, so that ``kerfpath --help`` does not wait f
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
 
+TYPE_CHECKING = False  # as that of typing, which takes longer to load than this module
 if TYPE_CHECKING:
     from kerfpath.auditor import audit as audit
     from kerfpath.certificate import Certify as Certify

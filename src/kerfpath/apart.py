@@ -25,7 +25,7 @@ from typing import Any, TypeVar
 
 from kerfpath.errors import InputError
 
-__all__ = ["call_apart", "stand_by"]
+__all__ = ["call_apart", "python_command", "stand_by"]
 
 SECONDS = 20.0
 """Processor time allowed for any file, s."""
@@ -42,10 +42,15 @@ IDLE = 10.0
 
 _T = TypeVar("_T")
 _LEAVES = "leaves"
-_START = (
-    "import sys; sys.path[:] = {path!r}; from kerfpath.apart import _serve; "
-    "_serve({fd}, {idle}, {module!r})"
-)
+
+
+def python_command(code: str) -> list[str]:
+    """Return the command of a Python process that runs `code`.
+
+    It imports from where this process does, and not from the current folder, which Python puts
+    first for `-c`.
+    """
+    return [sys.executable, "-P", "-c", f"import sys; sys.path[:] = {sys.path!r}; {code}"]
 
 
 def call_apart(function: Callable[..., _T], *arguments: object, size: int) -> _T:
@@ -134,9 +139,10 @@ class _Worker:
     def __init__(self, module: str | None) -> None:
         self.ours, theirs = Pipe()
         number = theirs.fileno()
-        start = _START.format(path=sys.path, fd=number, idle=IDLE, module=module)
         self.process = subprocess.Popen(
-            [sys.executable, "-c", start],
+            python_command(
+                f"from kerfpath.apart import _serve; _serve({number}, {IDLE}, {module!r})"
+            ),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

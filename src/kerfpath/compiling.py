@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Callable, Collection
 from pathlib import Path
 
 import numpy as np
 
 from kerfpath._arrays import freeze
+from kerfpath.apart import python_command
 from kerfpath.certifier import compile_bound
 from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.graph import build, gamma_grid
@@ -117,7 +117,7 @@ def warm_up(kinematics: str = "opw", *, later: Collection[str] = ()) -> bool:
 def _started(stage: str, kinematics: str) -> subprocess.Popen[bytes]:
     call = f"import {__name__} as own; own.compile_stage({stage!r}, {kinematics!r})"
     none = subprocess.DEVNULL
-    return subprocess.Popen([sys.executable, "-c", call], stdin=none, stdout=none, stderr=none)
+    return subprocess.Popen(python_command(call), stdin=none, stdout=none, stderr=none)
 
 
 def finish_compiling(stages: Collection[str] = tuple(STAGES)) -> None:

@@ -66,16 +66,17 @@ def _run_pool(
     """
     context = get_context("spawn")
     ours, theirs = context.Pipe()
-    pool = ProcessPoolExecutor(
-        processes, mp_context=context, initializer=_set_up, initargs=(theirs, call)
-    )
+    with _starting():  # a process that looks after semaphores
+        pool = ProcessPoolExecutor(
+            processes, mp_context=context, initializer=_set_up, initargs=(theirs, call)
+        )
     flying: dict[Future[TaskOutcome], Task] = {}
     broken = False
     try:
         while True:
             while waiting and not broken and len(flying) < ahead:
                 try:
-                    with _interrupt_blocked():
+                    with _starting():
                         future = pool.submit(attempt, __version__, call, waiting[0])
                 except BrokenProcessPool:
                     broken = True
@@ -110,6 +111,23 @@ def _run_pool(
         pool.shutdown(cancel_futures=True)
         ours.close()
         theirs.close()
+
+
+@contextmanager
+def _starting() -> Iterator[None]:
+    """Let processes start so that Ctrl-C does not reach them, without the current folder.
+
+    Python would put it first in their `sys.path`, before they take over that of this process.
+    """
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        with _interrupt_blocked():
+            yield
+    finally:
+        del os.environ["PYTHONSAFEPATH"]
+        if before is not None:
+            os.environ["PYTHONSAFEPATH"] = before
 
 
 @contextmanager
