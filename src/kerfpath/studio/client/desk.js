@@ -2,28 +2,33 @@
 
 import { byId } from "./dom.js";
 
+const system = matchMedia("(prefers-color-scheme: dark)");
+let changed = () => {};
+
+/** Whether the theme is the dark one. */
+export const isDark = () => document.documentElement.dataset.theme === "dark";
+
 /**
- * Follow the light or dark theme of the system until the button changes it.
- * @param {HTMLElement} button
- * @param {(name: string) => SVGElement} icon
- * @param {() => void} changed
+ * Follow the light or dark theme of the system until another one is chosen.
+ * @param {() => void} listener  called after each change
  */
-export function theme(button, icon, changed) {
-  const system = matchMedia("(prefers-color-scheme: dark)");
-  const set = () => {
-    const dark = (remembered("theme") ?? (system.matches ? "dark" : "light")) === "dark";
-    document.documentElement.dataset.theme = dark ? "dark" : "light";
-    button.replaceChildren(icon(dark ? "sun" : "moon"));
-    button.setAttribute("aria-label", dark ? "Use the light theme" : "Use the dark theme");
-    changed();
-  };
-  system.addEventListener("change", set);
-  button.addEventListener("click", () => {
-    const next = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
-    remember("theme", next === (system.matches ? "dark" : "light") ? null : next);
-    set();
-  });
-  set();
+export function followTheme(listener) {
+  changed = listener;
+  system.addEventListener("change", setTheme);
+  setTheme();
+}
+
+/** Use the other theme. */
+export function switchTheme() {
+  const next = isDark() ? "light" : "dark";
+  remember("theme", next === (system.matches ? "dark" : "light") ? null : next);
+  setTheme();
+}
+
+function setTheme() {
+  const usual = system.matches ? "dark" : "light";
+  document.documentElement.dataset.theme = remembered("theme") ?? usual;
+  changed();
 }
 
 /** Make the line between scene and map movable by pointer and keys. */

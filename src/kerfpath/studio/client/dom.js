@@ -51,6 +51,22 @@ export function byId(id, kind) {
   return /** @type {T} */ (found);
 }
 
+/**
+ * Return a function that calls `act` once before the next frame of the screen.
+ * @param {() => void} act
+ */
+export function onNextFrame(act) {
+  let waiting = false;
+  return () => {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => {
+      waiting = false;
+      act();
+    });
+  };
+}
+
 /** @type {Map<string, string>} cached, as every frame needs them; by theme and name */
 const colours = new Map();
 
@@ -79,15 +95,20 @@ export function textSize() {
 }
 
 /**
- * Match the resolution of a canvas to its size on the screen.
+ * Match the resolution of a canvas to its size on the screen, and clear it.
  * @param {HTMLCanvasElement} canvas
- * @returns {{width: number, height: number, ratio: number, changed: boolean}} in CSS px
+ * @returns {CanvasRenderingContext2D | null} for CSS px; null: it has no size
  */
-export function fitCanvas(canvas) {
-  const ratio = Math.min(window.devicePixelRatio || 1, 2);
+export function freshContext(canvas) {
   const { clientWidth: width, clientHeight: height } = canvas;
-  const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
-  const changed = canvas.width !== w || canvas.height !== h;
-  if (changed) Object.assign(canvas, { width: w, height: h });
-  return { width, height, ratio, changed };
+  const [w, h] = [width, height].map((each) => Math.round(each * pixelRatio()));
+  if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
+  const context = canvas.getContext("2d");
+  if (!context || !w || !h) return null;
+  context.setTransform(pixelRatio(), 0, 0, pixelRatio(), 0, 0);
+  context.clearRect(0, 0, width, height);
+  return context;
 }
+
+/** Return the number of pixels of a canvas per CSS px: two at most, to keep drawing fast. */
+export const pixelRatio = () => Math.min(window.devicePixelRatio || 1, 2);

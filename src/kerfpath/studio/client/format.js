@@ -77,3 +77,21 @@ export const UNITS = {
   share: { unit: "% limit", of: (value) => 100 * value },
   "m^3": { unit: "m\u00b3", of: (value) => value },
 };
+
+/**
+ * Return an SI value in the units that are shown.
+ * @param {number} value
+ * @param {string} unit
+ */
+export function inUnits(value, unit) {
+  if (unit === "rad") return degrees(value);
+  if (unit === "m")
+    return Math.abs(value) < 1e-6 ? "0 mm" : millimetres(value, Math.abs(value) < 1e-3 ? 4 : 2);
+  return `${digits(value, 3)}${unit ? ` ${unit}` : ""}`;
+}
+
+/**
+ * Return how long the cut of a contour takes, s.
+ * @param {import("./messages.js").PlanMessage[]} plans  its pieces
+ */
+export const secondsOf = (plans) => plans.reduce((sum, { time }) => sum + time[time.length - 1], 0);

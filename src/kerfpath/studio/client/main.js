@@ -1,35 +1,28 @@
-/** Assemble the page: one store, one connection, one player, and the views that follow them. */
+/** Assemble the page: its views follow the state, its panels are drawn from it. */
 
-import { Connection } from "./connection.js";
-import { byId, icon } from "./dom.js";
+import { connection, player, send, store } from "./app.js";
+import { followTheme, splitter } from "./desk.js";
+import { byId } from "./dom.js";
 import { MapView } from "./map/view.js";
 import { foot, notices, topBar } from "./panels/bar.js";
-import { comparePanel } from "./panels/compare.js";
-import { contourList } from "./panels/contours.js";
+import { comparePanel, followKept } from "./panels/compare.js";
+import { contoursPanel } from "./panels/contours.js";
 import { frontPanel } from "./panels/front.js";
 import { jobSheet } from "./panels/jobtext.js";
 import { jointsPanel } from "./panels/joints.js";
 import { layoutSheet } from "./panels/layout.js";
+import { loopsSheet } from "./panels/loops.js";
 import { morePanel } from "./panels/more.js";
 import { optionsPanel } from "./panels/options.js";
-import { resultPanel } from "./panels/result.js";
-import { loopsSheet } from "./panels/loops.js";
-import { programSheet } from "./panels/program.js";
+import { followProgram, programSheet } from "./panels/program.js";
+import { auditPanel, resultPanel } from "./panels/result.js";
+import { drawSheet, prepareSheets } from "./panels/sheet.js";
 import { Track } from "./panels/track.js";
-import { Player } from "./player.js";
 import { Plots } from "./plots.js";
 import { recordings } from "./scene/record.js";
 import { SceneView } from "./scene/view.js";
-import { Store } from "./store.js";
-import { splitter, theme } from "./desk.js";
 import { timelineOf } from "./timeline.js";
-
-const store = new Store();
-const player = new Player();
-const connection = new Connection(
-  (message) => store.take(message),
-  (status, retryAt) => store.connected(status, retryAt),
-);
+import { mount, redraw } from "./ui.js";
 
 // Build the timeline before the views are called, which depend on it.
 let loading = false;
@@ -43,30 +36,38 @@ store.on(["plan", "program", "scene"], () => {
   });
 });
 
-const view = new SceneView(store, player, connection);
-const map = new MapView(store, player, connection, (q, admitted) => view.haunt(q, admitted));
-const plots = new Plots(store, player);
-new Track(player, store);
-topBar(store, connection, recordings(store, player, view));
-foot(store, connection);
-notices(store, connection);
-contourList(store);
-resultPanel(store, connection, view);
-comparePanel(store, connection, player, view);
-const front = frontPanel(store, connection);
-jointsPanel(store, connection);
+const view = new SceneView();
+const map = new MapView((q, admitted) => view.haunt(q, admitted));
+const plots = new Plots();
+const extras = recordings(view);
+new Track();
+followKept(view);
+followProgram();
 optionsPanel(store, connection);
 morePanel(store, connection, player);
-jobSheet(store, connection);
-programSheet(store, player, connection);
-loopsSheet(store, connection);
-layoutSheet(store, connection, view);
+prepareSheets({
+  text: jobSheet,
+  program: programSheet,
+  loops: loopsSheet,
+  layout: layoutSheet(view.placing),
+});
+mount(byId("top"), () => topBar(extras));
+mount(byId("notices"), notices);
+mount(byId("left"), contoursPanel);
+mount(byId("result"), () => resultPanel(view));
+mount(byId("compare"), () => comparePanel(view));
+mount(byId("front"), frontPanel);
+mount(byId("joints"), jointsPanel);
+mount(byId("audit"), auditPanel);
+mount(byId("status"), foot);
+mount(byId("sheet"), drawSheet);
+store.on(["anything"], redraw);
 splitter();
-theme(byId("theme"), icon, () => {
+followTheme(() => {
   view.paint();
   map.paint();
   plots.invalidate();
-  front.paint();
+  redraw();
 });
 
 // Playing selects the contour that is being cut; selecting a contour moves the player there.
@@ -80,7 +81,7 @@ player.on((moment) => {
 store.on(["selected"], () => {
   const { selected } = store;
   if (!selected) return;
-  connection.send({ type: "focus", contour: selected });
+  send({ type: "focus", contour: selected });
   if (player.playing || player.moment?.span.contour === selected) return;
   const begin = player.timeline.begin(selected);
   if (begin !== null && document.activeElement?.id !== "scrub") player.seek(begin);
@@ -99,13 +100,13 @@ document.addEventListener("keydown", (event) => {
     target.closest("textarea, select, dialog:not(.docked), input:not([type=range])") !== null;
   const [command, { key }] = [event.ctrlKey || event.metaKey, event];
   if (command && key.toLowerCase() === "z" && !typing) {
-    connection.send({ type: event.shiftKey ? "redo" : "undo" });
+    send({ type: event.shiftKey ? "redo" : "undo" });
     event.preventDefault();
   } else if (command && key.toLowerCase() === "y" && !typing) {
-    connection.send({ type: "redo" });
+    send({ type: "redo" });
     event.preventDefault();
   } else if (command && key.toLowerCase() === "s") {
-    connection.send({ type: "save" });
+    send({ type: "save" });
     event.preventDefault();
   } else if (command || typing || event.altKey) return;
   else if (

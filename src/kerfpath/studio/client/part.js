@@ -1,24 +1,20 @@
 /** The loops of the part: which are cut, and descriptions in words. */
 
+import { send, store } from "./app.js";
 import { counted, millimetres } from "./format.js";
 
 /** @typedef {import("./messages.js").Loop} Loop */
-/** @typedef {import("./store.js").Store} Store */
 
-/**
- * Return the contours of the job by their loops.
- * @param {Store} store
- */
-export const contoursByLoop = (store) =>
+/** Return the contours of the job by their loops. */
+export const contoursByLoop = () =>
   new Map((store.scene?.contours ?? []).map((each) => [each.loop, each]));
 
 /**
  * Return the loops that are not cut.
- * @param {Store} store
- * @param {boolean} inside  whether to include the inner side of a sheet
+ * @param {boolean} [inside]  whether to include the inner side of a sheet
  */
-export function uncut(store, inside = false) {
-  const known = contoursByLoop(store);
+export function uncut(inside = false) {
+  const known = contoursByLoop();
   return (store.part?.loops ?? []).filter(
     ({ name, side }) => !known.has(name) && (inside || side !== "inner"),
   );
@@ -51,21 +47,18 @@ export const barred = ({ kind, closed, gap }) =>
 
 /**
  * Ask the server to cut loops; the contour of the first one is chosen once it exists.
- * @param {Store} store
- * @param {{send: (message: any) => boolean}} connection
  * @param {string[]} loops
  */
-export function cutLoops(store, connection, loops) {
+export function cutLoops(loops) {
   store.awaited = loops[0];
-  connection.send({ type: "cut", loops });
+  send({ type: "cut", loops });
 }
 
 /**
  * Return the words for taking a contour out of the job; its table may pick several contours.
- * @param {Store} store
  * @param {number} index
  */
-export function leaving(store, index) {
+export function leaving(index) {
   const contours = store.scene?.contours ?? [];
   const same = contours.filter((each) => each.index === index).length;
   const tables = new Set(contours.map((each) => each.index)).size;

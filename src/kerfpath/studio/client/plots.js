@@ -4,11 +4,11 @@ import UPlot from "uplot";
 
 import { axesOf } from "./axes.js";
 import { columns, dashed, scaleOf, span } from "./curves.js";
-import { byId, el, textSize, themeColour } from "./dom.js";
-import { digits, fixed } from "./format.js";
+import { player, store } from "./app.js";
+import { byId, onNextFrame, textSize, themeColour } from "./dom.js";
+import { digits, fixed, secondsOf } from "./format.js";
+import { colourKey, draw, html, mount, redraw, segmentButtons } from "./ui.js";
 
-/** @typedef {import("./store.js").Store} Store */
-/** @typedef {import("./player.js").Player} Player */
 /** @typedef {import("./curves.js").Kind} Kind */
 
 /** @type {Record<Kind, {title: string, per: string}>} */
@@ -29,17 +29,12 @@ const SCALES = {
 };
 
 export class Plots {
-  /**
-   * @param {Store} store
-   * @param {Player} player
-   */
-  constructor(store, player) {
-    this.store = store;
-    this.player = player;
+  constructor() {
     this.host = byId("plot");
-    this.said = byId("plot-state");
-    this.line = el("div", { class: "plot-line", hidden: true });
-    this.tip = el("div", { class: "tip plot-tip", hidden: true });
+    this.line = document.createElement("div");
+    this.tip = document.createElement("div");
+    Object.assign(this.line, { className: "plot-line", hidden: true });
+    Object.assign(this.tip, { className: "tip plot-tip", hidden: true });
     /** @type {Kind} */
     this.kind = "speed";
     /** @type {Set<number>} joints that are not shown */
@@ -48,74 +43,48 @@ export class Plots {
     this.plot = null;
     /** @type {(number | null)[][]} the curves of the plan to compare with */
     this.beside = [];
-    this.waiting = false;
-    const tabs = byId("plot-kind");
-    tabs.replaceChildren(
-      ...Object.entries(KINDS).map(([kind, { title }]) =>
-        el(
-          "button",
-          { "data-kind": kind, onclick: () => this.choose(/** @type {Kind} */ (kind)) },
-          title,
-        ),
-      ),
-    );
-    this.choose("speed");
-    store.on(["selected", "plan", "scene", "progress"], () => this.invalidate());
-    store.on(["job", "compare"], () => this.invalidate());
+    /** Draw the plot with the next frame. */
+    this.invalidate = onNextFrame(() => this.draw());
+    mount(byId("plot-kind"), () => this.tabs());
+    mount(byId("plot-legend"), () => this.legend());
+    mount(byId("plot-state"), () => this.state());
+    store.on(["selected", "plan", "scene", "job", "compare"], this.invalidate);
     player.on(() => this.follow());
     new ResizeObserver(() => this.resize()).observe(this.host);
   }
 
-  /** @param {Kind} kind */
-  choose(kind) {
-    this.kind = kind;
-    for (const tab of byId("plot-kind").children)
-      tab.setAttribute(
-        "aria-pressed",
-        String(/** @type {HTMLElement} */ (tab).dataset.kind === kind),
-      );
-    this.invalidate();
+  /** Buttons for what is plotted. */
+  tabs() {
+    const kinds = Object.entries(KINDS).map(([value, { title }]) => ({ value, label: title }));
+    return segmentButtons(kinds, this.kind, (kind) => {
+      this.kind = /** @type {Kind} */ (kind);
+      this.invalidate();
+      redraw();
+    });
   }
 
-  invalidate() {
-    if (this.waiting) return;
-    this.waiting = true;
-    requestAnimationFrame(() => {
-      this.waiting = false;
-      this.draw();
-    });
+  /** A text if there is nothing to plot. */
+  state() {
+    if (store.chosen.length) return null;
+    return store.nopaths.has(store.selected ?? "")
+      ? html`<p>No motion to plot: this contour has no path.</p>`
+      : html`<p>Speeds and accelerations appear with the plan.</p>`;
   }
 
   /** The shown plans, the joints of the robot, and their axes. */
   shown() {
-    const plans = this.store.plans.get(this.store.selected ?? "") ?? [];
-    const { robot } = this.store.scene ?? {};
-    return { plans, axes: axesOf(robot), joints: robot?.joints ?? [] };
+    const { robot } = store.scene ?? {};
+    return { plans: store.chosen, axes: axesOf(robot), joints: robot?.joints ?? [] };
   }
 
   draw() {
     const { plans, axes } = this.shown();
     this.plot?.destroy();
     this.plot = null;
-    this.legend();
-    const nopath = this.store.nopaths.has(this.store.selected ?? "");
-    this.said.replaceChildren(
-      ...(plans.length
-        ? []
-        : [
-            el(
-              "p",
-              {},
-              nopath
-                ? "No motion to plot: this contour has no path."
-                : "Speeds and accelerations appear with the plan.",
-            ),
-          ]),
-    );
     this.host.replaceChildren();
-    this.host.dataset.contour = this.store.selected ?? "";
+    this.host.dataset.contour = store.selected ?? "";
     if (!plans.length || !this.host.clientHeight) return;
-    const against = this.store.compared(this.store.selected ?? "");
+    const against = store.compared(store.selected ?? "");
     this.beside = against.length ? columns(against, axes, this.kind) : [];
     const scales = [...new Set(axes.map((each) => scaleOf(each, this.kind)))];
     const em = textSize();
@@ -230,7 +199,7 @@ export class Plots {
    */
   limits(plot) {
     if (this.kind === "angle") return;
-    const options = this.store.job?.values?.plan;
+    const options = store.job?.values?.plan;
     const eta = (this.kind === "speed" ? options?.eta_velocity : options?.eta_acceleration) ?? 1;
     const { ctx: context, bbox } = plot;
     context.save();
@@ -255,37 +224,25 @@ export class Plots {
     context.restore();
   }
 
+  /** Buttons that show and hide the joints. */
   legend() {
     const { plans, axes, joints } = this.shown();
-    byId("plot-legend").replaceChildren(
-      ...(plans.length ? axes : []).map(({ label, unit, of, colour }, j) => {
-        const key = el("i", { class: "key" });
-        key.style.background = themeColour(colour);
-        const { name, lower, upper, velocity, acceleration } = joints[j];
-        const [low, high] = [lower, upper].map((each) =>
-          each === null ? null : digits(of(each), 4),
-        );
-        const travel = low === null ? "endless" : `${low} to ${high} ${unit}`;
-        const limits = [velocity, acceleration].map((each) => digits(of(each), 4));
-        const toggle = () => {
-          if (!this.off.delete(j)) this.off.add(j);
-          this.plot?.setSeries(j + 1, { show: !this.off.has(j) });
-          button.setAttribute("aria-pressed", String(!this.off.has(j)));
-        };
-        const button = el(
-          "button",
-          {
-            class: "joint",
-            "aria-pressed": String(!this.off.has(j)),
-            title: `Show or hide ${name}: ${travel}, ${limits[0]} ${unit}/s, ${limits[1]} ${unit}/s\u00b2`,
-            onclick: toggle,
-          },
-          key,
-          label,
-        );
-        return button;
-      }),
-    );
+    if (!plans.length) return null;
+    return axes.map(({ label, unit, of, colour }, j) => {
+      const { name, lower, upper, velocity, acceleration } = joints[j];
+      const [low, high] = [lower, upper].map((each) => each !== null && digits(of(each), 4));
+      const travel = low === false ? "endless" : `${low} to ${high} ${unit}`;
+      const [speed, acc] = [velocity, acceleration].map((each) => digits(of(each), 4));
+      const title = `Show or hide ${name}: ${travel}, ${speed} ${unit}/s, ${acc} ${unit}/s\u00b2`;
+      const toggle = () => {
+        if (!this.off.delete(j)) this.off.add(j);
+        this.plot?.setSeries(j + 1, { show: !this.off.has(j) });
+        redraw();
+      };
+      return html`
+        <button class="joint" aria-pressed=${String(!this.off.has(j))} title=${title}
+          onClick=${toggle}>${colourKey(colour)}${label}</button>`;
+    });
   }
 
   /**
@@ -301,18 +258,14 @@ export class Plots {
       const value = column[idx];
       if (this.off.has(j) || value === null || value === undefined) return [];
       const { label, unit, of, colour } = axes[j];
-      const key = el("i", { class: "key" });
-      key.style.background = themeColour(colour);
       const { velocity, acceleration } = joints[j];
       const limit = { speed: velocity, acceleration, angle: 0 }[this.kind];
       const so = `${digits((of(limit) * value) / 100)} ${unit}${KINDS[this.kind].per}`;
       const share = `${fixed(value, 1)} ${scaleOf(axes[j], this.kind)}`;
-      return [el("span", {}, key, `${label} `, el("b", {}, limit ? `${share}, ${so}` : share))];
+      const text = limit ? `${share}, ${so}` : share;
+      return html`<span>${colourKey(colour)}${label} <b>${text}</b></span>`;
     });
-    this.tip.replaceChildren(
-      el("span", { class: "quiet" }, `${fixed(plot.data[0][idx], 3)} s`),
-      ...rows,
-    );
+    draw(this.tip, html`<span class="quiet">${fixed(plot.data[0][idx], 3)} s</span>${rows}`);
     const x = left + plot.over.offsetLeft;
     const right = x + 14 + this.tip.offsetWidth > this.host.clientWidth;
     this.tip.style.transform = `translate(${right ? x - 14 - this.tip.offsetWidth : x + 14}px, 6px)`;
@@ -328,8 +281,8 @@ export class Plots {
     for (const plan of plans) {
       const length = plan.time[plan.time.length - 1];
       if (rest <= length || plan === plans[plans.length - 1]) {
-        const begin = this.player.timeline.when(plan, 0);
-        if (begin !== null) this.player.seek(begin + Math.min(Math.max(rest, 0), length));
+        const begin = player.timeline.when(plan, 0);
+        if (begin !== null) player.seek(begin + Math.min(Math.max(rest, 0), length));
         return;
       }
       rest -= length;
@@ -338,12 +291,12 @@ export class Plots {
 
   /** Move the line to the time of the player. */
   follow() {
-    const { moment } = this.player;
+    const { moment } = player;
     const { plans } = this.shown();
     const index = plans.findIndex((plan) => plan.name === moment?.span.plan?.name);
     this.line.hidden = !this.plot || !moment || index < 0;
     if (this.line.hidden || !this.plot || !moment) return;
-    const before = plans.slice(0, index).reduce((sum, { time }) => sum + time[time.length - 1], 0);
+    const before = secondsOf(plans.slice(0, index));
     this.line.style.transform = `translateX(${this.plot.valToPos(before + moment.local, "x")}px)`;
   }
 

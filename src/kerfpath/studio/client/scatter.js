@@ -1,6 +1,6 @@
 /** A scatter plot of a Pareto set in two of its criteria, with a third one as colour. */
 
-import { fitCanvas, textSize, themeColour } from "./dom.js";
+import { freshContext, textSize, themeColour } from "./dom.js";
 import { digits } from "./format.js";
 import { alongScale } from "./scene/scale.js";
 
@@ -26,9 +26,9 @@ export function ticks(low, high, most) {
 }
 
 export class Scatter {
-  /** @param {HTMLCanvasElement} canvas */
-  constructor(canvas) {
-    this.canvas = canvas;
+  constructor() {
+    /** @type {HTMLCanvasElement | null} */
+    this.canvas = null;
     /** @type {Point[]} */
     this.points = [];
     /** @type {[Axis, Axis]} */
@@ -41,9 +41,28 @@ export class Scatter {
     this.chosen = null;
   }
 
+  /**
+   * Take the points of a set, in the units that are shown.
+   * @param {import("./messages.js").FrontMessage} front
+   * @param {(Axis & {of: (value: number) => number})[]} axes
+   * @param {number | null} chosen
+   */
+  load({ points }, axes, chosen) {
+    const [x, y, colour] = this.shown;
+    const fits = (/** @type {number} */ axis, /** @type {number} */ other) =>
+      axis < axes.length ? axis : other;
+    this.shown = [fits(x, 0), fits(y, 1), fits(colour, -1)];
+    this.points = points.map(({ number, values, best }) => ({
+      ...{ number, best },
+      values: values.map((value, i) => axes[i].of(value)),
+    }));
+    this.axes = [axes[this.shown[0]], axes[this.shown[1]]];
+    this.chosen = chosen;
+  }
+
   frame() {
     const em = textSize();
-    const { clientWidth, clientHeight } = this.canvas;
+    const { clientWidth = 0, clientHeight = 0 } = this.canvas ?? {};
     const [left, top] = [3.6 * em, 0.5 * em];
     return {
       ...{ em, left, top },
@@ -94,12 +113,8 @@ export class Scatter {
   }
 
   draw() {
-    const { width, height, ratio } = fitCanvas(this.canvas);
-    const context = this.canvas.getContext("2d");
-    if (!context || !width || !height) return;
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, height);
-    if (!this.points.length) return;
+    const context = this.canvas && freshContext(this.canvas);
+    if (!context || !this.points.length) return;
     this.grid(context);
     const colour = this.shown[2];
     const [low, high] = colour < 0 ? [0, 1] : this.range(colour);

@@ -8,7 +8,7 @@
 /**
  * @typedef {"connection" | "job" | "part" | "pointed" | "clearance" | "scene" | "plan" | "program" | "outcome" | "progress" | "map"
  *   | "pose" | "fastest" | "program_text" | "error" | "selected" | "kept" | "compare" | "front"
- *   | "candidate" | "shade" | "technique" | "reach" | "layout"} Topic
+ *   | "candidate" | "shade" | "technique" | "reach" | "layout" | "dismissed" | "sheet" | "anything"} Topic
  */
 
 /** @typedef {import("./messages.js").KeptEntry} KeptEntry */
@@ -16,6 +16,8 @@
 /** @typedef {{name: string, s: number[], gamma: number[], posture: number[]}} Course */
 
 const MOST_SHADES = 12; // some 100 kB each
+const MOST_ERRORS = 3;
+const ERROR_STAYS = 12_000; // ms
 
 /** The state of the page. A message changes it; then the listeners to its topic are called. */
 export class Store {
@@ -24,6 +26,8 @@ export class Store {
     this.connection = "connecting";
     /** @type {number | null} time of the next try, ms */
     this.retryAt = null;
+    this.met = false; // whether the connection has ever been open
+    this.broken = false; // whether it has been lost since it was last open
     /** @type {import("./messages.js").JobMessage | null} */
     this.job = null;
     /** @type {import("./messages.js").PartMessage | null} */
@@ -41,9 +45,9 @@ export class Store {
     /** @type {import("./messages.js").PoseMessage | null} */
     this.pose = null;
     /** @type {import("./messages.js").ProgramTextMessage | null} */
-    this.programText = null;
-    /** @type {import("./messages.js").ErrorMessage | null} */
-    this.error = null;
+    this.program_text = null;
+    /** @type {import("./messages.js").ErrorMessage[]} those that are shown */
+    this.errors = [];
     /** @type {Map<string, PlanMessage[]>} by contour, its pieces in order */
     this.plans = new Map();
     /** @type {Map<string, PlanMessage[]>} by contour, the plans before its last change */
@@ -81,7 +85,7 @@ export class Store {
   }
 
   /**
-   * Call `listener` after each change of a topic.
+   * Call `listener` after each change of a topic; "anything" is every topic.
    * @param {Topic[]} topics
    * @param {(about: any) => void} listener
    */
@@ -97,7 +101,8 @@ export class Store {
    * @param {unknown} [about]
    */
   emit(topic, about) {
-    for (const listener of this.listeners.get(topic) ?? []) listener(about);
+    for (const each of [topic, /** @type {const} */ ("anything")])
+      for (const listener of this.listeners.get(each) ?? []) listener(about);
   }
 
   /**
@@ -107,6 +112,8 @@ export class Store {
   connected(status, retryAt) {
     this.connection = status;
     this.retryAt = retryAt;
+    this.met ||= status === "open";
+    this.broken = status === "lost" || (this.broken && status !== "open");
     this.emit("connection");
   }
 
@@ -162,6 +169,30 @@ export class Store {
     return this.beside(contour).length ? (this.against?.entry.name ?? "before") : null;
   }
 
+  /** Whether the job can be edited. */
+  get live() {
+    return this.connection === "open" && Boolean(this.job?.values);
+  }
+
+  /** The plans of the chosen contour. */
+  get chosen() {
+    return this.plans.get(this.selected ?? "") ?? [];
+  }
+
+  /** The index of the chosen contour's table in the job, or null. */
+  get table() {
+    const known = [...(this.job?.contours ?? []), ...(this.scene?.contours ?? [])];
+    return known.find(({ name }) => name === this.selected)?.index ?? null;
+  }
+
+  /**
+   * Return what is wrong with a key of the job, or "".
+   * @param {string} key  dotted
+   */
+  faultOf(key) {
+    return this.job?.faults.find((each) => each.key.join(".") === key)?.message ?? "";
+  }
+
   /** The names of all contours, in the order of the job. */
   contours() {
     return (this.scene?.contours ?? this.job?.contours ?? []).map((each) => each.name);
@@ -178,12 +209,6 @@ export class Store {
   /** @param {ServerMessage} message */
   take(message) {
     switch (message.type) {
-      case "job":
-        this.job = message;
-        break;
-      case "part":
-        this.part = message;
-        break;
       case "scene":
         this.scene = message;
         this.shades.clear(); // robot or cell may have changed
@@ -194,8 +219,9 @@ export class Store {
         this.takePlan(message);
         break;
       case "nopath":
-        this.takeNoPath(message);
-        return;
+        return this.takeNoPath(message);
+      case "candidate":
+        return this.propose(message);
       case "clearance":
         this.clearances.set(message.name, message);
         break;
@@ -210,44 +236,32 @@ export class Store {
       case "technique":
         this.techniques.set(`${message.contour} ${message.method}`, message);
         break;
-      case "program":
-        this.program = message;
-        break;
-      case "outcome":
-        this.outcome = message;
-        break;
-      case "progress":
-        this.progress = message;
-        break;
-      case "pose":
-        this.pose = message;
-        break;
-      case "fastest":
-        this.fastest = message;
-        break;
-      case "program_text":
-        this.programText = message;
-        break;
-      case "front":
-        this.front = message;
-        break;
-      case "reach":
-        this.reach = message;
-        break;
-      case "layout":
-        this.layout = message;
-        break;
-      case "candidate":
-        this.propose(message);
-        return;
       case "kept":
         this.kept = message.plans;
         break;
       case "error":
-        this.error = message;
+        this.warn(message);
         break;
+      default: // the newest of its type
+        Object.assign(this, { [message.type]: message });
     }
-    this.emit(message.type, message);
+    return this.emit(message.type, message);
+  }
+
+  /**
+   * Keep an error for a while.
+   * @param {import("./messages.js").ErrorMessage} error
+   */
+  warn(error) {
+    if (this.errors.some(({ message }) => message === error.message)) return;
+    this.errors = [...this.errors, error].slice(-MOST_ERRORS);
+    window.setTimeout(() => this.dismiss(error), ERROR_STAYS);
+  }
+
+  /** @param {import("./messages.js").ErrorMessage} error */
+  dismiss(error) {
+    this.errors = this.errors.filter((each) => each !== error);
+    this.emit("dismissed");
   }
 
   /**

@@ -1,7 +1,8 @@
 /** Pins on the map: drawn as bands, edited with the pointer, and listed beside the map. */
 
-import { el, themeColour } from "../dom.js";
+import { themeColour } from "../dom.js";
 import { deg } from "../format.js";
+import { html } from "../ui.js";
 import { AROUND, intervals, pinOver, said, stretched, widened, Pins } from "./pins.js";
 
 /** @typedef {import("./pins.js").Pin} Pin */
@@ -287,52 +288,37 @@ export class Bands {
     context.restore();
   }
 
-  /**
-   * Return the list of pins for the side of the map.
-   * @returns {Node[]}
-   */
+  /** The list of pins for the side of the map. */
   listed() {
     const { pins } = this;
-    if (!pins.writable) return [];
-    const rows = pins.list.map((pin, i) =>
-      el(
-        "li",
-        {},
-        el(
-          "button",
-          {
-            "aria-pressed": String(pins.chosen === i),
-            onclick: () => {
-              pins.chosen = pins.chosen === i ? null : i;
-              this.changed();
-            },
-          },
-          said(pin),
-        ),
-        el(
-          "button",
-          {
-            ...{ class: "plain", title: "Remove this pin" },
-            "aria-label": `Remove the pin ${said(pin)}`,
-            onclick: () => {
-              pins.remove(i);
-              this.changed();
-            },
-          },
-          "×",
-        ),
-      ),
+    if (!pins.writable) return null;
+    const choose = (/** @type {number} */ i) => {
+      pins.chosen = pins.chosen === i ? null : i;
+      this.changed();
+    };
+    const remove = (/** @type {number} */ i) => {
+      pins.remove(i);
+      this.changed();
+    };
+    const rows = pins.list.map(
+      (pin, i) => html`
+        <li>
+          <button aria-pressed=${String(pins.chosen === i)} onClick=${() => choose(i)}>
+            ${said(pin)}
+          </button>
+          <button class="plain" title="Remove this pin" aria-label=${`Remove the pin ${said(pin)}`}
+            onClick=${() => remove(i)}>×</button>
+        </li>`,
     );
-    return [
-      el(
-        "section",
-        { class: "pins", "aria-label": "Pins of gamma" },
-        el("h3", {}, "Pins"),
-        rows.length
-          ? el("ul", {}, ...rows)
-          : el("p", { class: "quiet" }, "Drag over the map to keep gamma inside a rectangle."),
-      ),
-    ];
+    return html`
+      <section class="pins" aria-label="Pins of gamma">
+        <h3>Pins</h3>
+        ${
+          rows.length
+            ? html`<ul>${rows}</ul>`
+            : html`<p class="quiet">Drag over the map to keep gamma inside a rectangle.</p>`
+        }
+      </section>`;
   }
 }
 

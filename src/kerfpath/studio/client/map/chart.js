@@ -1,6 +1,6 @@
 /** The drawing of a map on its canvas: cells, axes, courses, cursors. */
 
-import { fitCanvas, textSize, themeColour } from "../dom.js";
+import { freshContext, pixelRatio, textSize, themeColour } from "../dom.js";
 import { deg, fixed } from "../format.js";
 import { wrapped } from "./grid.js";
 import { inks, pixels } from "./paint.js";
@@ -70,15 +70,11 @@ export class Chart {
 
   /** @param {Drawn} drawn */
   draw({ plans, before, technique, stale, broken, now, hover, under }) {
-    const { width, height, ratio } = fitCanvas(this.canvas);
-    const context = this.canvas.getContext("2d");
-    if (!context || !width || !height) return;
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, height);
-    if (!this.grid?.layers.length) return;
+    const context = freshContext(this.canvas);
+    if (!context || !this.grid?.layers.length) return;
     const frame = this.frame();
     const scale = frame.em / 13;
-    this.cells(ratio, frame);
+    this.cells(pixelRatio(), frame);
     context.drawImage(this.back, frame.left, frame.top, frame.width, frame.height);
     this.axes(context, frame);
     context.save();

@@ -1,28 +1,23 @@
 /** The shade of the map, and the course of another technique beside the plan's. */
 
-import { byId, el } from "../dom.js";
+import { send, store } from "../app.js";
 import { digits, fixed } from "../format.js";
+import { SCALE_GRADIENT } from "../scene/scale.js";
+import { html, options } from "../ui.js";
 import { Shade } from "./shade.js";
 
-/** @typedef {import("../store.js").Store} Store */
 /** @typedef {import("../messages.js").TechniqueMessage} TechniqueMessage */
 /** @typedef {import("./grid.js").Grid} Grid */
 
 /** Techniques by the names of the server. */
-export const TECHNIQUES = { paper: "paper's procedure", known: "known technique" };
+const TECHNIQUES = { paper: "paper's procedure", known: "known technique" };
 
 export class Choices {
-  /**
-   * @param {Store} store
-   * @param {{send: (message: any) => boolean}} connection
-   * @param {() => void} changed
-   */
-  constructor(store, connection, changed) {
-    this.store = store;
-    this.connection = connection;
+  /** @param {() => void} changed */
+  constructor(changed) {
     this.changed = changed;
-    this.by = "";
-    this.method = "";
+    /** What is chosen, by kind of message: a quantity and a technique; "": none. */
+    this.chosen = { shade: "", technique: "" };
     /** @type {Record<string, string>} the last request, by kind */
     this.asked = {};
     /** @type {Record<string, string>} why it was refused, by kind */
@@ -31,22 +26,6 @@ export class Choices {
     this.shade = null;
     /** @type {TechniqueMessage | null} */
     this.technique = null;
-    this.shadeBox = byId("map-shade", HTMLSelectElement);
-    this.techniqueBox = byId("map-technique", HTMLSelectElement);
-    this.shadeBox.addEventListener("change", () => {
-      this.by = this.shadeBox.value;
-      if (!this.by) this.ask("shade", "", { by: null });
-      changed();
-    });
-    this.techniqueBox.replaceChildren(
-      el("option", { value: "" }, "nothing"),
-      ...Object.entries(TECHNIQUES).map(([value, words]) => el("option", { value }, words)),
-    );
-    this.techniqueBox.addEventListener("change", () => {
-      this.method = this.techniqueBox.value;
-      if (!this.method) this.ask("technique", "", { method: null });
-      changed();
-    });
     store.on(["error"], ({ about, message }) => {
       if (!(about in this.asked)) return;
       this.refused[about] = message;
@@ -56,17 +35,35 @@ export class Choices {
   }
 
   /**
+   * Choose a quantity or a technique; "": none.
+   * @param {"shade" | "technique"} kind
+   * @param {string} name
+   */
+  choose(kind, name) {
+    this.chosen[kind] = name;
+    if (!name) this.ask(kind, "", { [kind === "shade" ? "by" : "method"]: null });
+    this.changed();
+  }
+
+  /**
    * Ask for something, once; an empty key stops its computation.
    * @param {"shade" | "technique"} kind
    * @param {string} key
    * @param {object} what
    */
   ask(kind, key, what) {
-    const { connection, store } = this;
     if ((key && this.asked[kind] === key) || !store.selected) return;
-    if (!connection.send({ type: kind, contour: store.selected, ...what })) return;
+    if (!send({ type: kind, contour: store.selected, ...what })) return;
     this.asked[kind] = key;
     delete this.refused[kind];
+  }
+
+  /**
+   * Return the chosen quantity, if a map has it.
+   * @param {Grid | null} grid
+   */
+  by(grid) {
+    return grid?.message.shades.find(({ by }) => by === this.chosen.shade)?.by ?? "";
   }
 
   /**
@@ -74,30 +71,14 @@ export class Choices {
    * @param {Grid | null} grid
    */
   load(grid) {
-    const { store, by, method } = this;
     if (store.connection !== "open") this.asked = {};
-    const shades = grid?.message.shades ?? [];
-    const list = [
-      { by: "", words: "reason only" },
-      ...shades.map((each) => ({ by: each.by, words: each.words })),
-    ];
-    if (
-      list.length !== this.shadeBox.length ||
-      list.some((e, i) => this.shadeBox.options[i].value !== e.by)
-    )
-      this.shadeBox.replaceChildren(
-        ...list.map((each) => el("option", { value: each.by }, each.words)),
-      );
-    const wanted = grid && shades.some((each) => each.by === by) ? by : "";
-    this.shadeBox.value = wanted;
-    this.techniqueBox.disabled = this.shadeBox.disabled = !grid?.layers.length;
-    const contour = grid?.message.contour ?? "";
-    const shade = wanted ? store.shades.get(`${contour} ${wanted}`) : undefined;
-    const fits = shade?.graph === grid?.message.graph;
+    const [by, method] = [this.by(grid), this.chosen.technique];
+    const { contour = "", graph } = grid?.message ?? {};
+    const shade = by ? store.shades.get(`${contour} ${by}`) : undefined;
+    const fits = shade?.graph === graph;
     if (!shade || !fits) this.shade = null;
     else if (this.shade?.message !== shade) this.shade = new Shade(shade);
-    if (grid && wanted && !fits)
-      this.ask("shade", `${contour} ${grid.message.graph} ${wanted}`, { by: wanted });
+    if (by && !fits) this.ask("shade", `${contour} ${graph} ${by}`, { by });
     this.technique = (method && store.techniques.get(`${contour} ${method}`)) || null;
     const done = (store.plans.get(contour) ?? []).every(({ passed }) => passed !== null);
     if (grid && method && done && !this.fresh(contour))
@@ -106,8 +87,7 @@ export class Choices {
 
   /** @param {string} contour */
   revision(contour) {
-    const { plans, nopaths } = this.store;
-    return (plans.get(contour)?.[0] ?? nopaths.get(contour))?.revision ?? 0;
+    return (store.plans.get(contour)?.[0] ?? store.nopaths.get(contour))?.revision ?? 0;
   }
 
   /**
@@ -125,72 +105,106 @@ export class Choices {
   }
 
   /**
-   * Return the legend of the shade and of the other course.
-   * @param {Grid} grid
-   * @returns {Node[]}
+   * The lists to choose from.
+   * @param {Grid | null} grid
    */
-  legend(grid) {
-    const nodes = [];
-    const waiting = (/** @type {string} */ kind, /** @type {string} */ words) =>
-      el("p", { class: "quiet" }, this.refused[kind] ?? words);
-    if (this.shadeBox.value)
-      nodes.push(
-        ...(this.shade?.legend() ?? [waiting("shade", "Shades are being computed \u2026")]),
-      );
-    if (this.method) nodes.push(...this.beside(grid.message.contour, waiting));
-    return nodes.length
-      ? [el("section", { class: "shades", "aria-live": "polite" }, ...nodes)]
-      : [];
+  lists(grid) {
+    const shades = (grid?.message.shades ?? []).map(({ by, words }) => ({
+      value: by,
+      label: words,
+    }));
+    const techniques = Object.entries(TECHNIQUES).map(([value, label]) => ({ value, label }));
+    /** @type {(kind: "shade" | "technique", label: string, value: string, choices: {value: string, label: string}[]) => unknown} */
+    const list = (kind, label, value, choices) => {
+      const choose = (/** @type {any} */ { target }) => this.choose(kind, target.value);
+      return html`
+        <label>${label}${" "}
+          <select id=${`map-${kind}`} value=${value} disabled=${!grid?.layers.length}
+            onChange=${choose}>${options(choices)}</select>
+        </label>`;
+    };
+    const none = [{ value: "", label: "reason only" }, ...shades];
+    const nothing = [{ value: "", label: "nothing" }, ...techniques];
+    return html`
+      ${list("shade", "Shade", this.by(grid), none)}
+      ${list("technique", "Beside", this.chosen.technique, nothing)}`;
   }
 
   /**
-   * Return the results of the other technique.
-   * @param {string} contour
-   * @param {(kind: string, words: string) => Node} waiting
-   * @returns {Node[]}
+   * The legend of the shade and of the other course.
+   * @param {Grid} grid
    */
-  beside(contour, waiting) {
+  legend(grid) {
+    const { technique: method } = this.chosen;
+    if (!this.by(grid) && !method) return null;
+    const { shade } = this;
+    return html`
+      <section class="shades" aria-live="polite">
+        ${this.by(grid) && (shade ? scale(shade) : this.waiting("shade", "Shades are being computed …"))}
+        ${method && this.beside(grid.message.contour)}
+      </section>`;
+  }
+
+  /** @type {(kind: string, words: string) => unknown} */
+  waiting(kind, words) {
+    return html`<p class="quiet">${this.refused[kind] ?? words}</p>`;
+  }
+
+  /**
+   * The results of the other technique.
+   * @param {string} contour
+   */
+  beside(contour) {
     const { technique } = this;
-    const name = TECHNIQUES[/** @type {keyof typeof TECHNIQUES} */ (this.method)];
-    const head = el("p", { class: "technique" }, el("i", { class: "line dots" }), name);
-    const late = this.fresh(contour) ? [] : [waiting("technique", "Being computed \u2026")];
-    if (!technique) return [head, ...late];
-    const notes = technique.notes.map((each) => el("p", { class: "quiet" }, each));
-    if (technique.cost === null)
-      return [
-        head,
-        ...late,
-        el(
-          "details",
-          {},
-          el("summary", {}, "finds no path"),
-          el("p", {}, technique.statement),
-          ...notes,
-        ),
-      ];
-    return [
-      head,
-      ...late,
-      el("p", {}, `cost ${digits(technique.cost, 4)}`),
-      peak("speed", technique.peak_velocity),
-      peak("acceleration", technique.peak_acceleration),
-      ...notes,
-    ];
+    const name = TECHNIQUES[/** @type {keyof typeof TECHNIQUES} */ (this.chosen.technique)];
+    const notes = technique?.notes.map((each) => html`<p class="quiet">${each}</p>`);
+    return html`
+      <p class="technique"><i class="line dots" />${name}</p>
+      ${!this.fresh(contour) && this.waiting("technique", "Being computed …")}
+      ${
+        technique?.cost === null &&
+        html`
+        <details>
+          <summary>finds no path</summary>
+          <p>${technique.statement}</p>
+          ${notes}
+        </details>`
+      }
+      ${
+        technique &&
+        technique.cost !== null &&
+        html`
+        <p>cost ${digits(technique.cost, 4)}</p>
+        ${peak("speed", technique.peak_velocity)}
+        ${peak("acceleration", technique.peak_acceleration)}
+        ${notes}`
+      }`;
   }
 }
 
 /**
- * Show the largest share of a limit and its joint, highlighted if the limit is broken.
+ * The scale of a shade.
+ * @param {Shade} shade
+ */
+function scale(shade) {
+  const { words, low, high, beyond } = shade.message;
+  const [begin, end] = [shade.shown(low).split(" ")[0], shade.shown(high)];
+  return html`
+    <p>${beyond ? `${words} beyond the near-miss distance` : words}</p>
+    <p class="scale">
+      ${begin}<i class="ramp" style=${{ background: SCALE_GRADIENT }} />${beyond ? `≥ ${end}` : end}
+    </p>
+    ${shade.closed && html`<p class="quiet">crossed out: closer than allowed</p>`}`;
+}
+
+/**
+ * The largest share of a limit and its joint, highlighted if the limit is broken.
  * @param {string} words
  * @param {(number | null)[]} shares
  */
 function peak(words, shares) {
   const all = shares.map((each) => each ?? Infinity);
   const most = Math.max(...all);
-  const joint = all.indexOf(most) + 1;
-  return el(
-    "p",
-    most > 1 ? { class: "over" } : {},
-    `peak ${words} ${fixed(most, 2)} \u00d7 limit, joint ${joint}`,
-  );
+  const text = `peak ${words} ${fixed(most, 2)} × limit, joint ${all.indexOf(most) + 1}`;
+  return html`<p class=${most > 1 ? "over" : ""}>${text}</p>`;
 }

@@ -1,13 +1,14 @@
 /** The cursor of the map: the reason of loss of a pose, its numbers, and its ghost. */
 
-import { byId, el } from "../dom.js";
-import { deg, degrees, fixed } from "../format.js";
+import { send, store } from "../app.js";
+import { byId } from "../dom.js";
+import { degrees, millimetres } from "../format.js";
 import { turnedAbout } from "../inverse.js";
+import { draw, html } from "../ui.js";
 import { wrapped } from "./grid.js";
 
 /** @typedef {import("./chart.js").Chart} Chart */
 /** @typedef {import("./choices.js").Choices} Choices */
-/** @typedef {import("../store.js").Store} Store */
 /** @typedef {{node: number, sample: number}} Cell */
 /** @typedef {(q: ArrayLike<number> | null, admitted: boolean) => void} Haunt */
 
@@ -15,18 +16,14 @@ const ASK_AFTER = 140; // ms at rest before the server is asked for details
 
 export class Hover {
   /**
-   * @param {Store} store
    * @param {Chart} chart
    * @param {Choices} choices
-   * @param {{send: (message: any) => boolean}} connection
    * @param {Haunt} haunt
    * @param {() => void} changed
    */
-  constructor(store, chart, choices, connection, haunt, changed) {
-    this.store = store;
+  constructor(chart, choices, haunt, changed) {
     this.chart = chart;
     this.choices = choices;
-    this.connection = connection;
     this.haunt = haunt;
     this.changed = changed;
     this.tip = byId("map-tip");
@@ -77,7 +74,7 @@ export class Hover {
       const { posture } = grid.layers[chart.layer];
       const gamma = grid.message.gamma[cell.sample];
       const { contour } = grid.message;
-      this.connection.send({ type: "reason", contour, node: cell.node, gamma, posture });
+      send({ type: "reason", contour, node: cell.node, gamma, posture });
     }, ASK_AFTER);
   }
 
@@ -87,7 +84,7 @@ export class Hover {
    * @param {Cell} cell
    */
   turned({ node, sample }) {
-    const { scene, plans } = this.store;
+    const { scene, plans } = store;
     const { s, gamma, contour } = this.grid.message;
     const { posture } = this.grid.layers[this.chart.layer];
     for (const plan of scene ? (plans.get(contour) ?? []) : []) {
@@ -106,7 +103,7 @@ export class Hover {
    * @param {ArrayLike<number> | null} q
    */
   numbers(words, q) {
-    const joints = this.store.scene?.robot.joints;
+    const joints = store.scene?.robot.joints;
     if (!q || !joints) return "";
     const named = /^joint (\d+) (low|high)$/.exec(words);
     if (named) {
@@ -142,14 +139,14 @@ export class Hover {
     const [{ posture }, { shade }] = [grid.layers[chart.layer], this.choices];
     const shaded = shade?.said(posture, place) ?? "";
     if (head === "free" && shade?.tooNear(posture, place)) head = "closer than allowed";
-    tip.replaceChildren(
-      el("b", {}, head[0].toUpperCase() + head.slice(1)),
-      ...[shaded, numbers].flatMap((each) => (each ? [el("span", {}, each), el("br")] : [])),
-      el(
-        "span",
-        { class: "quiet" },
-        `${fixed((s - grid.message.s[0]) * 1e3)} mm, gamma ${fixed(deg(gamma), 0)} deg`,
-      ),
+    draw(
+      tip,
+      html`
+        <b>${head[0].toUpperCase() + head.slice(1)}</b>
+        ${[shaded, numbers].map((each) => each && html`<span>${each}</span><br />`)}
+        <span class="quiet">
+          ${millimetres(s - grid.message.s[0])}, gamma ${degrees(gamma, 0)}
+        </span>`,
     );
     tip.hidden = false;
     const { clientWidth, clientHeight } = chart.canvas;

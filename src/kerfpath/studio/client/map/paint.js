@@ -109,6 +109,20 @@ function marked(pattern, x, y, period) {
 }
 
 /**
+ * Return the pixels of a square of one ink.
+ * @param {Ink} ink
+ * @param {number} size  px
+ * @param {number} period  px, of its pattern
+ */
+export function swatch({ base, mark, pattern }, size, period) {
+  const image = new ImageData(size, size);
+  const out = new Uint32Array(image.data.buffer);
+  for (let i = 0; i < out.length; i++)
+    out[i] = packed(marked(pattern, i % size, Math.floor(i / size), period) ? mark : base);
+  return image;
+}
+
+/**
  * Return the pixels of a layer: path length to the right, gamma upwards.
  * @param {Grid} grid
  * @param {number} layer

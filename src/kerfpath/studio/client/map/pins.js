@@ -1,6 +1,7 @@
 /** Pins: windows of gamma of the chosen contour, read from the job and written to it. */
 
-/** @typedef {import("../store.js").Store} Store */
+import { send, store } from "../app.js";
+
 /** @typedef {import("./grid.js").Grid} Grid */
 /** @typedef {{start: number, end: number, low: number, high: number}} Pin mm and deg */
 
@@ -96,13 +97,7 @@ export function widened(pin, by) {
 
 /** The pins of the chosen contour. */
 export class Pins {
-  /**
-   * @param {Store} store
-   * @param {{send: (message: any) => boolean}} connection
-   */
-  constructor(store, connection) {
-    this.store = store;
-    this.connection = connection;
+  constructor() {
     /** @type {number | null} */
     this.chosen = null;
     /** @type {Pin[] | null} pins that are being drawn, until the job has them */
@@ -114,25 +109,17 @@ export class Pins {
     store.on(["selected"], () => (this.chosen = null));
   }
 
-  /** The index of the chosen contour's table in the job, or null. */
-  get table() {
-    const { job, selected } = this.store;
-    return job?.contours.find(({ name }) => name === selected)?.index ?? null;
-  }
-
   /** @returns {Pin[]} */
   get list() {
     if (this.preview) return this.preview;
-    const { table } = this;
     /** @type {number[][]} */
-    const kept =
-      (table === null ? null : this.store.job?.values?.contour?.[table]?.gamma_windows) ?? [];
+    const kept = store.job?.values?.contour?.[store.table ?? -1]?.gamma_windows ?? [];
     return kept.map(([start, end, low, high]) => ({ start, end, low, high }));
   }
 
   /** Whether there is a job to write them to. */
   get writable() {
-    return this.table !== null && Boolean(this.store.job?.values);
+    return store.table !== null && Boolean(store.job?.values);
   }
 
   /**
@@ -140,11 +127,11 @@ export class Pins {
    * @param {Pin[]} pins
    */
   write(pins) {
-    const { table } = this;
+    const { table } = store;
     if (table === null) return;
     const value = pins.map(({ start, end, low, high }) => [start, end, low, high]);
     this.preview = pins;
-    this.connection.send({
+    send({
       type: "edit",
       path: ["contour", table, "gamma_windows"],
       value: value.length ? value : null,

@@ -1,8 +1,6 @@
-/** A quantity that shades the admitted poses of a map, and its scale. */
+/** A quantity that shades the admitted poses of a map. */
 
-import { el } from "../dom.js";
 import { UNITS, digits, fixed } from "../format.js";
-import { SCALE_GRADIENT } from "../scene/scale.js";
 import { bytes } from "./grid.js";
 import { MOST, NO_SHADE, TOO_NEAR } from "./paint.js";
 
@@ -70,22 +68,5 @@ export class Shade {
   /** Whether a body is too close anywhere. */
   get closed() {
     return [...this.layers.values()].some(({ values }) => values.includes(TOO_NEAR));
-  }
-
-  /**
-   * Return the scale.
-   * @returns {Node[]}
-   */
-  legend() {
-    const { words, low, high, beyond } = this.message;
-    const strip = el("i", { class: "ramp" });
-    strip.style.background = SCALE_GRADIENT;
-    const [first, last] = [low, high].map((each) => this.shown(each));
-    const begin = first.split(" ")[0];
-    return [
-      el("p", {}, beyond ? `${words} beyond the near-miss distance` : words),
-      el("p", { class: "scale" }, begin, strip, beyond ? `\u2265 ${last}` : last),
-      ...(this.closed ? [el("p", { class: "quiet" }, "crossed out: closer than allowed")] : []),
-    ];
   }
 }

@@ -1,7 +1,9 @@
 /** The map: the reason of loss of every rotation along the path, the plan's course, and ghosts. */
 
-import { byId, el } from "../dom.js";
+import { player, send, store } from "../app.js";
+import { byId, onNextFrame } from "../dom.js";
 import { deg } from "../format.js";
+import { html, mount, redraw, segmentButtons } from "../ui.js";
 import { Bands, courseAt } from "./bands.js";
 import { Chart } from "./chart.js";
 import { Choices } from "./choices.js";
@@ -11,59 +13,48 @@ import { Hover } from "./hover.js";
 import { legend } from "./legend.js";
 import { Pins } from "./pins.js";
 
-/** @typedef {import("../store.js").Store} Store */
-/** @typedef {import("../player.js").Player} Player */
 /** @typedef {import("./hover.js").Cell} Cell */
 
 export class MapView {
-  /**
-   * @param {Store} store
-   * @param {Player} player
-   * @param {{send: (message: any) => boolean}} connection
-   * @param {import("./hover.js").Haunt} haunt
-   */
-  constructor(store, player, connection, haunt) {
-    this.store = store;
-    this.player = player;
-    this.connection = connection;
+  /** @param {import("./hover.js").Haunt} haunt */
+  constructor(haunt) {
     this.canvas = byId("map-canvas", HTMLCanvasElement);
     this.chart = new Chart(this.canvas);
-    this.pins = new Pins(store, connection);
-    const again = () => this.invalidate();
+    this.pins = new Pins();
+    this.invalidate = onNextFrame(() => this.draw());
     this.bands = new Bands(this.chart, this.pins, () => {
       if (this.bands.busy) this.hover.leave();
-      this.describe();
+      redraw();
       this.invalidate();
     });
-    this.gestures = new Gestures(this.chart, again);
-    this.choices = new Choices(store, connection, () => this.load());
-    this.hover = new Hover(store, this.chart, this.choices, connection, haunt, again);
-    this.said = byId("map-state");
-    this.legend = byId("legend");
-    this.tabs = byId("postures");
+    this.gestures = new Gestures(this.chart, this.invalidate);
+    this.choices = new Choices(() => this.load());
+    this.hover = new Hover(this.chart, this.choices, haunt, this.invalidate);
     /** @type {Grid | null} */
     this.grid = null;
     this.layer = 0;
     this.picked = false; // by hand; else the layer follows the course
     this.asked = "";
-    this.waiting = false;
     this.bind();
     this.load();
+    mount(byId("postures"), () => this.tabs());
+    mount(byId("map-said"), () => this.grid?.layers.length === 1 && this.grid.layers[0].name);
+    mount(byId("map-state"), () => this.state());
+    mount(byId("map-choices"), () => this.choices.lists(this.grid));
+    mount(byId("legend"), () => this.legend());
   }
 
   bind() {
-    const { store, player, canvas, hover } = this;
+    const { canvas, hover } = this;
     store.on(["selected"], () => {
       this.picked = false;
       hover.leave();
       this.load();
     });
-    store.on(["map", "plan", "scene", "job", "connection", "progress", "compare"], () =>
-      this.load(),
-    );
-    store.on(["shade", "technique"], () => this.load());
-    player.on(() => this.invalidate());
-    new ResizeObserver(() => this.invalidate()).observe(canvas);
+    store.on(["map", "plan", "scene", "job", "connection", "progress"], () => this.load());
+    store.on(["compare", "shade", "technique"], () => this.load());
+    player.on(this.invalidate);
+    new ResizeObserver(this.invalidate).observe(canvas);
     canvas.addEventListener("pointermove", (event) => {
       const cell = hover.at(event.offsetX, event.offsetY);
       if (cell && !this.bands.busy && !this.gestures.drag) hover.enter(cell);
@@ -80,22 +71,12 @@ export class MapView {
 
   /** Take the data of the chosen contour; ask for its map unless it belongs to the plan. */
   load() {
-    const { store } = this;
-    const { selected } = store;
-    const plans = (selected && store.plans.get(selected)) || [];
-    const nopath = selected ? store.nopaths.get(selected) : undefined;
-    const graph = plans[0]?.graph ?? nopath?.graph ?? null;
-    const map = selected ? store.maps.get(selected) : undefined;
+    const { selected, chosen: plans } = store;
+    const graph = (plans[0] ?? store.nopaths.get(selected ?? ""))?.graph;
+    const map = store.maps.get(selected ?? "");
     const key = `${selected} ${graph} ${store.connection}`;
-    if (
-      selected &&
-      graph &&
-      map?.graph !== graph &&
-      this.asked !== key &&
-      store.connection === "open"
-    ) {
-      this.asked = key;
-      this.connection.send({ type: "map", contour: selected });
+    if (selected && graph && map?.graph !== graph && this.asked !== key) {
+      if (send({ type: "map", contour: selected })) this.asked = key;
     }
     if (map && this.grid?.message !== map) {
       this.grid = new Grid(map);
@@ -107,7 +88,7 @@ export class MapView {
     }
     this.choices.load(this.grid);
     this.hand();
-    this.describe();
+    redraw();
     this.invalidate();
   }
 
@@ -118,77 +99,55 @@ export class MapView {
     this.gestures.recall();
   }
 
-  /** Draw the tabs, the legend, or a text if there is no map. */
-  describe() {
-    const { grid, store } = this;
-    const busy = store.progress.busy || store.connection !== "open";
-    this.said.replaceChildren(
-      ...(grid
-        ? grid.layers.length
-          ? []
-          : [
-              el("strong", {}, "No rotation is admitted"),
-              el("p", {}, grid.message.hidden.join("; ")),
-            ]
-        : [
-            ...(busy ? [el("div", { class: "spinner" })] : []),
-            el(
-              "p",
-              {},
-              busy
-                ? "The map appears with the first plan of this contour."
-                : "Choose a contour to see its map.",
-            ),
-          ]),
-    );
-    this.tabs.replaceChildren(
-      ...(grid && grid.layers.length > 1
-        ? grid.layers.map(({ name }, i) =>
-            el(
-              "button",
-              { "aria-pressed": String(i === this.layer), onclick: () => this.show(i) },
-              name,
-            ),
-          )
-        : []),
-    );
-    byId("map-said").textContent = grid?.layers.length === 1 ? grid.layers[0].name : "";
-    if (!grid || !grid.layers.length) return this.legend.replaceChildren(...this.bands.listed());
+  /** Buttons for the postures. */
+  tabs() {
+    const layers = this.grid?.layers ?? [];
+    if (layers.length < 2) return null;
+    const choices = layers.map(({ name }, i) => ({ value: String(i), label: name }));
+    return segmentButtons(choices, String(this.layer), (layer) => this.show(Number(layer)));
+  }
+
+  /** A text if there is no map. */
+  state() {
+    const { grid } = this;
+    if (grid?.layers.length) return null;
+    if (grid)
+      return html`
+        <strong>No rotation is admitted</strong>
+        <p>${grid.message.hidden.join("; ")}</p>`;
+    return store.progress.busy || store.connection !== "open"
+      ? html`<div class="spinner" /><p>The map appears with the first plan of this contour.</p>`
+      : html`<p>Choose a contour to see its map.</p>`;
+  }
+
+  legend() {
+    const { grid, layer, chart, choices } = this;
+    if (!grid?.layers.length) return this.bands.listed();
     this.hand();
-    this.legend.replaceChildren(
-      ...this.choices.legend(grid),
-      ...legend(grid, this.layer, this.chart.inks(), {
-        course: store.plans.has(grid.message.contour),
-        before: store.besideOf(grid.message.contour),
-        shaded: this.choices.shade !== null,
-      }),
-      ...this.bands.listed(),
-    );
+    const { contour } = grid.message;
+    const lines = {
+      course: store.plans.has(contour),
+      before: store.besideOf(contour),
+      shaded: choices.shade !== null,
+    };
+    return html`
+      ${choices.legend(grid)}${legend(grid, layer, chart.inks(), lines)}${this.bands.listed()}`;
   }
 
   /** @param {number} layer */
   show(layer) {
     this.layer = layer;
     this.picked = true;
-    this.describe();
+    redraw();
     this.invalidate();
   }
 
-  invalidate() {
-    if (this.waiting) return;
-    this.waiting = true;
-    requestAnimationFrame(() => {
-      this.waiting = false;
-      this.draw();
-    });
-  }
-
   draw() {
-    const { store, chart } = this;
+    const { chart } = this;
     this.hand();
+    const { chosen: plans } = store;
     const name = store.selected ?? "";
-    const plans = store.plans.get(name) ?? [];
-    const { moment } = this.player;
+    const { moment } = player;
     const cutting = moment?.span.plan?.contour === name ? moment : null;
     const plan = cutting?.span.plan;
     const k = Math.min(cutting?.node ?? 0, (plan?.s.length ?? 1) - 1);
@@ -209,9 +168,9 @@ export class MapView {
    * @param {Cell} cell
    */
   go({ node }) {
-    const { store, grid, player } = this;
+    const { grid } = this;
     const s = grid?.message.s[node] ?? 0;
-    for (const plan of store.plans.get(store.selected ?? "") ?? []) {
+    for (const plan of store.chosen) {
       if (s < plan.s[0] - 1e-9 || s > plan.s[plan.s.length - 1] + 1e-9) continue;
       let k = plan.s.findIndex((each) => each >= s - 1e-9);
       if (k < 0) k = plan.s.length - 1;
@@ -237,7 +196,7 @@ export class MapView {
     if (event.key === "Escape") hover.leave();
     if (event.key === "Enter" && hover.cell) this.go(hover.cell);
     if (!move) return;
-    const plan = this.store.plans.get(grid.message.contour)?.[0];
+    const plan = store.plans.get(grid.message.contour)?.[0];
     const from = hover.cell ?? { node: 0, sample: grid.sampleAt(plan?.gamma[0] ?? 0) };
     const stride = event.shiftKey ? 10 : 1;
     const node = Math.min(Math.max(from.node + move[0] * stride, 0), grid.nodes - 1);
@@ -270,7 +229,7 @@ export class MapView {
     const { message } = /** @type {Grid} */ (this.grid);
     const { cell } = this.hover;
     const node = cell?.node ?? 0;
-    const course = courseAt(this.store.plans.get(message.contour) ?? [], message.s[node]);
+    const course = courseAt(store.plans.get(message.contour) ?? [], message.s[node]);
     const here = cell ? deg(message.gamma[cell.sample]) : null;
     return this.bands.key(event, node, course ?? here);
   }
@@ -278,7 +237,6 @@ export class MapView {
   /** Take the colours of the theme. */
   paint() {
     this.chart.painted = "";
-    this.describe();
     this.invalidate();
   }
 }

@@ -1,254 +1,220 @@
 /** The header and footer of the page: job, undo and redo, exports, theme, progress, notices. */
 
-import { byId, el, icon } from "../dom.js";
+import { useEffect, useRef, useState } from "preact/hooks";
 
-/** @typedef {import("../store.js").Store} Store */
-/** @typedef {{send: (message: any) => boolean, open: () => void}} Link */
+import { connection, send, store } from "../app.js";
+import { isDark, switchTheme } from "../desk.js";
+import { dot, html, icon } from "../ui.js";
+import { openSheet } from "./sheet.js";
+
+/** @typedef {import("../scene/record.js").Extra} Extra */
 
 /**
- * @param {Store} store
- * @param {Link} connection
- * @param {import("../scene/record.js").Extra[]} extras  exports that the page makes itself
+ * The header of the page.
+ * @param {Extra[]} extras  exports that the page makes itself
  */
-export function topBar(store, connection, extras) {
-  const send = (/** @type {string} */ type) => () => void connection.send({ type });
-  const buttons = /** @type {const} */ ([
-    ["undo", "undo", ""],
-    ["redo", "redo", ""],
-    ["save", "save", "Save job"],
-  ]);
-  for (const [id, name, text] of buttons) {
-    byId(id).append(icon(name), ...(text ? [text] : []));
-    byId(id).addEventListener("click", send(id));
-  }
-  byId("export").append(icon("export"), "Export");
-  byId("open-text").append(icon("file"), "Job file");
-  byId("open-program").append(icon("file"), "Program");
-  menu(store, extras);
-  store.on(["job", "connection", "outcome"], draw);
-  draw();
-
-  function draw() {
-    const { job } = store;
-    const live = store.connection === "open" && job !== null;
-    const set = (/** @type {string} */ id, /** @type {boolean} */ on) =>
-      (byId(id, HTMLButtonElement).disabled = !on);
-    set("undo", live && Boolean(job?.undo));
-    set("redo", live && Boolean(job?.redo));
-    set("save", live && !job?.saved && job?.faults.length === 0);
-    set("open-text", live);
-    set("open-program", live);
-    set("export", live);
-    byId("file").textContent = job?.name ?? "Opening the job";
-    byId("saved").textContent = !job ? "" : job.saved ? "saved" : "not saved; kept beside the job";
-    document.title = job
-      ? `${job.saved ? "" : "• "}${job.name} – kerfpath studio`
-      : "kerfpath studio";
-  }
+export function topBar(extras) {
+  const { job, scene } = store;
+  const open = store.connection === "open";
+  const live = open && job !== null;
+  const title = job ? `${job.saved ? "" : "• "}${job.name} – kerfpath studio` : "kerfpath studio";
+  if (document.title !== title) document.title = title;
+  const saved = !job ? "" : job.saved ? "saved" : "not saved; kept beside the job";
+  const theme = isDark() ? "Use the light theme" : "Use the dark theme";
+  const savable = live && !job.saved && !job.faults.length;
+  /** @type {(name: import("./sheet.js").Name, on: boolean, look: string, words: string) => unknown} */
+  const opener = (name, on, look, words) => html`
+    <button id=${`open-${name}`} class="plain" disabled=${!on} onClick=${() => openSheet(name)}>
+      ${icon(look)}${words}
+    </button>`;
+  /** @type {(type: "undo" | "redo", on: boolean, words: string) => unknown} */
+  const step = (type, on, words) => html`
+    <button id=${type} class="tool" title=${words} aria-label=${words.split(" ")[0]}
+      disabled=${!on} onClick=${() => send({ type })}>${icon(type)}</button>`;
+  return html`
+    <h1><img src="client/icon.svg" alt="" width="20" height="20" />kerfpath <span>studio</span></h1>
+    <div id="job-name">
+      <strong id="file">${job?.name ?? "Opening the job"}</strong>${" "}
+      <span id="saved">${saved}</span>
+    </div>
+    <div class="group" role="group" aria-label="Changes">
+      ${step("undo", live && job.undo, "Undo (Ctrl+Z)")}
+      ${step("redo", live && job.redo, "Redo (Ctrl+Shift+Z)")}
+    </div>
+    <div class="grow" />
+    ${opener("layout", open && Boolean(scene?.contours.length), "move", "Layout")}
+    ${opener("text", live, "file", "Job file")}
+    ${opener("program", live, "file", "Program")}
+    <${ExportMenu} live=${live} extras=${extras} />
+    <button id="save" class="primary" disabled=${!savable} onClick=${() => send({ type: "save" })}>
+      ${icon("save")}Save job
+    </button>
+    <button id="theme" class="tool" aria-label=${theme} title="Light or dark" onClick=${switchTheme}>
+      ${icon(isDark() ? "sun" : "moon")}
+    </button>`;
 }
 
-/**
- * @param {Store} store
- * @param {import("../scene/record.js").Extra[]} extras
- */
-function menu(store, extras) {
-  const [button, list] = [byId("export"), byId("export-menu")];
-  const show = (/** @type {boolean} */ open) => {
-    list.hidden = !open;
-    button.setAttribute("aria-expanded", String(open));
-    if (!open) return;
-    const { search } = location;
-    const entries = store.outcome?.exports ?? [];
-    const href = (/** @type {string} */ path) =>
-      path.replace(/^\//, "") +
-      (search ? (path.includes("?") ? `&${search.slice(1)}` : search) : "");
-    list.replaceChildren(
-      ...entries.map(({ name, href: path, ready, why }) =>
-        ready
-          ? el(
-              "a",
-              {
-                href: href(path),
-                download: path.startsWith("/report") ? false : true,
-                target: path.startsWith("/report") ? "_blank" : null,
-              },
-              name,
-              el("small", {}, why || describe(path)),
-            )
-          : el("div", { class: "off" }, name, el("small", {}, why)),
-      ),
-      ...(entries.length
-        ? []
-        : [
-            el(
-              "div",
-              { class: "off" },
-              "Nothing yet",
-              el("small", {}, "Files can be exported once every contour is planned."),
-            ),
-          ]),
-      ...extras.map(({ name, about, why, make }) => {
-        const [bar, says] = [why(), el("small", {}, why() || about)];
-        return bar
-          ? el("div", { class: "off" }, name, says)
-          : el("button", { class: "entry", onclick: make }, name, says);
-      }),
-    );
-    /** @type {HTMLElement | null} */ (list.querySelector("a, button"))?.focus();
-  };
-  button.addEventListener("click", () => show(Boolean(list.hidden)));
-  document.addEventListener("pointerdown", (event) => {
-    if (!list.hidden && !(/** @type {Node} */ (event.target).parentElement?.closest(".menu")))
-      show(false);
-  });
-  list.addEventListener("keydown", (event) => {
+/** @param {{live: boolean, extras: Extra[]}} props */
+function ExportMenu({ live, extras }) {
+  const [open, setOpen] = useState(false);
+  const menu = useRef(/** @type {HTMLElement | null} */ (null));
+  const entries = () => [...(menu.current?.querySelectorAll("a, .entry") ?? [])];
+  /** @param {number} i */
+  const focus = (i) => /** @type {HTMLElement | undefined} */ (entries().at(i))?.focus();
+  useEffect(() => {
+    if (!open) return undefined;
+    focus(0);
+    const leave = (/** @type {PointerEvent} */ { target }) => {
+      if (!menu.current?.contains(/** @type {Node} */ (target))) setOpen(false);
+    };
+    document.addEventListener("pointerdown", leave);
+    return () => document.removeEventListener("pointerdown", leave);
+  }, [open]);
+  /** @param {KeyboardEvent} event */
+  const key = (event) => {
+    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
     if (event.key === "Escape") {
-      show(false);
-      button.focus();
-    }
-    const links = /** @type {HTMLElement[]} */ ([...list.querySelectorAll("a, button")]);
-    const at = links.indexOf(/** @type {HTMLElement} */ (document.activeElement));
-    const to = { ArrowDown: at + 1, ArrowUp: at - 1 }[event.key];
-    if (to !== undefined) {
-      links[(to + links.length) % links.length]?.focus();
+      setOpen(false);
+      /** @type {HTMLElement | null | undefined} */ (
+        menu.current?.querySelector("#export")
+      )?.focus();
+    } else if (step) {
+      const at = entries().indexOf(/** @type {Element} */ (document.activeElement));
+      focus((at + step) % entries().length);
       event.preventDefault();
     }
-  });
-  list.addEventListener("click", () => show(false));
+  };
+  return html`
+    <div class="menu" ref=${menu}>
+      <button id="export" class="plain" aria-haspopup="true" aria-expanded=${String(open)}
+        aria-controls="export-menu" disabled=${!live} onClick=${() => setOpen(!open)}>
+        ${icon("export")}Export
+      </button>
+      <div id="export-menu" hidden=${!open} onKeyDown=${key} onClick=${() => setOpen(false)}>
+        ${open && exports(extras)}
+      </div>
+    </div>`;
 }
 
-/** @param {string} path */
-const describe = (path) =>
-  path.includes("script")
-    ? "in Python: the same plans from the public functions"
-    : path.includes("job")
-      ? "the job file with its comments"
-      : path.includes("program")
-        ? "in the language of the job"
-        : path.includes("trajectory")
-          ? "one row for each node"
-          : path.includes("report")
-            ? "on a separate page"
-            : "";
-
-/**
- * @param {Store} store
- * @param {Link} connection
- */
-export function foot(store, connection) {
-  const [link, doing, cancel] = [byId("link"), byId("doing"), byId("cancel")];
-  const bar = byId("bar", HTMLProgressElement);
-  cancel.addEventListener("click", () => void connection.send({ type: "cancel" }));
-  byId("hint").textContent = "Space plays, arrow keys step, F fits the view, G keeps a ghost";
-  store.on(["connection", "progress", "job"], draw);
-  draw();
-
-  function draw() {
-    const { progress, connection: status } = store;
-    const open = status === "open";
-    link.replaceChildren(
-      el("i", { class: `dot ${open ? "done" : "none"}` }),
-      open ? "connected" : status === "lost" ? "not connected" : "connecting",
-    );
-    const busy = open && progress.busy;
-    doing.textContent = busy ? progress.label || "planning" : open && store.job ? "ready" : "";
-    bar.hidden = cancel.hidden = !busy;
-    if (progress.total > 0) bar.value = progress.done / progress.total;
-    else bar.removeAttribute("value");
-  }
+/** @param {Extra[]} extras */
+function exports(extras) {
+  const files = store.outcome?.exports ?? [];
+  const none = "Files can be exported once every contour is planned.";
+  return html`
+    ${files.map(({ name, href, ready, why }) => (ready ? file(name, href, why) : off(name, why)))}
+    ${!files.length && off("Nothing yet", none)}
+    ${extras.map(({ name, about, why, make }) =>
+      why()
+        ? off(name, why())
+        : html`<button class="entry" onClick=${make}>${name}<small>${about}</small></button>`,
+    )}`;
 }
 
+/** @type {(name: string, why: string | null) => unknown} */
+const off = (name, why) => html`<div class="off">${name}<small>${why}</small></div>`;
+
 /**
- * Show errors, and what to do about them, above the desk.
- * @param {Store} store
- * @param {Link} connection
+ * A link to a file of the server.
+ * @param {string} name
+ * @param {string} path
+ * @param {string | null} why
  */
-export function notices(store, connection) {
-  const host = byId("notices");
-  /** @typedef {{message: string, timer: number, row: HTMLElement}} Entry */
-  /** @type {Entry[]} */
-  const errors = [];
-  let wasOpen = false;
-  let broken = false;
-  const send = (/** @type {string} */ type) => () => void connection.send({ type });
-  const again = { class: "plain", onclick: () => connection.open() };
-  const lost = notice(true, "", el("button", again, "Try now"));
-  store.on(["connection", "job"], draw);
-  store.on(["error"], (error) => {
-    if (errors.some(({ message }) => message === error.message)) return;
-    const close = { class: "tool", "aria-label": "Dismiss", onclick: () => drop(entry) };
-    const force = () => {
-      connection.send({ type: "save", over: true });
-      drop(entry);
-    };
-    const conflict = error.about === "save" && error.message.includes("changed since");
-    const over = conflict ? [el("button", { class: "plain", onclick: force }, "Save over it")] : [];
-    /** @type {Entry} */
-    const entry = {
-      message: error.message,
-      timer: window.setTimeout(() => drop(entry), 12000),
-      row: notice(false, error.message, ...over, el("button", close, icon("close"))),
-    };
-    errors.push(entry);
-    if (errors.length > 3) drop(errors[0]);
-    draw();
-  });
-  window.setInterval(count, 500);
-  draw();
+function file(name, path, why) {
+  const token = location.search.slice(1);
+  const href = path.slice(1) + (token && (path.includes("?") ? "&" : "?") + token);
+  const own = path.startsWith("/report"); // it is shown, not saved
+  const about = ABOUT.find(([begin]) => path.startsWith(begin))?.[1] ?? "";
+  return html`
+    <a href=${href} download=${own ? null : ""} target=${own ? "_blank" : null}>
+      ${name}<small>${why || about}</small>
+    </a>`;
+}
 
-  /** @param {Entry} entry */
-  function drop(entry) {
-    clearTimeout(entry.timer);
-    errors.splice(errors.indexOf(entry), 1);
-    draw();
-  }
+const ABOUT = [
+  ["/export/script", "in Python: the same plans from the public functions"],
+  ["/export/job", "the job file with its comments"],
+  ["/export/program", "in the language of the job"],
+  ["/export/trajectory", "one row for each node"],
+  ["/report", "on a separate page"],
+];
 
-  function draw() {
-    if (store.connection === "open") wasOpen = true;
-    const rows = [];
-    if (store.connection !== "open" && lostOnce()) rows.push(lost);
-    for (const { key, message } of store.job?.faults ?? []) {
-      const undo = { class: "plain", disabled: !store.job?.undo, onclick: send("undo") };
-      const text = `${key.length ? `${key.join(".")}: ` : ""}${message}`;
-      rows.push(notice(true, text, el("button", undo, icon("undo"), "Undo")));
-    }
-    for (const entry of errors) rows.push(entry.row);
-    const same =
-      rows.length === host.children.length && rows.every((row, i) => row === host.children[i]);
-    if (!same) host.replaceChildren(...rows);
-    count();
-  }
-
-  /** Whether the connection has been lost since it was last open. */
-  function lostOnce() {
-    if (store.connection === "lost") broken = true;
-    return broken;
-  }
-
-  /** Count down to the next try. */
-  function count() {
-    if (store.connection === "open") broken = false;
-    if (!broken) return;
-    const seconds = Math.max(1, Math.ceil(((store.retryAt ?? 0) - Date.now()) / 1000));
-    const when = store.connection === "lost" ? `Next try in ${seconds} s.` : "Trying now.";
-    const text = wasOpen
-      ? `The studio's server has stopped or cannot be reached. All changes are kept beside the job file; start "kerfpath studio" again to continue. ${when}`
-      : `The studio's server does not answer. ${when}`;
-    const said = lost.querySelector("p");
-    if (said && said.textContent !== text) said.textContent = text;
-  }
+/** The footer of the page. */
+export function foot() {
+  const { progress, connection: status } = store;
+  const open = status === "open";
+  const busy = open && progress.busy;
+  const link = open ? "connected" : status === "lost" ? "not connected" : "connecting";
+  const doing = busy ? progress.label || "planning" : open && store.job ? "ready" : "";
+  const cancel = () => send({ type: "cancel" });
+  return html`
+    <span id="link">${dot(open ? "done" : "none")}${link}</span>
+    <span id="doing">${doing}</span>
+    ${bar("Progress", progress, { id: "bar", hidden: !busy })}
+    <button id="cancel" class="text" hidden=${!busy} onClick=${cancel}>Cancel</button>
+    <span class="grow" />
+    <span id="hint">Space plays, arrow keys step, F fits the view, G keeps a ghost</span>`;
 }
 
 /**
- * @param {boolean} bad
- * @param {string} text
- * @param {...HTMLElement} buttons
+ * A progress bar; it has no value as long as the total is not known.
+ * @param {string} label
+ * @param {{done: number, total: number}} progress
+ * @param {Record<string, unknown>} more
  */
-const notice = (bad, text, ...buttons) =>
-  el(
-    "div",
-    { class: `notice ${bad ? "bad" : ""}` },
-    icon("warning"),
-    el("p", {}, text),
-    ...buttons,
+export const bar = (label, { done, total }, more) => html`
+  <progress max="1" value=${total > 0 ? done / total : null} aria-label=${label} ...${more} />`;
+
+/** Errors, and what to do about them, above the desk. */
+export function notices() {
+  const undo = html`
+    <button class="plain" disabled=${!store.job?.undo} onClick=${() => send({ type: "undo" })}>
+      ${icon("undo")}Undo
+    </button>`;
+  return html`
+    ${store.broken && html`<${Lost} />`}
+    ${(store.job?.faults ?? []).map(({ key, message }) =>
+      notice("bad", `${key.length ? `${key.join(".")}: ` : ""}${message}`, undo),
+    )}
+    ${store.errors.map((error) => html`<${Notice} key=${error.message} error=${error} />`)}`;
+}
+
+/** @param {{error: import("../messages.js").ErrorMessage}} props */
+function Notice({ error }) {
+  const drop = () => store.dismiss(error);
+  const force = () => {
+    send({ type: "save", over: true });
+    drop();
+  };
+  const conflict = error.about === "save" && error.message.includes("changed since");
+  return notice(
+    "",
+    error.message,
+    html`
+      ${conflict && html`<button class="plain" onClick=${force}>Save over it</button>`}
+      <button class="tool" aria-label="Dismiss" onClick=${drop}>${icon("close")}</button>`,
   );
+}
+
+/** The connection is lost; it counts down to the next try. */
+function Lost() {
+  const [, tick] = useState(0);
+  useEffect(() => {
+    const timer = window.setInterval(() => tick((n) => n + 1), 500);
+    return () => clearInterval(timer);
+  }, []);
+  const seconds = Math.max(1, Math.ceil(((store.retryAt ?? 0) - Date.now()) / 1000));
+  const when = store.connection === "lost" ? `Next try in ${seconds} s.` : "Trying now.";
+  const what = store.met
+    ? `The studio's server has stopped or cannot be reached. All changes are kept beside the job file; start "kerfpath studio" again to continue.`
+    : "The studio's server does not answer.";
+  const again = html`<button class="plain" onClick=${() => connection.open()}>Try now</button>`;
+  return notice("bad", `${what} ${when}`, again);
+}
+
+/**
+ * @param {"bad" | ""} kind
+ * @param {string} text
+ * @param {unknown} buttons
+ */
+const notice = (kind, text, buttons) =>
+  html`<div class=${`notice ${kind}`}>${icon("warning")}<p>${text}</p>${buttons}</div>`;

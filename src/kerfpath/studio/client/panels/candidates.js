@@ -1,13 +1,14 @@
 /** The search for the best placement: its ranges, the placements found, and taking one. */
 
-import { el } from "../dom.js";
+import { send, store } from "../app.js";
 import { change, counted, digits, fixed } from "../format.js";
+import { NUMBER, dot, html, options, redraw } from "../ui.js";
+import { bar } from "./bar.js";
 
-/** @typedef {import("../store.js").Store} Store */
 /** @typedef {import("../messages.js").Try} Try */
 
 /** The variables: label, unit, and default range on either side. */
-const VARIABLES = /** @type {const} */ ({
+const VARIABLES = /** @type {Record<string, [string, string, number]>} */ ({
   x_mm: ["Part x", "mm", 200],
   y_mm: ["Part y", "mm", 200],
   z_mm: ["Part z", "mm", 200],
@@ -21,83 +22,38 @@ const VARIABLES = /** @type {const} */ ({
   mount_deg: ["Head about flange", "deg", 90],
 });
 const USUAL = ["x_mm", "y_mm", "yaw_deg"];
-const EVALUATIONS = 64;
 /** @type {Record<string, {words: string, value: string}>} */
 const GOALS = {
   speed: { words: "Fastest speed of the slowest contour", value: "m/min" },
   margin: { words: "Least ratio of fastest to requested speed", value: "times requested speed" },
   motion: { words: "Least displacement of the joints", value: "displacement" },
 };
+const JUDGED = [
+  { value: "grid", label: "Judged on the grid (faster)" },
+  { value: "plans", label: "Judged by plans over continuous gamma" },
+];
+const LOST = { unreachable: "out of reach", collision: "collides", speed: "no path", feasible: "" };
 
 /**
- * @param {Store} store
- * @param {{send: (message: any) => boolean}} connection
+ * The search for the best placement.
  * @param {import("../scene/placing.js").Placing} placing
  * @param {() => void} moved  called once another placement is shown
  */
-export function candidates(store, connection, placing, moved) {
+export function candidates(placing, moved) {
   /** @type {number | null} the one that is shown */
   let shown = null;
   let filled = false;
-  /** @type {unknown[]} inputs of the last drawing of the list, which is only redrawn on changes */
-  let drawnBefore = [];
-  const goal = el(
-    "select",
-    { "aria-label": "Goal" },
-    ...Object.entries(GOALS).map(([value, { words }]) => el("option", { value }, words)),
-  );
-  const judged = el(
-    "select",
-    { "aria-label": "Judged by", onchange: draw },
-    el("option", { value: "grid" }, "Judged on the grid (faster)"),
-    el("option", { value: "plans" }, "Judged by plans over continuous gamma"),
-  );
-  const evaluations = el("input", {
-    ...{ class: "number", type: "number", min: 8, max: 100000, step: 8, value: EVALUATIONS },
-    "aria-label": "Placements to try",
-  });
-  const rows = Object.entries(VARIABLES).map(([name, [label, unit, far]]) => {
-    const end = (/** @type {string} */ which, /** @type {number} */ value) =>
-      el("input", {
-        ...{ class: "number", type: "number", step: "any", value, oninput: draw },
-        "aria-label": `${label}, ${which}, ${unit}`,
-      });
-    const [low, high] = [end("least", -far), end("most", far)];
-    const box = el("input", { type: "checkbox", checked: USUAL.includes(name), onchange: draw });
-    const element = el(
-      "div",
-      { class: "vary" },
-      el("label", {}, box, ` ${label}`),
-      low,
-      high,
-      el("span", { class: "unit" }, unit),
-    );
-    return { name, box, low, high, element };
-  });
-  const start = el("button", { class: "plain", onclick: look });
-  const bar = el("progress", { "aria-label": "Progress of the search" });
-  const said = el("p", { class: "quiet small", "aria-live": "polite" });
-  const list = el("div", { class: "list tries" });
-  const actions = el("div", { class: "actions" });
-  const element = el(
-    "section",
-    { class: "card" },
-    el("header", {}, el("h3", {}, "Best placement"), el("span", { class: "grow" }), start),
-    el("p", { class: "field" }, goal),
-    el("p", { class: "field" }, judged),
-    el(
-      "details",
-      { class: "group-of-keys" },
-      el("summary", {}, "Variables and ranges"),
-      ...rows.map((row) => row.element),
-      el("p", { class: "field head" }, el("span", {}, "Placements to try "), evaluations),
+  /** What is searched for, as it is in the fields; a variable without a range is not varied. */
+  const wanted = {
+    ...{ goal: "speed", judged: "grid", evaluations: "64" },
+    varied: new Set(USUAL),
+    ranges: /** @type {Record<string, [string, string]>} */ (
+      Object.fromEntries(
+        Object.entries(VARIABLES).map(([name, [, , far]]) => [name, [String(-far), String(far)]]),
+      )
     ),
-    bar,
-    said,
-    list,
-    actions,
-  );
-  return { element, draw, forget: () => (shown = null) };
+  };
+  return { card, forget: () => (shown = null) };
 
   function running() {
     return store.layout?.state === "running" && !store.stale(store.layout);
@@ -105,29 +61,22 @@ export function candidates(store, connection, placing, moved) {
 
   /** The requested ranges; null if there is none, or one is invalid. */
   function ranges() {
-    const wanted = rows.filter(({ box }) => box.checked);
-    const spans = wanted.map(({ name, low, high }) => [
-      name,
-      [low, high].map(({ value }) => value),
-    ]);
-    const bad = spans.some(([, [low, high]]) => !low || !high || !(Number(low) < Number(high)));
-    if (!wanted.length || bad) return null;
-    return Object.fromEntries(
-      wanted.map(({ name, low, high }) => [name, [Number(low.value), Number(high.value)]]),
-    );
+    const spans = [...wanted.varied].map((name) => wanted.ranges[name]);
+    const bad = spans.some(([low, high]) => !low || !high || !(Number(low) < Number(high)));
+    if (!spans.length || bad) return null;
+    const names = Object.keys(VARIABLES).filter((name) => wanted.varied.has(name));
+    return Object.fromEntries(names.map((name) => [name, wanted.ranges[name].map(Number)]));
   }
 
   function look() {
-    if (running()) return void connection.send({ type: "cancel" });
+    if (running()) return void send({ type: "cancel" });
     const spans = ranges();
     if (!spans) return;
-    shown = null;
-    placing.reset();
-    moved();
-    const count = Math.min(100000, Math.max(8, Math.round(Number(evaluations.value)) || 64));
-    connection.send({
-      ...{ type: "layout", goal: goal.value, ranges: spans, evaluations: count },
-      grid: judged.value === "grid",
+    back();
+    const count = Math.min(100000, Math.max(8, Math.round(Number(wanted.evaluations)) || 64));
+    send({
+      ...{ type: "layout", goal: wanted.goal, ranges: spans, evaluations: count },
+      grid: wanted.judged === "grid",
     });
   }
 
@@ -136,13 +85,13 @@ export function candidates(store, connection, placing, moved) {
     const table = store.job?.values?.layout;
     if (filled || !table) return;
     filled = true;
-    goal.value = table.goal;
-    if (store.job?.given.includes("layout.evaluations")) evaluations.value = table.evaluations;
-    if (!rows.some(({ name }) => table[name])) return;
-    for (const { name, box, low, high } of rows) {
-      box.checked = Boolean(table[name]);
-      if (table[name]) [low.value, high.value] = table[name].map(String);
-    }
+    wanted.goal = table.goal;
+    if (store.job?.given.includes("layout.evaluations")) wanted.evaluations = table.evaluations;
+    const given = Object.keys(VARIABLES).filter((name) => table[name]);
+    if (!given.length) return;
+    wanted.varied = new Set(given);
+    for (const name of given)
+      wanted.ranges[name] = /** @type {[string, string]} */ (table[name].map(String));
   }
 
   /** @param {Try} tried */
@@ -158,44 +107,95 @@ export function candidates(store, connection, placing, moved) {
     moved();
   }
 
-  function draw() {
+  function card() {
     fill();
     const { layout, job } = store;
     const planned = store.outcome?.revision === job?.revision;
-    const live = store.connection === "open" && Boolean(job?.values);
-    judged.hidden = job?.values?.plan?.method !== "continuous";
-    start.textContent = running() ? "Stop" : layout ? "Search again" : "Search";
-    start.disabled = !live || (!running() && (!planned || !ranges()));
-    bar.hidden = !running();
-    if (layout?.total) bar.value = layout.done / layout.total;
-    else bar.removeAttribute("value");
     const stale = layout !== null && store.stale(layout);
     if (stale || !placing.moved) shown = null;
-    say(stale);
-    const drawn = [layout, shown, stale, live];
-    if (drawn.every((each, i) => each === drawnBefore[i])) return;
-    drawnBefore = drawn;
     const tries = layout?.best ?? [];
-    const focused = /** @type {HTMLElement | null} */ (document.activeElement)?.dataset?.number;
-    list.classList.toggle("stale-set", stale);
-    list.replaceChildren(...tries.map((each) => entry(each, stale || !live)));
-    if (focused !== undefined && list.isConnected)
-      [...list.querySelectorAll("button")].find((b) => b.dataset.number === focused)?.focus();
     const chosen = tries.find(({ number }) => number === shown);
-    actions.replaceChildren(...(chosen ? taking(chosen, live) : []));
+    const off = !store.live || (!running() && (!planned || !ranges()));
+    const words = running() ? "Stop" : layout ? "Search again" : "Search";
+    const continuous = job?.values?.plan?.method === "continuous";
+    const goals = Object.entries(GOALS).map(([value, goal]) => ({ value, label: goal.words }));
+    /** @type {(key: "goal" | "judged" | "evaluations") => (event: any) => void} */
+    const set = (key) => (event) => {
+      wanted[key] = event.target.value;
+      redraw();
+    };
+    const count = { ...NUMBER, min: 8, max: 100000, step: 8, value: wanted.evaluations };
+    return html`
+      <section class="card">
+        <header>
+          <h3>Best placement</h3>
+          <span class="grow" />
+          <button class="plain" disabled=${off} onClick=${look}>${words}</button>
+        </header>
+        <p class="field">
+          <select aria-label="Goal" value=${wanted.goal} onChange=${set("goal")}>
+            ${options(goals)}
+          </select>
+        </p>
+        <p class="field">
+          <select aria-label="Judged by" hidden=${!continuous} value=${wanted.judged}
+            onChange=${set("judged")}>${options(JUDGED)}</select>
+        </p>
+        <details class="group-of-keys">
+          <summary>Variables and ranges</summary>
+          ${Object.keys(VARIABLES).map(variable)}
+          <p class="field head">
+            <span>Placements to try </span>
+            <input ...${count} aria-label="Placements to try" onInput=${set("evaluations")} />
+          </p>
+        </details>
+        ${bar("Progress of the search", layout ?? { done: 0, total: 0 }, { hidden: !running() })}
+        <p class="quiet small" aria-live="polite">${statement(stale)}</p>
+        <div class=${`list tries ${stale ? "stale-set" : ""}`}>
+          ${tries.map((each) => entry(each, stale || !store.live))}
+        </div>
+        <div class="actions">${chosen && taking(chosen)}</div>
+      </section>`;
+  }
+
+  /** @param {string} name */
+  function variable(name) {
+    const [label, unit] = VARIABLES[name];
+    const end = (/** @type {0 | 1} */ i) => {
+      const set = (/** @type {any} */ { target }) => {
+        wanted.ranges[name][i] = target.value;
+        redraw();
+      };
+      const words = `${label}, ${["least", "most"][i]}, ${unit}`;
+      const value = wanted.ranges[name][i];
+      return html`<input ...${NUMBER} value=${value} aria-label=${words} onInput=${set} />`;
+    };
+    const toggle = () => {
+      if (!wanted.varied.delete(name)) wanted.varied.add(name);
+      redraw();
+    };
+    return html`
+      <div class="vary" key=${name}>
+        <label>
+          <input type="checkbox" checked=${wanted.varied.has(name)} onChange=${toggle} /> ${label}
+        </label>
+        ${end(0)}${end(1)}
+        <span class="unit">${unit}</span>
+      </div>`;
   }
 
   /** @param {boolean} stale */
-  function say(stale) {
+  function statement(stale) {
     const { layout } = store;
-    const words = !layout
-      ? "Searches for the best placement around the current one. It takes from seconds to many minutes; a change of the job stops it."
-      : stale
-        ? "Out of date: the job has changed. Search again for the current job."
-        : running()
-          ? `${layout.label}: ${layout.total ? `${layout.done} of ${layout.total}` : "under way"}. ${counted(layout.tried, "placement")} tried.`
-          : `${counted(layout.tried, "placement")} tried, ${layout.feasible} feasible${layout.state === "stopped" ? "; stopped" : ""}. ${layout.said}${layout.grid ? " Values are for the grid; plans over continuous gamma may be faster." : ""}`;
-    if (said.textContent !== words) said.textContent = words;
+    if (!layout)
+      return "Searches for the best placement around the current one. It takes from seconds to many minutes; a change of the job stops it.";
+    if (stale) return "Out of date: the job has changed. Search again for the current job.";
+    const tried = `${counted(layout.tried, "placement")} tried`;
+    const at = layout.total ? `${layout.done} of ${layout.total}` : "under way";
+    if (running()) return `${layout.label}: ${at}. ${tried}.`;
+    const stopped = layout.state === "stopped" ? "; stopped" : "";
+    const grid = " Values are for the grid; plans over continuous gamma may be faster.";
+    return `${tried}, ${layout.feasible} feasible${stopped}. ${layout.said}${layout.grid ? grid : ""}`;
   }
 
   /**
@@ -203,61 +203,55 @@ export function candidates(store, connection, placing, moved) {
    * @param {boolean} disabled
    */
   function entry(tried, disabled) {
-    const { number, offsets, value, bound, estimate, status, reason } = tried;
-    const unit = GOALS[store.layout?.goal ?? "speed"].value;
-    const most = store.layout?.goal === "motion" ? "at least" : "at most";
-    const own = (store.layout?.best ?? []).find(isOwn)?.value ?? null;
-    const gain = value !== null && own !== null && !isOwn(tried) ? `, ${change(value, own)}` : "";
-    const words =
-      value !== null
-        ? `${digits(value, 3)} ${unit}${gain}`
-        : status !== "feasible"
-          ? { unreachable: "out of reach", collision: "collides", speed: "no path" }[status]
-          : bound !== null
-            ? `${most} ${digits(bound, 3)} ${unit}`
-            : estimate !== null
-              ? `about ${digits(estimate, 3)} ${unit}`
-              : "within reach";
-    return el(
-      "button",
-      {
-        ...{ "data-number": number, "aria-current": String(number === shown), disabled },
-        title: reason ?? null,
-        onclick: () => show(tried),
-      },
-      el("i", { class: `dot ${status !== "feasible" ? "none" : value !== null ? "done" : ""}` }),
-      el("span", { class: "name" }, words),
-      el("span", { class: "more" }, isOwn(tried) ? "placement of the job" : moves(offsets)),
-    );
+    const { number, offsets, value, status, reason } = tried;
+    const mark = status !== "feasible" ? "none" : value !== null ? "done" : "";
+    return html`
+      <button key=${number} aria-current=${String(number === shown)} disabled=${disabled}
+        title=${reason} onClick=${() => show(tried)}>
+        ${dot(mark)}
+        <span class="name">${worth(tried)}</span>
+        <span class="more">${isOwn(tried) ? "placement of the job" : moves(offsets)}</span>
+      </button>`;
   }
 
-  /**
-   * @param {Try} tried
-   * @param {boolean} live
-   */
-  function taking(tried, live) {
-    const take = () => {
-      placing.sent(connection.send({ type: "take", number: tried.number }));
-    };
-    const disabled = !live || tried.status !== "feasible";
-    return [
-      el("button", { class: "primary", disabled, onclick: take }, "Take it"),
-      el("button", { class: "plain", onclick: back }, "Back to the job's place"),
-      ...(tried.reason ? [el("p", { class: "fault" }, tried.reason)] : []),
-    ];
+  /** @param {Try} tried */
+  function taking({ number, status, reason }) {
+    const take = () => placing.sent(send({ type: "take", number }));
+    const off = !store.live || status !== "feasible";
+    return html`
+      <button class="primary" disabled=${off} onClick=${take}>Take it</button>
+      <button class="plain" onClick=${back}>Back to the job's place</button>
+      ${reason && html`<p class="fault">${reason}</p>`}`;
   }
+}
+
+/**
+ * Return what is known of the value of a placement.
+ * @param {Try} tried
+ */
+function worth(tried) {
+  const { value, bound, estimate, status } = tried;
+  const goal = store.layout?.goal ?? "speed";
+  const unit = GOALS[goal].value;
+  if (value !== null) {
+    const own = isOwn(tried) ? null : (store.layout?.best.find(isOwn)?.value ?? null);
+    return `${digits(value, 3)} ${unit}${own === null ? "" : `, ${change(value, own)}`}`;
+  }
+  if (status !== "feasible") return LOST[status];
+  const most = goal === "motion" ? "at least" : "at most";
+  if (bound !== null) return `${most} ${digits(bound, 3)} ${unit}`;
+  return estimate === null ? "within reach" : `about ${digits(estimate, 3)} ${unit}`;
 }
 
 /** @param {Try} tried */
 const isOwn = ({ offsets }) => Object.values(offsets).every((each) => each === 0);
 
 /** @param {Record<string, number>} offsets */
-function moves(offsets) {
-  return Object.entries(offsets)
+const moves = (offsets) =>
+  Object.entries(offsets)
     .filter(([, value]) => value !== 0)
     .map(([name, value]) => {
-      const [label, unit] = VARIABLES[/** @type {keyof typeof VARIABLES} */ (name)];
+      const [label, unit] = VARIABLES[name];
       return `${label} ${value > 0 ? "+" : ""}${fixed(value, 1)} ${unit}`;
     })
     .join(", ");
-}

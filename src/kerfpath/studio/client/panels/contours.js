@@ -1,149 +1,105 @@
 /** The list of contours with the state of their plans; one of them is chosen. */
 
-import { byId, el, icon } from "../dom.js";
-import { clock, fixed } from "../format.js";
+import { store } from "../app.js";
+import { clock, fixed, millimetres, secondsOf } from "../format.js";
+import { dot, html, icon } from "../ui.js";
+import { openSheet } from "./sheet.js";
 
-/** @typedef {import("../store.js").Store} Store */
-
-/** The state of a contour: the class of its dot, and words. */
-/** @typedef {{dot: "done" | "none" | "warn" | "busy" | "open", words: string}} Standing */
+/** @typedef {import("../messages.js").ContourShape} ContourShape */
+/** The state of a contour: its mark, and words. */
+/** @typedef {{mark: "done" | "none" | "warn" | "busy" | "open", words: string}} Standing */
 
 /**
  * Return the state of a contour.
- * @param {Store} store
  * @param {string} name
  * @returns {Standing}
  */
-export function standing(store, name) {
-  const nopath = store.nopaths.get(name);
-  const plans = store.plans.get(name);
-  if (nopath && !store.stale(nopath)) return { dot: "none", words: "no path" };
+export function standing(name) {
+  const { busy } = store.progress;
+  const [nopath, plans] = [store.nopaths.get(name), store.plans.get(name)];
+  if (nopath && !store.stale(nopath)) return { mark: "none", words: "no path" };
   if (!plans || plans.some((plan) => store.stale(plan)))
-    return store.progress.busy
-      ? { dot: "busy", words: plans ? "planning again" : "planning" }
-      : { dot: "open", words: plans ? "out of date" : "not planned" };
-  if (plans.some((plan) => plan.passed === false)) return { dot: "warn", words: "fails its audit" };
-  if (plans.some((plan) => plan.passed === null))
-    return store.progress.busy
-      ? { dot: "busy", words: "being refined" }
-      : { dot: "done", words: "planned" };
-  return { dot: "done", words: "audited" };
+    return busy
+      ? { mark: "busy", words: plans ? "planning again" : "planning" }
+      : { mark: "open", words: plans ? "out of date" : "not planned" };
+  if (plans.some(({ passed }) => passed === false))
+    return { mark: "warn", words: "fails its audit" };
+  if (plans.every(({ passed }) => passed)) return { mark: "done", words: "audited" };
+  return busy ? { mark: "busy", words: "being refined" } : { mark: "done", words: "planned" };
 }
 
-/** @param {Store} store */
-export function contourList(store) {
-  const host = byId("contours");
-  /** @type {string} */
-  let drawn = "";
-  store.on(["scene", "job", "plan", "selected", "progress"], () => draw());
-  store.on(["program", "outcome"], () => cycle(store));
-  draw();
-
-  function draw() {
-    const rows = (store.scene?.contours ?? []).map((shape) => ({
-      shape,
-      ...standing(store, shape.name),
-      seconds: (store.plans.get(shape.name) ?? []).reduce(
-        (sum, { time }) => sum + time[time.length - 1],
-        0,
-      ),
-    }));
-    const key = JSON.stringify([
-      rows.map(({ shape, ...rest }) => [shape.name, shape.s.length, rest]),
-      store.selected,
-    ]);
-    if (key === drawn) return;
-    drawn = key;
-    const focused = host.contains(document.activeElement);
-    host.replaceChildren(
-      ...rows.map(({ shape, dot, words, seconds }) =>
-        el(
-          "button",
-          {
-            "aria-current": String(shape.name === store.selected),
-            title: `${shape.name}: ${fixed(shape.s[shape.s.length - 1] * 1e3, 0)} mm, ${words}`,
-            onclick: () => store.select(shape.name),
-          },
-          el("i", { class: `dot ${dot}` }),
-          el("span", { class: "name" }, shape.name),
-          el("span", { class: "time" }, seconds ? `${fixed(seconds, 1)} s` : ""),
-          dot === "none" || dot === "warn" ? el("span", { class: "more" }, words) : null,
-        ),
-      ),
-    );
-    if (!rows.length)
-      host.replaceChildren(
-        el(
-          "p",
-          { class: "empty" },
-          store.scene ? "The job has no contour. Add one under Job file." : "Reading the drawing …",
-        ),
-      );
-    if (focused)
-      /** @type {HTMLElement | null} */ (host.querySelector("[aria-current=true]"))?.focus();
-  }
+/** The contours of the job, and the cycle time of its program. */
+export function contoursPanel() {
+  const { scene } = store;
+  const loops = store.connection === "open" && store.part;
+  const none = scene ? "The job has no contour. Add one under Job file." : "Reading the drawing …";
+  return html`
+    <header>
+      <h2>Contours</h2>
+      <span class="grow" />
+      <button id="open-loops" class="text" title="The loops of the part, cut or not"
+        disabled=${!loops} onClick=${() => openSheet("loops")}>Loops …</button>
+    </header>
+    <div id="contours" class="list">
+      ${scene?.contours.length ? scene.contours.map(row) : html`<p class="empty">${none}</p>`}
+    </div>
+    <div id="cycle">${cycle()}</div>`;
 }
 
-/**
- * Write the cycle time and the notes of the program.
- * @param {Store} store
- */
-function cycle(store) {
+/** @param {ContourShape} contour */
+function row({ name, s }) {
+  const { mark, words } = standing(name);
+  const seconds = secondsOf(store.plans.get(name) ?? []);
+  return html`
+    <button
+      key=${name}
+      aria-current=${String(name === store.selected)}
+      title=${`${name}: ${millimetres(s[s.length - 1], 0)}, ${words}`}
+      onClick=${() => store.select(name)}
+    >
+      ${dot(mark)}
+      <span class="name">${name}</span>
+      <span class="time">${seconds ? `${fixed(seconds, 1)} s` : ""}</span>
+      ${(mark === "none" || mark === "warn") && html`<span class="more">${words}</span>`}
+    </button>`;
+}
+
+/** The cycle time and the notes of the program. */
+function cycle() {
   const { program, outcome } = store;
   const notes = [...new Set([...(program?.notes ?? []), ...(outcome?.notes ?? [])])];
-  const known = outcome && program && outcome.revision === program.revision ? outcome.cycle : null;
-  const total = known?.total ?? program?.total ?? 0;
-  byId("cycle").replaceChildren(
-    ...(total
-      ? [
-          el(
-            "div",
-            { class: "total" },
-            el("span", {}, "Cycle time"),
-            el("b", {}, total < 60 ? `${fixed(total)} s` : `${clock(total)} min`),
-          ),
-          ...(known
-            ? [
-                bar(known),
-                el(
-                  "p",
-                  { class: "quiet" },
-                  `Cutting ${fixed(known.cutting)} s, transfer ${fixed(known.air)} s, piercing ${fixed(known.piercing)} s`,
-                ),
-              ]
-            : []),
-        ]
-      : []),
-    ...(notes.length
-      ? [
-          el(
-            "details",
-            {},
-            el(
-              "summary",
-              {},
-              icon("warning"),
-              notes.length > 1 ? `${notes.length} notes on the program` : "A note on the program",
-            ),
-            ...notes.map((note) => el("p", {}, note)),
-          ),
-        ]
-      : []),
-  );
+  const times = program && outcome?.revision === program.revision ? outcome.cycle : null;
+  const total = times?.total ?? program?.total ?? 0;
+  const title = notes.length > 1 ? `${notes.length} notes on the program` : "A note on the program";
+  return html`
+    ${
+      total > 0 &&
+      html`
+      <div class="total">
+        <span>Cycle time</span>
+        <b>${total < 60 ? `${fixed(total)} s` : `${clock(total)} min`}</b>
+      </div>`
+    }
+    ${total > 0 && times && shares(times)}
+    ${
+      notes.length > 0 &&
+      html`
+      <details>
+        <summary>${icon("warning")}${title}</summary>
+        ${notes.map((note) => html`<p>${note}</p>`)}
+      </details>`
+    }`;
 }
 
-/** @param {{cutting: number, air: number, piercing: number, total: number}} times */
-function bar({ cutting, air, piercing }) {
-  const strip = el("div", { class: "shares", "aria-hidden": "true" });
-  for (const [seconds, colour] of /** @type {[number, string][]} */ ([
-    [cutting, "--cut"],
-    [air, "--moving"],
-    [piercing, "--pierce"],
-  ])) {
-    const part = el("i");
-    part.style.flexGrow = String(seconds);
-    part.style.background = `var(${colour})`;
-    if (seconds) strip.append(part);
-  }
-  return strip;
+/** @param {{cutting: number, air: number, piercing: number}} times */
+function shares({ cutting, air, piercing }) {
+  /** @type {(seconds: number, colour: string) => unknown} */
+  const part = (seconds, colour) =>
+    seconds > 0 && html`<i style=${{ flexGrow: seconds, background: `var(${colour})` }} />`;
+  const [c, a, p] = [cutting, air, piercing].map((each) => fixed(each));
+  return html`
+    <div class="shares" aria-hidden="true">
+      ${part(cutting, "--cut")}${part(air, "--moving")}${part(piercing, "--pierce")}
+    </div>
+    <p class="quiet">${`Cutting ${c} s, transfer ${a} s, piercing ${p} s`}</p>`;
 }

@@ -1,11 +1,10 @@
 /** The figures of two plans of a contour, by criterion and by joint. */
 
-import { el } from "../dom.js";
-import { deg, digits, fixed } from "../format.js";
+import { UNITS, digits, fixed, secondsOf } from "../format.js";
+import { html } from "../ui.js";
 
 /** @typedef {import("../messages.js").PlanMessage} PlanMessage */
 /** @typedef {import("../axes.js").Axis} Axis */
-/** @typedef {import("../messages.js").KeptEntry} KeptEntry */
 /** @typedef {"displacement" | "range" | "peak_velocity" | "peak_acceleration"} OfJoint */
 
 /**
@@ -14,17 +13,9 @@ import { deg, digits, fixed } from "../format.js";
  * @property {string} unit
  * @property {number | null} then  of the plan that is compared
  * @property {number | null} now
- * @property {1 | -1 | 0} better  1: more is better, -1: less is better
+ * @property {1 | -1} [better]  1: more is better; default: less is better
  * @property {number} [places]  default: three significant digits
  */
-
-/** @type {Record<OfJoint, string>} */
-export const OF_JOINT = {
-  displacement: "Moves",
-  range: "Range",
-  peak_velocity: "Speed",
-  peak_acceleration: "Accel.",
-};
 
 const sum = (/** @type {number[]} */ values) => values.reduce((total, each) => total + each, 0);
 
@@ -42,39 +33,6 @@ function ofJoint(plans, kind, joint, { of }) {
 }
 
 /**
- * Return how far the joints of the arm move, and each external axis.
- * @param {PlanMessage[]} then
- * @param {PlanMessage[]} now
- * @param {Axis[]} axes
- * @returns {Row[]}
- */
-function travel(then, now, axes) {
-  const moved = (/** @type {PlanMessage[]} */ plans) =>
-    axes.map((axis, joint) => ofJoint(plans, "displacement", joint, axis));
-  const [before, after] = [moved(then), moved(now)];
-  const arm = axes.filter(({ external }) => !external).length;
-  /** @type {(name: string, unit: string, from: number, to: number) => Row} */
-  const row = (name, unit, from, to) => ({
-    ...{ name, unit, better: -1, places: 1 },
-    then: sum(before.slice(from, to)),
-    now: sum(after.slice(from, to)),
-  });
-  return [
-    row("Joint travel", "deg", 0, arm),
-    ...axes
-      .slice(arm)
-      .map(({ label, unit }, i) => row(`Travel of ${label}`, unit, arm + i, arm + i + 1)),
-  ];
-}
-
-/**
- * Return the largest share of a limit that any joint uses, %.
- * @param {PlanMessage[]} plans
- * @param {"peak_velocity" | "peak_acceleration"} kind
- */
-const largest = (plans, kind) => 100 * Math.max(...plans.flatMap(({ criteria }) => criteria[kind]));
-
-/**
  * Return the least value of each measure of comfort along a motion, in the shown units.
  * @param {PlanMessage[]} plans
  */
@@ -83,60 +41,65 @@ function nearest(plans) {
   const found = new Map();
   for (const { name, value, unit } of plans.flatMap(({ criteria }) => criteria.nearest)) {
     if (value === null) continue;
-    const scaled = unit === "rad" ? deg(value) : unit === "m" ? 1e3 * value : value;
-    const units = { rad: "deg", m: "mm", "m^3": "m\u00b3" }[unit] ?? unit;
-    const known = found.get(name);
-    if (!known || scaled < known.value) found.set(name, { value: scaled, unit: units });
+    const shown = UNITS[unit] ?? { unit, of: (/** @type {number} */ same) => same };
+    const known = found.get(name)?.value ?? Infinity;
+    if (shown.of(value) < known) found.set(name, { value: shown.of(value), unit: shown.unit });
   }
   return found;
 }
-
-/** @param {PlanMessage[]} plans */
-const gap = (plans) =>
-  plans.every((plan) => plan.gap !== null)
-    ? 100 * Math.max(...plans.map((plan) => /** @type {number} */ (plan.gap)))
-    : null;
-
-/** @param {PlanMessage[]} plans */
-const seconds = (plans) => sum(plans.map(({ time }) => time[time.length - 1]));
 
 /**
  * Return the criteria of two plans.
  * @param {PlanMessage[]} then
  * @param {PlanMessage[]} now
  * @param {{alike: boolean, cycle: [number | null, number | null], axes: Axis[]}} more
+ *   alike: whether their costs can be compared
  * @returns {Row[]}
  */
 export function rows(then, now, { alike, cycle, axes }) {
+  /** @type {(name: string, unit: string, of: (plans: PlanMessage[]) => number | null, places?: number) => Row} */
+  const row = (name, unit, of, places) => ({ name, unit, then: of(then), now: of(now), places });
+  /** @type {(kind: "peak_velocity" | "peak_acceleration") => (plans: PlanMessage[]) => number} */
+  const largest = (kind) => (plans) =>
+    100 * Math.max(...plans.flatMap(({ criteria }) => criteria[kind]));
+  /** @type {(chosen: (axis: Axis) => boolean) => (plans: PlanMessage[]) => number} */
+  const travel = (chosen) => (plans) =>
+    sum(axes.map((axis, j) => (chosen(axis) ? ofJoint(plans, "displacement", j, axis) : 0)));
+  const gap = (/** @type {PlanMessage[]} */ plans) =>
+    100 * Math.max(...plans.map((plan) => plan.gap ?? Infinity));
+  const known = (/** @type {number} */ value) => (value < Infinity ? value : null);
   const [before, after] = [nearest(then), nearest(now)];
-  const cost = (/** @type {PlanMessage[]} */ plans) => sum(plans.map((plan) => plan.cost));
-  /** @type {Row[]} */
+  const measures = [...new Map([...before, ...after])];
   const found = [
-    { name: "Time of the cut", unit: "s", then: seconds(then), now: seconds(now), better: -1 },
-    { name: "Cycle of the job", unit: "s", then: cycle[0], now: cycle[1], better: -1, places: 1 },
-    ...travel(then, now, axes),
-    {
-      ...{ name: "Top speed", unit: "% limit", better: -1, places: 1 },
-      then: largest(then, "peak_velocity"),
-      now: largest(now, "peak_velocity"),
-    },
-    {
-      ...{ name: "Top acceleration", unit: "% limit", better: -1, places: 1 },
-      then: largest(then, "peak_acceleration"),
-      now: largest(now, "peak_acceleration"),
-    },
-    ...[...new Set([...before.keys(), ...after.keys()])].map((name) => ({
-      ...{ name: `Nearest: ${name}`, better: /** @type {const} */ (1) },
-      unit: (after.get(name) ?? before.get(name))?.unit ?? "",
+    ...(alike ? [row("Cost", "", (plans) => sum(plans.map(({ cost }) => cost)))] : []),
+    row("Time of the cut", "s", secondsOf),
+    { name: "Cycle of the job", unit: "s", then: cycle[0], now: cycle[1], places: 1 },
+    row(
+      "Joint travel",
+      "deg",
+      travel(({ external }) => !external),
+      1,
+    ),
+    ...axes
+      .filter(({ external }) => external)
+      .map((axis) =>
+        row(
+          `Travel of ${axis.label}`,
+          axis.unit,
+          travel((each) => each === axis),
+          1,
+        ),
+      ),
+    row("Top speed", "% limit", largest("peak_velocity"), 1),
+    row("Top acceleration", "% limit", largest("peak_acceleration"), 1),
+    ...measures.map(([name, { unit }]) => ({
+      ...{ name: `Nearest: ${name}`, unit, better: /** @type {const} */ (1) },
       then: before.get(name)?.value ?? null,
       now: after.get(name)?.value ?? null,
     })),
-    { name: "Gap to the bound", unit: "%", then: gap(then), now: gap(now), better: -1, places: 2 },
+    row("Gap to the bound", "%", (plans) => known(gap(plans)), 2),
   ];
-  // Costs with different metrics or weights cannot be compared.
-  if (alike)
-    found.unshift({ name: "Cost", unit: "", then: cost(then), now: cost(now), better: -1 });
-  return found.filter((row) => row.then !== null || row.now !== null);
+  return found.filter((each) => each.then !== null || each.now !== null);
 }
 
 /**
@@ -147,42 +110,43 @@ export function rows(then, now, { alike, cycle, axes }) {
  * @param {Axis[]} axes
  * @returns {Row[]}
  */
-export function jointRows(then, now, kind, axes) {
-  return axes.map((axis, joint) => ({
+export const jointRows = (then, now, kind, axes) =>
+  axes.map((axis, joint) => ({
     name: axis.label,
     unit: kind === "displacement" || kind === "range" ? axis.unit : "% limit",
     then: ofJoint(then, kind, joint, axis),
     now: ofJoint(now, kind, joint, axis),
-    better: -1,
     places: 1,
   }));
-}
 
 /**
- * Return rows as the body of a table, with their differences.
+ * Rows as a table, with their differences.
+ * @param {string} name  of the plan that is compared
  * @param {Row[]} found
  */
-export const body = (found) => el("tbody", {}, ...found.map(line));
+export const table = (name, found) => html`
+  <table class="compared">
+    <thead>
+      <tr><td />${[name, "now", "difference"].map((each) => html`<th scope="col">${each}</th>`)}</tr>
+    </thead>
+    <tbody>${found.map(line)}</tbody>
+  </table>`;
 
 /** @param {Row} row */
-function line({ name, unit, then, now, better, places }) {
+function line({ name, unit, then, now, better = -1, places }) {
   const text = (/** @type {number | null} */ value) =>
     value === null ? "\u2013" : places === undefined ? digits(value, 3) : fixed(value, places);
   const by = then === null || now === null ? null : now - then;
   const same = by === null || text(then) === text(now);
-  const good = !same && better !== 0 && by * better > 0;
-  const said = by === null ? "" : same ? "same" : `${by > 0 ? "+" : ""}${text(by)}`;
-  return el(
-    "tr",
-    {},
-    el("th", { scope: "row" }, name, unit ? el("small", {}, ` ${unit}`) : null),
-    el("td", {}, text(then)),
-    el("td", {}, text(now)),
-    el(
-      "td",
-      { class: same ? "quiet" : good ? "down" : "up" },
-      said,
-      same || by === null ? null : el("span", { class: "unseen" }, good ? " better" : " worse"),
-    ),
-  );
+  const good = !same && by * better > 0;
+  const words = by === null ? "" : same ? "same" : `${by > 0 ? "+" : ""}${text(by)}`;
+  return html`
+    <tr>
+      <th scope="row">${name}${unit && html`<small> ${unit}</small>`}</th>
+      <td>${text(then)}</td>
+      <td>${text(now)}</td>
+      <td class=${same ? "quiet" : good ? "down" : "up"}>
+        ${words}${!same && html`<span class="unseen">${good ? " better" : " worse"}</span>`}
+      </td>
+    </tr>`;
 }

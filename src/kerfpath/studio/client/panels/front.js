@@ -1,127 +1,157 @@
 /** The Pareto set of the chosen contour: its points, whose motions can be shown and taken. */
 
-import { byId, el } from "../dom.js";
+import { useEffect, useRef } from "preact/hooks";
+
+import { send, store } from "../app.js";
 import { UNITS, digits } from "../format.js";
 import { SCALE_GRADIENT } from "../scene/scale.js";
 import { Scatter } from "../scatter.js";
+import { card, html, options, redraw } from "../ui.js";
+import { bar } from "./bar.js";
 
-/** @typedef {import("../store.js").Store} Store */
-/** @typedef {import("../messages.js").FrontPoint} FrontPoint */
+/** @typedef {import("../messages.js").FrontMessage} FrontMessage */
 
-const USUAL = ["displacement", "velocity", "range"];
 const MOST = 5; // criteria of one set
+const STALE = "Out of date: the job has changed. Search again for the current job.";
+const NO_KEYS =
+  "This plan was restricted by windows of joints or by a clearance, for which a job has no keys. kerfpath pareto --pick writes its program.";
+const TAKING = "Taking it sets weights, limits, metric, objective and method for every contour.";
+
+const scatter = new Scatter();
+const wanted = new Set(["displacement", "velocity", "range"]);
+let runs = 100;
+
+/** Return the set of the chosen contour, or null. */
+const mine = () => (store.front?.contour === store.selected ? store.front : null);
+
+const running = () => store.front?.state === "running" && !store.stale(store.front);
+
+function search() {
+  if (running()) return send({ type: "cancel" });
+  store.withdraw();
+  return send({ type: "front", contour: store.selected, criteria: [...wanted], runs });
+}
+
+/** @param {number} number  of the point whose motion is shown */
+function show(number) {
+  const front = mine();
+  if (front && !store.stale(front)) send({ type: "point", contour: front.contour, number });
+}
 
 /**
- * @param {Store} store
- * @param {{send: (message: any) => boolean}} connection
+ * Return a criterion in the units that are shown.
+ * @param {FrontMessage["axes"][number]} axis
  */
-export function frontPanel(store, connection) {
-  const host = byId("front");
-  const wanted = new Set(USUAL);
-  const canvas = el("canvas", { tabindex: 0, class: "scatter" });
-  const scatter = new Scatter(canvas);
-  const said = el("p", { class: "quiet small", "aria-live": "polite" });
-  const start = el("button", { class: "plain", onclick: look });
-  const runs = el("input", {
-    ...{ class: "number", type: "number", min: 10, max: 1000, step: 10, value: 100 },
+function shownAxis({ name, words, unit, better }) {
+  const known = UNITS[unit] ?? { unit, of: (/** @type {number} */ value) => value };
+  const label = `${words}, ${known.unit} ${better === "less" ? "\u2193" : "\u2191"}`;
+  return { ...known, name, words, label };
+}
+
+/** The Pareto set, and the search for it. */
+export function frontPanel() {
+  const { job } = store;
+  if (!job) return null;
+  const front = mine();
+  const off = !store.live || !store.chosen.length || wanted.size < 2;
+  const words = running() ? "Stop" : front ? "Search again" : "Search";
+  const start = html`<button class="plain" disabled=${off} onClick=${search}>${words}</button>`;
+  const progress = store.front ?? { done: 0, total: 1 };
+  const count = {
+    ...{ class: "number", type: "number", min: 10, max: 1000, step: 10, value: runs },
+    onInput: (/** @type {any} */ { target }) => (runs = clamped(target.value)),
     "aria-label": "Runs of the planner",
-  });
-  const bar = el("progress", { max: 1, value: 0, "aria-label": "Progress of the Pareto set" });
-  const boxes = el("div", { class: "criteria", role: "group", "aria-label": "Criteria" });
-  const pickers = ["across", "up", "by colour"].map((name, i) => {
-    const select = el("select", {
-      "aria-label": `Criterion ${name}`,
-      onchange: () => {
-        scatter.shown[i] = Number(select.value);
-        draw();
-      },
-    });
-    return select;
-  });
-  const ramp = el("i", { class: "ramp" });
-  ramp.style.background = SCALE_GRADIENT;
-  const [low, high] = [el("span"), el("span")];
-  const scale = el("p", { class: "quiet small" }, low, ramp, high);
-  const found = el(
-    "div",
-    {},
-    el("div", { class: "pickers" }, ...pickers),
-    el("div", { class: "scatter-box" }, canvas),
-    scale,
-    said,
+  };
+  return card(
+    "Pareto set",
+    start,
+    html`
+      ${bar("Progress of the Pareto set", progress, { hidden: !running() })}
+      <div hidden=${!front} class=${front && store.stale(front) ? "stale-set" : ""}>
+        ${front && set(front)}
+      </div>
+      <div class="actions">${front && taking(front)}</div>
+      <details class="group-of-keys">
+        <summary>Criteria and runs</summary>
+        <div class="criteria" role="group" aria-label="Criteria">
+          ${(job.choices["pareto.criteria"] ?? []).map(criterion)}
+        </div>
+        <p class="field head"><label>Runs of the planner </label><input ...${count} /></p>
+      </details>`,
   );
-  const actions = el("div", { class: "actions" });
-  const fold = el(
-    "details",
-    { class: "group-of-keys" },
-    el("summary", {}, "Criteria and runs"),
-    boxes,
-    el("p", { class: "field head" }, el("label", {}, "Runs of the planner "), runs),
+}
+
+/** @param {string} text */
+const clamped = (text) => Math.min(1000, Math.max(10, Math.round(Number(text)) || 100));
+
+/** @param {string} word */
+function criterion(word) {
+  const toggle = () => {
+    if (!wanted.delete(word)) wanted.add(word);
+    redraw();
+  };
+  const on = wanted.has(word);
+  const off = !on && wanted.size >= MOST;
+  return html`
+    <label key=${word}>
+      <input type="checkbox" checked=${on} disabled=${off} onChange=${toggle} /> ${word}
+    </label>`;
+}
+
+/** @param {FrontMessage} front */
+function set(front) {
+  const axes = front.axes.map(shownAxis);
+  const pick = (/** @type {number} */ i, /** @type {number} */ axis) => {
+    scatter.shown[i] = axis;
+    redraw();
+  };
+  scatter.load(
+    front,
+    axes,
+    store.candidate?.contour === front.contour ? store.candidate.number : null,
   );
-  host.replaceChildren(
-    el(
-      "section",
-      { class: "card" },
-      el("header", {}, el("h2", {}, "Pareto set"), el("span", { class: "grow" }), start),
-      bar,
-      found,
-      actions,
-      fold,
-    ),
+  const by = scatter.shown[2];
+  const [low, high] = by < 0 ? [] : scatter.range(by).map((value) => digits(value, 3));
+  const names = axes.map(({ name }, i) => ({ value: String(i), label: name }));
+  const pickers = ["across", "up", "by colour"].map(
+    (name, i) => html`
+      <select
+        aria-label=${`Criterion ${name}`}
+        value=${String(scatter.shown[i])}
+        onChange=${(/** @type {any} */ { target }) => pick(i, Number(target.value))}
+      >${options(i === 2 ? [{ value: "-1", label: "one colour" }, ...names] : names)}</select>`,
   );
-  store.on(["front", "candidate", "selected", "job", "plan", "connection"], draw);
-  new ResizeObserver(() => scatter.draw()).observe(canvas);
-  canvas.addEventListener("pointermove", ({ offsetX, offsetY }) =>
-    hover(scatter.at(offsetX, offsetY)?.number ?? null),
-  );
-  canvas.addEventListener("pointerleave", () => hover(null));
-  canvas.addEventListener("click", ({ offsetX, offsetY }) => {
-    const point = scatter.at(offsetX, offsetY);
-    if (point) show(point.number);
-  });
-  canvas.addEventListener("keydown", key);
-  draw();
-  return { paint: draw };
+  return html`
+    <div class="pickers">${pickers}</div>
+    <div class="scatter-box"><${Points} front=${front} /></div>
+    <p class="quiet small" hidden=${by < 0 || !front.points.length}>
+      <span>${low} </span>
+      <i class="ramp" style=${{ background: SCALE_GRADIENT }} />
+      <span> ${high} ${axes[by]?.unit}</span>
+    </p>
+    <p class="quiet small" aria-live="polite">${statement(front, axes)}</p>`;
+}
 
-  /** The set of the chosen contour, or null. */
-  function mine() {
-    return store.front?.contour === store.selected ? store.front : null;
-  }
-
-  function running() {
-    return store.front?.state === "running" && !store.stale(store.front);
-  }
-
-  function look() {
-    if (running()) return void connection.send({ type: "cancel" });
-    const count = Math.min(1000, Math.max(10, Math.round(Number(runs.value)) || 100));
-    store.withdraw();
-    connection.send({
-      type: "front",
-      contour: store.selected,
-      criteria: [...wanted],
-      runs: count,
-    });
-  }
-
-  /** @param {number} number */
-  function show(number) {
-    const front = mine();
-    if (front && !store.stale(front))
-      connection.send({ type: "point", contour: front.contour, number });
-  }
-
-  /** @param {number | null} number */
-  function hover(number) {
+/**
+ * The canvas of the points, which the pointer and keys choose among.
+ * @param {{front: FrontMessage}} props
+ */
+function Points({ front }) {
+  const host = useRef(/** @type {HTMLCanvasElement | null} */ (null));
+  useEffect(() => {
+    scatter.canvas = host.current;
+    const sized = new ResizeObserver(() => scatter.draw());
+    if (host.current) sized.observe(host.current);
+    return () => sized.disconnect();
+  }, []);
+  useEffect(() => scatter.draw());
+  const hover = (/** @type {number | null} */ number) => {
     if (number === scatter.hover) return;
     scatter.hover = number;
-    canvas.style.cursor = number === null ? "" : "pointer";
-    scatter.draw();
-    say();
-  }
-
+    redraw();
+  };
   /** @param {KeyboardEvent} event */
-  function key(event) {
+  const key = (event) => {
     const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     const best = scatter.points.filter((point) => point.best);
     best.sort((a, b) => a.values[scatter.shown[0]] - b.values[scatter.shown[0]]);
@@ -131,159 +161,50 @@ export function frontPanel(store, connection) {
     hover(best[Math.min(Math.max(at + by, 0), best.length - 1)].number);
     event.preventDefault();
     event.stopPropagation();
-  }
+  };
+  const at = (/** @type {PointerEvent} */ event) =>
+    scatter.at(event.offsetX, event.offsetY)?.number ?? null;
+  const click = (/** @type {PointerEvent} */ event) => {
+    const number = at(event);
+    if (number !== null) show(number);
+  };
+  const best = front.points.filter((point) => point.best).length;
+  const label = `${best} non-dominated plans; arrow keys go from one to the next, Enter shows its motion`;
+  return html`
+    <canvas ref=${host} class="scatter" tabindex="0" aria-label=${label} onKeyDown=${key}
+      style=${{ cursor: scatter.hover === null ? "" : "pointer" }} onClick=${click}
+      onPointerMove=${(/** @type {PointerEvent} */ event) => hover(at(event))}
+      onPointerLeave=${() => hover(null)} />`;
+}
 
-  /**
-   * @param {number} i
-   * @returns {{label: string, unit: string, of: (value: number) => number, words: string}}
-   */
-  function axis(i) {
-    const { words, unit, better } = /** @type {import("../messages.js").FrontMessage} */ (
-      store.front
-    ).axes[i];
-    const known = UNITS[unit] ?? { unit, of: (/** @type {number} */ value) => value };
-    return {
-      ...known,
-      words,
-      label: `${words}, ${known.unit} ${better === "less" ? "\u2193" : "\u2191"}`,
-    };
-  }
+/**
+ * Return the values of the point under the pointer, or the state of the search.
+ * @param {FrontMessage} front
+ * @param {ReturnType<typeof shownAxis>[]} axes
+ */
+function statement(front, axes) {
+  const number = scatter.hover ?? scatter.chosen;
+  const point = scatter.points.find((each) => each.number === number);
+  if (point)
+    return axes
+      .map(({ words, unit }, i) => `${words} ${digits(point.values[i], 3)} ${unit}`)
+      .join(", ");
+  if (store.stale(front)) return STALE;
+  const best = `${front.points.filter((each) => each.best).length} non-dominated plans`;
+  if (front.state === "running") return `${front.done} of ${front.total} runs, ${best}.`;
+  const stopped = front.state === "stopped" ? "; stopped" : "";
+  return `${best}, from ${front.done} runs${stopped}. Click a plan to see its motion. The arrow of a criterion points in the better direction.`;
+}
 
-  function draw() {
-    const { job, candidate } = store;
-    const front = mine();
-    const live = store.connection === "open" && Boolean(job?.values);
-    const planned = store.plans.has(store.selected ?? "");
-    host.hidden = !job;
-    start.textContent = running() ? "Stop" : front ? "Search again" : "Search";
-    start.disabled = !live || !planned || wanted.size < 2;
-    bar.hidden = !running();
-    bar.value = store.front ? store.front.done / store.front.total : 0;
-    const stale = front !== null && store.stale(front);
-    found.hidden = !front;
-    found.classList.toggle("stale-set", stale);
-    criteria();
-    if (front) {
-      scatter.shown = /** @type {[number, number, number]} */ (
-        scatter.shown.map((each, i) =>
-          each < front.axes.length ? each : i < 2 ? i % front.axes.length : -1,
-        )
-      );
-      choices(front.axes.length);
-      const scaled = front.axes.map((_, i) => axis(i).of);
-      scatter.points = front.points.map(({ number, values, best }) => ({
-        ...{ number, best },
-        values: values.map((value, i) => scaled[i](value)),
-      }));
-      scatter.axes = [axis(scatter.shown[0]), axis(scatter.shown[1])];
-      scatter.chosen = candidate?.contour === front.contour ? candidate.number : null;
-      const by = scatter.shown[2];
-      scale.hidden = by < 0 || !scatter.points.length;
-      if (!scale.hidden) {
-        const ends = scatter.range(by).map((value) => digits(value, 3));
-        low.textContent = `${ends[0]} `;
-        high.textContent = ` ${ends[1]} ${axis(by).unit}`;
-      }
-      const best = front.points.filter((point) => point.best).length;
-      canvas.setAttribute(
-        "aria-label",
-        `${best} non-dominated plans; arrow keys go from one to the next, Enter shows its motion`,
-      );
-      scatter.draw();
-    }
-    say();
-    actions.replaceChildren(...taking(live));
-  }
-
-  /** Let the criteria be chosen. */
-  function criteria() {
-    const words = store.job?.choices["pareto.criteria"] ?? [];
-    const shown = [...words, ...wanted].join(" ");
-    if (boxes.dataset.shown === shown) return;
-    boxes.dataset.shown = shown;
-    const focused = document.activeElement?.getAttribute("data-criterion");
-    boxes.replaceChildren(
-      ...words.map((word) => {
-        const box = el("input", {
-          ...{ type: "checkbox", checked: wanted.has(word), "data-criterion": word },
-          disabled: !wanted.has(word) && wanted.size >= MOST,
-          onchange: () => {
-            if (box.checked) wanted.add(word);
-            else wanted.delete(word);
-            draw();
-          },
-        });
-        return el("label", {}, box, ` ${word}`);
-      }),
-    );
-    if (focused)
-      /** @type {HTMLElement | null} */ (
-        boxes.querySelector(`[data-criterion="${focused}"]`)
-      )?.focus();
-  }
-
-  /** @param {number} count */
-  function choices(count) {
-    const names = Array.from({ length: count }, (_, i) => store.front?.axes[i].name ?? "");
-    pickers.forEach((select, i) => {
-      const all = [...(i === 2 ? [["-1", "one colour"]] : []), ...names.map((n, j) => [`${j}`, n])];
-      const shown = names.join();
-      if (select.dataset.shown !== shown) {
-        select.dataset.shown = shown;
-        select.replaceChildren(...all.map(([value, text]) => el("option", { value }, text)));
-      }
-      select.value = String(scatter.shown[i]);
-    });
-  }
-
-  /** Show the values of the point under the pointer, or the state of the search. */
-  function say() {
-    const front = mine();
-    if (!front) return;
-    const number = scatter.hover ?? scatter.chosen;
-    const point = scatter.points.find((each) => each.number === number);
-    if (point)
-      return void (said.textContent = point.values
-        .map((value, i) => `${axis(i).words} ${digits(value, 3)} ${axis(i).unit}`)
-        .join(", "));
-    const best = front.points.filter((each) => each.best).length;
-    said.textContent = store.stale(front)
-      ? "Out of date: the job has changed. Search again for the current job."
-      : front.state === "running"
-        ? `${front.done} of ${front.total} runs, ${best} non-dominated plans.`
-        : `${best} non-dominated plans, from ${front.done} runs${front.state === "stopped" ? "; stopped" : ""}. Click a plan to see its motion. The arrow of a criterion points in the better direction.`;
-  }
-
-  /** @param {boolean} live */
-  function taking(live) {
-    const { candidate } = store;
-    const front = mine();
-    const point = front?.points.find(({ number }) => number === candidate?.number);
-    if (!front || !point || candidate?.contour !== front.contour) return [];
-    const { edits } = point;
-    const back = el(
-      "button",
-      { class: "plain", onclick: () => store.withdraw() },
-      "Back to the job's plan",
-    );
-    if (!edits)
-      return [
-        back,
-        el(
-          "p",
-          { class: "quiet small" },
-          "This plan was restricted by windows of joints or by a clearance, for which a job has no keys. kerfpath pareto --pick writes its program.",
-        ),
-      ];
-    const take = () => connection.send({ type: "edits", edits });
-    return [
-      el("button", { class: "primary", disabled: !live, onclick: take }, "Take it"),
-      back,
-      el(
-        "p",
-        { class: "quiet small" },
-        "Taking it sets weights, limits, metric, objective and method for every contour.",
-      ),
-    ];
-  }
+/** @param {FrontMessage} front */
+function taking(front) {
+  const { candidate } = store;
+  const point = front.points.find(({ number }) => number === candidate?.number);
+  if (!point || candidate?.contour !== front.contour) return null;
+  const { edits } = point;
+  const take = () => send({ type: "edits", edits });
+  return html`
+    ${edits && html`<button class="primary" disabled=${!store.live} onClick=${take}>Take it</button>`}
+    <button class="plain" onClick=${() => store.withdraw()}>Back to the job's plan</button>
+    <p class="quiet small">${edits ? TAKING : NO_KEYS}</p>`;
 }

@@ -1,56 +1,39 @@
 /** The text of the job in a sheet over the page, for reading and editing. */
 
-import { byId, el } from "../dom.js";
-import { showSheet } from "./sheet.js";
+import { useEffect, useRef, useState } from "preact/hooks";
 
-/** @typedef {import("../store.js").Store} Store */
+import { send, store } from "../app.js";
+import { html } from "../ui.js";
+import { closeSheet } from "./sheet.js";
 
-/**
- * @param {Store} store
- * @param {{send: (message: any) => boolean}} connection
- */
-export function jobSheet(store, connection) {
-  const sheet = byId("sheet", HTMLDialogElement);
-  byId("open-text").addEventListener("click", open);
+/** @type {import("./sheet.js").Sheet} */
+export const jobSheet = {
+  docked: false,
+  content: () => ({ title: store.job?.name ?? "Job", body: () => html`<${JobText} />` }),
+};
 
-  function open() {
-    const text = el("textarea", { spellcheck: "false", "aria-label": "Text of the job" });
-    text.value = store.job?.text ?? "";
-    const apply = el(
-      "button",
-      {
-        class: "primary",
-        disabled: true,
-        onclick: () => {
-          connection.send({ type: "text", text: text.value });
-          sheet.close();
-        },
-      },
-      "Apply",
-    );
-    text.addEventListener("input", () => (apply.disabled = text.value === store.job?.text));
-    showSheet(
-      "job",
-      store.job?.name ?? "Job",
-      [],
-      [
-        text,
-        el(
-          "footer",
-          {},
-          el(
-            "span",
-            { class: "quiet" },
-            "Changes here are one step of undo. The job file is only written with Save job.",
-          ),
-          el("span", { class: "grow" }),
-          el("button", { class: "plain", onclick: () => sheet.close() }, "Cancel"),
-          apply,
-        ),
-      ],
-    );
-    text.focus();
-    text.setSelectionRange(0, 0);
-    text.scrollTop = 0;
-  }
+function JobText() {
+  const [text, type] = useState(store.job?.text ?? "");
+  const area = useRef(/** @type {HTMLTextAreaElement | null} */ (null));
+  useEffect(() => {
+    area.current?.focus();
+    area.current?.setSelectionRange(0, 0);
+    area.current?.scrollTo(0, 0);
+  }, []);
+  const apply = () => {
+    send({ type: "text", text });
+    closeSheet();
+  };
+  const typed = (/** @type {any} */ { target }) => type(target.value);
+  return html`
+    <textarea ref=${area} spellcheck=${false} aria-label="Text of the job" value=${text}
+      onInput=${typed} />
+    <footer>
+      <span class="quiet">
+        Changes here are one step of undo. The job file is only written with Save job.
+      </span>
+      <span class="grow" />
+      <button class="plain" onClick=${closeSheet}>Cancel</button>
+      <button class="primary" disabled=${text === store.job?.text} onClick=${apply}>Apply</button>
+    </footer>`;
 }

@@ -1,85 +1,38 @@
 /** The placement of the part: moved by numbers or handles, with its reach and fastest speed. */
 
-import { byId, el, icon } from "../dom.js";
-import { change, counted, fixed } from "../format.js";
-import { candidates } from "./candidates.js";
-import { sheetShown, showSheet } from "./sheet.js";
+import { useLayoutEffect, useRef } from "preact/hooks";
 
-/** @typedef {import("../store.js").Store} Store */
+import { send, store } from "../app.js";
+import { change, counted, fixed } from "../format.js";
+import { NUMBER, blurOnEnter, html, redraw, segments } from "../ui.js";
+import { candidates } from "./candidates.js";
+
 /** @typedef {import("../scene/placing.js").What} What */
+/** @typedef {import("../messages.js").ReachMessage} ReachMessage */
 
 const PATIENCE = 2000; // ms to wait for an answer
-const AXES = ["x", "y", "z"];
-const TURNS = ["roll", "pitch", "yaw"];
+const WHAT = [
+  { value: "part", label: "Part" },
+  { value: "robot", label: "Robot" },
+];
+const HOW = [
+  { value: "move", label: "Move" },
+  { value: "turn", label: "Turn" },
+];
+
+/** A key for the place of part and tip. */
+const placeNow = () => JSON.stringify([store.scene?.T_part, store.scene?.robot.T_tool]);
 
 /**
- * @param {Store} store
- * @param {{send: (message: any) => boolean}} connection
- * @param {import("../scene/view.js").SceneView} view
+ * The sheet of the placement.
+ * @param {import("../scene/placing.js").Placing} placing
+ * @returns {import("./sheet.js").Sheet}
  */
-export function layoutSheet(store, connection, view) {
-  const { placing } = view;
-  const opener = byId("open-layout", HTMLButtonElement);
-  opener.append(icon("move"), "Layout");
-  let [asked, waiting, again] = [0, 0, false]; // the number of the last question, whether it is open
+export function layoutSheet(placing) {
+  const question = { number: 0, asked: 0, again: false }; // asked: ms, 0: it is answered
   let [turns, revision] = [false, 0];
-  let [looked, looking] = ["", false]; // for which job and contour the fastest speed was asked for
-  /** @type {Map<string, {place: string, now: number | null, before: number | null}>} by contour */
-  const speeds = new Map();
-
-  const what = segments("Body to move", { part: "Part", robot: "Robot" }, (value) => {
-    placing.choose(/** @type {What} */ (value), turns);
-    draw();
-  });
-  const how = segments("How", { move: "Move", turn: "Turn" }, (value) => {
-    turns = value === "turn";
-    placing.choose(placing.what, turns);
-    draw();
-  });
-  const xyz = AXES.map((axis) => number(`Part ${axis}`, axis, "mm", 10, putPart));
-  const rpy = TURNS.map((turn) => number(`Part ${turn}`, turn, "deg", 1, putPart));
-  const base = AXES.map((axis) => number(`Robot base ${axis}, by`, axis, "mm", 10, putRobot));
-  const yaw = number("Robot base turned by", "yaw", "deg", 1, putRobot);
-  const mount = number("Head turned by", "head", "deg", 5, putRobot);
-  const all = [...xyz, ...rpy, ...base, yaw, mount];
-  const reach = el("div", { class: "reach", "aria-live": "polite" });
-  const speed = el("div", { "aria-live": "polite" });
-  const robot = el(
-    "details",
-    { class: "group-of-keys" },
-    el("summary", {}, "Robot and head, moved by"),
-    grid([...base, yaw, mount]),
-    el(
-      "p",
-      { class: "quiet small" },
-      "The job is written in the robot's base: if the base moves, all else moves the other way.",
-    ),
-  );
-  const search = candidates(store, connection, placing, moved);
-  const body = el(
-    "div",
-    { class: "cards" },
-    card(
-      "Position",
-      el("div", { class: "pair" }, what.element, how.element),
-      grid([...xyz, ...rpy]),
-      robot,
-    ),
-    card("Reach", reach),
-    card("Fastest speed", speed),
-    search.element,
-  );
-
-  opener.addEventListener("click", () => {
-    showSheet("layout", "Layout", [], [body], true);
-    revision = store.job?.revision ?? 0;
-    placing.show(true);
-    placing.choose(placing.what, turns);
-    draw();
-    ask();
-    xyz[0].input.focus();
-  });
-  byId("sheet").addEventListener("close", leave);
+  const search = candidates(placing, moved);
+  const speed = fastestHere(placing);
   placing.on((done) => {
     search.forget();
     if (done) commit();
@@ -94,30 +47,27 @@ export function layoutSheet(store, connection, view) {
   });
   store.on(["scene"], ask);
   store.on(["reach"], heard);
+  store.on(["connection"], () => (question.asked = 0));
   store.on(["error"], ({ about }) => {
     if (about === "place" || about === "take") placing.reset();
-    if (about === "reach") waiting = 0;
-    if (about === "fastest") found(null);
+    if (about === "reach") question.asked = 0;
   });
-  store.on(["fastest"], ({ contour, revision: of, speed_m_min: now }) => {
-    if (of === store.job?.revision && contour === store.selected) found(now);
-  });
-  store.on(["connection"], () => (waiting = 0));
-  store.on(["job", "scene", "connection", "selected", "progress", "outcome", "layout"], () => {
-    opener.disabled = store.connection !== "open" || !store.scene?.contours.length;
-    if (sheetShown() !== "layout") leave();
-    else draw();
-  });
-
-  function leave() {
-    if (!placing.open || (byId("sheet", HTMLDialogElement).open && sheetShown() === "layout"))
-      return;
-    placing.show(false);
-  }
+  return {
+    docked: true,
+    content: () => ({ title: "Layout", body }),
+    closed: () => placing.show(false),
+    opened() {
+      revision = store.job?.revision ?? 0;
+      placing.show(true);
+      placing.choose(placing.what, turns);
+      ask();
+      document.querySelector(/** @type {"input"} */ (".place input"))?.focus();
+    },
+  };
 
   /** Show the new placement, and ask for its reach. */
   function moved() {
-    draw();
+    redraw();
     ask();
   }
 
@@ -125,112 +75,223 @@ export function layoutSheet(store, connection, view) {
   function commit() {
     const offsets = placing.offsets();
     if (Object.keys(offsets).length)
-      placing.sent(connection.send({ type: "place", scene: store.scene?.revision, offsets }));
+      placing.sent(send({ type: "place", scene: store.scene?.revision, offsets }));
     moved();
   }
 
   /** Ask for the reach; if an answer is awaited, ask again after it. */
   function ask() {
     if (!placing.open || store.connection !== "open") return;
-    if (waiting && performance.now() - waiting < PATIENCE) return void (again = true);
-    again = false;
-    waiting = performance.now();
-    connection.send({ type: "reach", offsets: placing.offsets(), number: ++asked });
+    question.again = performance.now() - question.asked < PATIENCE && question.asked > 0;
+    if (question.again) return;
+    question.asked = performance.now();
+    send({ type: "reach", offsets: placing.offsets(), number: ++question.number });
   }
 
-  function heard() {
-    const { reach: answer } = store;
-    if (!answer || answer.number !== asked) return;
-    waiting = 0;
+  /** @param {ReachMessage} answer */
+  function heard(answer) {
+    if (answer.number !== question.number) return;
+    question.asked = 0;
     if (!placing.open) return;
     if (answer.revision === store.scene?.revision) placing.take(answer);
-    draw();
-    if (again) ask();
+    if (question.again) ask();
   }
 
-  function putPart() {
-    search.forget();
-    placing.put(
-      xyz.map(({ input }) => Number(input.value)),
-      rpy.map(({ input }) => Number(input.value)),
-    );
-    moved();
+  /** @param {string} what @param {boolean} turn */
+  function choose(what, turn) {
+    turns = turn;
+    placing.choose(/** @type {What} */ (what), turns);
+    redraw();
   }
 
-  function putRobot() {
-    search.forget();
-    placing.moveRobot(
-      base.map(({ input }) => Number(input.value)),
-      Number(yaw.input.value),
-      Number(mount.input.value),
-    );
-    moved();
+  function body() {
+    return html`
+      <div class="cards">
+        <section class="card">
+          <h3>Position</h3>
+          <div class="pair">
+            ${segments("Body to move", WHAT, placing.what, (what) => choose(what, turns))}
+            ${segments("How", HOW, turns ? "turn" : "move", (how) => choose(placing.what, how === "turn"))}
+          </div>
+          ${fields()}
+        </section>
+        <section class="card">
+          <h3>Reach</h3>
+          <div class="reach" aria-live="polite">${reach(placing.reach)}</div>
+        </section>
+        <section class="card">
+          <h3>Fastest speed</h3>
+          <div aria-live="polite">${speed()}</div>
+        </section>
+        ${search.card()}
+      </div>`;
   }
 
-  function draw() {
-    if (!placing.open) return;
-    const live = store.connection === "open" && Boolean(store.job?.values);
-    for (const { input } of all) input.disabled = !live;
-    what.show(placing.what);
-    how.show(turns ? "turn" : "move");
+  /** The numbers of the placement. */
+  function fields() {
+    const { xyz, rpy } = placing.place ?? { xyz: [0, 0, 0], rpy: [0, 0, 0] };
     const offsets = placing.offsets();
-    const { place } = placing;
-    xyz.forEach((each, i) => each.show(place?.xyz[i] ?? 0, 2));
-    rpy.forEach((each, i) => each.show(place?.rpy[i] ?? 0, 3));
-    AXES.forEach((axis, i) => base[i].show(offsets[`base_${axis}_mm`] ?? 0, 2));
-    yaw.show(offsets.base_yaw_deg ?? 0, 3);
-    mount.show(offsets.mount_deg ?? 0, 3);
-    drawReach();
-    drawSpeed();
-    search.draw();
+    const base = ["x", "y", "z"].map((axis) => offsets[`base_${axis}_mm`] ?? 0);
+    const [yaw, mount] = [offsets.base_yaw_deg ?? 0, offsets.mount_deg ?? 0];
+    /** @type {(label: string, short: string, unit: string, step: number, value: number, put: (value: number) => void) => unknown} */
+    const field = (label, short, unit, step, value, put) => {
+      const set = (/** @type {number} */ to) => {
+        search.forget();
+        put(to);
+        moved();
+      };
+      const is = { label: `${label}, ${unit}`, short, unit, step, value, put: set, commit };
+      return html`<${Place} key=${label} ...${is} moved=${placing.moved} />`;
+    };
+    return html`
+      <div class="place">
+        ${["x", "y", "z"].map((axis, i) =>
+          field(`Part ${axis}`, axis, "mm", 10, xyz[i], (to) => placing.put(xyz.with(i, to), rpy)),
+        )}
+        ${["roll", "pitch", "yaw"].map((turn, i) =>
+          field(`Part ${turn}`, turn, "deg", 1, rpy[i], (to) => placing.put(xyz, rpy.with(i, to))),
+        )}
+      </div>
+      <details class="group-of-keys">
+        <summary>Robot and head, moved by</summary>
+        <div class="place">
+          ${["x", "y", "z"].map((axis, i) =>
+            field(`Robot base ${axis}, by`, axis, "mm", 10, base[i], (to) =>
+              placing.moveRobot(base.with(i, to), yaw, mount),
+            ),
+          )}
+          ${field("Robot base turned by", "yaw", "deg", 1, yaw, (to) =>
+            placing.moveRobot(base, to, mount),
+          )}
+          ${field("Head turned by", "head", "deg", 5, mount, (to) =>
+            placing.moveRobot(base, yaw, to),
+          )}
+        </div>
+        <p class="quiet small">
+          The job is written in the robot's base: if the base moves, all else moves the other way.
+        </p>
+      </details>`;
   }
+}
 
-  function drawReach() {
-    const contours = placing.reach?.contours ?? [];
-    const lost = contours.filter(({ out }) => out.length);
-    const count = lost.reduce((sum, { out }) => sum + out.length, 0);
-    const nodes = contours.reduce((sum, each) => sum + each.nodes, 0);
-    const words = !placing.reach
-      ? "Testing what the robot reaches."
-      : count
-        ? `Out of reach: ${count} of ${counted(nodes, "node")}, on ${lost.length} of ${counted(contours.length, "contour")}.`
-        : `All ${counted(nodes, "node")} of ${counted(contours.length, "contour")} are within reach.`;
-    const stroke = (/** @type {string} */ kind) => el("i", { class: `stroke ${kind}` });
-    const said = el("p", { class: count ? "fault" : "" }, stroke(count ? "lost" : "here"), words);
-    if (reach.textContent === words + lost.map(where).join("") && reach.childElementCount) return;
-    reach.replaceChildren(
-      said,
-      ...(lost.length
-        ? [el("ul", { class: "quiet small" }, ...lost.map((each) => el("li", {}, where(each))))]
-        : []),
-    );
-  }
+/**
+ * A number of the placement, which is sent once it is complete.
+ * @param {{label: string, short: string, unit: string, step: number, value: number, moved: boolean,
+ *   put: (value: number) => void, commit: () => void}} props
+ */
+function Place({ label, short, unit, step, value, moved, put, commit }) {
+  const input = useRef(/** @type {HTMLInputElement | null} */ (null));
+  const places = unit === "mm" ? 2 : 3;
+  useLayoutEffect(() => {
+    const { current } = input;
+    if (!current) return;
+    const typing = document.activeElement === current && current.value !== "";
+    const other = Math.abs(Number(current.value) - value) > 10 ** -places && !moved;
+    if (!typing || other) current.value = String(Number(value.toFixed(places)) + 0);
+  });
+  const given = () => (input.current?.value ?? "") !== "";
+  return html`
+    <label>
+      <span>${short}</span>
+      <input ref=${input} ...${NUMBER} step=${step} disabled=${!store.live} aria-label=${label}
+        onInput=${() => given() && put(Number(input.current?.value))}
+        onChange=${() => (given() ? commit() : redraw())} onKeyDown=${blurOnEnter} />
+      <span class="unit">${unit}</span>
+    </label>`;
+}
 
-  /** @param {{name: string, nodes: number, out: number[]}} contour */
-  function where({ name, nodes, out }) {
-    return `${name}: ${out.length === nodes ? "all of it" : `${out.length} of ${counted(nodes, "node")}`}`;
-  }
+/** @param {ReachMessage | null} answer */
+function reach(answer) {
+  const contours = answer?.contours ?? [];
+  const lost = contours.filter(({ out }) => out.length);
+  const count = lost.reduce((sum, { out }) => sum + out.length, 0);
+  const nodes = counted(
+    contours.reduce((sum, each) => sum + each.nodes, 0),
+    "node",
+  );
+  const all = counted(contours.length, "contour");
+  const words = !answer
+    ? "Testing what the robot reaches."
+    : count
+      ? `Out of reach: ${count} of ${nodes}, on ${lost.length} of ${all}.`
+      : `All ${nodes} of ${all} are within reach.`;
+  const rows = lost.map(({ name, nodes: of, out }) => {
+    const part = out.length === of ? "all of it" : `${out.length} of ${counted(of, "node")}`;
+    return html`<li>${name}: ${part}</li>`;
+  });
+  return html`
+    <p class=${count ? "fault" : ""}><i class=${`stroke ${count ? "lost" : "here"}`} />${words}</p>
+    ${count > 0 && html`<ul class="quiet small">${rows}</ul>`}`;
+}
 
-  /** Show the fastest speed of the chosen contour; search for it once the server is idle. */
-  function drawSpeed() {
+/**
+ * Return what draws the fastest speed of the chosen contour; it is searched for once the server is
+ * idle.
+ * @param {import("../scene/placing.js").Placing} placing
+ */
+function fastestHere(placing) {
+  let [looked, looking] = ["", false]; // for which job and contour it was asked for
+  /** @type {Map<string, {place: string, now: number | null, before: number | null}>} by contour */
+  const speeds = new Map();
+  store.on(["anything"], consider);
+  store.on(["error"], ({ about }) => about === "fastest" && found(null));
+  store.on(["fastest"], ({ contour, revision, speed_m_min: now }) => {
+    if (revision === store.job?.revision && contour === store.selected) found(now);
+  });
+  return content;
+
+  /** What is known of the chosen contour where the part is. */
+  function known() {
     const { selected, job, outcome, progress } = store;
-    if (!selected || !job) return;
-    const key = `${job.revision} ${selected}`;
-    const known = speeds.get(selected);
-    const here = known?.place === placeNow();
+    const speed = speeds.get(selected ?? "");
     const out = placing.reach?.contours.find(({ name }) => name === selected)?.out.length ?? 0;
-    const settled = !progress.busy && outcome?.revision === job.revision && !job.faults.length;
+    const settled = !progress.busy && outcome?.revision === job?.revision && !job?.faults.length;
     const idle = settled && !placing.moved && store.layout?.state !== "running";
-    if (looking && !progress.busy && looked !== key) looking = false;
-    if (idle && placing.reach && !out && looked !== key && !here) find(key);
-    const row = (/** @type {string} */ name, /** @type {number | null | undefined} */ value) =>
-      el("dd", {}, value === undefined || value === null ? name : `${fixed(value, 2)} m/min`);
-    const was = here && !placing.moved ? known?.before : known?.now;
-    const gain =
-      here && !placing.moved && known?.now && was
-        ? el("span", { class: "quiet" }, ` ${change(known.now, was)}`)
-        : "";
-    const state = placing.moved
+    return {
+      speed,
+      key: `${job?.revision} ${selected}`,
+      here: speed?.place === placeNow(),
+      out,
+      idle,
+    };
+  }
+
+  function consider() {
+    if (!placing.open || !store.selected || !store.job) return;
+    const { key, here, out, idle } = known();
+    if (looking && !store.progress.busy && looked !== key) looking = false;
+    if (idle && placing.reach && !out && looked !== key && !here) find();
+  }
+
+  function find() {
+    looked = known().key;
+    looking = send({ type: "fastest", contour: store.selected });
+    redraw();
+  }
+
+  function stop() {
+    looking = false;
+    send({ type: "cancel" });
+    redraw();
+  }
+
+  /** @param {number | null} now  m/min */
+  function found(now) {
+    const { selected } = store;
+    if (!selected || (!looking && now === null)) return;
+    looking = false;
+    const [last, place] = [speeds.get(selected), placeNow()];
+    const before = last?.place === place ? last.before : (last?.now ?? null);
+    speeds.set(selected, { place, now, before });
+  }
+
+  function content() {
+    if (!store.selected) return null;
+    const { speed, key, here, out, idle } = known();
+    const still = here && !placing.moved;
+    const now = (still && !out && speed?.now) || null;
+    const was = still ? speed?.before : speed?.now;
+    const why = placing.moved
       ? "once the move is in the job"
       : out
         ? "none: nodes are out of reach"
@@ -241,125 +302,20 @@ export function layoutSheet(store, connection, view) {
             : idle
               ? "not searched for"
               : "once all contours are planned";
-    const now = row(state, here && !out && !placing.moved ? known?.now : null);
-    now.append(gain);
-    const offer = looking ? "stop" : idle && !here && !out && looked === key ? "look" : "";
-    const drawn = [selected, now.textContent, was, offer].join();
-    if (speed.dataset.drawn === drawn) return;
-    speed.dataset.drawn = drawn;
-    speed.replaceChildren(
-      el("p", { class: "quiet small" }, `Constant speed along ${selected}.`),
-      el(
-        "dl",
-        { class: "facts" },
-        el("dt", {}, "here"),
-        now,
-        el("dt", {}, "before"),
-        row("–", was),
-      ),
-      ...(offer === "stop"
-        ? [el("button", { class: "text", onclick: () => stop() }, "Stop the search")]
-        : offer
-          ? [el("button", { class: "text", onclick: () => find(key) }, "Find the fastest")]
-          : []),
-    );
+    const gain = still && speed?.now && was ? ` ${change(speed.now, was)}` : "";
+    const offer = idle && !here && !out && looked === key;
+    return html`
+      <p class="quiet small">Constant speed along ${store.selected}.</p>
+      <dl class="facts">
+        <dt>here</dt>
+        <dd>${now ? `${fixed(now, 2)} m/min` : why}${gain && html`<span class="quiet">${gain}</span>`}</dd>
+        <dt>before</dt>
+        <dd>${was ? `${fixed(was, 2)} m/min` : "–"}</dd>
+      </dl>
+      ${
+        looking
+          ? html`<button class="text" onClick=${stop}>Stop the search</button>`
+          : offer && html`<button class="text" onClick=${find}>Find the fastest</button>`
+      }`;
   }
-
-  /** @param {string} key */
-  function find(key) {
-    looked = key;
-    looking = connection.send({ type: "fastest", contour: store.selected });
-  }
-
-  function stop() {
-    looking = false;
-    connection.send({ type: "cancel" });
-    draw();
-  }
-
-  /** @param {number | null} now  m/min */
-  function found(now) {
-    const { selected } = store;
-    if (!selected || (!looking && now === null)) return;
-    looking = false;
-    const [known, place] = [speeds.get(selected), placeNow()];
-    const before = known?.place === place ? known.before : (known?.now ?? null);
-    speeds.set(selected, { place, now, before });
-    draw();
-  }
-
-  /** A key for the place of part and tip. */
-  function placeNow() {
-    return JSON.stringify([store.scene?.T_part, store.scene?.robot.T_tool]);
-  }
-
-  /**
-   * @param {string} label
-   * @param {string} short
-   * @param {string} unit
-   * @param {number} step
-   * @param {() => void} put
-   */
-  function number(label, short, unit, step, put) {
-    /** @type {HTMLInputElement} */
-    const input = el("input", {
-      ...{ class: "number", type: "number", step, inputmode: "decimal" },
-      "aria-label": `${label}, ${unit}`,
-      oninput: () => input.value !== "" && put(),
-      onchange: () => (input.value === "" ? draw() : commit()),
-      onkeydown: (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && input.blur(),
-    });
-    const element = el(
-      "label",
-      {},
-      el("span", {}, short),
-      input,
-      el("span", { class: "unit" }, unit),
-    );
-    return {
-      element,
-      input,
-      /**
-       * @param {number} value
-       * @param {number} places
-       */
-      show(value, places) {
-        if (document.activeElement !== input || input.value === "")
-          input.value = String(Number(value.toFixed(places)) + 0);
-        else if (Math.abs(Number(input.value) - value) > 10 ** -places && !placing.moved)
-          input.value = String(Number(value.toFixed(places)) + 0);
-      },
-    };
-  }
-}
-
-/** @param {{element: HTMLElement}[]} fields */
-const grid = (fields) => el("div", { class: "place" }, ...fields.map(({ element }) => element));
-
-/**
- * @param {string} title
- * @param {...HTMLElement} body
- */
-const card = (title, ...body) => el("section", { class: "card" }, el("h3", {}, title), ...body);
-
-/**
- * Return a group of buttons, one of which is pressed.
- * @param {string} label
- * @param {Record<string, string>} words
- * @param {(value: string) => void} take
- */
-function segments(label, words, take) {
-  const buttons = Object.entries(words).map(([value, text]) => ({
-    value,
-    button: el("button", { onclick: () => take(value) }, text),
-  }));
-  const all = buttons.map(({ button }) => button);
-  return {
-    element: el("div", { class: "segments", role: "group", "aria-label": label }, ...all),
-    /** @param {string} now */
-    show(now) {
-      for (const { value, button } of buttons)
-        button.setAttribute("aria-pressed", String(value === now));
-    },
-  };
 }

@@ -1,140 +1,121 @@
 /** The loops of the part in a sheet, with buttons to add them to the job or remove them. */
 
-import { byId, el } from "../dom.js";
+import { send, store } from "../app.js";
+import { byId } from "../dom.js";
 import { counted } from "../format.js";
 import { barred, contoursByLoop, cutLoops, described, leaving } from "../part.js";
-import { sheetShown, showSheet } from "./sheet.js";
+import { html, redraw } from "../ui.js";
 
-/** @typedef {import("../store.js").Store} Store */
 /** @typedef {import("../messages.js").Loop} Loop */
 
-/**
- * @param {Store} store
- * @param {{send: (message: any) => boolean}} connection
- */
-export function loopsSheet(store, connection) {
-  const opener = byId("open-loops", HTMLButtonElement);
-  const rows = el("div", { class: "rows" });
-  const words = el("input", { type: "search", placeholder: "Find by name", "aria-label": "Find" });
-  const [onlyUncut, inside] = ["Only uncut loops", "Also inner side of the sheet"].map((label) => {
-    const box = el("input", { type: "checkbox", onchange: draw });
-    return { box, label: el("label", {}, box, label) };
-  });
-  words.addEventListener("input", draw);
-  opener.addEventListener("click", () => {
-    draw();
-    const filter = el("div", { class: "filter" }, words, onlyUncut.label, inside.label);
-    showSheet("loops", "Loops of the part", [], [filter, rows, footer()], true);
-    words.focus();
-  });
-  byId("sheet").addEventListener("close", () => store.emit("pointed", []));
-  store.on(["part", "scene", "job", "connection"], () => {
-    opener.disabled = store.connection !== "open" || !store.part;
-    if (sheetShown() === "loops") draw();
-  });
+const filter = { words: "", uncut: false, inner: false };
 
-  function footer() {
-    const hidden = store.part?.left_out ?? 0;
-    const more = hidden
-      ? ` ${counted(hidden, "loop")} of single faces of skins and around the thickness of sheets are not listed: write their names in the job file.`
-      : "";
-    const text = `An added loop is cut like the most similar contour of the job.${more}`;
-    return el("footer", {}, el("span", { class: "quiet" }, text));
-  }
+/** @type {import("./sheet.js").Sheet} */
+export const loopsSheet = {
+  docked: true,
+  opened: () => byId("sheet").querySelector("input")?.focus(),
+  content: () => ({ title: "Loops of the part", body }),
+  closed: () => store.emit("pointed", []),
+};
 
-  function draw() {
-    const known = contoursByLoop(store);
-    const all = store.part?.loops ?? [];
-    inside.label.hidden = all.every(({ side }) => side !== "inner");
-    const wanted = words.value.trim().toLowerCase();
-    const shown = all.filter(
-      (loop) =>
-        (known.has(loop.name) || loop.side !== "inner" || inside.box.checked) &&
-        !(onlyUncut.box.checked && known.has(loop.name)) &&
-        `${loop.name} ${known.get(loop.name)?.name ?? ""}`.toLowerCase().includes(wanted),
-    );
-    /** @type {Map<string, Loop[]>} */
-    const faces = new Map();
-    for (const loop of shown) faces.set(loop.face, [...(faces.get(loop.face) ?? []), loop]);
-    const focused = /** @type {HTMLElement | null} */ (document.activeElement)?.dataset?.loop;
-    rows.replaceChildren(
-      ...[...faces].flatMap(([face, loops]) => [heading(face, loops, known), ...loops.map(row)]),
-    );
-    if (!shown.length) {
-      const why = all.length ? "No loop matches." : "The drawing has no loops.";
-      rows.replaceChildren(el("p", { class: "empty" }, why));
-    }
-    if (focused !== undefined)
-      [...rows.querySelectorAll("button")].find(({ dataset }) => dataset.loop === focused)?.focus();
-  }
+function body() {
+  const known = contoursByLoop();
+  const all = store.part?.loops ?? [];
+  const wanted = filter.words.trim().toLowerCase();
+  const shown = all.filter(
+    ({ name, side }) =>
+      (known.has(name) || side !== "inner" || filter.inner) &&
+      !(filter.uncut && known.has(name)) &&
+      `${name} ${known.get(name)?.name ?? ""}`.toLowerCase().includes(wanted),
+  );
+  const find = (/** @type {any} */ { target }) => {
+    filter.words = target.value;
+    redraw();
+  };
+  /** @type {(key: "uncut" | "inner", words: string, hidden?: boolean) => unknown} */
+  const box = (key, words, hidden = false) => {
+    const toggle = () => {
+      filter[key] = !filter[key];
+      redraw();
+    };
+    return html`
+      <label hidden=${hidden}>
+        <input type="checkbox" checked=${filter[key]} onChange=${toggle} />${words}
+      </label>`;
+  };
+  const hidden = store.part?.left_out ?? 0;
+  const more = hidden
+    ? ` ${counted(hidden, "loop")} of single faces of skins and around the thickness of sheets are not listed: write their names in the job file.`
+    : "";
+  const none = all.length ? "No loop matches." : "The drawing has no loops.";
+  return html`
+    <div class="filter">
+      <input type="search" placeholder="Find by name" aria-label="Find"
+        value=${filter.words} onInput=${find} />
+      ${box("uncut", "Only uncut loops")}
+      ${box(
+        "inner",
+        "Also inner side of the sheet",
+        all.every(({ side }) => side !== "inner"),
+      )}
+    </div>
+    <div class="rows">
+      ${[...Map.groupBy(shown, ({ face }) => face)].map(([face, loops]) => [
+        heading(face, loops, known),
+        ...loops.map((loop) => row(loop, known)),
+      ])}
+      ${!shown.length && html`<p class="empty">${none}</p>`}
+    </div>
+    <footer>
+      <span class="quiet">An added loop is cut like the most similar contour of the job.${more}</span>
+    </footer>`;
+}
 
-  /**
-   * @param {string} face
-   * @param {Loop[]} loops
-   * @param {ReturnType<typeof contoursByLoop>} known
-   */
-  function heading(face, loops, known) {
-    const left = loops.filter((loop) => !known.has(loop.name) && !barred(loop));
-    const names = left.map(({ name }) => name);
-    const all = el(
-      "button",
-      { class: "text", onclick: () => cutLoops(store, connection, names) },
-      `Cut all ${left.length}`,
-    );
-    return el(
-      "h3",
-      {},
-      el("span", {}, face),
-      el("span", { class: "quiet" }, counted(loops.length, "loop")),
-      el("span", { class: "grow" }),
-      left.length > 1 ? all : null,
-    );
-  }
+/** @typedef {ReturnType<typeof contoursByLoop>} Known */
 
-  /** @param {Loop} loop */
-  function row(loop) {
-    const contour = contoursByLoop(store).get(loop.name);
-    const light = () => store.emit("pointed", [loop]);
-    const why = barred(loop);
-    const name =
-      contour && contour.name !== loop.name ? `${contour.name} (${loop.name})` : loop.name;
-    return el(
-      "div",
-      {
-        class: `row ${contour ? "cut" : ""}`,
-        onpointerenter: light,
-        onpointerleave: () => store.emit("pointed", []),
-        onfocusin: light,
-      },
-      el(
-        "span",
-        {},
-        el("strong", {}, name),
-        el("small", {}, why ? `${described(loop)}; ${why}` : described(loop)),
-      ),
-      contour ? out(loop, contour.index) : cut(loop, why),
-    );
-  }
+/** @type {(face: string, loops: Loop[], known: Known) => unknown} */
+function heading(face, loops, known) {
+  const left = loops.filter((loop) => !known.has(loop.name) && !barred(loop));
+  const all = () => cutLoops(left.map(({ name }) => name));
+  return html`
+    <h3 key=${`face ${face}`}>
+      <span>${face}</span>
+      <span class="quiet">${counted(loops.length, "loop")}</span>
+      <span class="grow" />
+      ${left.length > 1 && html`<button class="text" onClick=${all}>Cut all ${left.length}</button>`}
+    </h3>`;
+}
 
-  /**
-   * @param {Loop} loop
-   * @param {string} why
-   */
-  function cut({ name }, why) {
-    const add = () => cutLoops(store, connection, [name]);
-    const said = { "aria-label": `Cut ${name}`, "data-loop": name };
-    return el("button", { class: "plain", disabled: why !== "", onclick: add, ...said }, "Cut");
-  }
+/** @type {(loop: Loop, known: Known) => unknown} */
+function row(loop, known) {
+  const { name } = loop;
+  const contour = known.get(name);
+  const light = () => store.emit("pointed", [loop]);
+  const why = barred(loop);
+  const about = why ? `${described(loop)}; ${why}` : described(loop);
+  const button = contour ? takeOut(name, contour.index) : cut(name, why);
+  return html`
+    <div key=${name} class=${`row ${contour ? "cut" : ""}`} onPointerEnter=${light}
+      onPointerLeave=${() => store.emit("pointed", [])} onFocusIn=${light}>
+      <span>
+        <strong>${contour && contour.name !== name ? `${contour.name} (${name})` : name}</strong>
+        <small>${about}</small>
+      </span>
+      ${button}
+    </div>`;
+}
 
-  /**
-   * @param {Loop} loop
-   * @param {number} index
-   */
-  function out({ name }, index) {
-    const { words: text, why } = leaving(store, index);
-    const leave = () => connection.send({ type: "leave", index });
-    const said = { "aria-label": `${text}: ${name}`, "data-loop": name, title: why || null };
-    const button = { class: "plain", disabled: why !== "", onclick: leave, ...said };
-    return el("button", button, text);
-  }
+/** @type {(name: string, why: string) => unknown} */
+const cut = (name, why) => html`
+  <button class="plain" disabled=${why !== ""} aria-label=${`Cut ${name}`}
+    onClick=${() => cutLoops([name])}>Cut</button>`;
+
+/** @type {(name: string, index: number) => unknown} */
+function takeOut(name, index) {
+  const { words, why } = leaving(index);
+  return html`
+    <button class="plain" disabled=${why !== ""} title=${why || null}
+      aria-label=${`${words}: ${name}`} onClick=${() => send({ type: "leave", index })}>
+      ${words}
+    </button>`;
 }

@@ -1,7 +1,8 @@
 /** No feasible path: where it breaks, why, what is proved, and buttons for changes that help. */
 
-import { el, icon } from "../dom.js";
+import { send } from "../app.js";
 import { millimetres } from "../format.js";
+import { dot, html, icon } from "../ui.js";
 
 /** @typedef {import("../messages.js").NoPathMessage} NoPathMessage */
 
@@ -10,90 +11,61 @@ const SCOPES = {
   grid: "Proved on this grid of gamma; between its samples a motion may exist.",
   undecided: "Not proved: no motion was found, but one may exist.",
 };
+const NOTHING =
+  "No single change was found that makes a path. Move the part, or allow more postures.";
 
 /**
- * Return the elements for a contour without a path.
+ * Why a contour has no path, and what would help.
  * @param {NoPathMessage} answer
- * @param {{send: (message: any) => boolean}} connection
- * @param {{look: (view: string) => void}} view
- * @returns {Node[]}
+ * @param {() => void} show  shows the place where it breaks
  */
-export function noPath(answer, connection, view) {
-  const total = answer.reasons.reduce((sum, { count }) => sum + count, 0) || 1;
+export function noPath(answer, show) {
+  const { node, s, reasons } = answer;
+  const total = reasons.reduce((sum, { count }) => sum + count, 0) || 1;
+  const at = s === null ? "" : `at ${millimetres(s)} of the path, `;
   const place =
-    answer.node < 0
-      ? "Its first node has no admitted pose."
-      : `It breaks ${answer.s === null ? "" : `at ${millimetres(answer.s)} of the path, `}after node ${answer.node + 1}.`;
-  return [
-    el(
-      "div",
-      { class: "alert" },
-      icon("warning"),
-      el(
-        "div",
-        {},
-        el("strong", {}, "No feasible path"),
-        el("p", {}, place),
-        el("p", { class: "quiet" }, SCOPES[answer.scope]),
-      ),
-    ),
-    ...(answer.point
-      ? [
-          el(
-            "p",
-            {},
-            el(
-              "button",
-              { class: "plain", onclick: () => view.look("mark") },
-              icon("follow"),
-              "Show the place",
-            ),
-          ),
-        ]
-      : []),
-    el("h3", { class: "sub" }, "Reasons of loss there"),
-    el(
-      "ul",
-      { class: "reasons" },
-      ...answer.reasons.slice(0, 6).map(({ name, count }) => {
-        const row = el("li", {}, el("span", {}, name), el("b", {}, String(count)), el("i"));
-        /** @type {HTMLElement} */ (row.lastChild).style.width = `${(100 * count) / total}%`;
-        return row;
-      }),
-    ),
-    el("h3", { class: "sub" }, "What would help"),
-    ...(answer.relaxations === null
-      ? [
-          el(
-            "p",
-            { class: "waiting" },
-            el("i", { class: "dot busy" }),
-            "Searching for the smallest change that makes a path.",
-          ),
-        ]
-      : answer.relaxations.length
-        ? answer.relaxations.map(({ label }, index) =>
-            el(
-              "button",
-              {
-                class: "plain remedy",
-                onclick: () => connection.send({ type: "relax", contour: answer.contour, index }),
-              },
-              icon("check"),
-              el("span", {}, label),
-            ),
-          )
-        : [
-            el(
-              "p",
-              { class: "quiet" },
-              answer.remedy ||
-                "No single change was found that makes a path. Move the part, or allow more postures.",
-            ),
-          ]),
-    ...(answer.relaxations?.length && answer.remedy
-      ? [el("p", { class: "quiet" }, answer.remedy)]
-      : []),
-    el("details", {}, el("summary", {}, "Details"), el("p", { class: "quiet" }, answer.statement)),
-  ];
+    node < 0 ? "Its first node has no admitted pose." : `It breaks ${at}after node ${node + 1}.`;
+  return html`
+    <div class="alert">
+      ${icon("warning")}
+      <div>
+        <strong>No feasible path</strong>
+        <p>${place}</p>
+        <p class="quiet">${SCOPES[answer.scope]}</p>
+      </div>
+    </div>
+    ${
+      answer.point &&
+      html`<p><button class="plain" onClick=${show}>${icon("follow")}Show the place</button></p>`
+    }
+    <h3 class="sub">Reasons of loss there</h3>
+    <ul class="reasons">
+      ${reasons.slice(0, 6).map(
+        ({ name, count }) => html`
+          <li>
+            <span>${name}</span><b>${count}</b><i style=${{ width: `${(100 * count) / total}%` }} />
+          </li>`,
+      )}
+    </ul>
+    <h3 class="sub">What would help</h3>
+    ${remedies(answer)}
+    <details><summary>Details</summary><p class="quiet">${answer.statement}</p></details>`;
+}
+
+/** @param {NoPathMessage} answer */
+function remedies({ contour, relaxations, remedy }) {
+  if (!relaxations)
+    return html`
+      <p class="waiting">
+        ${dot("busy")}Searching for the smallest change that makes a path.
+      </p>`;
+  const words = relaxations.length ? remedy : remedy || NOTHING;
+  return html`
+    ${relaxations.map(
+      ({ label }, index) => html`
+        <button class="plain remedy" onClick=${() => send({ type: "relax", contour, index })}>
+          ${icon("check")}<span>${label}</span>
+        </button>`,
+    )}
+    ${words && html`<p class="quiet">${words}</p>`}`;
 }

@@ -1,213 +1,226 @@
 /** The text of the program beside the scene; its lines are linked to places of the motion. */
 
-import { byId, el } from "../dom.js";
-import { interval } from "../kinematics.js";
-import { Listing } from "./listing.js";
-import { sheetShown, showSheet } from "./sheet.js";
+import { useEffect, useRef } from "preact/hooks";
 
-/** @typedef {import("../store.js").Store} Store */
-/** @typedef {import("../player.js").Player} Player */
+import { player, send, store } from "../app.js";
+import { interval } from "../kinematics.js";
+import { html, options, redraw, segments } from "../ui.js";
+import { sheetShown } from "./sheet.js";
+
 /** @typedef {import("../messages.js").ProgramTextMessage} Answer */
-/** @typedef {import("../messages.js").Finding} Finding */
+
+const SOON = "It is written once every contour has a plan that passes its audit.";
+const LINKED =
+  "Click a line, or use the arrow keys, to move the robot there; the current line is marked.";
+const UNLINKED =
+  "Programs in this language are not read back, so their lines are not linked to the scene.";
+
+const state = {
+  language: "",
+  asked: 0, // the revision
+  waiting: false,
+  why: "", // there is no program
+  file: 0, // the shown one
+  line: 0, // the marked one, from 1; 0: none
+};
+
+const shown = () => sheetShown() === "program";
+
+/** Follow the answers of the server, the results of the job and the player. */
+export function followProgram() {
+  store.on(["program_text"], ({ language, files }) => {
+    Object.assign(state, { language, waiting: false, why: "" });
+    state.file = Math.min(state.file, Math.max(0, files.length - 1));
+    follow();
+  });
+  store.on(["error"], ({ about, message }) => {
+    if (about === "program") Object.assign(state, { waiting: false, why: message });
+  });
+  store.on(["outcome"], ({ revision }) => {
+    if (!shown() || revision === state.asked) return;
+    state.asked = revision;
+    request(); // what is shown follows the job
+  });
+  player.on(follow);
+}
+
+/** @type {import("./sheet.js").Sheet} */
+export const programSheet = {
+  docked: true,
+  opened: () => ask(state.language || (store.job?.values?.program?.language ?? "")),
+  content: () => {
+    const files = (!state.waiting && !state.why && store.program_text?.files) || [];
+    const tabs = files.map(({ name }, i) => ({ value: String(i), label: name }));
+    const pick = (/** @type {string} */ i) => show(Number(i));
+    return {
+      title: files.length === 1 ? files[0].name : "Program",
+      tools: html`
+        ${tabs.length > 1 && segments("File", tabs, String(state.file), pick)}${languages()}`,
+      body,
+    };
+  },
+};
+
+function request() {
+  send({ type: "program", ...(state.language ? { language: state.language } : {}) });
+}
+
+/** @param {string} language */
+function ask(language) {
+  Object.assign(state, { language, asked: store.outcome?.revision ?? 0, waiting: true, why: "" });
+  request();
+  redraw();
+}
+
+function languages() {
+  const words = store.job?.choices["program.language"] ?? [];
+  if (!words.length) return null;
+  const choices = words.map((word) => ({ value: word, label: word }));
+  return html`
+    <select aria-label="Language" value=${state.language}
+      onChange=${(/** @type {any} */ { target }) => ask(target.value)}>${options(choices)}</select>`;
+}
+
+function body() {
+  const answer = store.program_text;
+  if (state.waiting)
+    return html`<div class="state still"><div class="spinner" /><p>Writing the program</p></div>`;
+  if (state.why || !answer) return none(state.why);
+  const linked = answer.files.some(({ lines }) => lines.length) && player.timeline.whole;
+  const file = answer.files[state.file];
+  return html`
+    ${notes(answer)}
+    ${!file && none(SOON)}
+    ${file && html`<${Listing} text=${file.text} />`}
+    ${file && html`<footer><span class="quiet">${linked ? LINKED : UNLINKED}</span></footer>`}`;
+}
+
+/** @param {string} why */
+const none = (why) => html`<div class="state still"><strong>No program</strong><p>${why}</p></div>`;
+
+/** @param {Answer} answer */
+function notes({ faults, findings, notes: more }) {
+  const items = [
+    ...faults.map((each) => html`<li class="fault">${each}</li>`),
+    ...findings.map(finding),
+    ...more.map((each) => html`<li>${each}</li>`),
+  ];
+  return items.length > 0 && html`<ul class="notes">${items}</ul>`;
+}
+
+/** @param {Answer["findings"][number]} finding */
+function finding({ level, message, place, file, line }) {
+  const bad = level === "error" ? "fault" : null;
+  if (file === null || line === null) return html`<li class=${bad}>${place}: ${message}</li>`;
+  const jump = () => {
+    const i = store.program_text?.files.findIndex(({ name }) => name === file) ?? -1;
+    if (i < 0) return;
+    show(i);
+    go(line);
+    mark(line);
+  };
+  return html`
+    <li class=${bad}>
+      <button class="link" onClick=${jump}>${file}, line ${line}</button> (${place}): ${message}
+    </li>`;
+}
 
 /**
- * @param {Store} store
- * @param {Player} player
- * @param {{send: (message: any) => boolean}} connection
+ * The text of a file with numbered lines; a click or the arrow keys choose another one.
+ * @param {{text: string}} props
  */
-export function programSheet(store, player, connection) {
-  let language = "";
-  let shown = 0; // the file
-  let asked = 0; // the revision
-  const listing = new Listing(go);
-  const tabs = el("div", { class: "segments", role: "group", "aria-label": "File" });
-  listing.element.addEventListener("keydown", (event) => {
+function Listing({ text }) {
+  const listing = useRef(/** @type {HTMLElement | null} */ (null));
+  const code = useRef(/** @type {HTMLElement | null} */ (null));
+  const here = useRef(/** @type {HTMLElement | null} */ (null));
+  const lines = text.replace(/\n$/, "").split("\n");
+  const height = () => (code.current?.getBoundingClientRect().height ?? 0) / lines.length;
+  const { line } = state;
+  useEffect(() => listing.current?.scrollTo(0, 0), [text]);
+  useEffect(() => {
+    const [bar, pane] = [here.current, listing.current];
+    if (!line || !bar || !pane) return;
+    const top = (line - 1) * height();
+    bar.style.height = `${height()}px`;
+    bar.style.transform = `translateY(${top}px)`;
+    if (top < pane.scrollTop || top + height() > pane.scrollTop + pane.clientHeight)
+      pane.scrollTop = top - pane.clientHeight / 2;
+  }, [text, line]);
+  /** @param {PointerEvent} event */
+  const click = ({ clientY }) => {
+    if (getSelection()?.type === "Range" || !code.current) return; // a text is being copied
+    const at = Math.floor((clientY - code.current.getBoundingClientRect().top) / height()) + 1;
+    if (at >= 1 && at <= lines.length) go(at);
+  };
+  /** @param {KeyboardEvent} event */
+  const key = (event) => {
     const way = { ArrowDown: 1, ArrowUp: -1 }[event.key];
     if (!way) return;
     step(way);
     event.preventDefault();
     event.stopPropagation();
+  };
+  return html`
+    <div ref=${listing} class="listing" tabindex="0" role="region" aria-label="Text of the program"
+      onClick=${click} onKeyDown=${key}>
+      <div class="pane">
+        <i ref=${here} class="here" hidden=${!line} />
+        <pre class="gutter" aria-hidden="true">${lines.map((_, i) => i + 1).join("\n")}</pre>
+        <pre ref=${code} class="code">${lines.join("\n")}</pre>
+      </div>
+    </div>`;
+}
+
+/** @param {number} line */
+function mark(line) {
+  if (state.line === line) return;
+  state.line = line;
+  redraw();
+}
+
+/** @param {number} file  that is shown */
+function show(file) {
+  if (state.file !== file) Object.assign(state, { file, line: 0 });
+  redraw();
+}
+
+/**
+ * Go to the place of a line, or of the next line that is linked.
+ * @param {number} line
+ */
+function go(line) {
+  const file = store.program_text?.files[state.file];
+  const k = file?.lines.findIndex((each) => each >= line) ?? -1;
+  if (!file || k < 0 || !player.timeline.whole) return;
+  player.pause();
+  player.seek(file.end[k]);
+  mark(file.lines[k]); // several lines may end at that time
+}
+
+/**
+ * Go to the next or the previous linked line.
+ * @param {number} way  1 or -1
+ */
+function step(way) {
+  const lines = store.program_text?.files[state.file]?.lines ?? [];
+  const { line } = state;
+  const next = way > 0 ? lines.find((each) => each > line) : lines.findLast((each) => each < line);
+  if (next !== undefined) go(next);
+}
+
+/** Mark the line that runs now. */
+function follow() {
+  const files = store.program_text?.files ?? [];
+  if (!shown() || !player.timeline.whole) return;
+  const t = player.moment?.t ?? 0;
+  const near = 1e-5; // s: times are sent to a microsecond
+  // The line that ends next; the robot may also be before the first one.
+  let [at, line, soonest] = [-1, 0, Infinity];
+  files.forEach(({ lines, end }, i) => {
+    const k = !end.length || end[0] >= t - near ? 0 : interval([...end, Infinity], t - near) + 1;
+    if (k < end.length && end[k] < soonest) [at, line, soonest] = [i, lines[k], end[k]];
   });
-  byId("open-program").addEventListener("click", () =>
-    ask(language || (store.job?.values?.program?.language ?? "")),
-  );
-  store.on(["program_text"], () => sheetShown() === "program" && draw());
-  store.on(["error"], ({ about, message }) => {
-    if (sheetShown() === "program" && about === "program") none(message);
-  });
-  store.on(["outcome"], () => {
-    // What is shown follows the job.
-    const { outcome } = store;
-    if (sheetShown() !== "program" || !outcome || outcome.revision === asked) return;
-    asked = outcome.revision;
-    send(language);
-  });
-  player.on((moment) => {
-    if (sheetShown() === "program" && store.programText) follow(moment?.t ?? 0);
-  });
-
-  /** @param {string} wanted */
-  function send(wanted) {
-    connection.send(wanted ? { type: "program", language: wanted } : { type: "program" });
-  }
-
-  /** @param {string} wanted */
-  function ask(wanted) {
-    language = wanted;
-    asked = store.outcome?.revision ?? 0;
-    send(wanted);
-    wait(el("div", { class: "spinner" }), el("p", {}, "Writing the program"));
-  }
-
-  /** @param {...HTMLElement} body */
-  function wait(...body) {
-    const state = el("div", { class: "state still" }, ...body);
-    showSheet("program", "Program", [languages()], [state], true);
-  }
-
-  /** @param {string} why */
-  function none(why) {
-    wait(el("strong", {}, "No program"), el("p", {}, why));
-  }
-
-  function languages() {
-    const words = store.job?.choices["program.language"] ?? [];
-    if (!words.length) return null;
-    const select = el(
-      "select",
-      { "aria-label": "Language", onchange: () => ask(select.value) },
-      ...words.map((word) => el("option", { value: word, selected: word === language }, word)),
-    );
-    return select;
-  }
-
-  function draw() {
-    const answer = store.programText;
-    if (!answer) return;
-    language = answer.language;
-    shown = Math.min(shown, Math.max(0, answer.files.length - 1));
-    const { files } = answer;
-    tabs.replaceChildren(
-      ...(files.length > 1
-        ? files.map(({ name }, i) => el("button", { onclick: () => pick(answer, i) }, name))
-        : []),
-    );
-    const state = el(
-      "div",
-      { class: "state still" },
-      el("strong", {}, "No program"),
-      el("p", {}, "It is written once every contour has a plan that passes its audit."),
-    );
-    const focused = listing.element === document.activeElement;
-    const title = files.length === 1 ? files[0].name : "Program";
-    const body = files.length ? [listing.element, footer(answer)] : [state];
-    showSheet("program", title, [tabs, languages()], [said(answer), ...body], true);
-    if (!files.length) return;
-    pick(answer, shown);
-    if (focused) listing.element.focus();
-    follow(player.moment?.t ?? 0);
-  }
-
-  /** @param {Answer} answer */
-  function footer({ files }) {
-    const linked = files.some(({ lines }) => lines.length) && player.timeline.whole;
-    const words = linked
-      ? "Click a line, or use the arrow keys, to move the robot there; the current line is marked."
-      : "Programs in this language are not read back, so their lines are not linked to the scene.";
-    return el("footer", {}, el("span", { class: "quiet" }, words));
-  }
-
-  /** @param {Answer} answer */
-  function said({ faults, findings, notes }) {
-    const items = [
-      ...faults.map((each) => el("li", { class: "fault" }, each)),
-      ...findings.map(found),
-      ...notes.map((each) => el("li", {}, each)),
-    ];
-    return items.length ? el("ul", { class: "notes" }, ...items) : null;
-  }
-
-  /** @param {Finding} finding */
-  function found({ level, message, place, file, line }) {
-    const bad = { class: level === "error" ? "fault" : null };
-    if (file === null || line === null) return el("li", bad, `${place}: ${message}`);
-    const to = el(
-      "button",
-      { class: "link", onclick: () => jump(file, line) },
-      `${file}, line ${line}`,
-    );
-    return el("li", bad, to, ` (${place}): ${message}`);
-  }
-
-  /**
-   * @param {Answer} answer
-   * @param {number} i
-   */
-  function pick({ files }, i) {
-    shown = i;
-    listing.load(files[i].text);
-    [...tabs.children].forEach((tab, j) => tab.setAttribute("aria-pressed", String(i === j)));
-  }
-
-  /**
-   * Show a line and go there.
-   * @param {string} file
-   * @param {number} line
-   */
-  function jump(file, line) {
-    const answer = store.programText;
-    const i = answer?.files.findIndex(({ name }) => name === file) ?? -1;
-    if (!answer || i < 0) return;
-    if (i !== shown) pick(answer, i);
-    go(line);
-    listing.mark(line);
-  }
-
-  /**
-   * Go to the place of a line, or of the next line that is linked.
-   * @param {number} line
-   */
-  function go(line) {
-    const file = store.programText?.files[shown];
-    if (!file || !player.timeline.whole) return;
-    const k = file.lines.findIndex((each) => each >= line);
-    if (k < 0) return;
-    player.pause();
-    player.seek(file.end[k]);
-    listing.mark(file.lines[k]); // several lines may end at that time
-  }
-
-  /**
-   * Go to the next or the previous linked line.
-   * @param {number} way  1 or -1
-   */
-  function step(way) {
-    const file = store.programText?.files[shown];
-    if (!file) return;
-    const { lines } = file;
-    const next =
-      way > 0
-        ? lines.find((each) => each > listing.line)
-        : lines.findLast((each) => each < listing.line);
-    if (next !== undefined) go(next);
-  }
-
-  /**
-   * Mark the line that runs at a time.
-   * @param {number} t  s
-   */
-  function follow(t) {
-    const answer = store.programText;
-    if (!answer?.files.length || !player.timeline.whole) return;
-    const near = 1e-5; // s: times are sent to a microsecond
-    // The line that ends next; the robot may also be before the first one.
-    let [at, line, soonest] = [-1, 0, Infinity];
-    answer.files.forEach(({ lines, end }, i) => {
-      const k = !end.length || end[0] >= t - near ? 0 : interval([...end, Infinity], t - near) + 1;
-      if (k < end.length && end[k] < soonest) [at, line, soonest] = [i, lines[k], end[k]];
-    });
-    if (at < 0) return;
-    if (at !== shown) pick(answer, at);
-    if (line !== listing.line) listing.mark(line);
-  }
+  if (at < 0) return;
+  if (at !== state.file) show(at);
+  mark(line);
 }

@@ -2,6 +2,7 @@
 
 import { Color, Group, Mesh, MeshStandardMaterial } from "three";
 
+import { player, store } from "../app.js";
 import { byId, themeColour } from "../dom.js";
 import { counted } from "../format.js";
 
@@ -29,7 +30,7 @@ export class Ghosts {
 
   /** Keep a ghost where the robot is; if there are too many, the oldest is removed. */
   keep() {
-    const { machine, player, store, stage } = this.view;
+    const { machine, stage } = this.view;
     const { moment } = player;
     if (!store.scene || !moment || !machine.ghostFrames.length) return;
     const before = machine.ghostFrames.map(({ matrix }) => matrix.clone());

@@ -1,9 +1,8 @@
 /** The loops of the part that are not cut: thin lines, some highlighted, and the one pointed at. */
 
-import { Color, Group, Raycaster, Vector2, Vector3 } from "three";
+import { Group, Raycaster, Vector2, Vector3 } from "three";
 
-import { textSize, themeColour } from "../dom.js";
-import { fill, line, pairs } from "./paths.js";
+import { fill, line, paintLines } from "./paths.js";
 
 /** @typedef {import("../messages.js").Loop} Loop */
 /** @typedef {import("../messages.js").PartMessage} PartMessage */
@@ -15,10 +14,8 @@ const THICK = 0.015; // m by which a loop may lie behind the surface that is poi
 export class Loops {
   constructor() {
     this.group = new Group();
-    this.all = line(1.5, { opacity: 0.85 });
-    this.lit = line(4.5);
-    this.all.renderOrder = 1;
-    this.lit.renderOrder = 6;
+    this.all = line(1.5, "--quiet", 1, { opacity: 0.85 });
+    this.lit = line(4.5, "--accent", 6);
     this.group.add(this.all, this.lit);
     /** @type {Loop[]} those that are shown */
     this.shown = [];
@@ -27,29 +24,18 @@ export class Loops {
 
   /** Take the colours and the text size of the theme. */
   paint() {
-    const scale = textSize() / 13;
-    for (const each of [this.all, this.lit]) {
-      each.material.linewidth = each.userData.width * scale;
-    }
-    this.all.material.color = new Color(themeColour("--quiet"));
-    this.lit.material.color = new Color(themeColour("--accent"));
+    paintLines([this.all, this.lit]);
   }
 
   /** @param {Loop[]} loops */
   load(loops) {
     this.shown = loops;
-    fill(
-      this.all,
-      loops.flatMap(({ points }) => pairs(points)),
-    );
+    fill(this.all, loops);
   }
 
   /** @param {Loop[]} loops  none: no loop is lit */
   light(loops) {
-    fill(
-      this.lit,
-      loops.flatMap(({ points }) => pairs(points)),
-    );
+    fill(this.lit, loops);
   }
 
   /**

@@ -2,8 +2,10 @@
 
 import { Color, Mesh, MeshBasicMaterial, Vector3 } from "three";
 
-import { byId, el, themeColour } from "../dom.js";
+import { store } from "../app.js";
+import { byId, themeColour } from "../dom.js";
 import { millimetres } from "../format.js";
+import { draw, html } from "../ui.js";
 import { creased, mesh } from "./meshes.js";
 
 /** @typedef {import("../messages.js").PlanMessage} PlanMessage */
@@ -28,13 +30,13 @@ export class Near {
    * @param {PlanMessage} plan
    */
   along(plan) {
-    const known = this.view.store.clearanceOf(plan);
+    const known = store.clearanceOf(plan);
     return known && known.distance.map((each) => each ?? Infinity);
   }
 
   /** Return why there are no distances. */
   why() {
-    return this.view.store.scene?.cell
+    return store.scene?.cell
       ? "distances are computed once all contours are planned"
       : "the job has no [cell]: no distances are computed";
   }
@@ -46,7 +48,7 @@ export class Near {
    */
   show(moment, at) {
     const plan = moment?.span.plan;
-    const known = plan && this.view.store.clearanceOf(plan);
+    const known = plan && store.clearanceOf(plan);
     const k = moment?.node ?? 0;
     const distance = known ? known.distance[k] : null;
     this.label.hidden = !known || distance === null;
@@ -56,10 +58,11 @@ export class Near {
     const [one, other] = pair;
     const over = known.over[k] ?? 0;
     this.label.classList.toggle("bad", over <= 0);
-    this.label.replaceChildren(
-      el("b", {}, millimetres(distance)),
-      `: ${one} \u2013 ${other}`,
-      over <= 0 ? el("small", {}, " closer than allowed") : "",
+    draw(
+      this.label,
+      html`
+        <b>${millimetres(distance)}</b>: ${one} – ${other}
+        ${over <= 0 && html`<small> closer than allowed</small>`}`,
     );
     this.at.copy(at);
     this.place();
@@ -84,7 +87,7 @@ export class Near {
     const key = names.join("\n");
     if (key === this.shown) return;
     this.shown = key;
-    const { machine, store, stage } = this.view;
+    const { machine, stage } = this.view;
     for (const each of this.lit.splice(0)) {
       each.removeFromParent();
       each.geometry.dispose();

@@ -27,11 +27,14 @@ const colourOfKind = (kind) =>
   themeColour(kind === "cut" ? "--cut" : kind.startsWith("lead") ? "--lead" : "--other");
 
 /**
+ * Return lines in a colour of the theme.
  * @param {number} width  of the usual text size
+ * @param {string} colour  "": each vertex has its own
+ * @param {number} order  later lines are drawn over earlier ones
  * @param {object} [more]
  */
-export function line(width, more = {}) {
-  // Draw lines in front of the surface that they are on, and later lines over earlier ones.
+export function line(width, colour, order, more = {}) {
+  // Draw lines in front of the surface that they are on.
   const nearer = {
     depthWrite: false,
     polygonOffset: true,
@@ -42,8 +45,20 @@ export function line(width, more = {}) {
   const made = new LineSegments2(new LineSegmentsGeometry(), material);
   made.frustumCulled = false;
   made.visible = false;
-  made.userData.width = width;
+  made.renderOrder = order;
+  made.userData = { width, colour };
   return made;
+}
+
+/**
+ * Take the colours and the text size of the theme.
+ * @param {LineSegments2[]} lines
+ */
+export function paintLines(lines) {
+  for (const { material, userData } of lines) {
+    material.linewidth = (userData.width * textSize()) / 13;
+    if (userData.colour) material.color.set(themeColour(userData.colour));
+  }
 }
 
 /** Distance from which on all distances have the same colour, m. */
@@ -52,17 +67,12 @@ export const FAR = 0.2;
 export class Paths {
   constructor() {
     this.group = new Group();
-    this.all = line(2.6, { vertexColors: true });
-    this.chosen = line(8);
-    this.through = line(1.6, { opacity: 0.35, depthTest: false });
-    this.kerf = line(3.8);
-    this.beam = line(2.6, { opacity: 0.9 });
-    this.mark = line(7, { depthTest: false });
-    this.chosen.renderOrder = this.through.renderOrder = 1;
-    this.all.renderOrder = 2;
-    this.kerf.renderOrder = 3;
-    this.beam.renderOrder = 4;
-    this.mark.renderOrder = 5;
+    this.chosen = line(8, "--chosen", 1);
+    this.through = line(1.6, "--accent", 1, { opacity: 0.35, depthTest: false });
+    this.all = line(2.6, "", 2, { vertexColors: true });
+    this.kerf = line(3.8, "--kerf", 3);
+    this.beam = line(2.6, "--beam", 4, { opacity: 0.9 });
+    this.mark = line(7, "--alert", 5, { depthTest: false });
     this.lines = [this.chosen, this.through, this.all, this.kerf, this.beam, this.mark];
     // All of these move with the part; the beam moves with the head.
     this.group.add(...this.lines.filter((each) => each !== this.beam));
@@ -78,13 +88,7 @@ export class Paths {
 
   /** Take the colours and the text size of the theme. */
   paint() {
-    const scale = textSize() / 13;
-    for (const each of this.lines) each.material.linewidth = each.userData.width * scale;
-    this.chosen.material.color.set(themeColour("--chosen"));
-    this.through.material.color.set(themeColour("--accent"));
-    this.kerf.material.color.set(themeColour("--kerf"));
-    this.beam.material.color.set(themeColour("--beam"));
-    this.mark.material.color.set(themeColour("--alert"));
+    paintLines(this.lines);
     this.colour();
   }
 
@@ -94,10 +98,7 @@ export class Paths {
    */
   load(tracks) {
     this.tracks = tracks;
-    fill(
-      this.all,
-      tracks.flatMap(({ points }) => pairs(points)),
-    );
+    fill(this.all, tracks);
     this.colour();
   }
 
@@ -139,11 +140,7 @@ export class Paths {
   /** @param {string | null} contour */
   choose(contour) {
     const chosen = this.tracks.filter((each) => each.contour === contour);
-    for (const each of [this.chosen, this.through])
-      fill(
-        each,
-        chosen.flatMap(({ points }) => pairs(points)),
-      );
+    for (const each of [this.chosen, this.through]) fill(each, chosen);
   }
 
   /**
@@ -152,14 +149,18 @@ export class Paths {
    */
   prepare(timeline) {
     this.cuts = [];
-    /** @type {number[]} */
-    const points = [];
-    for (const { plan, begin, end } of timeline.spans) {
-      if (!plan) continue;
-      this.cuts.push({ begin, end, first: points.length / 6, time: plan.time });
-      for (const each of pairs(plan.points)) points.push(each);
+    const cuts = timeline.spans.flatMap(({ plan, begin, end }) =>
+      plan ? { plan, begin, end } : [],
+    );
+    let first = 0;
+    for (const { plan, begin, end } of cuts) {
+      this.cuts.push({ begin, end, first, time: plan.time });
+      first += plan.time.length - 1;
     }
-    fill(this.kerf, points);
+    fill(
+      this.kerf,
+      cuts.map(({ plan }) => plan),
+    );
   }
 
   /**
@@ -188,10 +189,7 @@ export class Paths {
     if (!tip) return;
     const at = new Vector3(tip[3], tip[7], tip[11]);
     const axis = new Vector3(tip[2], tip[6], tip[10]);
-    const [from, to] = [
-      at.clone().addScaledVector(axis, -0.02),
-      at.clone().addScaledVector(axis, 0.045),
-    ];
+    const [from, to] = [-0.02, 0.045].map((by) => at.clone().addScaledVector(axis, by));
     this.beam.geometry.setPositions([...from.toArray(), ...to.toArray()]);
   }
 
@@ -200,13 +198,13 @@ export class Paths {
    * @param {number[] | null} point
    */
   markAt(point) {
-    if (!point) {
-      this.mark.visible = false;
-      return;
-    }
     const r = 0.012;
-    const [x, y, z] = point;
-    fill(this.mark, [x - r, y - r, z, x + r, y + r, z, x - r, y + r, z, x + r, y - r, z]);
+    const [x, y, z] = point ?? [0, 0, 0];
+    const ends = [
+      [x - r, y - r, z, x + r, y + r, z],
+      [x - r, y + r, z, x + r, y - r, z],
+    ];
+    fill(this.mark, point ? ends.map((points) => ({ points })) : []);
   }
 }
 
@@ -226,26 +224,19 @@ function valuesOf({ plan, clearance }, by) {
 }
 
 /**
- * Return the segments between successive points.
- * @param {number[]} points  K 3
- * @returns {number[]} (K-1) 6
- */
-export function pairs(points) {
-  /** @type {number[]} */
-  const out = [];
-  for (let i = 0; i + 5 < points.length; i += 3)
-    for (let j = 0; j < 6; j++) out.push(points[i + j]);
-  return out;
-}
-
-/**
+ * Draw lines through points.
  * @param {LineSegments2} target
- * @param {number[]} points
+ * @param {{points: number[]}[]} paths  K 3 each
  */
-export function fill(target, points) {
-  target.visible = points.length > 0;
-  if (!points.length) return;
+export function fill(target, paths) {
+  /** @type {number[]} */
+  const segments = [];
+  for (const { points } of paths)
+    for (let i = 0; i + 5 < points.length; i += 3)
+      for (let j = 0; j < 6; j++) segments.push(points[i + j]);
+  target.visible = segments.length > 0;
+  if (!target.visible) return;
   target.geometry.dispose();
   target.geometry = new LineSegmentsGeometry();
-  target.geometry.setPositions(points);
+  target.geometry.setPositions(segments);
 }

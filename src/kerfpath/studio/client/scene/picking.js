@@ -1,30 +1,26 @@
 /** Loops and faces of the part, pointed at and clicked: they become contours of the job. */
 
-import { byId, el, icon } from "../dom.js";
+import { send, store } from "../app.js";
+import { byId } from "../dom.js";
 import { counted, millimetres } from "../format.js";
 import { barred, cutLoops, described, leaving, uncut } from "../part.js";
+import { draw, html, icon } from "../ui.js";
 import { Loops, faceOf } from "./loops.js";
 
 /** @typedef {import("../messages.js").Loop} Loop */
 /** @typedef {import("./view.js").SceneView} SceneView */
-/** @typedef {{send: (message: any) => boolean}} Link */
 
 export class Picking {
-  /**
-   * @param {SceneView} view
-   * @param {Link} connection
-   */
-  constructor(view, connection) {
+  /** @param {SceneView} view */
+  constructor(view) {
     this.view = view;
-    this.store = view.store;
-    this.connection = connection;
     this.loops = new Loops();
     this.loops.paint();
     this.menu = byId("scene-menu");
     this.lit = ""; // the loop under the pointer
     view.stage.scene.add(this.loops.group);
-    this.store.on(["part", "scene"], () => this.draw());
-    this.store.on(["pointed"], (/** @type {Loop[]} */ loops) => this.light(loops));
+    store.on(["part", "scene"], () => this.draw());
+    store.on(["pointed"], (/** @type {Loop[]} */ loops) => this.light(loops));
     this.menu.addEventListener("keydown", (event) => {
       if (event.key !== "Escape") return;
       this.close();
@@ -38,7 +34,7 @@ export class Picking {
 
   /** Draw the loops that are not cut. */
   draw() {
-    this.loops.load(uncut(this.store));
+    this.loops.load(uncut());
     this.close();
     this.view.stage.invalidate();
   }
@@ -68,7 +64,7 @@ export class Picking {
    * @param {number} y  px
    */
   face(x, y) {
-    const { stage, machine, store } = this.view;
+    const { stage, machine } = this.view;
     const hit = this.loops.struck(stage, x, y, machine.group);
     if (!store.part || hit?.object.name !== "part") return "";
     return faceOf(store.part, hit.faceIndex ?? -1);
@@ -82,19 +78,24 @@ export class Picking {
    */
   clicked(x, y, loop) {
     const name = loop?.face ?? this.face(x, y);
-    const beside = uncut(this.store, true).filter((each) => each.face === name && !barred(each));
+    const beside = uncut(true).filter((each) => each.face === name && !barred(each));
     if (!loop && !beside.length) return false;
     this.light(loop ? [loop] : beside);
     const all = beside.map((each) => each.name);
     const why = loop ? barred(loop) : "";
-    this.open(x, y, loop?.name ?? name, [
-      el("p", {}, loop ? described(loop) : `face, ${counted(beside.length, "loop")} of it not cut`),
-      why ? el("p", { class: "fault" }, why) : null,
-      loop && !why ? this.button("Cut this loop", [loop.name], true) : null,
-      all.length > (loop ? 1 : 0)
-        ? this.button(`Cut all ${all.length} loops of ${loop ? name : "this face"}`, all, !loop)
-        : null,
-    ]);
+    const about = loop ? described(loop) : `face, ${counted(beside.length, "loop")} of it not cut`;
+    const whole = `Cut all ${all.length} loops of ${loop ? name : "this face"}`;
+    const several = all.length > (loop ? 1 : 0);
+    this.open(
+      x,
+      y,
+      html`
+        <strong>${loop?.name ?? name}</strong>
+        <p>${about}</p>
+        ${why && html`<p class="fault">${why}</p>`}
+        ${loop && !why && this.button("Cut this loop", [loop.name], "primary")}
+        ${several && this.button(whole, all, loop ? "plain" : "primary")}`,
+    );
     return true;
   }
 
@@ -105,52 +106,48 @@ export class Picking {
    * @param {string} contour
    */
   asked(x, y, contour) {
-    const shape = this.store.scene?.contours.find(({ name }) => name === contour);
+    const shape = store.scene?.contours.find(({ name }) => name === contour);
     if (!shape) return;
-    const { words, why } = leaving(this.store, shape.index);
-    const out = el(
-      "button",
-      {
-        class: "plain",
-        disabled: why !== "",
-        onclick: () => {
-          this.connection.send({ type: "leave", index: shape.index });
-          this.close();
-        },
-      },
-      icon("close"),
-      `${words} of the job`,
+    const { index, loop, s } = shape;
+    const { words, why } = leaving(index);
+    const leave = () => {
+      send({ type: "leave", index });
+      this.close();
+    };
+    this.open(
+      x,
+      y,
+      html`
+        <strong>${contour}</strong>
+        <p>${millimetres(s[s.length - 1])} long, ${loop}</p>
+        ${why && html`<p>${why}</p>`}
+        <button class="plain" disabled=${why !== ""} onClick=${leave}>
+          ${icon("close")}${words} of the job
+        </button>`,
     );
-    const length = shape.s[shape.s.length - 1];
-    this.open(x, y, contour, [
-      el("p", {}, `${millimetres(length)} long, ${shape.loop}`),
-      why ? el("p", {}, why) : null,
-      out,
-    ]);
   }
 
   /**
    * @param {string} words
    * @param {string[]} loops
-   * @param {boolean} first
+   * @param {"plain" | "primary"} kind
    */
-  button(words, loops, first) {
+  button(words, loops, kind) {
     const cut = () => {
-      cutLoops(this.store, this.connection, loops);
+      cutLoops(loops);
       this.close();
     };
-    return el("button", { class: first ? "primary" : "plain", onclick: cut }, words);
+    return html`<button class=${kind} onClick=${cut}>${words}</button>`;
   }
 
   /**
    * @param {number} x  px
    * @param {number} y  px
-   * @param {string} title
-   * @param {(HTMLElement | null)[]} body
+   * @param {import("../ui.js").Content} content
    */
-  open(x, y, title, body) {
+  open(x, y, content) {
     const { menu, view } = this;
-    menu.replaceChildren(el("strong", {}, title), ...body.filter((each) => each !== null));
+    draw(menu, content);
     menu.hidden = false;
     view.label.hidden = true;
     const room = view.canvas;
@@ -182,6 +179,6 @@ export class Picking {
    * @param {Loop} loop
    */
   words(loop) {
-    return [el("strong", {}, loop.name), ` ${described(loop)}, not cut`];
+    return html`<strong>${loop.name}</strong> ${described(loop)}, not cut`;
   }
 }

@@ -3,9 +3,9 @@
 import { Euler, Group, Matrix4, Object3D, Vector3 } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 
-import { textSize, themeColour } from "../dom.js";
+import { store } from "../app.js";
 import { matrix } from "./machine.js";
-import { fill, line } from "./paths.js";
+import { fill, line, paintLines } from "./paths.js";
 
 /** @typedef {import("./view.js").SceneView} SceneView */
 /** @typedef {import("../messages.js").ReachMessage} ReachMessage */
@@ -72,10 +72,8 @@ export class Placing {
     this.handle = new Object3D();
     this.group = new Group();
     this.group.matrixAutoUpdate = false;
-    this.reached = line(3.6);
-    this.lost = line(7);
-    this.reached.renderOrder = 7;
-    this.lost.renderOrder = 8;
+    this.reached = line(3.6, "--accent", 7);
+    this.lost = line(7, "--alert", 8);
     this.group.add(this.reached, this.lost);
     const { stage } = view;
     this.gizmo = new TransformControls(stage.camera, stage.canvas);
@@ -244,7 +242,7 @@ export class Placing {
 
   /** Take a new scene: it contains the move that was sent; a move that was not sent is kept. */
   landed() {
-    const { stage, store } = this.view;
+    const { stage } = this.view;
     const away = this.base.clone().invert();
     const still = away.equals(new Matrix4());
     if (!this.fresh && !still) stage.move(away);
@@ -276,17 +274,17 @@ export class Placing {
 
   /** Colour the nodes by whether they are in reach. */
   draw() {
-    const { scene } = this.view.store;
-    /** @type {number[][]} of nodes in reach, and of those out of it */
-    const segments = [[], []];
-    for (const { name, points } of (this.open && this.reach && scene?.contours) || []) {
+    /** @type {{points: number[]}[][]} stretches in reach, and those out of it */
+    const stretches = [[], []];
+    for (const { name, points } of (this.open && this.reach && store.scene?.contours) || []) {
       const lost = new Set(this.reach?.contours.find((each) => each.name === name)?.out);
       for (let k = 0; 3 * k + 5 < points.length; k++)
-        for (let i = 3 * k; i < 3 * k + 6; i++)
-          segments[lost.has(k) || lost.has(k + 1) ? 1 : 0].push(points[i]);
+        stretches[lost.has(k) || lost.has(k + 1) ? 1 : 0].push({
+          points: points.slice(3 * k, 3 * k + 6),
+        });
     }
-    fill(this.reached, segments[0]);
-    fill(this.lost, segments[1]);
+    fill(this.reached, stretches[0]);
+    fill(this.lost, stretches[1]);
     this.view.stage.invalidate();
   }
 
@@ -336,11 +334,7 @@ export class Placing {
 
   /** Take the colours and the text size of the theme. */
   paint() {
-    const scale = textSize() / 13;
-    for (const each of [this.reached, this.lost])
-      each.material.linewidth = each.userData.width * scale;
-    this.reached.material.color.set(themeColour("--accent"));
-    this.lost.material.color.set(themeColour("--alert"));
+    paintLines([this.reached, this.lost]);
   }
 }
 

@@ -1,10 +1,10 @@
 /** Pictures and videos of the scene, which the browser makes and offers as files. */
 
-import { byId, el, themeColour } from "../dom.js";
+import { player, store } from "../app.js";
+import { byId, themeColour } from "../dom.js";
 import { clock } from "../format.js";
+import { dot, draw, html } from "../ui.js";
 
-/** @typedef {import("../store.js").Store} Store */
-/** @typedef {import("../player.js").Player} Player */
 /** @typedef {import("./view.js").SceneView} SceneView */
 
 /**
@@ -22,19 +22,17 @@ const KINDS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 
 /**
  * Return the entries of the scene for the export menu.
- * @param {Store} store
- * @param {Player} player
  * @param {SceneView} view
  * @returns {Extra[]}
  */
-export function recordings(store, player, view) {
-  const film = new Film(store, player, view);
+export function recordings(view) {
+  const film = new Film(view);
   return [
     {
       name: "picture of the view",
       about: "PNG, in the size of the view",
       why: () => (view.ready ? "" : "the cell is not drawn yet"),
-      make: () => picture(store, view),
+      make: () => picture(view),
     },
     {
       name: "video of the motion",
@@ -52,50 +50,31 @@ export function recordings(store, player, view) {
   ];
 }
 
-/**
- * @param {Store} store
- * @param {SceneView} view
- */
-function picture(store, view) {
+/** @param {SceneView} view */
+function picture(view) {
   view.stage.draw();
-  const shot = el("canvas");
+  const shot = document.createElement("canvas");
   Object.assign(shot, { width: view.canvas.width, height: view.canvas.height });
   paint(shot, view.canvas);
-  shot.toBlob((blob) => blob && offer(blob, `${stem(store)}.png`), "image/png");
+  shot.toBlob((blob) => blob && offer(blob, `${stem()}.png`), "image/png");
 }
 
 /** A recording of the motion from begin to end while it is played. */
 class Film {
-  /**
-   * @param {Store} store
-   * @param {Player} player
-   * @param {SceneView} view
-   */
-  constructor(store, player, view) {
-    this.store = store;
-    this.player = player;
+  /** @param {SceneView} view */
+  constructor(view) {
     this.view = view;
     this.kind = KINDS.find((kind) => globalThis.MediaRecorder?.isTypeSupported(kind)) ?? "";
     /** @type {MediaRecorder | null} */
     this.recorder = null;
-    this.canvas = el("canvas");
+    this.canvas = document.createElement("canvas");
     this.host = byId("recording");
-    this.said = el("span");
-    this.bar = el("progress", { max: 1, value: 0, "aria-label": "Recorded" });
-    const end = (/** @type {boolean} */ keep) => () => this.end(keep);
-    this.host.append(
-      el("i", { class: "dot none" }),
-      this.said,
-      this.bar,
-      el("button", { class: "text", onclick: end(true) }, "Stop and keep"),
-      el("button", { class: "text", onclick: end(false) }, "Cancel"),
-    );
     view.stage.drawn = () => this.recorder && paint(this.canvas, view.canvas);
     player.on(() => this.follow());
   }
 
   begin() {
-    const { canvas, view, player } = this;
+    const { canvas, view } = this;
     // Videos have an even number of rows and columns.
     const [width, height] = [view.canvas.width, view.canvas.height].map((each) => each & ~1);
     Object.assign(canvas, { width, height });
@@ -109,7 +88,7 @@ class Film {
     recorder.addEventListener("dataavailable", ({ data }) => pieces.push(data));
     recorder.addEventListener("stop", () => {
       for (const track of recorder.stream.getTracks()) track.stop();
-      if (this.keep) offer(new Blob(pieces, { type: "video/webm" }), `${stem(this.store)}.webm`);
+      if (this.keep) offer(new Blob(pieces, { type: "video/webm" }), `${stem()}.webm`);
     });
     this.keep = false;
     player.pause();
@@ -123,11 +102,18 @@ class Film {
 
   /** Follow the player, which may be paused; the recording ends with it. */
   follow() {
-    const { recorder, player } = this;
+    const { recorder } = this;
     if (!recorder) return;
     const { t, timeline, playing } = player;
-    this.said.textContent = `Recording ${clock(t, 0)} of ${clock(timeline.total, 0)}`;
-    this.bar.value = timeline.total ? t / timeline.total : 1;
+    draw(
+      this.host,
+      html`
+        ${dot("none")}
+        <span>Recording ${clock(t, 0)} of ${clock(timeline.total, 0)}</span>
+        <progress max="1" value=${timeline.total ? t / timeline.total : 1} aria-label="Recorded" />
+        <button class="text" onClick=${() => this.end(true)}>Stop and keep</button>
+        <button class="text" onClick=${() => this.end(false)}>Cancel</button>`,
+    );
     if (t >= timeline.total) this.end(true);
     else if (playing && recorder.state === "paused") recorder.resume();
     else if (!playing && recorder.state === "recording") recorder.pause();
@@ -140,7 +126,7 @@ class Film {
     this.recorder = null;
     this.keep = keep;
     this.host.hidden = true;
-    this.player.pause();
+    player.pause();
     recorder.stop();
   }
 }
@@ -168,9 +154,8 @@ function paint(target, scene) {
  */
 function offer(blob, name) {
   const href = URL.createObjectURL(blob);
-  el("a", { href, download: name }).click();
+  Object.assign(document.createElement("a"), { href, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(href), 60_000);
 }
 
-/** @param {Store} store */
-const stem = (store) => (store.job?.name ?? "studio").replace(/\.toml$/, "");
+const stem = () => (store.job?.name ?? "studio").replace(/\.toml$/, "");

@@ -14,7 +14,7 @@ import {
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
-import { themeColour } from "../dom.js";
+import { onNextFrame, pixelRatio, themeColour } from "../dom.js";
 
 /** Directions from which the views look, z up. */
 const VIEWS = {
@@ -44,7 +44,8 @@ export class Stage {
     this.size = new Vector2();
     /** Called with each frame, while it can be copied. @type {() => void} */
     this.drawn = () => {};
-    this.waiting = false;
+    /** Draw once, before the next frame of the screen. */
+    this.invalidate = onNextFrame(() => this.draw());
     this.frames = 0;
     this.cost = 0;
     /** @type {GridHelper | null} */
@@ -54,16 +55,6 @@ export class Stage {
     canvas.addEventListener("webglcontextrestored", () => this.invalidate());
     this.look("fit", [new Vector3(-1, -1, 0), new Vector3(2, 1, 2)]);
     this.resize();
-  }
-
-  /** Draw once, before the next frame of the screen. */
-  invalidate() {
-    if (this.waiting) return;
-    this.waiting = true;
-    requestAnimationFrame(() => {
-      this.waiting = false;
-      this.draw();
-    });
   }
 
   draw() {
@@ -79,7 +70,7 @@ export class Stage {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (!width || !height) return;
     this.size.set(width, height);
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
+    this.renderer.setPixelRatio(pixelRatio());
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();

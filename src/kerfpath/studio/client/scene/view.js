@@ -2,8 +2,10 @@
 
 import { Box3, Vector3 } from "three";
 
-import { byId, el, icon } from "../dom.js";
-import { fixed, percent } from "../format.js";
+import { player, store } from "../app.js";
+import { byId } from "../dom.js";
+import { fixed, millimetres, percent } from "../format.js";
+import { draw, html, mount, redraw } from "../ui.js";
 import { Machine } from "./machine.js";
 import { Ghosts } from "./ghosts.js";
 import { legend } from "./legend.js";
@@ -13,30 +15,20 @@ import { Paths } from "./paths.js";
 import { Placing } from "./placing.js";
 import { Stage } from "./stage.js";
 
-/** @typedef {import("../store.js").Store} Store */
-/** @typedef {import("../player.js").Player} Player */
 /** @typedef {import("../timeline.js").Moment} Moment */
 
 const REACH = 14; // px within which a contour is pointed at
 
 export class SceneView {
-  /**
-   * @param {Store} store
-   * @param {Player} player
-   * @param {import("./picking.js").Link} connection
-   */
-  constructor(store, player, connection) {
-    this.store = store;
-    this.player = player;
+  constructor() {
     this.canvas = byId("scene", HTMLCanvasElement);
     this.label = byId("scene-label");
-    this.said = byId("scene-state");
     this.stage = new Stage(this.canvas);
     this.machine = new Machine();
     this.paths = new Paths();
     const { group: lines, beam } = this.paths;
     this.stage.scene.add(this.machine.group, this.machine.ghost, lines, beam);
-    this.picking = new Picking(this, connection);
+    this.picking = new Picking(this);
     this.near = new Near(this);
     this.ghosts = new Ghosts(this);
     this.placing = new Placing(this);
@@ -53,15 +45,16 @@ export class SceneView {
     this.carried = null;
     this.paths.paint();
     this.bind();
-    this.state();
+    mount(byId("scene-state"), () => this.state());
+    mount(byId("scene-note"), () => this.note());
+    mount(byId("scale"), () => legend(this.paths, this.near.why()));
   }
 
   bind() {
-    const { store, player, canvas } = this;
+    const { canvas } = this;
     store.on(["scene"], () => this.build());
     store.on(["scene", "plan", "clearance"], () => this.draw());
     store.on(["selected", "plan"], () => this.mark());
-    store.on(["connection", "job", "progress"], () => this.state());
     player.on((moment) => this.show(moment));
     let [x, y] = [0, 0];
     canvas.addEventListener("pointerdown", (event) => ([x, y] = [event.offsetX, event.offsetY]));
@@ -82,11 +75,9 @@ export class SceneView {
     });
     for (const button of document.querySelectorAll("[data-view]")) {
       const { view } = /** @type {HTMLElement} */ (button).dataset;
-      if (view === "fit") button.append(icon("fit"));
       button.addEventListener("click", () => this.look(view ?? "fit"));
     }
     const follow = byId("follow");
-    follow.append(icon("follow"));
     follow.addEventListener("click", () => {
       this.follow = !this.follow;
       this.carried = null;
@@ -96,8 +87,8 @@ export class SceneView {
     const by = byId("colour-by", HTMLSelectElement);
     by.addEventListener("change", () => {
       this.paths.colour(/** @type {import("./paths.js").ColourBy} */ (by.value));
-      this.scale();
-      this.show(this.player.moment);
+      redraw();
+      this.show(player.moment);
     });
   }
 
@@ -121,18 +112,18 @@ export class SceneView {
    * @param {number} node
    */
   chosen(contour, node) {
-    this.store.select(contour);
-    const plan = this.store.plans.get(contour)?.[0];
-    const when = plan && this.player.timeline.when(plan, Math.min(node, plan.time.length - 1));
-    if (when !== null && when !== undefined) this.player.seek(when);
+    store.select(contour);
+    const plan = store.plans.get(contour)?.[0];
+    const when = plan && player.timeline.when(plan, Math.min(node, plan.time.length - 1));
+    if (when !== null && when !== undefined) player.seek(when);
   }
 
   /** Build the bodies if they are not the shown ones. */
   async build() {
-    const { scene } = this.store;
+    const { scene } = store;
     if (!scene) return;
     this.placing.landed();
-    const layout = this.store.job?.values?.layout ?? {};
+    const layout = store.job?.values?.layout ?? {};
     const key = JSON.stringify([scene.robot, scene.bodies, layout.standing, layout.move]);
     if (key === this.built) return this.placing.apply();
     const first = this.built === "";
@@ -149,15 +140,14 @@ export class SceneView {
     this.ready = true;
     this.placing.apply();
     this.lay();
-    this.note();
-    this.show(this.player.moment);
+    this.show(player.moment);
     if (first) this.look("fit");
-    this.state();
+    redraw();
   }
 
   /** Draw the floor under the bodies of the cell. */
   lay() {
-    const { scene } = this.store;
+    const { scene } = store;
     if (!scene || !this.ready || scene.bodies.some(({ kind }) => kind === "floor")) return;
     const box = new Box3();
     const still = this.machine.frames.slice(0, this.machine.base + 1);
@@ -167,7 +157,7 @@ export class SceneView {
 
   /** Draw the contours again. */
   draw() {
-    const { scene, plans } = this.store;
+    const { scene, plans } = store;
     /** @type {import("./paths.js").Track[]} */
     const tracks = [];
     for (const { name: contour, points, kind } of scene?.contours ?? []) {
@@ -185,14 +175,13 @@ export class SceneView {
       if (!found.length) tracks.push({ contour, plan: null, points, kind, clearance: null });
     }
     this.paths.load(tracks);
-    this.paths.choose(this.store.selected);
-    this.scale();
+    this.paths.choose(store.selected);
     this.stage.invalidate();
   }
 
   /** Mark the chosen contour, and where it has no path. */
   mark() {
-    const { selected, nopaths } = this.store;
+    const { selected, nopaths } = store;
     this.paths.choose(selected);
     this.paths.markAt((selected && nopaths.get(selected)?.point) || null);
     this.stage.invalidate();
@@ -200,10 +189,10 @@ export class SceneView {
 
   /** @param {Moment | null} moment */
   show(moment) {
-    const { scene } = this.store;
+    const { scene } = store;
     if (!scene || !this.ready) return;
-    if (this.prepared !== this.player.timeline) {
-      this.prepared = this.player.timeline;
+    if (this.prepared !== player.timeline) {
+      this.prepared = player.timeline;
       this.paths.prepare(this.prepared);
     }
     const q = moment?.q ?? scene.sample.q;
@@ -227,7 +216,7 @@ export class SceneView {
    * @param {boolean} [admitted]
    */
   haunt(q, admitted = true) {
-    const { scene } = this.store;
+    const { scene } = store;
     this.haunted = q !== null;
     const at = q ?? this.other;
     this.machine.ghost.visible = at !== null;
@@ -249,9 +238,9 @@ export class SceneView {
 
   /** @param {string} view  "fit", "part", "top", ..., "head", or "mark", where the path breaks */
   look(view) {
-    const { scene, nopaths, selected } = this.store;
+    const { scene, nopaths, selected } = store;
     if (!scene || !this.ready) return;
-    const { moment } = this.player;
+    const { moment } = player;
     const tip = this.machine.pose(scene.robot, moment?.q ?? scene.sample.q);
     const head = [tip[3], tip[7], tip[11]];
     const mark = nopaths.get(selected ?? "")?.point;
@@ -266,7 +255,7 @@ export class SceneView {
     }
     /** @type {Vector3[]} */
     const points = [];
-    for (const { points: xyz } of [...scene.contours, ...(this.store.part?.loops ?? [])])
+    for (const { points: xyz } of [...scene.contours, ...(store.part?.loops ?? [])])
       for (let i = 0; i < xyz.length; i += 3)
         points.push(new Vector3().fromArray(xyz, i).applyMatrix4(there));
     if (view !== "part") points.push(...this.machine.outline());
@@ -310,70 +299,51 @@ export class SceneView {
     if (this.picking.menu.hidden && !found) this.picking.hover(loop?.loop ?? null);
     this.label.hidden = !(found || loop) || !this.picking.menu.hidden;
     if (this.label.hidden) return;
-    if (found) this.describe(found);
-    else if (loop) this.label.replaceChildren(...this.picking.words(loop.loop));
+    draw(this.label, found ? this.described(found) : loop && this.picking.words(loop.loop));
     const right = Math.min(x + 14, this.canvas.clientWidth - this.label.offsetWidth - 8);
     this.label.style.transform = `translate(${right}px, ${Math.max(4, y - 40)}px)`;
   }
 
   /**
-   * Show the values of a contour at a node.
+   * The values of a contour at a node.
    * @param {{contour: string, node: number}} found
    */
-  describe(found) {
-    const plan = this.store.plans.get(found.contour)?.[0];
-    const node = Math.min(found.node, (plan?.time.length ?? 1) - 1);
-    const speed = plan && plan.speed[Math.min(node, plan.speed.length - 1)] * 60;
-    this.label.replaceChildren(
-      el("strong", {}, found.contour),
-      ...(plan && speed !== undefined
-        ? [
-            ` ${fixed(plan.s[node] * 1e3)} mm, ${fixed(speed, 2)} m/min, joint load ${percent(plan.joint_load[node])}`,
-          ]
-        : []),
-    );
+  described({ contour, node }) {
+    const plan = store.plans.get(contour)?.[0];
+    if (!plan) return html`<strong>${contour}</strong>`;
+    const k = Math.min(node, plan.time.length - 1);
+    const speed = fixed(plan.speed[Math.min(k, plan.speed.length - 1)] * 60, 2);
+    const load = percent(plan.joint_load[k]);
+    return html`
+      <strong>${contour}</strong> ${millimetres(plan.s[k])}, ${speed} m/min, joint load ${load}`;
   }
 
-  /** Show the legend of the contours' colours. */
-  scale() {
-    byId("scale").replaceChildren(...legend(this.paths, this.near.why()));
-  }
-
-  /** Show the state while there is no scene. */
+  /** The state while there is no scene. */
   state() {
-    const { job, scene, connection, progress } = this.store;
+    const { job, scene, connection, progress } = store;
     byId("view").classList.toggle("ready", this.ready);
-    if (this.ready && !this.trouble) return this.said.replaceChildren();
-    if (this.trouble)
-      return this.said.replaceChildren(
-        el("strong", {}, "The cell cannot be drawn"),
-        el("p", {}, `${this.trouble}. Reload the page to try again; planning goes on meanwhile.`),
-      );
-    if (job?.faults.length && !scene)
-      return this.said.replaceChildren(
-        el("strong", {}, "The job has an error"),
-        el("p", {}, job.faults[0].message),
-        el("p", {}, "Correct it under Job file, at the top of the page."),
-      );
-    this.said.replaceChildren(
-      el("div", { class: "spinner" }),
-      el(
-        "strong",
-        {},
-        connection === "open" ? "Reading the cell" : "Waiting for the studio's server",
-      ),
-      el("p", {}, progress.label || "Robot, head and part appear here once they are read."),
-    );
+    /** @type {(title: string, ...words: string[]) => import("../ui.js").Content} */
+    const said = (title, ...words) =>
+      html`<strong>${title}</strong>${words.map((each) => html`<p>${each}</p>`)}`;
+    if (this.trouble) {
+      const again = "Reload the page to try again; planning goes on meanwhile.";
+      return said("The cell cannot be drawn", `${this.trouble}. ${again}`);
+    }
+    if (this.ready) return null;
+    if (job?.faults.length && !scene) {
+      const how = "Correct it under Job file, at the top of the page.";
+      return said("The job has an error", job.faults[0].message, how);
+    }
+    const what = connection === "open" ? "Reading the cell" : "Waiting for the studio's server";
+    const step = progress.label || "Robot, head and part appear here once they are read.";
+    return html`<div class="spinner" />${said(what, step)}`;
   }
 
-  /** List the approximate shapes. */
+  /** The approximate shapes. */
   note() {
-    const rough = new Set(
-      this.store.scene?.bodies.filter((body) => body.approximate).map(({ kind }) => kind),
-    );
-    byId("scene-note").textContent = rough.size
-      ? `approximate shapes: ${[...rough].join(", ")}`
-      : "";
+    const bodies = this.ready ? (store.scene?.bodies ?? []) : [];
+    const rough = new Set(bodies.flatMap(({ approximate, kind }) => (approximate ? kind : [])));
+    return rough.size ? `approximate shapes: ${[...rough].join(", ")}` : "";
   }
 
   /** Take the colours of the theme. */
@@ -384,7 +354,6 @@ export class SceneView {
     this.ghosts.paint();
     this.placing.paint();
     this.lay();
-    this.scale();
     this.stage.invalidate();
   }
 }
