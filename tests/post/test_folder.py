@@ -1,6 +1,8 @@
 """Programs in folders: whole or not at all, and nothing of an earlier one beside them."""
 
 import json
+import os
+import socket
 from pathlib import Path
 
 import pytest
@@ -103,6 +105,28 @@ def test_all_files_are_written_or_none(folder):
         write_files(folder, {"cut.src": "new", "a.src": "new", "z.src": "new"})
     assert (folder / "cut.src").read_text() == LONG["cut.src"]
     assert names(folder) == {*MINE, *LONG, MANIFEST}
+
+
+def test_only_a_regular_file_is_replaced(tmp_path):
+    fifo, device = tmp_path / "x.mod", tmp_path / "null"
+    os.mkfifo(fifo)
+    device.symlink_to("/dev/null")
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(tmp_path / "s"))
+        for path, what in (
+            (fifo, "a FIFO"), (device, "a device"), (tmp_path / "s", "a socket"),
+            (tmp_path, "a folder"),
+        ):  # fmt: skip
+            with pytest.raises(InputError, match=rf"it is {what}, not a file$"):
+                write_program(path, "text")
+            with pytest.raises(InputError, match=rf"it is {what}, not a file$"):
+                replace_program(tmp_path.parent, {str(path): "text"}, [str(path)])
+    assert fifo.is_fifo()
+    assert {path.name for path in tmp_path.iterdir()} == {"x.mod", "null", "s"}
+    link = tmp_path / "link.mod"
+    link.symlink_to("cut.mod")  # to nothing, which is as good as a file
+    write_program(link, "new")
+    assert link.read_text() == "new"
 
 
 def test_writing_replaces_the_file_at_one_stroke(tmp_path):

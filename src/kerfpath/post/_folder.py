@@ -147,6 +147,8 @@ def _write(texts: Mapping[Path, str]) -> None:
 
 def _read_list(folder: Path) -> dict[str, dict[str, str]]:
     """Return the files in the manifest; none if it does not exist or is not valid."""
+    if not (folder / MANIFEST).is_file():
+        return {}
     try:
         found = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["programs"]
         entries = {str(n): {k: str(e[k]) for k in ("of", "sha256")} for n, e in found.items()}
@@ -190,7 +192,7 @@ def _remove(folder: Path, names: Sequence[str]) -> None:
 def _holds(path: Path, text: str) -> bool:
     """Return whether the file exists and has exactly this text."""
     try:
-        return path.read_bytes() == text.encode("utf-8")
+        return path.is_file() and path.read_bytes() == text.encode("utf-8")  # a FIFO would wait
     except OSError:
         return False
 
