@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath import Contour, Robot, robot
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 
 __all__ = ["arm", "arm_of_one_turn", "chain", "placement", "tool", "wave"]
 

@@ -8,9 +8,9 @@ from itertools import combinations
 import numpy as np
 
 from kerfpath import Robot
-from kerfpath._arrays import Array, Bools
+from kerfpath.arrays import Array, Bools
 from kerfpath.cell import Body, Capsule, Cell, Hull, Mesh, box, link_capsules
-from kerfpath.cell._bodies import Kind
+from kerfpath.cell.scene import Kind
 from kerfpath.robots import chain_of
 
 __all__ = ["Boxes", "Verdicts", "with_collimator"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks import _arm
 from kerfpath import Contour, Plan, Robot, plan, robot
-from kerfpath._arrays import Array, Ints
+from kerfpath.arrays import Array, Ints
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import (
     Body,

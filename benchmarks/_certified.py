@@ -15,7 +15,7 @@ from unittest.mock import patch
 import numpy as np
 
 from kerfpath import Contour, NoFeasiblePath, PlanOptions, Robot, plan
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.certifier import certify
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner import layered_graph

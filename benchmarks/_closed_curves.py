@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from shapely import Polygon
 
 from kerfpath import Contour, InputError
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.operations import offset
 
 __all__ = ["KINDS", "Curve", "Verdict", "curve", "judge"]

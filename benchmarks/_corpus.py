@@ -25,7 +25,7 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 
 __all__ = ["Known", "corpus"]
 

@@ -17,7 +17,7 @@ from typing import Literal, ParamSpec, TypeVar
 import numba
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.arrays import Array, Bools, Ints
 
 __all__ = ["Metric", "dense_cost", "second_order_cost"]
 

@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks._arm import chain
 from benchmarks._figures import available_gigabytes, peak_megabytes
 from kerfpath import Robot
-from kerfpath._arrays import Array, Ints
+from kerfpath.arrays import Array, Ints
 
 __all__ = ["NotRun", "Solid", "Solved", "Task", "solve"]
 

@@ -10,7 +10,7 @@ from eaik.IK_DH import DhRobot
 
 from benchmarks._figures import Figure, Report, in_turn
 from kerfpath import Robot, robot
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.urdf import KinematicChain
 
 __all__ = ["run"]

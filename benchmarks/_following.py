@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from benchmarks._random_contours import Cut
-from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.arrays import Array, Bools, Ints
 from kerfpath.kernels.frames import location
 from kerfpath.kernels.kinematics import POSTURES, OpwArm, inverse
 from kerfpath.kernels.turns import JointLimits

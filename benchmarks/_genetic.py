@@ -13,7 +13,7 @@ from pymoo.optimize import minimize
 from scipy.interpolate import BSpline
 
 from benchmarks._following import Follower
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 
 __all__ = ["GENERATIONS", "POPULATION", "genetic"]
 

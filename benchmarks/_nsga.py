@@ -14,7 +14,7 @@ from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 
 from kerfpath import Plan
-from kerfpath._arrays import Array, freeze
+from kerfpath.arrays import Array, freeze
 from kerfpath.front import ParetoProblem, Subproblem
 from kerfpath.search import Metric, ObjectiveKind
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.post import JointMove, LinearMove, Program, Section, Step, Switch, Wait
 from kerfpath.robots import Robot
 

@@ -20,7 +20,7 @@ from benchmarks._random_contours import head, posed
 from benchmarks._shipped import PARTS
 from benchmarks.public.check import INSTANCES
 from kerfpath import Contour, NoFeasiblePath, PlanOptions, Robot, cad, fastest_speed, plan, robot
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.planner import node_interval
 from kerfpath.robots import chain_of
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kerfpath import Contour, Robot, robot
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner import fastest_speed, layered_graph, node_interval

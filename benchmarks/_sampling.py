@@ -17,7 +17,7 @@ from ompl import base, geometric, util
 from scipy.ndimage import gaussian_filter1d
 
 from benchmarks._following import Follower, edge_cost
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.kernels.kinematics import POSTURES
 
 __all__ = ["EDGES", "sampled", "start_generators"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks._certified import Task
 from kerfpath import refine
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.plans import Plan
 
 __all__ = ["from_grids", "shaken"]

@@ -26,7 +26,7 @@ from kerfpath import (
     plan,
     robot,
 )
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.auditor import certified_bound
 from kerfpath.cell import Mesh, box_between, cell_of
 from kerfpath.certifier import certify

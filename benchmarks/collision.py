@@ -16,7 +16,7 @@ from benchmarks._dense import second_order_cost
 from benchmarks._figures import Figure, Report, Sheet, in_turn
 from benchmarks._scene import against_descartes
 from kerfpath import Plan, robot
-from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.arrays import Array, Bools, Ints
 from kerfpath.auditor import checks
 from kerfpath.cell import Cell
 from kerfpath.planner import clearance_map

@@ -18,7 +18,7 @@ from benchmarks._following import Follower
 from benchmarks._random_contours import ROBOTS, Cut, cut
 from benchmarks._tally import Outcome, sheet
 from kerfpath import NoFeasiblePath, plan
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.planner import layered_graph
 from kerfpath.plans import Plan
 

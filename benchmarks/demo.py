@@ -21,11 +21,11 @@ start, frames and sampling, plan and program files, kernels that `warm_up` leave
 
 CLOCKS = {
     "compile (cold only)": ("kerfpath.job", "warm_up"),
-    "read STEP": ("kerfpath.cli._plan", "drawing_of"),
-    "graph": ("kerfpath.job.format._read", "layered_graph"),
-    "search and refinement": ("kerfpath.planner._continuous", "clear_motion"),
-    "audit": ("kerfpath.job.format._program", "checks"),
-    "report": ("kerfpath.job.output._files", "report_text"),
+    "read STEP": ("kerfpath.cli.plan_output", "drawing_of"),
+    "graph": ("kerfpath.job.format.reading", "layered_graph"),
+    "search and refinement": ("kerfpath.planner.continuous", "clear_motion"),
+    "audit": ("kerfpath.job.format.program", "checks"),
+    "report": ("kerfpath.job.output.writing", "report_text"),
 }
 PARTS = ("import", *CLOCKS, "other")
 

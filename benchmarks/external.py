@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks._figures import Report, Sheet
 from kerfpath import Contour, NoFeasiblePath, PlanOptions, fastest_speed, plan, robot
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.robots import Robot
 
 __all__ = ["run"]

@@ -14,7 +14,7 @@ from scipy.spatial.transform import RigidTransform
 from benchmarks._arm import arm, chain
 from benchmarks._figures import Figure, Report, in_turn
 from kerfpath import Robot
-from kerfpath._arrays import Array, Bools, Ints
+from kerfpath.arrays import Array, Bools, Ints
 from kerfpath.kernels.kinematics import POSTURES, inverse_all
 
 __all__ = ["run"]

@@ -22,8 +22,8 @@ from OCP.STEPControl import STEPControl_Reader, STEPControl_StepModelType, STEPC
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
 
 from benchmarks._figures import Figure, Report, in_turn
-from kerfpath import apart
-from kerfpath.cad import _read, read
+from kerfpath import isolated
+from kerfpath.cad import read, reading
 
 __all__ = ["run"]
 
@@ -80,13 +80,13 @@ def _bare(path: Path) -> None:
 
 
 def _ours(path: Path) -> None:
-    _read._kept.clear()
+    reading._kept.clear()
     read(path)
 
 
 def _worker() -> int:
-    assert apart._worker is not None
-    return apart._worker.process.pid
+    assert isolated._worker is not None
+    return isolated._worker.process.pid
 
 
 def _peak(process: str) -> float:

@@ -16,11 +16,11 @@ from benchmarks._figures import Figure, Report
 from kerfpath.job import Goal, Job, warm_up
 from kerfpath.search import SearchProblem, find_least_interval
 from kerfpath.study import Layout, digest, layout
-from kerfpath.study._evaluator import SampledContour
-from kerfpath.study.placing._evaluate import contours_of, evaluate_placements, nodes_of
-from kerfpath.study.placing._place import middle_of, move_job, numbers_of
-from kerfpath.study.placing._search import HALF
-from kerfpath.study.placing._value import PlacementValue
+from kerfpath.study.evaluator import SampledContour
+from kerfpath.study.placing.evaluator import PlacementValue
+from kerfpath.study.placing.place import middle_of, move_job, numbers_of
+from kerfpath.study.placing.search import HALF
+from kerfpath.study.placing.study import contours_of, evaluate_placements, nodes_of
 
 __all__ = ["run"]
 

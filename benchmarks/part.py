@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks._figures import Figure, Report, Sheet
 from benchmarks._process import parts
 from kerfpath import Contour, Plan, plan
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Cell
 from kerfpath.job import ContourSpec, Job, cell_of_job, read_job
@@ -30,11 +30,11 @@ TARGET = 60.0
 """s, of a warm run on two cores."""
 
 CLOCKS = {
-    "compiling": ("kerfpath.cli._plan", "compile_kernels"),
-    "reading the STEP file": ("kerfpath.cli._plan", "drawing_of"),
-    "planning and audit": ("kerfpath.job.run._run", "cut_candidate"),
-    "order and air moves": ("kerfpath.job.run._run", "order_cuts"),
-    "writing": ("kerfpath.cli._plan", "write_result"),
+    "compiling": ("kerfpath.cli.plan_output", "compile_kernels"),
+    "reading the STEP file": ("kerfpath.cli.plan_output", "drawing_of"),
+    "planning and audit": ("kerfpath.job.run.contour", "cut_candidate"),
+    "order and air moves": ("kerfpath.job.run.contour", "order_cuts"),
+    "writing": ("kerfpath.cli.plan_output", "write_result"),
 }
 PARTS = ("import", *CLOCKS, "other")
 

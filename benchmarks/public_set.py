@@ -32,7 +32,7 @@ from benchmarks._public_planners import PLANNERS, answer
 from benchmarks._public_tables import written
 from benchmarks.public.check import INSTANCES, KNOWN, check, instance, names
 from benchmarks.public.outside.__main__ import NAMES as OUTSIDE
-from kerfpath._writing import write_whole
+from kerfpath.files import write_whole
 
 ANSWERS = Path(__file__).parents[1] / "build" / "public-set"
 LONGEST = 300.0

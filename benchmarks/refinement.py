@@ -15,7 +15,7 @@ from benchmarks import _arm
 from benchmarks._descartes import NotRun, Task, solve
 from benchmarks._figures import Figure, Report, Sheet, in_turn, peak_megabytes
 from kerfpath import Contour, NoFeasiblePath, Robot, plan
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, read_job
 from kerfpath.planner import layered_graph

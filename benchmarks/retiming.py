@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks._figures import Figure, Report, in_turn
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.limits import Limits
 from kerfpath.retime import retime
 

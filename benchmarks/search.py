@@ -13,7 +13,7 @@ from benchmarks._dense import Metric, dense_cost
 from benchmarks._descartes import NotRun, Task, solve
 from benchmarks._figures import Figure, Report, in_turn, peak_megabytes
 from kerfpath import LayeredPath, Robot, shortest_path
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.graph import LayeredGraph
 from kerfpath.planner import layered_graph, node_interval
 

@@ -22,7 +22,7 @@ import numpy as np
 import kerfpath
 from benchmarks._figures import Figure, Report
 from kerfpath import sweep
-from kerfpath.sweep._local import ONE_THREAD
+from kerfpath.sweep.workers import ONE_THREAD
 
 __all__ = ["run"]
 

@@ -13,12 +13,12 @@ import numpy as np
 from benchmarks import _arm
 from benchmarks._figures import Figure, Report, in_turn
 from kerfpath import NoFeasiblePath, Robot, shortest_path
-from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.auditor._torque import LagrangeArm
+from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.auditor.steps import LagrangeArm
 from kerfpath.dynamics import Load
 from kerfpath.limits import TorqueLimit
 from kerfpath.planner import layered_graph, node_interval
-from kerfpath.robots._chain import model_chain
+from kerfpath.robots.chains import model_chain
 from kerfpath.urdf import ChainInertia
 
 __all__ = ["run"]

@@ -1,4 +1,4 @@
-"""Functions that the tests of `kerfpath.apart` call in another process."""
+"""Functions that the tests of `kerfpath.isolated` call in another process."""
 
 import ctypes
 import os

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from kerfpath import apart, compiling
+from kerfpath import compiling, isolated
 from kerfpath.certificate import USUAL
-from kerfpath.certifier import _certify, _largest, _nopath
+from kerfpath.certifier import bound, infeasibility
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
-from kerfpath.planner import _closed, _quickest
+from kerfpath.planner import on_grid, quickest
 from kerfpath.robots import robot
 
 # The same examples in every run, without a deadline that a busy machine could miss.
@@ -39,16 +39,16 @@ def pose(xyz, rotation=None):
 # A plan states a bound by default, which takes seconds. Tests ask for it where they are about it,
 # and jobs get a little of it; the processes that tests start state it as a user sees it.
 PlanOptions.__init__.__kwdefaults__["certify"] = None
-USUAL_WORK = _certify.MOST_PAIRS, _certify.MOST_PER_NODE
-_certify.MOST_PAIRS, _certify.MOST_PER_NODE = 1_500_000, 0
+USUAL_WORK = bound.MOST_PAIRS, bound.MOST_PER_NODE
+bound.MOST_PAIRS, bound.MOST_PER_NODE = 1_500_000, 0
 
 
 # So does the search for the quickest motion, which takes seconds a contour, and its ceiling.
-USUAL_RUNGS, _quickest.RUNGS = _quickest.RUNGS, ()
-_closed.MOST_BINDING = 2
-_largest.FAILED = 2
-USUAL_CEILING = _nopath.MOST_STEPS, _nopath.MOST_PAIRS
-_nopath.MOST_STEPS, _nopath.MOST_PAIRS = 200_000, 3_000_000
+USUAL_RUNGS, quickest.RUNGS = quickest.RUNGS, ()
+on_grid.MOST_BINDING = 2
+infeasibility.FAILED = 2
+USUAL_CEILING = infeasibility.MOST_STEPS, infeasibility.MOST_PAIRS
+infeasibility.MOST_STEPS, infeasibility.MOST_PAIRS = 200_000, 3_000_000
 
 
 def pytest_sessionstart(session):
@@ -81,14 +81,14 @@ def pytest_collection_modifyitems(items):
 @pytest.fixture
 def quickest_at_work(monkeypatch):
     """Look for the quickest motion as far as outside the tests."""
-    monkeypatch.setattr(_quickest, "RUNGS", USUAL_RUNGS)
+    monkeypatch.setattr(quickest, "RUNGS", USUAL_RUNGS)
 
 
 @pytest.fixture
 def ceiling_at_work(monkeypatch):
     """Let the search for what is impossible work as much as outside the tests."""
-    monkeypatch.setattr(_nopath, "MOST_STEPS", USUAL_CEILING[0])
-    monkeypatch.setattr(_nopath, "MOST_PAIRS", USUAL_CEILING[1])
+    monkeypatch.setattr(infeasibility, "MOST_STEPS", USUAL_CEILING[0])
+    monkeypatch.setattr(infeasibility, "MOST_PAIRS", USUAL_CEILING[1])
 
 
 @pytest.fixture
@@ -100,15 +100,15 @@ def certified_by_default(monkeypatch):
 @pytest.fixture
 def certifier_at_work(monkeypatch):
     """Let the certifier work as much as outside the tests."""
-    monkeypatch.setattr(_certify, "MOST_PAIRS", USUAL_WORK[0])
-    monkeypatch.setattr(_certify, "MOST_PER_NODE", USUAL_WORK[1])
+    monkeypatch.setattr(bound, "MOST_PAIRS", USUAL_WORK[0])
+    monkeypatch.setattr(bound, "MOST_PER_NODE", USUAL_WORK[1])
 
 
 @pytest.fixture(scope="session", autouse=True)
 def reader():
     """Keep the process that reads files: between tests it would leave, and start again for 2 s."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(apart, "IDLE", 600.0)
+        patch.setattr(isolated, "IDLE", 600.0)
         yield
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job import cell_of_job
-from kerfpath.job.run._speeds import fastest_along
+from kerfpath.job.run.speeds import fastest_along
 
 DEMO = Path(str(files("kerfpath") / "demo"))
 

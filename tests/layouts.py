@@ -7,8 +7,8 @@ import numpy as np
 from conftest import ROOT
 from jobs import ENDLESS_AND_HEAD, ROBOT_AND_HEAD
 from kerfpath.study import digest
-from kerfpath.study.placing._evaluate import evaluate_placements
-from kerfpath.study.placing._value import PlacementValue
+from kerfpath.study.placing.evaluator import PlacementValue
+from kerfpath.study.placing.study import evaluate_placements
 
 DEMO = ROOT / "src" / "kerfpath" / "demo"
 HEAD = f"""

@@ -19,9 +19,9 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 
 from kerfpath.cad import read, read_measured
 from kerfpath.cell import Hull, link_bodies
-from kerfpath.cell._stl import close_surface, read_surface
-from kerfpath.cli._audit import show_audit
-from kerfpath.cli._contours import list_contours
+from kerfpath.cell.mesh import close_surface, read_surface
+from kerfpath.cli.check_output import show_audit
+from kerfpath.cli.drawing_output import list_contours
 from kerfpath.errors import InputError, about
 from kerfpath.job import (
     cell_of_job,
@@ -33,8 +33,8 @@ from kerfpath.job import (
 from kerfpath.placement import placement_from_points
 from kerfpath.post import languages
 from kerfpath.robots import Robot
-from kerfpath.sweep._store import Store
-from kerfpath.sweep._task import Failure, Task, TaskOutcome
+from kerfpath.sweep.store import Store
+from kerfpath.sweep.task import Failure, Task, TaskOutcome
 from spoilt import Reader, Whole
 
 LOOPS = 8

@@ -23,9 +23,9 @@ from apart_calls import (
     whose,
 )  # fmt: skip
 from conftest import ROOT
-from kerfpath import apart as module
-from kerfpath.apart import call_apart
+from kerfpath import isolated as module
 from kerfpath.errors import InputError
+from kerfpath.isolated import call_apart
 
 
 def asked_in_a_fork(answers):
@@ -110,7 +110,7 @@ def test_a_process_that_stands_by_imports_what_it_will_be_asked_for(wanted, ther
 INTERRUPTED = """
 import signal
 from apart_calls import doubled, interrupted
-from kerfpath.apart import call_apart
+from kerfpath.isolated import call_apart
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # where it was ignored by who started this
 try:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from jobs import DEMO, SMALL
-from kerfpath.apart import python_command
+from kerfpath.isolated import python_command
 
 COMMAND = [Path(sys.executable).parent / "kerfpath"]
 MODULE = [sys.executable, "-m", "kerfpath"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from kerfpath import InputError
-from kerfpath._extras import NEEDS, imported, require_extra
+from kerfpath.extras import NEEDS, imported, require_extra
 
 ROOT = Path(__file__).parents[1]
 WITHOUT = f"""

@@ -11,7 +11,7 @@ from kerfpath import Band, Comfort, InputError, robot
 from kerfpath.graph import build, gamma_grid
 from kerfpath.options import PlanOptions
 from kerfpath.planner import layered_graph
-from kerfpath.planner._graph import within_margins
+from kerfpath.planner.layers import within_margins
 from kerfpath.robots import FAMILIES
 
 

@@ -44,9 +44,8 @@ def test_every_equation_has_a_test_that_names_it(number):
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda f: str(f.relative_to(ROOT)))
-def test_a_module_stays_under_400_lines_and_keeps_the_house_rules(source):
+def test_a_module_keeps_the_house_rules(source):
     text = source.read_text()
-    assert len(text.splitlines()) <= 400
     assert not re.search(r"fastmath *= *True|prange|except Exception|except:", text)
     if "cli" not in source.parts:
         assert not re.search(r"(?<![\w.])print\(", text)

@@ -18,10 +18,10 @@ from tests.post.external_cells import moving_plan
 
 from conftest import ROOT
 from kerfpath import InputError, Tilt, robot
-from kerfpath.job.output._files import trajectory_text
+from kerfpath.job.output.writing import trajectory_text
 from kerfpath.post import joint_trajectory, post
 from kerfpath.post.ros import RosSettings
-from kerfpath.report._motion import cutting_speed, joint_positions, limit_shares
+from kerfpath.report.motion import cutting_speed, joint_positions, limit_shares
 from programs import arc, frames, hand_plan
 
 PAGE = (ROOT / "docs" / "interoperability.md").read_text(encoding="utf-8")

@@ -20,7 +20,7 @@ from kerfpath import (
     PlanOptions,
     Tilt,
 )
-from kerfpath.job.format.tables._plan import PlanTable
+from kerfpath.job.format.tables.plan import PlanTable
 from kerfpath.options import OptionData, PlanKeywords
 
 EVERY = PlanOptions(

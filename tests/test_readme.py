@@ -25,10 +25,10 @@ def test_every_link_leads_somewhere():
 
 
 def test_every_command_it_shows_exists():
-    from kerfpath.cli import _programs, _studies
-    from kerfpath.cli._main import app
+    from kerfpath.cli import programs, studies
+    from kerfpath.cli.main import app
 
-    assert _programs, _studies  # their commands
+    assert programs, studies  # their commands
 
     known = {command.callback.__name__ for command in app.registered_commands}
     shown = set(re.findall(r"^    kerfpath (\w+)", README, re.MULTILINE))

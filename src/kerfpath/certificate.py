@@ -29,8 +29,7 @@ from typing import TypedDict, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath._arrays import Array, scalar
-from kerfpath._repr import short_repr
+from kerfpath.arrays import Array, scalar, short_repr
 from kerfpath.errors import InputError
 
 __all__ = [

@@ -32,8 +32,16 @@ from typing import TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Bools, as_pose, floats, freeze, not_negative, require_one_of
-from kerfpath._repr import short_repr
+from kerfpath.arrays import (
+    Array,
+    Bools,
+    as_pose,
+    floats,
+    freeze,
+    not_negative,
+    require_one_of,
+    short_repr,
+)
 from kerfpath.errors import InputError
 from kerfpath.kernels.turns import JointLimits
 from kerfpath.losses import Loss, Reason

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from kerfpath._arrays import freeze
-from kerfpath.apart import python_command
+from kerfpath.arrays import freeze
 from kerfpath.certifier import compile_bound
 from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.graph import build, gamma_grid
+from kerfpath.isolated import python_command
 from kerfpath.kernels import CACHE
 from kerfpath.kernels.metric import MANHATTAN, maximum_distance, total_distance
 from kerfpath.robots import Robot, robot

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, floats, freeze, not_negative
-from kerfpath._repr import short_repr
+from kerfpath.arrays import Array, floats, freeze, not_negative, short_repr
 from kerfpath.errors import InputError
 from kerfpath.kernels.dynamics import ArmBodies, torques
 from kerfpath.urdf import ChainInertia, KinematicChain, joined, require_tensor

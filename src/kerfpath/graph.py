@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath._arrays import Array, Bools, Ints, freeze, scalar
+from kerfpath.arrays import Array, Bools, Ints, freeze, scalar
 from kerfpath.errors import InputError
 from kerfpath.kernels.turns import JointLimits, count_admissible, fill_admissible
 from kerfpath.losses import Loss, Reason

@@ -13,8 +13,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, Ints, floats, freeze, positive, scalar
-from kerfpath._repr import short_repr
+from kerfpath.arrays import Array, Ints, floats, freeze, positive, scalar, short_repr
 from kerfpath.dynamics import ArmDynamics
 from kerfpath.errors import InputError
 

@@ -9,8 +9,7 @@ from typing import Any, Literal, TypedDict, cast, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath._arrays import Array, floats, require_one_of, scalar
-from kerfpath._repr import short_repr
+from kerfpath.arrays import Array, floats, require_one_of, scalar, short_repr
 from kerfpath.certificate import USUAL, Certify, CertifyData
 from kerfpath.comfort import Band, BandData, Comfort
 from kerfpath.contour import FrameKind

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array, as_pose, floats, freeze, scalar
-from kerfpath._repr import short_repr
+from kerfpath.arrays import Array, as_pose, floats, freeze, scalar, short_repr
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels.metric import turns_of
 from kerfpath.planner import plan as plan_contour

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from kerfpath._arrays import Array, Ints, floats, freeze, positive
+from kerfpath.arrays import Array, Ints, floats, freeze, positive
 from kerfpath.errors import InputError
 from kerfpath.limits import Limits, meetings, rates_of
 from kerfpath.plans import Feed

@@ -8,7 +8,7 @@ from typing import TypedDict
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath._arrays import Array, freeze, not_negative
+from kerfpath.arrays import Array, freeze, not_negative
 from kerfpath.errors import InputError
 
 __all__ = ["Tilt", "TiltData", "tilt_frames"]

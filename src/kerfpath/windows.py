@@ -8,8 +8,7 @@ from typing import TypedDict
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, freeze, scalar
-from kerfpath._repr import short_repr
+from kerfpath.arrays import Array, Bools, freeze, scalar, short_repr
 from kerfpath.errors import InputError
 
 __all__ = [

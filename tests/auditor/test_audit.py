@@ -10,7 +10,7 @@ from tests.robots.test_robot import pinocchio_pose, random_joints
 import naive
 from kerfpath import Contour, InputError, audit, plan, robot
 from kerfpath.auditor import chain_of, checks
-from kerfpath.auditor._motion import joint_increments
+from kerfpath.auditor.motion import joint_increments
 from kerfpath.robots import Coupling, robot_ids
 
 STEP = np.radians(5)

@@ -8,10 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath import Contour, Plan
 from kerfpath.auditor import chain_of, checks
-from kerfpath.auditor._between import HIDDEN_ANGLE, HIDDEN_SPEED, bound_between_nodes
-from kerfpath.auditor._collision import collision_along
-from kerfpath.auditor._motion import follow, motion_of, straight
-from kerfpath.auditor._swept import HIDDEN
+from kerfpath.auditor.between import HIDDEN_ANGLE, HIDDEN_SPEED, bound_between_nodes
+from kerfpath.auditor.collision import HIDDEN, collision_along
+from kerfpath.auditor.motion import follow, motion_of, straight
 from kerfpath.cell import CuttingHead, box, cell_of
 from kerfpath.options import PlanOptions
 from kerfpath.plans import Proof

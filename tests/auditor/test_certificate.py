@@ -8,10 +8,12 @@ import pytest
 from certificates import every_cell, flat, grid_values, increments, stage_of
 from conftest import pose
 from kerfpath import Contour, InputError, plan, robot
-from kerfpath.auditor import _certificate, _steps, certified_bound, checks
-from kerfpath.auditor._certificate import _asked, _rates
-from kerfpath.auditor._cover import covered
-from kerfpath.auditor._steps import candidates, reduced_costs
+from kerfpath.auditor import certificate as certificate_module
+from kerfpath.auditor import certified_bound, checks
+from kerfpath.auditor import steps as steps_module
+from kerfpath.auditor.certificate import _asked, _rates
+from kerfpath.auditor.cover import covered
+from kerfpath.auditor.steps import candidates, reduced_costs
 from kerfpath.certificate import Certificate
 from kerfpath.plans import Proof
 
@@ -190,9 +192,9 @@ def test_costs_that_are_not_held_are_worked_out_again(which, request, monkeypatc
     of = request.getfixturevalue(which)
     certificate = potential(of) if which == "made" else flat(of)
     bound = certified_bound(certificate, of)
-    monkeypatch.setattr(_certificate, "MOST_HELD", 1000)
-    monkeypatch.setattr(_steps, "FOUND_AT_ONCE", 700)
-    monkeypatch.setattr(_steps, "AT_ONCE", 300)
+    monkeypatch.setattr(certificate_module, "MOST_HELD", 1000)
+    monkeypatch.setattr(steps_module, "FOUND_AT_ONCE", 700)
+    monkeypatch.setattr(steps_module, "AT_ONCE", 300)
     assert certified_bound(certificate, of) == bound
 
 

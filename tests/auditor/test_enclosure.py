@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from conftest import pose
 from kerfpath import InputError, robot
 from kerfpath.auditor import chain_of
-from kerfpath.auditor._enclosure import Status, enclose, linear_minimum
+from kerfpath.auditor.enclosure import Status, enclose, linear_minimum
 from kerfpath.robots import robot_ids
 
 NAMES = [name for name in robot_ids() if robot(name).kinematics in ("opw", "ur")]

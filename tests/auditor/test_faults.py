@@ -8,7 +8,7 @@ import pytest
 from kerfpath import Contour, InputError, plan
 from kerfpath.auditor import bound_checks, certified_bound
 from kerfpath.certificate import BASE
-from kerfpath.certifier import _certify as course
+from kerfpath.certifier import bound as course
 from kerfpath.certifier import certify
 from kerfpath.plans import Proof
 

@@ -5,8 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from kerfpath.auditor._intervals import HALF_TURN, Interval, exact, stack
-from kerfpath.auditor._jets import angle_from, argument, constant
+from kerfpath.auditor.jets import HALF_TURN, Interval, angle_from, argument, constant, exact, stack
 
 MANY = 400
 

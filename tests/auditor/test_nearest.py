@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from kerfpath.auditor import chain_of
-from kerfpath.auditor._nearest import nearest
-from kerfpath.auditor._swept import Moves
+from kerfpath.auditor.collision import Moves, nearest
 from kerfpath.cell import Mesh, box, cell_of
 
 

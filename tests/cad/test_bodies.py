@@ -17,9 +17,9 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 from tests.cad.test_part import compound, cut, cylinder, plate, tube, write_step
 
 from kerfpath.cad import Part, read
-from kerfpath.cad._bodies import bodies_of
-from kerfpath.cad._loops import bounds_of
-from kerfpath.cad._shape import list_shapes
+from kerfpath.cad.loops import bounds_of
+from kerfpath.cad.sewing import bodies_of
+from kerfpath.cad.shape import list_shapes
 
 EXACT = 1e-7
 """m: IGES writes 13 digits of places hundreds of mm off."""

@@ -13,7 +13,7 @@ from ezdxf.layouts import Modelspace
 from tests.cad.test_dxf import BAD, EXACT, bulges, drawn, mirrored_arcs, nested_blocks, splines
 
 from kerfpath.cad import Part, read
-from kerfpath.cli._drawing import drawing_entry
+from kerfpath.cli.drawing_output import drawing_entry
 from kerfpath.errors import InputError
 
 # --- blocks: any affine map ------------------------------------------------------------------
@@ -272,6 +272,6 @@ def test_blocks_of_blocks_without_a_line_end(
                 block.add_blockref(f"B{k - 1}", (0, 0), dxfattribs=rows)
         space.add_blockref("B9", (0, 0))
 
-    monkeypatch.setattr("kerfpath.cad._dxf.MOST", 2000)
+    monkeypatch.setattr("kerfpath.cad.dxf.MOST", 2000)
     with pytest.raises(InputError, match="more than 2000 curves and blocks"):
         drawn(tmp_path, draw)

@@ -15,7 +15,7 @@ from tests.cad.test_part import box, compound, plate, tube, write_step
 
 from kerfpath import InputError
 from kerfpath.cad import read
-from kerfpath.cad._shape import list_shapes
+from kerfpath.cad.shape import list_shapes
 
 FACE = TopAbs_ShapeEnum.TopAbs_FACE
 FILE = 1e-9

@@ -42,8 +42,8 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 
 from conftest import ROOT
 from kerfpath.cad import Loop, Part, read
-from kerfpath.cad._build import loop_of
-from kerfpath.cad._sample import EdgeChain
+from kerfpath.cad.build import loop_of
+from kerfpath.cad.curves import EdgeChain
 from kerfpath.errors import InputError
 
 B_PILLAR = ROOT / "src" / "kerfpath" / "demo" / "b_pillar.step"

@@ -3,8 +3,8 @@
 import numpy as np
 
 from jobs import DEMO
-from kerfpath.cad import _read as module
 from kerfpath.cad import read
+from kerfpath.cad import reading as module
 
 
 def test_the_same_content_is_the_same_part_by_its_own_name(tmp_path, monkeypatch):

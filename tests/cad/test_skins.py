@@ -17,7 +17,7 @@ from OCP.TopLoc import TopLoc_Location
 from tests.cad.test_part import box, compound, cut, cylinder, placed, tube, write_step
 
 from kerfpath.cad import Part, read
-from kerfpath.cad._shape import list_shapes
+from kerfpath.cad.shape import list_shapes
 from kerfpath.errors import InputError
 
 EXACT = 1e-9

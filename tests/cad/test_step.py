@@ -24,7 +24,7 @@ from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
 from tests.cad.test_part import box, compound
 
 from kerfpath.cad import Part, read
-from kerfpath.cad._shape import list_shapes
+from kerfpath.cad.shape import list_shapes
 from kerfpath.errors import InputError
 
 SCHEMAS = {"AP203": "CONFIG_CONTROL_DESIGN", "AP214IS": "AUTOMOTIVE", "AP242DIS": "AP242"}

@@ -21,7 +21,7 @@ from kerfpath.cell import (
     read_stl,
     weld,
 )
-from kerfpath.cell._scene import Scene
+from kerfpath.cell.scene import Scene
 from kerfpath.errors import InputError
 from kerfpath.robots import chain_of, robot, robot_ids
 from kerfpath.urdf import KinematicChain

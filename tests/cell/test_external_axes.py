@@ -7,8 +7,7 @@ import pytest
 
 from kerfpath import InputError
 from kerfpath.auditor import chain_of as audit_chain
-from kerfpath.auditor._collision import collision_along
-from kerfpath.auditor._swept import Moves
+from kerfpath.auditor.collision import Moves, collision_along
 from kerfpath.cell import CollisionChecker, Mesh, box, box_between, cell_of, clearances
 from kerfpath.robots import carried, chain_of, lowest_joint
 

@@ -19,7 +19,6 @@ from kerfpath.cell import (
     Hull,
     Mesh,
     MeshHead,
-    _links,
     box,
     box_between,
     cell_of,
@@ -27,7 +26,8 @@ from kerfpath.cell import (
     link_bodies,
     link_capsules,
 )
-from kerfpath.robots import _chain, chain_of, robot_ids
+from kerfpath.cell import links as links_module
+from kerfpath.robots import chain_of, chains, robot_ids
 from kerfpath.urdf import LinkBody as Described
 
 LIBRARY = [robot(name) for name in robot_ids()]
@@ -102,7 +102,7 @@ def test_a_ur_folded_onto_itself_is_not_clear():
 def test_an_arm_of_no_known_family_is_drawn_along_its_chain(monkeypatch):
     """Lines from joint to joint, at any pose, for whatever the description calls its frames."""
     arm = robot("ur_ur10e")
-    monkeypatch.delitem(_links._LINES, "ur")
+    monkeypatch.delitem(links_module._LINES, "ur")
     capsules = {body.frame: body.shape for body in link_capsules(arm)}
     q = np.random.default_rng(52).uniform(-3, 3, (5, 6))
     for frames in chain_of(arm).frames(q):
@@ -113,10 +113,10 @@ def test_an_arm_of_no_known_family_is_drawn_along_its_chain(monkeypatch):
                 np.testing.assert_allclose(ends[1], frames[i + 1, :3, 3], atol=1e-12)
     # Link 6 ends half way to the flange; the base, where joint 1 is.
     assert sorted(capsules) == [0, 1, 2, 3, 4, 5, 6]
-    monkeypatch.delitem(_links._LINES, "opw")
+    monkeypatch.delitem(links_module._LINES, "opw")
     wrist = [body.frame for body in link_capsules(robot("abb_irb4600_60_205"))]
     assert wrist == [0, 1, 2, 3, 6]  # joints 4 to 6 are in one place
-    monkeypatch.delitem(_chain._MODELS, "ur")
+    monkeypatch.delitem(chains._MODELS, "ur")
     with pytest.raises(InputError, match="are known only from a robot description"):
         chain_of(arm)
 

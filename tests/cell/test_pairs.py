@@ -22,8 +22,8 @@ from kerfpath.cell import (
     frustum,
     odd_sizes,
 )
-from kerfpath.cell._pairs import BY_DESIGN
-from kerfpath.cell._shaved import shave
+from kerfpath.cell.links import shave
+from kerfpath.cell.pairs import BY_DESIGN
 from kerfpath.urdf import KinematicChain
 
 ARM = robot("abb_irb2600_12_165")

@@ -9,15 +9,16 @@ from jobs import DEMO
 from kerfpath import InputError, plan
 from kerfpath.auditor import certified_bound
 from kerfpath.certificate import BASE
-from kerfpath.certifier import MotionTest, _largest, certify
-from kerfpath.certifier import _certify as course
-from kerfpath.certifier import _stage as stages
-from kerfpath.certifier._cells import CellMaker
-from kerfpath.certifier._nodes import between, turning_nodes
-from kerfpath.certifier._steps import Steps
+from kerfpath.certifier import MotionTest, certify
+from kerfpath.certifier import bound as course
+from kerfpath.certifier import infeasibility as largest
+from kerfpath.certifier import stages as stages
+from kerfpath.certifier.cells import CellMaker
+from kerfpath.certifier.infeasibility import between, turning_nodes
+from kerfpath.certifier.stages import Steps
 from kerfpath.job import read_job
 from kerfpath.kernels.metric import rho
-from kerfpath.refiner._curves import JointCurves
+from kerfpath.refiner.convex_program import JointCurves
 from kerfpath.tilt import Tilt
 
 pytestmark = pytest.mark.usefixtures("certifier_at_work")
@@ -251,7 +252,7 @@ def test_of_the_largest_step_the_bound_is_below_every_motion(metric, arc, arm, t
     # What the plan itself costs is never proved to be impossible, nor anything above it.
     test = MotionTest(best.robot, best.frames, best.T_flange_tip)
     for share in (1.0, 1.05):
-        assert test.closed_to(_largest._capped(steps_of(best), share * best.cost)) is None
+        assert test.closed_to(largest._capped(steps_of(best), share * best.cost)) is None
     kept = certify(best, gap=0.01)
     assert kept.plan.proof.certificate is None
     assert "no certificate to keep" in kept.statement

@@ -8,10 +8,10 @@ from benchmarks import _arm
 from benchmarks._random_contours import cut
 
 from kerfpath import PlanOptions, plan
-from kerfpath.certifier import _certify as course
+from kerfpath.certifier import bound as course
 from kerfpath.certifier import certify
-from kerfpath.certifier._cells import CellSet
-from kerfpath.certifier._finer import cells_to_divide
+from kerfpath.certifier.cells import CellSet
+from kerfpath.certifier.infeasibility import cells_to_divide
 
 WEIGHT = np.array([1.0, 2.0])
 

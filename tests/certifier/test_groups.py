@@ -5,12 +5,10 @@ import pytest
 from benchmarks import _arm
 
 from kerfpath import plan
-from kerfpath.certifier import _certify as course
-from kerfpath.certifier import _parts, certify
-from kerfpath.certifier._cells import CellMaker
-from kerfpath.certifier._groups import distinct_groups
-from kerfpath.certifier._stage import solve_stage
-from kerfpath.certifier._steps import Steps
+from kerfpath.certifier import bound as course
+from kerfpath.certifier import certify, infeasibility
+from kerfpath.certifier.cells import CellMaker
+from kerfpath.certifier.stages import Steps, distinct_groups, solve_stage
 from kerfpath.kernels.metric import MANHATTAN
 
 RANGE = np.radians([180, 95, 70, 250, 115, 350])
@@ -116,7 +114,7 @@ def test_bounding_repeated_motions_once_proves_the_same(robot, arc, tool, placem
     def every(result, kept, maker):
         return [np.isin(np.arange(len(kept)), group) for group in groups(result, kept)]
 
-    for module in (course, _parts):
+    for module in (course, infeasibility):
         monkeypatch.setattr(module, "distinct_groups", every)
     twice = certify(best, checkable=False)
     assert once.pairs < twice.pairs

@@ -8,12 +8,11 @@ import pytest
 from from_python import from_python
 from kerfpath import plan
 from kerfpath.certificate import cell_bounds
-from kerfpath.certifier import _certify as course
-from kerfpath.certifier import _stage, certify
-from kerfpath.certifier._bends import cross_bends
-from kerfpath.certifier._prices import limit_prices
-from kerfpath.certifier._stage import solve_stage
-from kerfpath.certifier._steps import Steps
+from kerfpath.certifier import bound as course
+from kerfpath.certifier import certify
+from kerfpath.certifier import stages as stage
+from kerfpath.certifier.bound import limit_prices
+from kerfpath.certifier.stages import Steps, cross_bends, solve_stage
 from kerfpath.kernels import outer
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN
@@ -204,7 +203,7 @@ def test_steps_that_may_not_follow_each_other_are_left_out(planned, monkeypatch)
         seen.append((packed, (begin, to, cost, behind.copy()), most, found[0]))
         return found
 
-    monkeypatch.setattr(_stage, "cross_bends", kept)
+    monkeypatch.setattr(stage, "cross_bends", kept)
     plain = solve_stage(cells, one.steps)
     result = solve_stage(cells, one.steps, most=best.cost * 1.2)
     (packed, steps_in, most, found) = seen[0]

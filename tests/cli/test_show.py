@@ -12,15 +12,15 @@ import pytest
 from commands import run
 from jobs import DEMO, SMALL
 from kerfpath import plan
-from kerfpath.cli import _show
-from kerfpath.cli._show import merge_notes, progress_bars, sweep_bar, table
+from kerfpath.cli import show as show_module
+from kerfpath.cli.show import merge_notes, progress_bars, sweep_bar, table
 
 LONG = ["a hole whose name is quite long", "outer trim line, upper half", "slot/7"]
 
 
 @pytest.fixture(params=[80, 120])
 def width(request, monkeypatch):
-    monkeypatch.setattr(_show.out, "_width", request.param)
+    monkeypatch.setattr(show_module.out, "_width", request.param)
     return request.param
 
 
@@ -89,7 +89,7 @@ def test_a_table_leaves_columns_out_before_it_hides_what_matters(width):
 
 def test_headings_are_folded_only_where_that_makes_room(monkeypatch):
     def heads(width):
-        monkeypatch.setattr(_show.out, "_width", width)
+        monkeypatch.setattr(show_module.out, "_width", width)
         out = io.StringIO()
         with redirect_stdout(out):
             table(columns, rows, numbers=columns[1:3])
@@ -112,7 +112,7 @@ def test_equal_notes_are_merged():
 
 
 def test_without_a_terminal_lines_tell_what_is_being_done(monkeypatch):
-    monkeypatch.setattr(_show, "LINE_SECONDS", 0.02)
+    monkeypatch.setattr(show_module, "LINE_SECONDS", 0.02)
     said = io.StringIO()
     with redirect_stderr(said), progress_bars() as progress:
         progress("trim", 3, 9)
@@ -121,7 +121,7 @@ def test_without_a_terminal_lines_tell_what_is_being_done(monkeypatch):
         time.sleep(0.1)
     assert "kerfpath: trim, 3 of 9 nodes (0 s)\n" in said.getvalue()
     assert "kerfpath: trim: refinement (0 s)\n" in said.getvalue()
-    monkeypatch.setattr(_show.quiet, "is_set", lambda: True)
+    monkeypatch.setattr(show_module.quiet, "is_set", lambda: True)
     said = io.StringIO()
     with redirect_stderr(said), progress_bars() as progress:
         progress("trim", 3, 9)
@@ -131,16 +131,16 @@ def test_without_a_terminal_lines_tell_what_is_being_done(monkeypatch):
 
 def test_quiet_is_an_option_of_every_command(monkeypatch):
     assert run("--quiet", "robots", "--json").returncode == 0
-    assert _show.quiet.is_set()
+    assert show_module.quiet.is_set()
     assert run("robots", "--json").returncode == 0
-    assert not _show.quiet.is_set()
+    assert not show_module.quiet.is_set()
 
 
 def test_bars_have_their_phases(monkeypatch):
     terminal = io.StringIO()
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(_show.errors, "_force_terminal", True)
-    monkeypatch.setattr(_show.errors, "is_interactive", True)
+    monkeypatch.setattr(show_module.errors, "_force_terminal", True)
+    monkeypatch.setattr(show_module.errors, "is_interactive", True)
     with redirect_stderr(terminal), progress_bars() as progress:
         progress("trim", 9, 9)
         progress("trim: search", 0, 0)

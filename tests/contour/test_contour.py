@@ -124,7 +124,7 @@ def test_sharp_corners_get_the_nodes_that_the_tolerance_asks_for(monkeypatch):
     assert 5 < len(sheet.resample(tolerance=1e-3)) <= sheet.length / (np.sqrt(8) * 1e-3) + 2
     turning = Contour([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [DOWN, DOWN, (0, np.sin(1), -np.cos(1))])
     assert 2 < len(turning.resample(axis_tolerance=1e-3)) < 2001
-    monkeypatch.setattr("kerfpath.contour._sampling.MOST_NODES", 20)
+    monkeypatch.setattr("kerfpath.contour.sampling.MOST_NODES", 20)
     with pytest.raises(InputError, match="more than 20 nodes"):
         sheet.resample(tolerance=1e-3)
 

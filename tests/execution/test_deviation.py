@@ -5,7 +5,7 @@ import pytest
 
 from kerfpath import Contour
 from kerfpath.execution import ToolCourse, deviation_of
-from kerfpath.execution._executed import Executed
+from kerfpath.execution.executed import Executed
 from kerfpath.post import LinearMove
 
 SIDE, ZONE = 0.02, 0.004

@@ -10,14 +10,7 @@ from tests.post.external_cells import CELLS, ExternalCase, moving_plan, with_axe
 from conftest import pose
 from kerfpath import robot
 from kerfpath.auditor import chain_of
-from kerfpath.execution import (
-    _keep,
-    executed,
-    from_stop_to_stop,
-    keep_limits,
-    run_along,
-    timing_of,
-)
+from kerfpath.execution import executed, from_stop_to_stop, keep, keep_limits, run_along, timing_of
 from kerfpath.post import Controller, LinearMove, build_program, with_tips
 from programs import arc
 
@@ -214,7 +207,7 @@ def test_what_axes_need_between_the_nodes_is_brought_within_the_limits():
 
 
 def test_an_axis_that_needs_too_much_is_named(monkeypatch):
-    monkeypatch.setattr(_keep, "ROUNDS", 1)  # the words are those of ten
+    monkeypatch.setattr(keep, "ROUNDS", 1)  # the words are those of ten
     plan = made("rail+table", waves, speed=0.04)
     _, acceleration = plan.robot.speed_limits()
     needed = acceleration * np.abs(plan.acceleration_share).max(axis=0)

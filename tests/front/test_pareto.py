@@ -31,8 +31,7 @@ from kerfpath.front import (
     hypervolume,
     plan_run,
 )
-from kerfpath.front._problem import Solution
-from kerfpath.front._subproblem import grid
+from kerfpath.front.problem import Solution, grid
 from kerfpath.planner import layered_graph
 from kerfpath.transfer import least_time
 

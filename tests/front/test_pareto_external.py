@@ -92,7 +92,7 @@ def test_a_run_whose_window_leaves_the_courses_looks_for_one_within_it(problem, 
 def test_windows_for_the_range_of_all_joints_leave_the_courses_alone(problem):
     made = problem.solve(problem.unbounded, first=True)
     known = problem.evaluate(made)
-    from kerfpath.front._problem import Gap, Solution
+    from kerfpath.front.problem import Gap, Solution
 
     worse = Solution(losses=known.losses, spans=known.spans, number=0, run=problem.unbounded)
     criterion = problem.criteria[1]

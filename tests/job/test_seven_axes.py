@@ -10,8 +10,8 @@ from commands import run
 from jobs import SLITS
 from kerfpath import InputError, audit, robot
 from kerfpath.job import read_job, read_plan_file
-from kerfpath.studio._scene import scene_of_robot
-from kerfpath.study._robots import with_robot
+from kerfpath.studio.scene import scene_of_robot
+from kerfpath.study.robots import with_robot
 
 JOB = """
 [robot]

@@ -16,8 +16,8 @@ from kerfpath import NoFeasiblePath, shortest_path
 from kerfpath.kernels import exact, limits, to_go
 from kerfpath.kernels import search as kernel
 from kerfpath.kernels.search import LostTime
-from kerfpath.search._exact import NO_SEAM, best_allowed
-from kerfpath.search._layers import sort_layers
+from kerfpath.search.exact import NO_SEAM, best_allowed
+from kerfpath.search.problem import sort_layers
 
 distance, fill_increment, is_shut, late_cost, shut_edges = map(
     from_python,

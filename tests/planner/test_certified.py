@@ -8,7 +8,7 @@ import pytest
 from kerfpath import Certify, Contour, fastest_speed, pareto, plan, plan_in_pieces, refine, refiner
 from kerfpath.certifier import Certified
 from kerfpath.placement import placed
-from kerfpath.planner import _certified, with_bound
+from kerfpath.planner import planning, with_bound
 from kerfpath.plans import Proof
 from kerfpath.sequence import plan_part
 
@@ -28,7 +28,7 @@ def asked(monkeypatch):
         bounded = replace(made, proof=proof)
         return Certified(plan=bounded, done=False, statement="a bound is proved")
 
-    monkeypatch.setattr(_certified, "certify", certify)
+    monkeypatch.setattr(planning, "certify", certify)
     return calls
 
 
@@ -131,7 +131,7 @@ def test_where_nothing_can_be_proved_the_statement_says_why(monkeypatch, task, c
     def nothing(made, **_):
         return Certified(plan=made, done=False, statement="no bound: unknown arm")
 
-    monkeypatch.setattr(_certified, "certify", nothing)
+    monkeypatch.setattr(planning, "certify", nothing)
     made = plan(circle, arm, **task)
     assert made.proof.bound is None
     assert made.proof.statement.endswith("; no bound: unknown arm")

@@ -20,8 +20,8 @@ from kerfpath import (
 from kerfpath.cell import box_between, cell_of
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
-from kerfpath.planner import _dip, _thinned, layered_graph
-from kerfpath.planner._task import task_of
+from kerfpath.planner import layered_graph, on_grid, statements
+from kerfpath.planner.task import task_of
 from kerfpath.plans import Proof
 
 STEP = np.radians(4)
@@ -88,11 +88,11 @@ def test_very_many_nodes_are_planned_from_every_few_of_them(
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "postures": (0, 1)}
     options = options | {"speed": 0.1} | TASKS[name]
     plain = plan(circle, arm, **options)
-    lifted, lift = [], _thinned.ThinTask.lifted
+    lifted, lift = [], on_grid.ThinTask.lifted
     monkeypatch.setattr(
-        _thinned.ThinTask, "lifted", lambda *of: lifted.append(lift(*of)) or lifted[-1]
+        on_grid.ThinTask, "lifted", lambda *of: lifted.append(lift(*of)) or lifted[-1]
     )
-    monkeypatch.setattr(_thinned, "MANY", 100)
+    monkeypatch.setattr(on_grid, "MANY", 100)
     made = plan(circle, arm, **options)
     assert len(lifted) == 1
     assert made.cost <= plain.cost * (1 + SAME)
@@ -100,10 +100,10 @@ def test_very_many_nodes_are_planned_from_every_few_of_them(
 
 
 def test_every_few_nodes_are_those_of_the_whole(circle, arm, tool, placement, monkeypatch):
-    monkeypatch.setattr(_thinned, "MANY", 100)
+    monkeypatch.setattr(on_grid, "MANY", 100)
     asked = PlanOptions(gamma_step=STEP, frames="rotation-minimising")
     whole = task_of(circle, arm, asked, tool=tool, placement=placement, speed=0.1)
-    thin = _thinned.thinned(whole)
+    thin = on_grid.thinned(whole)
     graph, nodes = thin.task.graph, [*range(0, 120, 5), 120]
     assert thin.nodes.tolist() == nodes
     assert thin.task.dt == 5 * whole.dt
@@ -135,11 +135,11 @@ def test_poses_of_very_many_nodes_are_solved_only_where_those_of_a_few_do_not_do
     space = circle, arm, tool, placement
     whole, nodes = solved(*space)
     assert nodes == len(circle) == 121
-    monkeypatch.setattr(_thinned, "MANY", 100)
+    monkeypatch.setattr(on_grid, "MANY", 100)
     made, nodes = solved(*space)
     assert nodes == 25
     assert sum(made.counts.values()) * 121 == sum(whole.counts.values()) * 25
-    monkeypatch.setattr(_thinned.ThinTask, "lifted", lambda *of: None)
+    monkeypatch.setattr(on_grid.ThinTask, "lifted", lambda *of: None)
     again, nodes = solved(*space)
     assert nodes == 25 + 121
     np.testing.assert_array_equal(again.q, whole.q)
@@ -154,7 +154,7 @@ def test_a_node_without_a_pose_is_named_among_very_many(circle, arm, tool, place
         points[node] += (0, 0, 30)
         far = replace(circle, points=points)
         broken.append(solved(far, *space)[0])
-        monkeypatch.setattr(_thinned, "MANY", 100)
+        monkeypatch.setattr(on_grid, "MANY", 100)
         broken.append(solved(far, *space)[0])
         monkeypatch.undo()
     for plain, thinned in (broken[:2], broken[2:]):
@@ -167,10 +167,10 @@ def test_a_node_without_a_pose_is_named_among_very_many(circle, arm, tool, place
 def test_a_motion_along_some_nodes_is_one_along_all(
     circle, arm, tool, placement, monkeypatch, intervals, every
 ):
-    monkeypatch.setattr(_thinned, "MANY", 100)
+    monkeypatch.setattr(on_grid, "MANY", 100)
     asked, nodes = PlanOptions(gamma_step=STEP), circle.resample(count=intervals + 1)
     whole = task_of(nodes, arm, asked, tool=tool, placement=placement, speed=0.1)
-    thin = _thinned.thinned(whole)
+    thin = on_grid.thinned(whole)
     assert (np.diff(thin.nodes) == every).all()
     assert intervals - every < thin.nodes[-1] <= intervals
     some = thin.task.plan(np.zeros(len(thin.nodes), int), 0.0, Proof(optimal=False, statement=""))
@@ -179,7 +179,7 @@ def test_a_motion_along_some_nodes_is_one_along_all(
     np.testing.assert_allclose(made.gamma, 0.3 * np.arange(intervals + 1) / intervals, atol=1e-12)
     assert made.time[-1] == whole.times[-1]
     periodic = replace(whole, settings=replace(whole.settings, closure="periodic"))
-    assert (_thinned.thinned(periodic) is None) == (intervals == 103)
+    assert (on_grid.thinned(periodic) is None) == (intervals == 103)
 
 
 def test_with_fewer_nodes_a_tilt_or_another_axis_no_node_is_left_out(
@@ -187,12 +187,12 @@ def test_with_fewer_nodes_a_tilt_or_another_axis_no_node_is_left_out(
 ):
     def thin(robot=arm, **options):
         asked = PlanOptions(gamma_step=np.radians(30), **options)
-        return _thinned.thinned(
+        return on_grid.thinned(
             task_of(circle, robot, asked, tool=tool, placement=placement, speed=0.1)
         )
 
     assert thin() is None
-    monkeypatch.setattr(_thinned, "MANY", 100)
+    monkeypatch.setattr(on_grid, "MANY", 100)
     assert thin() is not None
     assert thin(tilt=Tilt(cone=0.1, steps=1)) is None
     rail = {"lower": 0.0, "upper": 0.1, "velocity": 1.0, "acceleration": 1.0, "step": 0.1}
@@ -249,7 +249,7 @@ def test_a_motion_that_is_just_missed_is_looked_for_on_half_the_step():
 @pytest.mark.slow
 @pytest.mark.parametrize(("closure", "many"), [("free", 800), ("periodic", 800), ("free", 50)])
 def test_it_goes_around_what_is_in_the_way(task, arm, tool, placement, closure, many, monkeypatch):
-    monkeypatch.setattr(_thinned, "MANY", many)  # intervals: there are 60
+    monkeypatch.setattr(on_grid, "MANY", many)  # intervals: there are 60
     there = posts(arm, tool, placement, 6)
     options = task[1] | {"closure": closure}
     blind = plan(*task[0], **options)
@@ -310,7 +310,7 @@ def test_a_feed_reduction_is_no_slower_for_paths_between_the_samples(
     corner = Contour(points, np.c_[lean, 0 * along, -np.ones(81)], name="corner")
     options = {"tool": tool, "placement": placement, "gamma_step": np.radians(5), "feed": "dip"}
     made = plan(corner, arm, speed=speed, **options)
-    monkeypatch.setattr(_dip, "_between_the_samples", lambda task, finder: [])
+    monkeypatch.setattr(statements, "_between_the_samples", lambda task, finder: [])
     without = plan(corner, arm, speed=speed, **options)
     assert made.time[-1] <= without.time[-1]
     if speed == 0.4:

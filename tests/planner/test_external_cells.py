@@ -53,8 +53,8 @@ def test_a_plan_on_a_rail_keeps_clear_of_what_stands_beside_it(along_a_wall):
 def test_courses_keep_clear_where_they_can(along_a_wall):
     """The gentlest course leads into the post; with the cell it leads past it."""
     from kerfpath.options import PlanOptions
-    from kerfpath.planner._courses import GENTLE, courses
-    from kerfpath.planner._task import task_of
+    from kerfpath.planner.external_motion import GENTLE, courses
+    from kerfpath.planner.task import task_of
 
     contour, robot, cell, options = along_a_wall
     there = {name: options[name] for name in ("tool", "placement", "speed")}
@@ -110,7 +110,7 @@ def test_a_cell_of_another_rail_is_refused(along_a_wall, arm, tool):
 def test_ends_that_are_apart_begin_with_the_best_and_lie_far_from_each_other():
     from types import SimpleNamespace
 
-    from kerfpath.planner._coarse import DEARER, ELSEWHERE, FARTHEST, Coarse, apart
+    from kerfpath.planner.on_grid import DEARER, ELSEWHERE, FARTHEST, Coarse, apart
 
     rng = np.random.default_rng(8)
     counts, samples = (6, 9), 18

@@ -9,10 +9,10 @@ import pytest
 from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan, refiner
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
-from kerfpath.planner import _quickest
-from kerfpath.planner._clear import ClearSearch
-from kerfpath.planner._quickest import quick_motions
-from kerfpath.planner._task import task_of
+from kerfpath.planner import quickest as quickest_module
+from kerfpath.planner.collision_free import ClearSearch
+from kerfpath.planner.quickest import quick_motions
+from kerfpath.planner.task import task_of
 from kerfpath.plans import path_cost
 
 STEP = np.radians(6)
@@ -138,8 +138,8 @@ def test_of_a_hopeless_speed_a_motion_is_found_without_the_exact_search(
     def no_search(problem):
         raise AssertionError("the exact search may take minutes here")
 
-    monkeypatch.setattr(_quickest, "find_least_interval", no_search)
-    monkeypatch.setattr(_quickest, "MOST_EDGES", 0)
+    monkeypatch.setattr(quickest_module, "find_least_interval", no_search)
+    monkeypatch.setattr(quickest_module, "MOST_EDGES", 0)
     with pytest.raises(NoFeasiblePath) as caught:
         plan(nodes, arm, speed=20 * fastest.speed, **space)
     needed = caught.value.relaxation.speed * 20

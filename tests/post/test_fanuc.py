@@ -20,7 +20,7 @@ from kerfpath.post import (
     build_program,
     post,
 )
-from kerfpath.post._frames import euler, world
+from kerfpath.post.arcs import euler, world
 from kerfpath.post.fanuc import FanucSettings, axes_from_joints, joints_from_axes, posture
 from kerfpath.robots import robot_ids
 from programs import arc, arced, changed, codes, hand_plan, with_steps
@@ -51,7 +51,7 @@ MEASURED = """
    -150   0   0    0 -90    0  N U T 0  0  0  -835.714 -482.500  965.000  -180   0 -150
 """
 """Axes (deg), configuration, X Y Z (mm) and W P R (deg) of an M-20iD/25 on FANUC's simulated
-controller, measured by others: source in kerfpath.post.fanuc._axes."""
+controller, measured by others: source in kerfpath.post.fanuc.controller."""
 
 
 def read(program, options=OPTIONS):

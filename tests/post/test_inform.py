@@ -16,7 +16,7 @@ from kerfpath.post import (
     build_program,
     post,
 )
-from kerfpath.post._frames import world
+from kerfpath.post.arcs import world
 from kerfpath.post.inform import (
     Inform,
     InformSettings,

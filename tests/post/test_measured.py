@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kerfpath import Robot, robot
-from kerfpath.post._frames import faceplate, world
+from kerfpath.post.arcs import faceplate, world
 from kerfpath.post.inform import joints_from_axes, manipulator_type
-from kerfpath.post.inform._axes import joints_at
+from kerfpath.post.inform.controller import joints_at
 from kerfpath.post.rapid import confdata
 
 PULSES = """

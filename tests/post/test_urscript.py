@@ -18,7 +18,7 @@ from kerfpath.post import (
     post,
 )
 from kerfpath.post.urscript import URScriptSettings
-from kerfpath.post.urscript._switching import distance_ahead, time_ahead
+from kerfpath.post.urscript.writer import distance_ahead, time_ahead
 from programs import arc, arced, changed, codes, hand_plan, read_text, text_of, with_steps
 
 CASE = CASES["urscript"]

@@ -21,7 +21,7 @@ from kerfpath.post import (
     read_program,
     write_files,
 )
-from kerfpath.post._frames import world
+from kerfpath.post.arcs import world
 from kerfpath.post.val3 import (
     Val3,
     Val3Settings,
@@ -173,7 +173,7 @@ def test_without_leads_nothing_is_left_out():
 
 
 def test_a_public_project_for_a_tx90_has_these_axes_this_world_and_these_angles():
-    """Joints, tool and point of AA_Chessie.dtx: source in kerfpath.post.val3._axes."""
+    """Joints, tool and point of AA_Chessie.dtx: source in kerfpath.post.val3.controller."""
     arm = robot("staubli_tx90")
     axes_deg = [-7.236149, 83.896154, 110.243942, 0.0, -14.140096, 172.763851]
     tool = np.eye(4)

@@ -5,7 +5,7 @@ import pytest
 
 from kerfpath import InputError, robot
 from kerfpath.post import build_program
-from kerfpath.post._zones import zones_at
+from kerfpath.post.arcs import zones_at
 from programs import arc, frames, hand_plan
 
 

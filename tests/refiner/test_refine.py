@@ -8,8 +8,8 @@ from scipy.optimize import linprog, minimize
 
 from kerfpath import InputError, audit, plan, refine
 from kerfpath.limits import Limits
-from kerfpath.refiner._program import LinearModel, solve
-from kerfpath.refiner._rates import RateLimits
+from kerfpath.refiner.convex_program import LinearModel, solve
+from kerfpath.refiner.rows import RateLimits
 
 METRICS = ["manhattan", "chebychev", "euclid"]
 STEP = np.radians(2)

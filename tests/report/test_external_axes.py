@@ -10,14 +10,13 @@ from conftest import pose
 from kerfpath import Contour, plan
 from kerfpath.auditor import checks
 from kerfpath.cell import Mesh, box, box_between, cell_of, surface
-from kerfpath.front._criteria import criteria_named
-from kerfpath.job.output._files import trajectory_text
+from kerfpath.front.criteria import criteria_named
+from kerfpath.job.output.writing import trajectory_text
 from kerfpath.options import PlanOptions
 from kerfpath.planner import layered_graph
 from kerfpath.report import ContourSection, render
-from kerfpath.report._cell import add_cell, poses_shown
-from kerfpath.report._motion import joint_positions, limit_shares
-from kerfpath.report._tables import criteria_table
+from kerfpath.report.motion import add_cell, joint_positions, limit_shares, poses_shown
+from kerfpath.report.page import criteria_table
 from kerfpath.robots import carried
 from kerfpath.transfer import transfer_move
 

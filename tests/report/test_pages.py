@@ -19,11 +19,16 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.planner import layered_graph, plan
 from kerfpath.plans import Feed
 from kerfpath.report import ContourSection, feasibility_map, render
-from kerfpath.report._look import JOINT_COLOURS, reason_colours
-from kerfpath.report._map import chosen_line, hidden_postures, shown_postures
-from kerfpath.report._motion import cutting_speed, joint_positions, limit_shares, posture_runs
-from kerfpath.report._scene import scene
-from kerfpath.report._tables import audit_table, counts_table, criteria_table, summary_table
+from kerfpath.report.maps import (
+    JOINT_COLOURS,
+    chosen_line,
+    hidden_postures,
+    reason_colours,
+    shown_postures,
+)
+from kerfpath.report.motion import cutting_speed, joint_positions, limit_shares, posture_runs
+from kerfpath.report.page import audit_table, counts_table, criteria_table, summary_table
+from kerfpath.report.scene import scene
 from kerfpath.robots import posture_name, robot
 
 NODES = 41

@@ -9,7 +9,7 @@ from tests.urdf.test_urdf import frames_of, joint, urdf
 
 from kerfpath import InputError, Robot, robot
 from kerfpath.post import fanuc, inform, krl, rapid, val3
-from kerfpath.post._languages import language
+from kerfpath.post.languages import language
 from kerfpath.robots import robot_ids
 
 SAYS = {"ABB": rapid, "FANUC": fanuc, "KUKA": krl, "Staubli": val3, "Yaskawa": inform}

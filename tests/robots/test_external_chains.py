@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath import Contour, InputError, NoFeasiblePath, Tilt, audit, fastest_speed, plan
 from kerfpath.auditor import chain_of
-from kerfpath.auditor._between import bound_between_nodes
-from kerfpath.auditor._motion import motion_of
+from kerfpath.auditor.between import bound_between_nodes
+from kerfpath.auditor.motion import motion_of
 from kerfpath.planner import external_course
 from kerfpath.robots import ExternalAxis
 

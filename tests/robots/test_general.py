@@ -14,8 +14,8 @@ from kerfpath import Contour, InputError, Robot, audit, plan
 from kerfpath.auditor import chain_of, checks
 from kerfpath.graph import build, gamma_grid
 from kerfpath.job import read_plan_file
-from kerfpath.job.plan_file._write import plan_document, plan_entry, plan_text
-from kerfpath.robots import _general, _ssik
+from kerfpath.job.plan_file.writing import plan_document, plan_entry, plan_text
+from kerfpath.robots import general, ssik_interface
 from kerfpath.urdf import KinematicChain
 
 HALF = np.pi / 2
@@ -145,7 +145,7 @@ def test_searching_from_many_starts_finds_the_same_solutions(offset_wrist):
 def test_many_poses_go_to_a_process_and_come_back_the_same(offset_wrist, monkeypatch):
     T = offset_wrist.forward(np.random.default_rng(45).uniform(-3, 3, (60, 6)))
     q, reach = offset_wrist.inverse_all(T)
-    monkeypatch.setattr(_ssik, "A_PROCESS", 50)
+    monkeypatch.setattr(ssik_interface, "A_PROCESS", 50)
     again, reached = offset_wrist.inverse_all(T)
     np.testing.assert_array_equal(reach, reached)
     np.testing.assert_array_equal(q, again)
@@ -258,7 +258,7 @@ def test_without_the_solver_it_is_said_what_to_install(tmp_path, monkeypatch):
 
 
 def test_an_arm_that_the_solver_does_not_solve_is_refused(monkeypatch):
-    monkeypatch.setattr(_general, "solve", lambda arm, T: (np.zeros((0, 6)), np.zeros(0, int)))
+    monkeypatch.setattr(general, "solve", lambda arm, T: (np.zeros((0, 6)), np.zeros(0, int)))
     with pytest.raises(InputError, match=r"does not solve this arm: it did not recover 24 of 24"):
         arm_from([0.4, 0, 0, 1, 1, 0], [0.2] * 6, [0.1] * 6).inverse(np.eye(4))
 

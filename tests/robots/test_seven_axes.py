@@ -12,7 +12,7 @@ from kerfpath import InputError, Robot, robot
 from kerfpath.comfort import jacobian, measure
 from kerfpath.dynamics import Load
 from kerfpath.robots import chain_of
-from kerfpath.robots._recognise import recognise
+from kerfpath.robots.described import recognise
 from kerfpath.urdf import KinematicChain
 
 LBR = "kuka_lbr_iiwa14_r820"

@@ -11,7 +11,7 @@ from kerfpath.kernels import continuous as kernel
 from kerfpath.kernels.continuous import Steps, Targets
 from kerfpath.limits import Limits
 from kerfpath.search import METRIC_CODES, ContinuousSearch, Effort, GammaSamples, SearchProblem
-from kerfpath.search._continuous import _targets
+from kerfpath.search.continuous import _targets
 
 METRICS = ["manhattan", "chebychev", "euclid"]
 M = 9  # samples on the circle

@@ -78,7 +78,7 @@ def test_the_optimum_agrees_with_trying_every_pair_of_edges(closure):
 @pytest.mark.parametrize("below", [0.3, 20.0])
 @pytest.mark.parametrize("closure", ["free", "periodic"])
 def test_costs_below_zero_change_nothing_but_the_optimum(monkeypatch, closure, below):
-    monkeypatch.setattr("kerfpath.search._exact.ROOM", 30)
+    monkeypatch.setattr("kerfpath.search.exact.ROOM", 30)
     rng = np.random.default_rng(26)
     # From one layer back to it all steps are 0 but for rounding, which is no tie to break.
     assert sum(agree(rng, closure, below=below, layers=(2, 9)) for _ in range(300)) > 60
@@ -246,7 +246,7 @@ def test_ends_that_do_not_repeat_are_refused():
 
 def test_the_bound_cannot_hide_a_dear_optimum(monkeypatch):
     # Forgetting what it recorded must not change the answer.
-    monkeypatch.setattr("kerfpath.search._exact.ROOM", 3)
+    monkeypatch.setattr("kerfpath.search.exact.ROOM", 3)
     rng = np.random.default_rng(24)
     assert sum(agree(rng, "free") for _ in range(200)) > 50
 

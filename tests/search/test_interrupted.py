@@ -8,7 +8,7 @@ from tests.search.posed import interrupted_path
 
 import naive
 from kerfpath import InputError, NoFeasiblePath, shortest_path
-from kerfpath.search import _long_enough as long_enough
+from kerfpath.search import long_enough as long_enough
 
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [0.1]}
 
@@ -184,7 +184,7 @@ def plans(q, start, o, least_piece=0):
 
 
 def test_without_a_record_the_answer_is_the_same(monkeypatch):
-    monkeypatch.setattr("kerfpath.search._exact.ROOM", 3)
+    monkeypatch.setattr("kerfpath.search.exact.ROOM", 3)
     rng = np.random.default_rng(33)
     assert sum(bool(agree(rng, layers=(4, 12))) for _ in range(200)) > 50
 

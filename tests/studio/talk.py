@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from starlette.testclient import TestClient
 
 from jobs import DEMO, SMALL
-from kerfpath.studio._app import application
-from kerfpath.studio._document import Document
+from kerfpath.studio.app import application
+from kerfpath.studio.document import Document
 
 HOST = "127.0.0.1:8087"
 SOCKET = f"ws://{HOST}/ws"

@@ -9,8 +9,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from conftest import ROOT
-from kerfpath.studio._app import application
-from kerfpath.studio._document import Document
+from kerfpath.studio.app import application
+from kerfpath.studio.document import Document
 from studio.talk import HOST
 
 CLIENT = ROOT / "src" / "kerfpath" / "studio" / "client"

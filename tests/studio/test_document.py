@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from jobs import DEMO
 from kerfpath.errors import InputError
-from kerfpath.studio._document import Document, with_values
+from kerfpath.studio.document import Document, with_values
 
 TEXT = (DEMO / "b_pillar.toml").read_text()
 
@@ -157,7 +157,7 @@ def test_a_gesture_after_undo_is_a_step_of_its_own(document):
 
 
 def test_steps_that_can_be_undone_are_bounded(document, monkeypatch):
-    monkeypatch.setattr("kerfpath.studio._document.MOST_STEPS", 5)
+    monkeypatch.setattr("kerfpath.studio.document.MOST_STEPS", 5)
     for i in range(9):
         document.change([(("contour", 0, "speed_m_min"), i + 10)])
     for _ in range(20):
@@ -211,7 +211,7 @@ def test_a_folder_that_cannot_be_written_to_is_said(document, monkeypatch):
     def refuse(files):
         raise OSError(30, "Read-only file system", str(document.beside))
 
-    monkeypatch.setattr("kerfpath.studio._document.write_whole", refuse)
+    monkeypatch.setattr("kerfpath.studio.document.write_whole", refuse)
     with pytest.raises(InputError, match=r"cannot be written .Read-only"):
         document.change([(("plan", "metric"), "euclid")])
 

@@ -9,7 +9,7 @@ import pytest
 from jobs import RAIL_AND_TABLE
 from kerfpath.job import prepare, read_job
 from kerfpath.robots import chain_of
-from kerfpath.studio._scene import scene_of
+from kerfpath.studio.scene import scene_of
 from studio.talk import QUICK, serving, talking, write_job
 from studio.test_session import last, matrix
 

@@ -7,7 +7,7 @@ import pytest
 
 from kerfpath.job import prepare, read_job
 from kerfpath.study.placing import placement_of
-from kerfpath.study.placing._place import move_job
+from kerfpath.study.placing.place import move_job
 from studio.talk import QUICK, serving, talking, write_job
 
 ONE = QUICK.partition("[[contour]]")[0] + "[[contour]]" + QUICK.split("[[contour]]")[2]

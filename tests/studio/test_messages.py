@@ -8,15 +8,14 @@ import pytest
 from pydantic import ValidationError
 
 from conftest import ROOT
-from kerfpath.studio import _asks, _decide_messages, _layout_messages, _messages
-from kerfpath.studio._numbers import Message, flat
+from kerfpath.studio import hub, messages
+from kerfpath.studio.messages import Message, flat
 
 PAGE = (ROOT / "src" / "kerfpath" / "studio" / "README.md").read_text()
 SAMPLE = json.loads((ROOT / "tests" / "studio" / "sample.json").read_text())
 SAID = {
     kind.model_fields["type"].default: kind
-    for module in (_messages, _decide_messages, _layout_messages)
-    for kind in vars(module).values()
+    for kind in vars(messages).values()
     if isinstance(kind, type) and issubclass(kind, Message) and "type" in kind.model_fields
 }
 
@@ -42,12 +41,8 @@ def _messages_in(annotation):
 
 def test_what_a_page_may_say_is_on_the_page():
     asked = set()
-    for kind in vars(_asks).values():
-        if (
-            isinstance(kind, type)
-            and issubclass(kind, _asks._Strict)
-            and "type" in kind.model_fields
-        ):
+    for kind in vars(hub).values():
+        if isinstance(kind, type) and issubclass(kind, hub._Strict) and "type" in kind.model_fields:
             asked |= set(kind.model_fields["type"].annotation.__args__)
             keys = set(kind.model_fields) - {"type"}
             for word in kind.model_fields["type"].annotation.__args__:
@@ -89,7 +84,7 @@ def test_the_recorded_messages_are_those_that_the_server_says(message):
 )
 def test_what_a_page_may_not_say_is_refused(text):
     with pytest.raises(ValidationError):
-        _asks.parse(text)
+        hub.parse(text)
 
 
 def test_numbers_are_flat_and_null_where_they_are_not_finite():

@@ -6,9 +6,8 @@ import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from kerfpath.studio._app import LONGEST, application
-from kerfpath.studio._document import Document
-from kerfpath.studio._guard import POLICY
+from kerfpath.studio.app import LONGEST, POLICY, application
+from kerfpath.studio.document import Document
 from studio.talk import HOST, SOCKET, talking, write_job
 
 TOKEN = "a" * 32
@@ -131,7 +130,7 @@ def test_only_kinds_of_files_that_pages_have_are_served(client, tmp_path, monkey
     (tmp_path / "a.js").write_text("1")
     (tmp_path / "a.py").write_text("1")
     (tmp_path / "b.js").symlink_to("/etc/hostname")
-    monkeypatch.setattr("kerfpath.studio._app.CLIENT", tmp_path)
+    monkeypatch.setattr("kerfpath.studio.app.CLIENT", tmp_path)
     assert client.get("/client/a.js").status_code == 200
     assert client.get("/client/a.py").status_code == 404
     assert client.get("/client/b.js").status_code == 404

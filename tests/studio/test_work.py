@@ -7,8 +7,8 @@ import pytest
 
 from kerfpath import plan, refine
 from kerfpath.progress import may_stop, stopped_by
-from kerfpath.studio._bench import Kept
-from kerfpath.studio._work import Newest, Seldom, Stop, Superseded
+from kerfpath.studio.hub import Newest, Seldom, Stop, Superseded
+from kerfpath.studio.planning import Kept
 
 
 @pytest.fixture

@@ -14,8 +14,8 @@ from jobs import SLIT_JOB, write_slit_jobs
 from kerfpath.errors import InputError
 from kerfpath.post import MANIFEST
 from kerfpath.study import batch
-from kerfpath.sweep import _cluster, _local
-from kerfpath.sweep._store import Store
+from kerfpath.sweep import workers as processes
+from kerfpath.sweep.store import Store
 
 # Paths of the grid, which turn as far as the comments say.
 SLIT = SLIT_JOB.replace("[plan]", '[plan]\nmethod = "exact"\ncertify = false')
@@ -39,7 +39,7 @@ def idle(monkeypatch):
     def none(*_):
         raise AssertionError("a process was started")
 
-    monkeypatch.setattr(_local, "get_context", none)
+    monkeypatch.setattr(processes, "get_context", none)
 
 
 @pytest.fixture(scope="module")
@@ -181,7 +181,7 @@ def test_bad_input_of_the_command_is_one_line(tmp_path, monkeypatch, idle):
     assert "with a scheduler, got 0" in said("good.toml", "--processes", 0)
     both = ("--processes", 1, "--scheduler", "tcp://127.0.0.1:9")
     assert "none with a scheduler" in said("good.toml", *both)
-    monkeypatch.setattr(_cluster, "PATIENCE", 0.5)
+    monkeypatch.setattr(processes, "PATIENCE", 0.5)
     assert "no answer within" in said("good.toml", "--scheduler", "tcp://127.0.0.1:9")
     with Store(tmp_path / "kerfpath-batch" / "batch.sqlite"):
         assert "another sweep uses this store" in said("good.toml")

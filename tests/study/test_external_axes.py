@@ -24,8 +24,8 @@ from kerfpath.study import (
     write_pareto,
 )
 from kerfpath.study.placing import placement_of
-from kerfpath.study.placing._place import middle_of, move_job, numbers_of, placed_text
-from kerfpath.study.placing._value import is_estimated
+from kerfpath.study.placing.evaluator import is_estimated
+from kerfpath.study.placing.place import middle_of, move_job, numbers_of, placed_text
 from layouts import job_file, worth
 
 RAIL = """
@@ -134,7 +134,7 @@ def test_a_base_that_moves_takes_its_rail_along_and_leaves_all_else(tmp_path):
     q = some_joints(job)
     # Seen from the part, the flange is where the robot has been shifted to: with the part at x
     # at C(x) P, that is inv(C P) B F, whatever carries the part.
-    from kerfpath.robots._external import carried
+    from kerfpath.robots.external_axes import carried
 
     turn = np.radians(8.0)
     B = pose([0.06, -0.02, 0], [[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0],
@@ -163,7 +163,7 @@ def test_an_axis_that_moves_takes_the_part_and_what_it_carries_along(tmp_path):
     M = there.placement @ np.linalg.inv(job.placement)
     q = some_joints(job)
     # With tilt and table moved by M, all that carries the part is conjugated by it: M C(x) P.
-    from kerfpath.robots._external import carried
+    from kerfpath.robots.external_axes import carried
 
     axes, x = job.robot.externals, q[:, 6:]
     flange = carried(axes, x, "robot") @ job.robot.alone().forward(q[:, :6])

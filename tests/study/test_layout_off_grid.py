@@ -11,10 +11,10 @@ from commands import run
 from kerfpath.job import fastest_along, read_job
 from kerfpath.planner import plan
 from kerfpath.study import digest, layout
-from kerfpath.study.placing._evaluate import contours_of, nodes_of
-from kerfpath.study.placing._off_grid import leaves_grid
-from kerfpath.study.placing._place import middle_of, move_job, numbers_of
-from kerfpath.study.placing._value import is_estimated
+from kerfpath.study.placing.evaluator import is_estimated
+from kerfpath.study.placing.place import middle_of, move_job, numbers_of
+from kerfpath.study.placing.search import leaves_grid
+from kerfpath.study.placing.study import contours_of, nodes_of
 from layouts import CELL, HEAD, contours, job_file, rings, worth
 
 RANGES = {"x_mm": (-150.0, 150.0), "yaw_deg": (-30.0, 30.0)}

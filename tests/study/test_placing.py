@@ -7,7 +7,7 @@ import pytest
 
 from kerfpath.job import prepare, read_job
 from kerfpath.study.placing import changes_of, layout_as, placed_text, placement_of
-from kerfpath.study.placing._place import move_job
+from kerfpath.study.placing.place import move_job
 from layouts import CELL, HEAD, contours, job_file, rings
 
 MOVES = [

@@ -18,7 +18,6 @@ from kerfpath.job import read_job
 from kerfpath.robots import robot
 from kerfpath.study import (
     NEAREST,
-    _robots,
     contour_speeds,
     digest,
     robots_entry,
@@ -26,8 +25,9 @@ from kerfpath.study import (
     with_robot,
     write_robots,
 )
-from kerfpath.study._robots import evaluate_robot
-from kerfpath.sweep import _local
+from kerfpath.study import robots as robots_module
+from kerfpath.study.robots import evaluate_robot
+from kerfpath.sweep import workers
 
 # The job gives accelerations of its own robot, and none that could be assumed of others.
 KNOWN = SLIT_JOB.replace(
@@ -138,7 +138,7 @@ def test_a_second_call_computes_nothing(found, folder, monkeypatch):
     def none(*_):
         raise AssertionError("a process was started")
 
-    monkeypatch.setattr(_local, "get_context", none)
+    monkeypatch.setattr(workers, "get_context", none)
     names = [each.robot.id for each in found]
     again = which_robots(folder / "job.toml", store=folder / "robots.sqlite", robots=names)
     assert [each.contours for each in again] == [each.contours for each in found]
@@ -186,7 +186,7 @@ def test_files_hold_what_was_found(found, folder):
 
 def test_the_command_prints_and_writes_what_was_found(folder, found, monkeypatch):
     names = [each.robot.id for each in found]
-    monkeypatch.setattr(_robots, "robot_ids", lambda: names)
+    monkeypatch.setattr(robots_module, "robot_ids", lambda: names)
     (folder / "out").mkdir()
     shutil.copy(folder / "robots.sqlite", folder / "out")
     command = ["layout", "job.toml", "--robots", "--out", "out"]

@@ -20,8 +20,9 @@ from conftest import ROOT
 from kerfpath import sweep
 from kerfpath.errors import InputError
 from kerfpath.progress import stopped_by
-from kerfpath.sweep import _cluster, _store
-from kerfpath.sweep._task import Task, attempt
+from kerfpath.sweep import store as store_module
+from kerfpath.sweep import workers as cluster
+from kerfpath.sweep.task import Task, attempt
 
 HERE = ROOT / "tests"
 
@@ -285,7 +286,7 @@ def test_a_full_disk_ends_in_one_line_and_what_was_kept_stays(tmp_path, monkeypa
     connect = sqlite3.connect
     with monkeypatch.context() as patch:
         patch.setattr(
-            _store.sqlite3, "connect", lambda *a, **given: connect(*a, factory=Small, **given)
+            store_module.sqlite3, "connect", lambda *a, **given: connect(*a, factory=Small, **given)
         )
         with pytest.raises(InputError, match="s: the disk is full; the results so far are stored"):
             sweep.run(sweep_tasks.square, numbers(2000), store=tmp_path / "s", processes=1)
@@ -386,7 +387,7 @@ def test_workers_of_another_version_are_refused_and_named(workers, scheduler, tm
 
 
 def test_a_cluster_that_is_not_there_is_refused_in_one_line(scheduler, tmp_path, monkeypatch):
-    monkeypatch.setattr(_cluster, "PATIENCE", 0.5)
+    monkeypatch.setattr(cluster, "PATIENCE", 0.5)
 
     def refused(address):
         with pytest.raises(InputError) as caught:

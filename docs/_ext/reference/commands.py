@@ -8,13 +8,13 @@ import typer
 from typer.core import TyperArgument, TyperCommand, TyperGroup, TyperOption
 from typer.main import get_command
 
-from kerfpath.cli import _programs, _studies
-from kerfpath.cli._main import app
+from kerfpath.cli import programs, studies
+from kerfpath.cli.main import app
 from reference.markdown import code, prose, table
 
 __all__ = ["page", "program"]
 
-assert _programs, _studies  # their commands
+assert programs, studies  # their commands
 EXAMPLE = "Example: "
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from kerfpath._arrays import Array
+from kerfpath.arrays import Array
 from kerfpath.robots import (
     FAMILIES,
     ExternalProduct,

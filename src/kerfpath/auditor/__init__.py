@@ -2,28 +2,28 @@
 
 import warnings
 
-from kerfpath.auditor._air import transfer_checks as transfer_checks
-from kerfpath.auditor._audit import audit as audit
-from kerfpath.auditor._audit import checks as checks
-from kerfpath.auditor._certificate import BOUND as BOUND
-from kerfpath.auditor._certificate import bound_checks as bound_checks
-from kerfpath.auditor._certificate import certified_bound as certified_bound
-from kerfpath.auditor._chain import JointChain as JointChain
-from kerfpath.auditor._chain import chain_of as chain_of
-from kerfpath.auditor._course import ENCLOSED as ENCLOSED
-from kerfpath.auditor._course import CoursePieces as CoursePieces
-from kerfpath.auditor._course import rates_along as rates_along
-from kerfpath.auditor._room import retract_checks as retract_checks
-from kerfpath.auditor._rounding import MOST_ROUNDED as MOST_ROUNDED
-from kerfpath.auditor._rounding import Rounding as Rounding
-from kerfpath.auditor._rounding import rounding_of as rounding_of
-from kerfpath.auditor._table import Check as Check
-from kerfpath.auditor._table import Issue as Issue
-from kerfpath.auditor._table import Level as Level
-from kerfpath.auditor._table import Unit as Unit
-from kerfpath.auditor._table import format_value as format_value
-from kerfpath.auditor._table import worst_of as worst_of
-from kerfpath.auditor._windows import window_checks as window_checks
+from kerfpath.auditor.between import retract_checks as retract_checks
+from kerfpath.auditor.between import transfer_checks as transfer_checks
+from kerfpath.auditor.certificate import BOUND as BOUND
+from kerfpath.auditor.certificate import bound_checks as bound_checks
+from kerfpath.auditor.certificate import certified_bound as certified_bound
+from kerfpath.auditor.chain import JointChain as JointChain
+from kerfpath.auditor.chain import chain_of as chain_of
+from kerfpath.auditor.motion import ENCLOSED as ENCLOSED
+from kerfpath.auditor.motion import CoursePieces as CoursePieces
+from kerfpath.auditor.motion import rates_along as rates_along
+from kerfpath.auditor.nodes import audit as audit
+from kerfpath.auditor.nodes import checks as checks
+from kerfpath.auditor.nodes import window_checks as window_checks
+from kerfpath.auditor.table import MOST_ROUNDED as MOST_ROUNDED
+from kerfpath.auditor.table import Check as Check
+from kerfpath.auditor.table import Issue as Issue
+from kerfpath.auditor.table import Level as Level
+from kerfpath.auditor.table import Rounding as Rounding
+from kerfpath.auditor.table import Unit as Unit
+from kerfpath.auditor.table import format_value as format_value
+from kerfpath.auditor.table import rounding_of as rounding_of
+from kerfpath.auditor.table import worst_of as worst_of
 
 
 def __getattr__(name: str) -> object:

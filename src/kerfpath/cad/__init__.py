@@ -7,26 +7,26 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from kerfpath.cad._departure import Departure as Departure
-    from kerfpath.cad._departure import departure_from as departure_from
-    from kerfpath.cad._left_out import LeftOut as LeftOut
-    from kerfpath.cad._measured import read_measured as read_measured
-    from kerfpath.cad._part import Loop as Loop
-    from kerfpath.cad._part import Part as Part
-    from kerfpath.cad._read import read as read
-    from kerfpath.cad._units import GAP as GAP
-    from kerfpath.cad._units import UNITS_MM as UNITS_MM
+    from kerfpath.cad.departure import Departure as Departure
+    from kerfpath.cad.departure import departure_from as departure_from
+    from kerfpath.cad.left_out import LeftOut as LeftOut
+    from kerfpath.cad.part import Loop as Loop
+    from kerfpath.cad.part import Part as Part
+    from kerfpath.cad.reading import read as read
+    from kerfpath.cad.reading import read_measured as read_measured
+    from kerfpath.cad.units import GAP as GAP
+    from kerfpath.cad.units import UNITS_MM as UNITS_MM
 
 _HOME = {
-    "Departure": "_departure",
-    "GAP": "_units",
-    "LeftOut": "_left_out",
-    "Loop": "_part",
-    "Part": "_part",
-    "UNITS_MM": "_units",
-    "departure_from": "_departure",
-    "read": "_read",
-    "read_measured": "_measured",
+    "Departure": "departure",
+    "GAP": "units",
+    "LeftOut": "left_out",
+    "Loop": "part",
+    "Part": "part",
+    "UNITS_MM": "units",
+    "departure_from": "departure",
+    "read": "reading",
+    "read_measured": "reading",
 }
 
 __all__ = sorted(_HOME)

@@ -2,9 +2,9 @@
 
 import sys
 
-from kerfpath._extras import require_extra
-from kerfpath.cli._stop import stoppable
+from kerfpath.cli.stop import stoppable
 from kerfpath.errors import InputError
+from kerfpath.extras import require_extra
 
 __all__ = ["main"]
 
@@ -17,8 +17,8 @@ def main() -> None:
         except InputError as error:
             print(f"kerfpath: error: {error}", file=sys.stderr)
             sys.exit(2)
-        from kerfpath.cli import _programs, _studies
-        from kerfpath.cli._main import run
+        from kerfpath.cli import programs, studies
+        from kerfpath.cli.main import run
 
-        assert _programs, _studies  # their commands
+        assert programs, studies  # their commands
         run()

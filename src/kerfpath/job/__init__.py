@@ -1,6 +1,6 @@
 """Read a job file, run it, and write, read and audit its plans and programs."""
 
-from kerfpath._extras import require_extra
+from kerfpath.extras import require_extra
 
 require_extra("programs", "jobs")
 

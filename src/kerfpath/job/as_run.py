@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath._repr import short_repr
+from kerfpath.arrays import short_repr
 from kerfpath.auditor import Check, Level
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError

@@ -15,12 +15,12 @@ M_dist, M_ind         out_dist and out_before: cost and best predecessor
 ====================  ===============================================================
 """
 
-from kerfpath.kernels._jit import CACHE
+from kerfpath.kernels.jit import CACHE
 
 __all__ = ["CACHE", "EQUATIONS"]
 
 EQUATIONS = {
-    1: "kerfpath.contour._contour:Contour.resample",
+    1: "kerfpath.contour.contour:Contour.resample",
     2: "kerfpath.kernels.frames:location",
     3: "kerfpath.kernels.kinematics:forward",
     4: "kerfpath.kernels.kinematics:inverse",

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit, jit_inline, jit_part, variable
+from kerfpath.arrays import Array, Ints
 from kerfpath.kernels.continuous import (
     RELAXED,
     Steps,
@@ -23,6 +22,7 @@ from kerfpath.kernels.continuous import (
     least_value,
     step_value,
 )
+from kerfpath.kernels.jit import jit, jit_inline, jit_part, variable
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import wrap_angle
 from kerfpath.kernels.search import first_from

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit
+from kerfpath.arrays import Array, Ints
+from kerfpath.kernels.jit import jit
 from kerfpath.kernels.outer import bent_by
 from kerfpath.kernels.reduced import Cells, Step
 

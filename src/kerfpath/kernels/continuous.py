@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit, jit_inline, variable
+from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.kernels.jit import jit, jit_inline, variable
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import EUCLID, MANHATTAN, increment, wrap_angle
 from kerfpath.kernels.search import first_from

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.kernels.jit import jit, jit_inline
 from kerfpath.kernels.metric import increment
 
 __all__ = ["CoarseLayer", "Nearby", "best_steps"]

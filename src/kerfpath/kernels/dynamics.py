@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath._arrays import Array
-from kerfpath.kernels._jit import jit, jit_inline, jit_part
+from kerfpath.arrays import Array
+from kerfpath.kernels.jit import jit, jit_inline, jit_part
 
 __all__ = ["ArmBodies", "Posed", "fill_torque", "pose_arm", "room_for", "torques"]
 

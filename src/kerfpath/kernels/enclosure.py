@@ -14,8 +14,7 @@ from __future__ import annotations
 from math import atan2, ceil, cos, inf, pi, sin, sqrt
 from typing import Any, NamedTuple
 
-from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit, jit_inline, jit_part, smaller, variable
+from kerfpath.arrays import Array, Ints
 from kerfpath.kernels.intervals import (
     DOWN,
     EPS,
@@ -42,6 +41,7 @@ from kerfpath.kernels.intervals import (
     times,
     turning,
 )
+from kerfpath.kernels.jit import jit, jit_inline, jit_part, smaller, variable
 from kerfpath.kernels.kinematics import REACH, OpwArm
 
 __all__ = [

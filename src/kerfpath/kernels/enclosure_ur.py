@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from math import copysign, cos, pi, sin
 
-from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit, jit_part
+from kerfpath.arrays import Array, Ints
 from kerfpath.kernels.enclosure import (
     NONE,
     Curves,
@@ -41,6 +40,7 @@ from kerfpath.kernels.intervals import (
     shift,
     sine_of,
 )
+from kerfpath.kernels.jit import jit, jit_part
 from kerfpath.kernels.kinematics import REACH
 from kerfpath.kernels.ur import UrArm
 

@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit, jit_inline, jit_part
+from kerfpath.arrays import Array, Ints
+from kerfpath.kernels.jit import jit, jit_inline, jit_part
 from kerfpath.kernels.limits import (
     acceleration_excess,
     acceleration_time,

@@ -25,9 +25,9 @@ from math import atan2, cos, pi, sin
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import jit, jit_part
+from kerfpath.arrays import Array, Bools
 from kerfpath.kernels.frames import location
+from kerfpath.kernels.jit import jit, jit_part
 from kerfpath.kernels.kinematics import ON_AXIS, POSTURES, OpwArm, forward, inverse, wrap
 
 __all__ = ["forward_all", "inverse_all", "inverse_nodes"]

@@ -6,8 +6,8 @@ from math import atan2, sqrt
 
 import numpy as np
 
-from kerfpath._arrays import Array
-from kerfpath.kernels._jit import jit, jit_equation, jit_inline
+from kerfpath.arrays import Array
+from kerfpath.kernels.jit import jit, jit_equation, jit_inline
 
 __all__ = ["closing_twist", "location", "rotation_minimising_x", "tangent_x"]
 

@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit, jit_part
+from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.kernels.jit import jit, jit_part
 from kerfpath.kernels.kinematics import wrap
 
 __all__ = ["EXACT", "POSTURES", "GeneralArm", "follow_all", "forward_all", "sort_in"]

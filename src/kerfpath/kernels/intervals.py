@@ -16,7 +16,7 @@ from __future__ import annotations
 from math import atan2, cos, inf, pi, sin, sqrt
 from typing import NamedTuple
 
-from kerfpath.kernels._jit import jit_inline, jit_part, smaller
+from kerfpath.kernels.jit import jit_inline, jit_part, smaller
 
 __all__ = [
     "DOWN",

@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import jit, jit_part
+from kerfpath.arrays import Array, Bools
 from kerfpath.kernels.frames import location
+from kerfpath.kernels.jit import jit, jit_part
 
 __all__ = [
     "POSTURES",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from kerfpath._arrays import Array
-from kerfpath.kernels._jit import jit_equation, jit_inline
+from kerfpath.arrays import Array
+from kerfpath.kernels.jit import jit_equation, jit_inline
 
 __all__ = [
     "LIMIT_TOLERANCE",

@@ -7,8 +7,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import either, jit, jit_equation, jit_inline, jit_vector, larger, smaller
+from kerfpath.arrays import Array, Bools
+from kerfpath.kernels.jit import either, jit, jit_equation, jit_inline, jit_vector, larger, smaller
 
 __all__ = [
     "CHEBYCHEV",

@@ -21,8 +21,8 @@ from math import inf, pi
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.kernels.jit import jit, jit_inline
 from kerfpath.kernels.metric import extend, finish, increment
 from kerfpath.kernels.reduced import SLACK, Cells, Step, near, window
 

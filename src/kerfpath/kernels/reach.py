@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfpath._arrays import Array
-from kerfpath.kernels._jit import jit_inline, jit_vector, larger, trailing_zeros
+from kerfpath.arrays import Array
+from kerfpath.kernels.jit import jit_inline, jit_vector, larger, trailing_zeros
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import apart, wrap_angle
 from kerfpath.kernels.search import Aim, SortedLayers, runs

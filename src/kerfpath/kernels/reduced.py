@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.kernels.jit import jit, jit_inline
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, increment
 from kerfpath.kernels.search import first_from
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit, jit_inline
+from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.kernels.jit import jit, jit_inline
 from kerfpath.kernels.limits import acceleration_excess, exceeds
 from kerfpath.kernels.metric import apart, extend, finish, increment, wrap_angle
 from kerfpath.kernels.torque import NO_TORQUE, TorqueTest

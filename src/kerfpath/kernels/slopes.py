@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit_inline
+from kerfpath.arrays import Array, Ints
+from kerfpath.kernels.jit import jit_inline
 from kerfpath.kernels.metric import MANHATTAN, extend, finish
 from kerfpath.kernels.reduced import Cells, Potential, Step, tangent
 

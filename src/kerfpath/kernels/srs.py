@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import jit, jit_part
+from kerfpath.arrays import Array, Bools
+from kerfpath.kernels.jit import jit, jit_part
 from kerfpath.kernels.kinematics import ON_AXIS, REACH, wrap
 
 __all__ = ["SrsArm", "forward_all", "inverse_all"]

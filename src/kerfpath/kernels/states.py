@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath._arrays import Array, Ints
-from kerfpath.kernels._jit import jit_part
+from kerfpath.arrays import Array, Ints
+from kerfpath.kernels.jit import jit_part
 from kerfpath.kernels.torque import TorqueRoom
 
 __all__ = ["EVERY", "Scratch", "States", "group_by_vertex", "joined_states", "with_more_room"]

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import either, jit, jit_inline, jit_vector, larger, smaller
+from kerfpath.arrays import Array, Bools
+from kerfpath.kernels.jit import either, jit, jit_inline, jit_vector, larger, smaller
 from kerfpath.kernels.limits import exceeds
 from kerfpath.kernels.metric import apart, extend, finish
 from kerfpath.kernels.search import Aim, SortedLayers, combined, shut_edges

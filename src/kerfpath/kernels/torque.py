@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath._arrays import Array, Ints, freeze
-from kerfpath.kernels._jit import jit, jit_inline, jit_part
+from kerfpath.arrays import Array, Ints, freeze
 from kerfpath.kernels.dynamics import ArmBodies, Posed, fill_torque, pose_arm, room_for
+from kerfpath.kernels.jit import jit, jit_inline, jit_part
 
 __all__ = [
     "NO_TORQUE",

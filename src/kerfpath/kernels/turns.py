@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath._arrays import Array, Bools, Ints
-from kerfpath.kernels._jit import jit, jit_part
+from kerfpath.arrays import Array, Bools, Ints
+from kerfpath.kernels.jit import jit, jit_part
 from kerfpath.losses import Loss
 
 __all__ = [

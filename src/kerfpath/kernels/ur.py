@@ -20,8 +20,8 @@ from __future__ import annotations
 from math import atan2, copysign, cos, sin, sqrt
 from typing import NamedTuple
 
-from kerfpath._arrays import Array, Bools
-from kerfpath.kernels._jit import jit, jit_part
+from kerfpath.arrays import Array, Bools
+from kerfpath.kernels.jit import jit, jit_part
 from kerfpath.kernels.kinematics import ON_AXIS, REACH, wrap
 
 __all__ = ["UrArm", "forward", "forward_all", "inverse", "inverse_all"]

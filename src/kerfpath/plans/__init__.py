@@ -2,16 +2,16 @@
 
 import warnings
 
-from kerfpath.plans._columns import joint_columns as joint_columns
-from kerfpath.plans._criteria import Criteria as Criteria
-from kerfpath.plans._criteria import Feed as Feed
-from kerfpath.plans._criteria import Proof as Proof
-from kerfpath.plans._criteria import path_cost as path_cost
-from kerfpath.plans._motion import JointMotion as JointMotion
-from kerfpath.plans._motion import node_rates as node_rates
-from kerfpath.plans._plan import Plan as Plan
-from kerfpath.plans._plan import has_room as has_room
-from kerfpath.plans._plan import on_turns as on_turns
+from kerfpath.plans.plan import Criteria as Criteria
+from kerfpath.plans.plan import Feed as Feed
+from kerfpath.plans.plan import JointMotion as JointMotion
+from kerfpath.plans.plan import Plan as Plan
+from kerfpath.plans.plan import Proof as Proof
+from kerfpath.plans.plan import has_room as has_room
+from kerfpath.plans.plan import joint_columns as joint_columns
+from kerfpath.plans.plan import node_rates as node_rates
+from kerfpath.plans.plan import on_turns as on_turns
+from kerfpath.plans.plan import path_cost as path_cost
 
 
 def __getattr__(name: str) -> object:

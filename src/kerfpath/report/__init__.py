@@ -1,21 +1,22 @@
 """Self-contained HTML pages of a job, a drawing, a Pareto set, a layout, or a single table."""
 
-from kerfpath._extras import require_extra
+from kerfpath.extras import require_extra
 
 require_extra("report", "reports")
 
-from kerfpath.report._drawing import DrawnLoop, render_drawing
-from kerfpath.report._front import FrontAxis, FrontPlan
-from kerfpath.report._front_page import render_front
-from kerfpath.report._html import with_library, without_library
-from kerfpath.report._layout import render_layout
-from kerfpath.report._layout_entry import LayoutEntry
-from kerfpath.report._look import reason_colours
-from kerfpath.report._map import feasibility_map, hidden_postures, shown_postures
-from kerfpath.report._motion import plot
-from kerfpath.report._page import render
-from kerfpath.report._section import ContourSection, add_clearance
-from kerfpath.report._table_page import render_table
+from kerfpath.report.drawing import DrawnLoop, render_drawing
+from kerfpath.report.front import FrontAxis, FrontPlan, render_front
+from kerfpath.report.layout import LayoutEntry, render_layout
+from kerfpath.report.maps import (
+    ContourSection,
+    add_clearance,
+    feasibility_map,
+    hidden_postures,
+    reason_colours,
+    shown_postures,
+)
+from kerfpath.report.motion import plot
+from kerfpath.report.page import render, render_table, with_library, without_library
 
 __all__ = [
     "ContourSection",

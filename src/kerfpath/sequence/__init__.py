@@ -1,11 +1,11 @@
 """A part with many contours: their order, the start of each, and the transfer moves."""
 
-from kerfpath.sequence._inner import inner_first as inner_first
-from kerfpath.sequence._order import Order as Order
-from kerfpath.sequence._order import best_order as best_order
-from kerfpath.sequence._part import PartPlan as PartPlan
-from kerfpath.sequence._part import distances_between as distances_between
-from kerfpath.sequence._part import longest_search as longest_search
-from kerfpath.sequence._part import order_candidates as order_candidates
-from kerfpath.sequence._part import order_plans as order_plans
-from kerfpath.sequence._part import plan_part as plan_part
+from kerfpath.sequence.order import Order as Order
+from kerfpath.sequence.order import best_order as best_order
+from kerfpath.sequence.order import inner_first as inner_first
+from kerfpath.sequence.part import PartPlan as PartPlan
+from kerfpath.sequence.part import distances_between as distances_between
+from kerfpath.sequence.part import longest_search as longest_search
+from kerfpath.sequence.part import order_candidates as order_candidates
+from kerfpath.sequence.part import order_plans as order_plans
+from kerfpath.sequence.part import plan_part as plan_part

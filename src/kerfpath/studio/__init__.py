@@ -1,3 +1,3 @@
 """The studio: show, edit and plan a job in a browser, with the functions of the library."""
 
-from kerfpath.studio._serve import serve as serve
+from kerfpath.studio.server import serve as serve

@@ -11,11 +11,11 @@ import pytest
 from commands import assert_refused, run
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job import plan_file_text, program_from_file, read_job, read_plan_file, run_job
-from kerfpath.job.programs._audit import audit_program
-from kerfpath.job.programs._read import language_of
+from kerfpath.job.programs.audit import audit_program
+from kerfpath.job.programs.reading import language_of
 from kerfpath.post import MANIFEST, groups_of, read_program, write_files
 from kerfpath.post import language as find_language
-from kerfpath.post._languages import SHIPPED
+from kerfpath.post.languages import SHIPPED
 from kerfpath.transfer import least_time
 
 HEAD = """\

@@ -232,7 +232,7 @@ def test_a_contour_that_no_way_leads_to_is_planned_in_its_other_postures(folder,
         plans.extend([*candidates[0], *more(0)])
         raise NoFeasiblePath("no way", proved=False, node=-1)
 
-    monkeypatch.setattr("kerfpath.sequence._part.order_plans", order_plans)
+    monkeypatch.setattr("kerfpath.sequence.part.order_plans", order_plans)
     result = run_job(read_job(path), progress=lambda *words: done.append(words))
     assert str(result.stuck) == "no way"
     # The job allows two postures, front/up with either wrist; it has two candidates.

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from kerfpath.job.format.tables._cut import CornersTable, LeadTable, MicroJointsTable
-from kerfpath.job.format.tables._sequence import SequenceTable
+from kerfpath.job.format.tables.job import SequenceTable
+from kerfpath.job.format.tables.part import CornersTable, LeadTable, MicroJointsTable
 from studio.browser.test_page import ready, sent, serious, until
 
 pytestmark = pytest.mark.slow

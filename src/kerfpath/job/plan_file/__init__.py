@@ -1,18 +1,18 @@
 """Write plan.json, read it back, and audit it against its job."""
 
-from kerfpath.job.plan_file._audit import PlanAudit as PlanAudit
-from kerfpath.job.plan_file._audit import audit_file as audit_file
-from kerfpath.job.plan_file._checks import check as check
-from kerfpath.job.plan_file._checks import count as count
-from kerfpath.job.plan_file._layout import ContourData as ContourData
-from kerfpath.job.plan_file._order_checks import check_order as check_order
-from kerfpath.job.plan_file._read import PlanFile as PlanFile
-from kerfpath.job.plan_file._read import read_plan_file as read_plan_file
-from kerfpath.job.plan_file._read import table_of as table_of
-from kerfpath.job.plan_file._report import AuditReport as AuditReport
-from kerfpath.job.plan_file._report import collision_note as collision_note
-from kerfpath.job.plan_file._sequence import sequence_entry as sequence_entry
-from kerfpath.job.plan_file._write import broken_entry as broken_entry
-from kerfpath.job.plan_file._write import plan_document as plan_document
-from kerfpath.job.plan_file._write import plan_entry as plan_entry
-from kerfpath.job.plan_file._write import plan_text as plan_text
+from kerfpath.job.plan_file.audit import PlanAudit as PlanAudit
+from kerfpath.job.plan_file.audit import audit_file as audit_file
+from kerfpath.job.plan_file.audit import check_order as check_order
+from kerfpath.job.plan_file.layout import ContourData as ContourData
+from kerfpath.job.plan_file.reading import AuditReport as AuditReport
+from kerfpath.job.plan_file.reading import PlanFile as PlanFile
+from kerfpath.job.plan_file.reading import check as check
+from kerfpath.job.plan_file.reading import collision_note as collision_note
+from kerfpath.job.plan_file.reading import count as count
+from kerfpath.job.plan_file.reading import read_plan_file as read_plan_file
+from kerfpath.job.plan_file.reading import table_of as table_of
+from kerfpath.job.plan_file.schema import sequence_entry as sequence_entry
+from kerfpath.job.plan_file.writing import broken_entry as broken_entry
+from kerfpath.job.plan_file.writing import plan_document as plan_document
+from kerfpath.job.plan_file.writing import plan_entry as plan_entry
+from kerfpath.job.plan_file.writing import plan_text as plan_text

@@ -1,11 +1,11 @@
 """A table of all targets (CSV), for spreadsheets and your own programs."""
 
-from kerfpath.post._languages import Language, no_settings_needed
-from kerfpath.post._times import check_times
-from kerfpath.post.csv._read import read
-from kerfpath.post.csv._write import Csv as Csv
-from kerfpath.post.csv._write import CsvSettings as CsvSettings
-from kerfpath.post.csv._write import is_reserved, rules
+from kerfpath.post.arcs import check_times
+from kerfpath.post.csv.reader import read
+from kerfpath.post.csv.writer import Csv as Csv
+from kerfpath.post.csv.writer import CsvSettings as CsvSettings
+from kerfpath.post.csv.writer import is_reserved, rules
+from kerfpath.post.languages import Language, no_settings_needed
 
 CSV = Language(
     name="csv",

@@ -1,15 +1,14 @@
 """TP, the language of FANUC controllers, as the listings (.ls) that they load."""
 
-from kerfpath.post._languages import Language, no_settings_needed
-from kerfpath.post.fanuc._axes import axes_from_joints as axes_from_joints
-from kerfpath.post.fanuc._axes import joints_from_axes as joints_from_axes
-from kerfpath.post.fanuc._axes import posture as posture
-from kerfpath.post.fanuc._check import check
-from kerfpath.post.fanuc._read import read
-from kerfpath.post.fanuc._settings import FanucSettings as FanucSettings
-from kerfpath.post.fanuc._settings import is_reserved, rules
-from kerfpath.post.fanuc._switching import sayable
-from kerfpath.post.fanuc._write import Fanuc as Fanuc
+from kerfpath.post.fanuc.controller import FanucSettings as FanucSettings
+from kerfpath.post.fanuc.controller import axes_from_joints as axes_from_joints
+from kerfpath.post.fanuc.controller import is_reserved, rules, sayable
+from kerfpath.post.fanuc.controller import joints_from_axes as joints_from_axes
+from kerfpath.post.fanuc.controller import posture as posture
+from kerfpath.post.fanuc.reader import read
+from kerfpath.post.fanuc.writer import Fanuc as Fanuc
+from kerfpath.post.fanuc.writer import check
+from kerfpath.post.languages import Language, no_settings_needed
 
 FANUC = Language(
     name="fanuc",

@@ -1,17 +1,14 @@
 """INFORM, the language of Yaskawa controllers, as jobs (.JBI)."""
 
-from kerfpath.post._languages import Language
-from kerfpath.post._standing import stop_to_switch
-from kerfpath.post.inform._axes import axes_from_joints as axes_from_joints
-from kerfpath.post.inform._axes import joints_from_axes as joints_from_axes
-from kerfpath.post.inform._axes import manipulator_type as manipulator_type
-from kerfpath.post.inform._axes import posture
-from kerfpath.post.inform._check import check
-from kerfpath.post.inform._external import missing
-from kerfpath.post.inform._read import read
-from kerfpath.post.inform._settings import InformSettings as InformSettings
-from kerfpath.post.inform._settings import is_reserved, rules
-from kerfpath.post.inform._write import Inform as Inform
+from kerfpath.post.inform.controller import InformSettings as InformSettings
+from kerfpath.post.inform.controller import axes_from_joints as axes_from_joints
+from kerfpath.post.inform.controller import check, is_reserved, missing, posture, rules
+from kerfpath.post.inform.controller import joints_from_axes as joints_from_axes
+from kerfpath.post.inform.controller import manipulator_type as manipulator_type
+from kerfpath.post.inform.reader import read
+from kerfpath.post.inform.writer import Inform as Inform
+from kerfpath.post.languages import Language
+from kerfpath.post.program import stop_to_switch
 
 INFORM = Language(
     name="inform",

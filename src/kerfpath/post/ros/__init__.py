@@ -1,15 +1,14 @@
 """ROS trajectories: trajectory_msgs/JointTrajectory and switching events, as YAML."""
 
-from kerfpath.post._languages import Language, no_settings_needed
-from kerfpath.post.ros._check import check
-from kerfpath.post.ros._read import read
-from kerfpath.post.ros._trajectory import Trajectory as Trajectory
-from kerfpath.post.ros._trajectory import trajectory as trajectory
-from kerfpath.post.ros._write import Message as Message
-from kerfpath.post.ros._write import Ros as Ros
-from kerfpath.post.ros._write import RosSettings as RosSettings
-from kerfpath.post.ros._write import message as message
-from kerfpath.post.ros._write import rules
+from kerfpath.post.languages import Language, no_settings_needed
+from kerfpath.post.ros.reader import read
+from kerfpath.post.ros.writer import Message as Message
+from kerfpath.post.ros.writer import Ros as Ros
+from kerfpath.post.ros.writer import RosSettings as RosSettings
+from kerfpath.post.ros.writer import Trajectory as Trajectory
+from kerfpath.post.ros.writer import check, rules
+from kerfpath.post.ros.writer import message as message
+from kerfpath.post.ros.writer import trajectory as trajectory
 
 ROS = Language(
     name="ros",

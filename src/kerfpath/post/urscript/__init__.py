@@ -1,11 +1,10 @@
 """URScript, the language of Universal Robots' controllers."""
 
-from kerfpath.post._languages import Language
-from kerfpath.post.urscript._check import check, is_reserved
-from kerfpath.post.urscript._read import read
-from kerfpath.post.urscript._write import URScript as URScript
-from kerfpath.post.urscript._write import URScriptSettings as URScriptSettings
-from kerfpath.post.urscript._write import rules
+from kerfpath.post.languages import Language
+from kerfpath.post.urscript.reader import read
+from kerfpath.post.urscript.writer import URScript as URScript
+from kerfpath.post.urscript.writer import URScriptSettings as URScriptSettings
+from kerfpath.post.urscript.writer import check, is_reserved, rules
 
 URSCRIPT = Language(
     name="urscript",

@@ -1,16 +1,15 @@
 """VAL 3, the language of Staubli controllers, as projects of XML files."""
 
-from kerfpath.post._languages import Language
-from kerfpath.post._standing import stop_to_switch
-from kerfpath.post.val3._axes import axes_from_joints as axes_from_joints
-from kerfpath.post.val3._axes import configurations as configurations
-from kerfpath.post.val3._axes import joints_from_axes as joints_from_axes
-from kerfpath.post.val3._axes import posture as posture
-from kerfpath.post.val3._check import check
-from kerfpath.post.val3._read import read
-from kerfpath.post.val3._settings import Val3Settings as Val3Settings
-from kerfpath.post.val3._settings import is_reserved, rules
-from kerfpath.post.val3._write import Val3 as Val3
+from kerfpath.post.languages import Language
+from kerfpath.post.program import stop_to_switch
+from kerfpath.post.val3.controller import Val3Settings as Val3Settings
+from kerfpath.post.val3.controller import axes_from_joints as axes_from_joints
+from kerfpath.post.val3.controller import check, is_reserved, rules
+from kerfpath.post.val3.controller import configurations as configurations
+from kerfpath.post.val3.controller import joints_from_axes as joints_from_axes
+from kerfpath.post.val3.controller import posture as posture
+from kerfpath.post.val3.reader import read
+from kerfpath.post.val3.writer import Val3 as Val3
 
 VAL3 = Language(
     name="val3",

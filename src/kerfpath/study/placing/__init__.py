@@ -1,17 +1,17 @@
 """Search for the best placement of the part, the robot base and the head."""
 
-from kerfpath.study.placing._evaluate import contours_of as contours_of
-from kerfpath.study.placing._evaluate import nodes_of as nodes_of
-from kerfpath.study.placing._files import UNITS as UNITS
-from kerfpath.study.placing._files import layout_entry as layout_entry
-from kerfpath.study.placing._files import write_layout as write_layout
-from kerfpath.study.placing._layout import Layout as Layout
-from kerfpath.study.placing._layout import layout as layout
-from kerfpath.study.placing._layout import layout_as as layout_as
-from kerfpath.study.placing._place import changes_of as changes_of
-from kerfpath.study.placing._place import middle_of as middle_of
-from kerfpath.study.placing._place import placed_text as placed_text
-from kerfpath.study.placing._place import ranges_of as ranges_of
-from kerfpath.study.placing._reach import Placement as Placement
-from kerfpath.study.placing._reach import placement_of as placement_of
-from kerfpath.study.placing._search import PlacementTrial as PlacementTrial
+from kerfpath.study.placing.evaluator import Placement as Placement
+from kerfpath.study.placing.evaluator import placement_of as placement_of
+from kerfpath.study.placing.place import changes_of as changes_of
+from kerfpath.study.placing.place import middle_of as middle_of
+from kerfpath.study.placing.place import placed_text as placed_text
+from kerfpath.study.placing.place import ranges_of as ranges_of
+from kerfpath.study.placing.search import PlacementTrial as PlacementTrial
+from kerfpath.study.placing.study import UNITS as UNITS
+from kerfpath.study.placing.study import Layout as Layout
+from kerfpath.study.placing.study import contours_of as contours_of
+from kerfpath.study.placing.study import layout as layout
+from kerfpath.study.placing.study import layout_as as layout_as
+from kerfpath.study.placing.study import layout_entry as layout_entry
+from kerfpath.study.placing.study import nodes_of as nodes_of
+from kerfpath.study.placing.study import write_layout as write_layout

@@ -5,19 +5,19 @@ x, y and z, R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF. Messages about a field s
 as the expected value and its example as the way to write it.
 """
 
-from kerfpath.job.format.tables._cell import CellTable as CellTable
-from kerfpath.job.format.tables._cell import FixtureTable as FixtureTable
-from kerfpath.job.format.tables._comfort import LIMITS_MARGIN as LIMITS_MARGIN
-from kerfpath.job.format.tables._contour import ContourTable as ContourTable
-from kerfpath.job.format.tables._external import ExternalTable as ExternalTable
-from kerfpath.job.format.tables._job import REPEATED as REPEATED
-from kerfpath.job.format.tables._job import TABLES as TABLES
-from kerfpath.job.format.tables._job import JobFile as JobFile
-from kerfpath.job.format.tables._layout import VARIABLES as VARIABLES
-from kerfpath.job.format.tables._layout import Goal as Goal
-from kerfpath.job.format.tables._layout import LayoutTable as LayoutTable
-from kerfpath.job.format.tables._plan import PlanTable as PlanTable
-from kerfpath.job.format.tables._program import AuditTable as AuditTable
-from kerfpath.job.format.tables._program import ProgramTable as ProgramTable
-from kerfpath.job.format.tables._sequence import SequenceTable as SequenceTable
-from kerfpath.job.format.tables._table import given as given
+from kerfpath.job.format.tables.cell import CellTable as CellTable
+from kerfpath.job.format.tables.cell import FixtureTable as FixtureTable
+from kerfpath.job.format.tables.cell import given as given
+from kerfpath.job.format.tables.job import LIMITS_MARGIN as LIMITS_MARGIN
+from kerfpath.job.format.tables.job import REPEATED as REPEATED
+from kerfpath.job.format.tables.job import TABLES as TABLES
+from kerfpath.job.format.tables.job import VARIABLES as VARIABLES
+from kerfpath.job.format.tables.job import AuditTable as AuditTable
+from kerfpath.job.format.tables.job import Goal as Goal
+from kerfpath.job.format.tables.job import JobFile as JobFile
+from kerfpath.job.format.tables.job import LayoutTable as LayoutTable
+from kerfpath.job.format.tables.job import ProgramTable as ProgramTable
+from kerfpath.job.format.tables.job import SequenceTable as SequenceTable
+from kerfpath.job.format.tables.part import ContourTable as ContourTable
+from kerfpath.job.format.tables.plan import PlanTable as PlanTable
+from kerfpath.job.format.tables.robot import ExternalTable as ExternalTable

@@ -1,0 +1,279 @@
+"""Prove the bound of a certificate again, with the audit's own enclosures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kerfpath.arrays import Array
+from kerfpath.auditor.cover import DEEPEST_CELL, Places, Reachable, covered
+from kerfpath.auditor.enclosure import POSTURES
+from kerfpath.auditor.jets import UNIT
+from kerfpath.auditor.steps import Rates, candidates, least_value, linked, reduced_costs, steps_on
+from kerfpath.auditor.table import Check
+from kerfpath.certificate import BASE, Certificate, Stage
+from kerfpath.errors import CertificateRefused, InputError
+from kerfpath.plans import Plan
+
+BOUND = "bound"
+"""Code of the check of a bound."""
+LIMIT_TOLERANCE = 1e-9
+"""rad: by how much a motion may exceed (5) and (6)."""
+EVEN = 1e-6
+"""Largest relative difference between the intervals of a plan at constant speed."""
+MOST_HELD = 16_000_000
+"""Number of steps whose costs are kept, 16 bytes each; other costs are computed twice."""
+Costs = tuple[NDArray[np.int32], NDArray[np.int32], Array]
+LARGEST = 1e12
+"""Largest value or slope of a potential."""
+SAME = 1e-9
+"""Relative rounding error of a cost, a bound and the gap between them."""
+
+
+def bound_checks(plan: Plan) -> list[Check]:
+    """Return the checks of the bound that a plan states, if it has a certificate."""
+    proof = plan.proof
+    if proof.certificate is None:
+        return []
+    title = "certificate that does not hold"
+    try:
+        if proof.bound is None:
+            raise CertificateRefused("the plan states no bound")
+        proved = certified_bound(proof.certificate, plan)
+    except CertificateRefused as error:
+        return [_row(f"{title}: {error.why}", 1.0, 0.0)]
+    except InputError as error:  # there are no enclosures of such a robot
+        return [_row(f"{title}: {error}", 1.0, 0.0)]
+    size = max(abs(plan.cost), abs(proof.bound))
+    claims = (
+        ("bound above what its certificate proves", proof.bound, proved),
+        ("bound of the certificate above what it proves", proof.certificate.bound, proved),
+        ("bound above the cost of the plan", proof.bound, plan.cost * (1 + SAME)),
+    )
+    rows = [_row(words, claim, true) for words, claim, true in claims]
+    gap = (plan.cost - proof.bound) / plan.cost if plan.cost else 0.0
+    if proof.gap is None or not abs(proof.gap - gap) <= SAME * max(1.0, size / abs(plan.cost or 1)):
+        rows.append(_row("gap that does not match cost and bound", 1.0, 0.0))
+    # Only the worst row is returned; NaN counts as broken.
+    broken = [row for row in rows if not row.ok]
+    return [max(broken or rows, key=lambda row: row.value - row.limit)]
+
+
+def _row(title: str, value: float, limit: float) -> Check:
+    return Check(
+        code=BOUND,
+        title=title,
+        value=float(value),
+        limit=float(limit),
+        unit="count",
+        node=0,
+        advice="plan again",
+    )
+
+
+def certified_bound(certificate: Certificate, plan: Plan) -> float:
+    """Return the lower bound that a certificate proves for motions along a plan's contour.
+
+    The bound holds for every motion that keeps (5), (6), the joint ranges and the couplings at the
+    nodes, at any gamma, in any allowed posture and on any turn. It is never larger than the plan's
+    cost.
+
+    Parameters
+    ----------
+    certificate : Certificate
+        Only its cells, potentials and multipliers are used.
+    plan : Plan
+
+    Raises
+    ------
+    InputError
+        The certificate does not fit the plan or does not cover all motions, or certificates do not
+        apply to such a plan.
+    """
+    where, every, change = _asked(plan)
+    if not certificate.stages:
+        raise CertificateRefused("it has no stage")
+    K, n = plan.q.shape
+    proved = -np.inf
+    left: Places | None = None
+    for stage in certificate.stages:
+        _require_fit(stage, K, n)
+        rates, constant = _rates(stage, every, change)
+        at = covered(where, stage, left, partial(linked, rates))
+        bounds = _through(rates, at, stage) + constant
+        proved = max(proved, float(bounds.min(initial=np.inf)))
+        if proved >= plan.cost:
+            return plan.cost
+        left = at.take(bounds <= plan.cost)
+    return proved
+
+
+def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
+    """Return where the motions of a plan's task may be, the bounds of their steps, and A of (6)."""
+    settings, robot = plan.settings, plan.robot
+    tau = np.diff(plan.time)
+    dt = float(tau.max())
+    for known, what in (
+        (settings.objective == "sum", f"the objective {settings.objective!r}"),
+        (settings.tilt is None and not plan.tilt.any(), "a tilt of the tool axis"),
+        (not robot.externals, "an external axis"),
+        (robot.family.free_rotation, "a robot without free rotation"),
+        (plan.feed is None and dt - tau.min() <= EVEN * dt, "a feed that is not constant"),
+    ):
+        if not known:
+            raise CertificateRefused(f"certificates do not apply to {what}")
+    limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
+    endless = np.asarray(robot.endless, dtype=bool)
+    lower, upper = (np.where(endless, 0.0, end) for end in (limits.lower, limits.upper))
+    if not (np.isfinite(lower) & np.isfinite(upper)).all():
+        raise CertificateRefused(
+            "certificates do not apply to joints that are neither endless nor limited"
+        )
+    # The value of an endless joint is known only up to full turns: its couplings are ignored.
+    bound = ~np.asarray((limits.rows[:, endless] != 0).any(axis=1))
+    where = Reachable(
+        robot,
+        plan.frames,
+        plan.T_flange_tip,
+        np.arange(POSTURES) if settings.postures is None else np.unique(settings.postures),
+        lower,
+        upper,
+        endless,
+        limits.rows[bound],
+        limits.row_lower[bound],
+        limits.row_upper[bound],
+    )
+    if not ((where.postures >= 0) & (where.postures < POSTURES)).all():
+        raise CertificateRefused(
+            f"the plan allows unknown postures; expected numbers from 0 to {POSTURES - 1}"
+        )
+    most = settings.eta_v * velocity * dt * (1 + 8 * UNIT) + LIMIT_TOLERANCE
+    most = np.where(endless, np.minimum(most, np.pi + LIMIT_TOLERANCE), most)
+    change = settings.eta_a * acceleration * dt**2 * (1 + EVEN) ** 2 + LIMIT_TOLERANCE
+    K, n = plan.q.shape
+    most = np.tile(most, (K - 1, 1))
+    weights = np.asarray(settings.weights)
+    if not (weights >= 0).all():
+        raise CertificateRefused("certificates do not apply to negative weights")
+    return (
+        where,
+        Rates(np.arange(K), most, weights, settings.metric, endless, np.zeros((K - 1, n))),
+        change,
+    )
+
+
+def _require_fit(stage: Stage, K: int, n: int) -> None:
+    """Raise CertificateRefused unless the arrays of a stage fit K nodes and n joints."""
+    C = len(stage.node)
+    shapes = {
+        "node": (C,), "posture": (C,), "level": (C,), "index": (C,), "lift": (C, n),
+        "value": (C, 2), "dual": (C, 2, n),
+    }  # fmt: skip
+    for name, shape in shapes.items():
+        part = getattr(stage, name)
+        if part.shape != shape:
+            raise CertificateRefused(f"{name}: expected shape {shape}, got {part.shape}")
+        if (part.dtype.kind in "iu") != (name not in ("value", "dual")):
+            kind = "real numbers" if name in ("value", "dual") else "integers"
+            raise CertificateRefused(f"{name}: expected {kind}, got {part.dtype}")
+    level = stage.level.astype(np.int64)
+    for name, most in (("node", K), ("posture", POSTURES), ("level", DEEPEST_CELL + 1)):
+        part = getattr(stage, name)
+        if not ((part >= 0) & (part < most)).all():
+            raise CertificateRefused(f"{name}: expected numbers from 0 to {most - 1}")
+    if not ((stage.index >= 0) & (stage.index < BASE << level)).all():
+        raise CertificateRefused("index: a cell is not on the circle of gamma")
+    if (np.diff(stage.node) < 0).any():
+        raise CertificateRefused("node: expected cells in the order of nodes")
+    for name in ("value", "dual"):
+        if not (np.abs(getattr(stage, name)) <= LARGEST).all():
+            raise CertificateRefused(f"{name}: expected numbers up to {LARGEST:g}")
+
+
+def _rates(stage: Stage, every: Rates, change: Array) -> tuple[Rates, float]:
+    """Return the steps between the nodes of a stage, and the constant of its multipliers.
+
+    Parameters
+    ----------
+    stage : Stage
+    every : Rates
+        Steps between all nodes.
+    change : (n,) rad
+        Bound of (6).
+    """
+    nodes = np.unique(stage.node).astype(np.int64)
+    K, n = len(every.nodes), len(every.weights)
+    if len(nodes) < 2 or nodes[0] != 0 or nodes[-1] != K - 1:
+        raise CertificateRefused("its cells leave out motions at the first node or the last")
+    # The bound of a step over several intervals is the sum of theirs.
+    velocity = np.add.reduceat(every.velocity, nodes[:-1], axis=0) * (1 + K * UNIT)
+    rates = replace(every, nodes=nodes, velocity=velocity, tilt=np.zeros(velocity.shape))
+    nu = stage.multipliers
+    if nu is None:
+        return rates, 0.0
+    if nu.shape != (K, n) or nu.dtype.kind != "f":
+        raise CertificateRefused(f"multipliers: expected shape {(K, n)}, got {nu.shape}")
+    if not (np.abs(nu) <= LARGEST).all():
+        raise CertificateRefused(f"multipliers: expected numbers up to {LARGEST:g}")
+    if nu[0].any() or nu[-1].any():
+        raise CertificateRefused("multipliers: expected zeros at the first node and the last")
+    if len(nodes) < K:
+        raise CertificateRefused("multipliers: expected cells at every node")
+    size = float((np.abs(nu) @ change).sum())
+    rounded = 2 * float(np.abs(nu).sum(axis=0) @ velocity.max(axis=0)) + size
+    return replace(rates, tilt=nu[:-1] - nu[1:]), -size - 4 * UNIT * (K + n) * rounded
+
+
+def _through(rates: Rates, at: Places, stage: Stage) -> Array:
+    """Return a lower bound (C,) on the cost of motions through each place; inf where none passes.
+
+    At the last node no cost remains, so the potential is taken as zero there.
+    """
+    layer, last = rates.layer(at), len(rates.nodes) - 1
+    ends = (layer == last)[:, None]
+    value = np.where(ends, 0.0, stage.value[at.cell])
+    dual = np.where(ends[..., None], 0.0, stage.dual[at.cell].astype(float))
+    begun = np.where(layer == 0, least_value(at, value, dual), np.inf)
+    ended = np.where(layer == last, 0.0, np.inf)
+    steps, held = list(steps_on(rates, at)), 0
+    kept: list[list[Costs] | None] = []
+    for both, places in steps:
+        parts: list[Costs] | None = []
+        for a, b, cost in _costs(rates, places, value[both], dual[both]):
+            np.minimum.at(begun[both], b, begun[both][a] + cost)
+            held += len(a)
+            if parts is not None:
+                parts.append((a, b, cost))
+            if held > MOST_HELD:  # the costs from here on are computed again
+                parts = None
+        kept.append(parts)
+    for (both, places), known in zip(reversed(steps), reversed(kept), strict=True):
+        for a, b, cost in known or _costs(rates, places, value[both], dual[both]):
+            np.minimum.at(ended[both], a, ended[both][b] + cost)
+    whole = begun + ended
+    return whole - _rounding(rates, at, value, dual, whole)
+
+
+def _costs(rates: Rates, at: Places, value: Array, dual: Array) -> Iterator[Costs]:
+    """Yield the steps between the places of two nodes, and lower bounds on their costs."""
+    for a, b in candidates(rates, at):
+        cost = reduced_costs(rates, at, value, dual, a, b)
+        yield a.astype(np.int32), b.astype(np.int32), cost
+
+
+def _rounding(rates: Rates, at: Places, value: Array, dual: Array, whole: Array) -> float:
+    """Return a bound on the rounding error of all sums along a motion.
+
+    A step is a sum of products, with an error of at most 64 units of their sizes; the sums of K
+    steps have an error of K units of their size.
+    """
+    n = len(rates.weights)
+    joint = 3 * (np.pi + rates.velocity.max() + 2 * at.reach.max(initial=0.0))
+    slope = np.abs(dual).max(initial=0.0) + np.abs(rates.tilt).max() + rates.weights.max()
+    step = 2 * np.abs(value).max(initial=0.0) + 2 * n * slope * joint
+    sums = np.abs(whole[np.isfinite(whole)]).max(initial=0.0)
+    return float(64 * UNIT * len(rates.nodes) * (step + sums))

@@ -1,0 +1,426 @@
+"""Read DXF files: flat curves with layers and colours, chained to loops.
+
+Entities that are left out, also those that ezdxf drops when it repairs a file, are counted by kind
+and reason.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import struct
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from io import BytesIO
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from ezdxf import recover
+from ezdxf.audit import Auditor
+from ezdxf.colors import BYBLOCK, BYLAYER, int2rgb
+from ezdxf.document import Drawing
+from ezdxf.entities.arc import Arc as DxfArc
+from ezdxf.entities.circle import Circle
+from ezdxf.entities.dxfgfx import DXFGraphic
+from ezdxf.entities.ellipse import Ellipse
+from ezdxf.entities.insert import Insert
+from ezdxf.entities.line import Line as DxfLine
+from ezdxf.entities.lwpolyline import LWPolyline
+from ezdxf.entities.polyline import Polyline
+from ezdxf.entities.spline import Spline as DxfSpline
+from ezdxf.entities.ucs import UCSTableEntry
+from ezdxf.lldxf.const import DXFError
+from ezdxf.lldxf.tagger import binary_tags_loader
+from ezdxf.math import Vec3
+from ezdxf.xclip import XClip
+from scipy.interpolate import BSpline
+
+from kerfpath.arrays import Array, freeze
+from kerfpath.cad.chains import Look, Stroke, loops_in
+from kerfpath.cad.curves import Arc, Curve, Line, Spline
+from kerfpath.cad.left_out import LeftOut
+from kerfpath.cad.part import Part
+from kerfpath.cad.units import LARGEST, MM, UNITS_MM
+from kerfpath.errors import InputError
+
+# -----------------------------------------------------------------------------
+# Convert the entities of a DXF that are lines to cut to curves.
+
+
+def curves_of(entity: DXFGraphic, T: Array) -> Iterator[Curve]:
+    """Yield the curves (mm) of an entity, or none if it is no line to cut.
+
+    T (4, 4) maps its coordinates to mm. Blocks may have different scales in x and y; arcs, ellipses
+    and splines stay exact under any such map, without division.
+    """
+
+    def point(at: Iterable[float]) -> Array:
+        return np.asarray(T[:3, :3] @ np.array([*at], dtype=float) + T[:3, 3])
+
+    def along(vector: Iterable[float]) -> Array:
+        return np.asarray(T[:3, :3] @ np.array([*vector], dtype=float))
+
+    if isinstance(entity, DxfLine):
+        yield Line(point(entity.dxf.start), point(entity.dxf.end))
+    elif isinstance(entity, Circle):  # ARC is a subclass
+        first, last = 0.0, 360.0
+        if isinstance(entity, DxfArc):
+            first, last = float(entity.dxf.start_angle), float(entity.dxf.end_angle)
+            last = first + ((last - first) % 360.0 or 360.0)
+        ocs, radius = entity.ocs(), float(entity.dxf.radius)
+        yield Arc(
+            point(ocs.to_wcs(entity.dxf.center)),
+            along(ocs.to_wcs((radius, 0, 0))),
+            along(ocs.to_wcs((0, radius, 0))),
+            *np.radians([first, last]).tolist(),
+        )
+    elif isinstance(entity, Ellipse):
+        first, last = float(entity.dxf.start_param), float(entity.dxf.end_param)
+        yield Arc(
+            point(entity.dxf.center),
+            along(entity.dxf.major_axis),
+            along(entity.minor_axis),
+            first,
+            first + ((last - first) % (2 * np.pi) or 2 * np.pi),
+        )
+    elif isinstance(entity, LWPolyline) or (
+        isinstance(entity, Polyline) and (entity.is_2d_polyline or entity.is_3d_polyline)
+    ):
+        for piece in entity.virtual_entities():
+            yield from curves_of(piece, T)
+    elif isinstance(entity, DxfSpline):
+        tool = entity.construction_tool()
+        weights = np.array(tool.weights() or np.ones(tool.count))
+        points = np.array([point(p) for p in tool.control_points])
+        net = np.column_stack([points * weights[:, None], weights])
+        spline = BSpline(np.array(tool.knots()), net, tool.order - 1)
+        low, high = spline.t[spline.k], spline.t[-spline.k - 1]
+        yield Spline(spline, float(low), float(high))
+
+
+# -----------------------------------------------------------------------------
+# Open a DXF, text or binary, with ezdxf, and find what ezdxf repaired and dropped.
+
+logger = logging.getLogger("ezdxf")
+DAMAGED = (
+    DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, RecursionError,
+    TypeError, ValueError, struct.error,
+)  # fmt: skip
+"""Exceptions that ezdxf and splines raise on bad values and on damaged structures."""
+BINARY = b"AutoCAD Binary DXF"
+LINES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE", "INSERT")
+"""Kinds of entities that are lines to cut; none of them may be lost without a note."""
+STANDS = re.compile(
+    rf"^[ \t]*0[ \t]*\r?\n[ \t]*({'|'.join(LINES)})[ \t]*\r?$".encode(), re.MULTILINE
+)
+MARKERS = {b"LWPOLYLINE": b"AcDbPolyline", b"SPLINE": b"AcDbSpline"}
+"""Kinds that ezdxf reads only after the marker of their class, which some writers leave out."""
+MARKED = re.compile(
+    rb"^([ \t]*0[ \t]*\r?\n[ \t]*(%s)[ \t]*\r?\n)(.*?)(?=^[ \t]*0[ \t]*\r?\n[ \t]*[A-Z])"
+    % b"|".join(MARKERS),
+    re.MULTILINE | re.DOTALL,
+)
+COMMON = frozenset(map(str, (
+    5, 6, 8, 48, 60, 62, 67, 92, 100, 102, 160, 284, 310, 330, 347, 348, 360, 370, 390, 410, 420,
+    430, 440,
+)))  # fmt: skip
+"""Codes before the marker, the same for all kinds (DXF reference, common group codes)."""
+DROPPED = re.compile(
+    r"(?:Removed|Deleted) (?:[a-zDXF]+ )*([A-Z][A-Z0-9_]+)(?:\(#\w+\))? (?:entity )?(.*)"
+)
+"""Message of ezdxf when it drops an entity."""
+
+
+def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, str]]]:
+    """Return the drawing, the repaired faults, and the count of lost entities by kind and reason.
+
+    Raises
+    ------
+    one of DAMAGED
+        Not a DXF, or one that cannot be repaired.
+    """
+    is_binary = content.startswith(BINARY)
+    if not (is_binary or b"SECTION" in content[:4096]):
+        raise DXFError(f"expected SECTION at its start, got {content[:32]!r}")
+    with _overheard() as said:
+        if is_binary:
+            document = Drawing.load(binary_tags_loader(content))
+            auditor: Auditor = document.audit()
+        else:
+            document, auditor = recover.read(BytesIO(MARKED.sub(_with_markers, content)))
+    faults = [*said, *(fault.message for fault in (*auditor.fixes, *auditor.errors))]
+    faults = [" ".join(fault.split())[:200] for fault in faults]
+    return document, faults, _lost(document, content, faults)
+
+
+def _with_markers(entity: re.Match[bytes]) -> bytes:
+    """Return an entity with the markers of its classes, adding those that are missing."""
+    head, kind, body = entity.groups()
+    if MARKERS[kind] in body:
+        return entity[0]
+    lines = body.splitlines(keepends=True)
+    pairs = [b"".join(lines[k : k + 2]) for k in range(0, len(lines), 2)]
+    codes = [pair.split(b"\n", 1)[0].strip().decode("ascii", "replace") for pair in pairs]
+    end = b"\r\n" if head.endswith(b"\r\n") else b"\n"
+    own = next((k for k, code in enumerate(codes) if code not in COMMON), len(pairs))
+    pairs.insert(own, b"100" + end + MARKERS[kind] + end)
+    if b"AcDbEntity" not in body:
+        common = codes.index("8") if "8" in codes[:own] else own
+        pairs.insert(common, b"100" + end + b"AcDbEntity" + end)
+    return head + b"".join(pairs)
+
+
+def _lost(document: Drawing, content: bytes, faults: list[str]) -> Counter[tuple[str, str]]:
+    """Return which lines of the file are not in the drawing."""
+    kept = Counter(entity.dxftype() for entity in document.entitydb.values() if entity.is_alive)
+    stand = Counter(kind.decode() for kind in STANDS.findall(content))
+    lost: Counter[tuple[str, str]] = Counter()
+    for fault in faults:
+        dropped = DROPPED.match(fault)
+        if dropped and dropped[1] in LINES:
+            lost[dropped[1], dropped[2].rstrip(".")] += 1
+    for kind, count in stand.items():
+        explained = sum(n for (lost_kind, _), n in lost.items() if lost_kind == kind)
+        if (missing := count - kept[kind] - explained) > 0:
+            lost[kind, "the file is damaged there"] += missing
+    return lost
+
+
+class _Listener(logging.Handler):
+    """Keep the messages that are logged."""
+
+    def __init__(self, level: int) -> None:
+        super().__init__(level)
+        self.said: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a message."""
+        self.said.append(record.getMessage())
+
+
+@contextmanager
+def _overheard() -> Iterator[list[str]]:
+    """Collect what ezdxf logs about faults, instead of printing it on the terminal."""
+    handler = _Listener(logging.WARNING)
+    propagates, logger.propagate = logger.propagate, False
+    logger.addHandler(handler)
+    try:
+        yield handler.said
+    finally:
+        logger.removeHandler(handler)
+        logger.propagate = propagates
+
+
+# -----------------------------------------------------------------------------
+# Read DXF files: flat curves with layers and colours, chained to loops.
+
+INSUNITS = {
+    1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 9: "mil", 13: "um", 14: "dm",
+}  # fmt: skip
+"""Units by value of the header variable $INSUNITS."""
+COLOURS = {1: "red", 2: "yellow", 3: "green", 4: "cyan", 5: "blue", 6: "magenta", 7: "white"}
+"""Names of the first colours of the AutoCAD colour index."""
+LOOSE = ("0", "white")
+"""Layer and colour of entities outside blocks."""
+DEEPEST = 32
+"""Deepest nesting of blocks; more means that a block contains itself."""
+MOST = 200_000
+"""Most curves and blocks in a drawing; more is an error in the rows and columns of a block."""
+FLAT = 1e-6
+"""How far (mm) a curve may leave the drawing plane, as writers round numbers."""
+NEVER_CUT = frozenset([
+    "TEXT", "MTEXT", "ATTDEF", "ATTRIB", "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION",
+    "LEADER", "MLEADER", "MULTILEADER", "TOLERANCE", "POINT", "VIEWPORT", "IMAGE", "WIPEOUT",
+    "PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "RAY", "XLINE", "ACAD_TABLE", "LIGHT", "SUN",
+    "HATCH", "MPOLYGON",
+])  # fmt: skip
+"""Kinds of entities that annotate a part and are no lines to cut; others may be."""
+
+
+def read_dxf(
+    path: Path, content: bytes, unit: str | None, gap: float, axis: Array | None = None
+) -> Part:
+    """Return the part in a DXF drawing; the tool axis is -z of its plane, or the given `axis`.
+
+    Raises
+    ------
+    InputError
+        Not a DXF file, a damaged one, one without curves, curves that leave the plane, or no known
+        unit.
+    """
+    try:
+        document, repairs, lost = document_of(content)
+        insunits = int(document.header.get("$INSUNITS", 0))
+    except DAMAGED as error:
+        raise InputError(
+            f"{path}: not a DXF file, or a damaged one ({_reason(error)}); save the drawing as DXF "
+            "again"
+        ) from None
+    declared = INSUNITS.get(insunits, "")
+    if unit is None and not declared:
+        raise InputError(
+            f"{path}: states no length unit ($INSUNITS is {insunits}); "
+            f"give the unit of its numbers with unit= one of {', '.join(UNITS_MM)}"
+        )
+    notes = []
+    if unit is None:
+        notes.append(f"unit {declared} taken from $INSUNITS, which is only a hint: check it")
+    elif declared and declared != unit:
+        notes.append(f"unit {unit} as given; $INSUNITS says {declared}")
+    if repairs:
+        notes.append(f"{len(repairs)} faults of the file repaired, the first: {repairs[0]}")
+    sheet = _Sheet(document, is_flat=axis is None)
+    scale = UNITS_MM[unit or declared]
+    try:
+        with np.errstate(all="ignore"):  # ezdxf divides by lengths that may be 0
+            sheet.add(document.modelspace(), np.diag([scale, scale, scale, 1.0]))
+            sheet.look_on_paper()
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except DAMAGED as error:
+        raise InputError(f"{path}: damaged ({_reason(error)}); repair it in CAD") from None
+    sheet.left_out.update(lost)
+    part = loops_in(
+        path, unit or declared, sheet.strokes, gap=gap, notes=notes, left_out=sheet.summed(),
+        axis=axis,
+    )  # fmt: skip
+    return replace(part, frames={str(ucs.dxf.name): _frame(ucs, scale) for ucs in document.ucs})
+
+
+def _frame(ucs: UCSTableEntry, scale: float) -> Array:
+    """Return T_part_frame (4, 4) m of a user coordinate system of a drawing."""
+    T = np.array(list(ucs.ucs().matrix.columns()))
+    T[:3, 3] *= scale * MM
+    return freeze(T)
+
+
+def _reason(error: Exception) -> str:
+    """Return the message of an exception, short enough for a line."""
+    return " ".join(str(error).split())[:80] or type(error).__name__
+
+
+@dataclass
+class _Sheet:
+    """Strokes gathered from the entities of a drawing, in mm, by (layer, colour)."""
+
+    document: Drawing
+    is_flat: bool = True
+    strokes: dict[Look, list[Stroke]] = field(default_factory=dict)
+    left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
+    put_aside: Counter[tuple[str, str]] = field(default_factory=Counter)
+    count: int = 0
+
+    def summed(self) -> tuple[LeftOut, ...]:
+        """Return what was left out by kind and reason, first what may have been a line to cut."""
+        found = [
+            LeftOut(
+                kind=kind, reason=reason, count=count, may_cut=doubtful and kind not in NEVER_CUT
+            )
+            for what, doubtful in ((self.left_out, True), (self.put_aside, False))
+            for (kind, reason), count in what.items()
+        ]
+        return tuple(sorted(found, key=lambda one: not one.may_cut))
+
+    def look_on_paper(self) -> None:
+        """Count the entities on the sheets for printing, outside the model."""
+        for layout in self.document.layouts:
+            if not layout.is_modelspace:
+                for entity in layout:
+                    self.put_aside[entity.dxftype(), f"on the sheet {layout.name}"] += 1
+
+    def add(
+        self, entities: Iterable[DXFGraphic], T: Array, inside: Look = LOOSE, depth: int = 0
+    ) -> None:
+        """Add entities; `inside` is the layer and colour of the insertion of their block.
+
+        T (4, 4) maps their coordinates to those of the drawing, mm; it may scale.
+        """
+        if depth > DEEPEST:
+            raise InputError(f"blocks nest deeper than {DEEPEST}: one contains itself; repair it")
+        for entity in entities:
+            kind = entity.dxftype()
+            try:
+                self._entity(entity, kind, T, inside, depth)
+            except InputError:
+                raise
+            except DAMAGED as error:
+                self.left_out[kind, f"it cannot be read: {_reason(error)}"] += 1
+
+    def _entity(self, entity: DXFGraphic, kind: str, T: Array, inside: Look, depth: int) -> None:
+        look = self._look(entity, inside)
+        if self.document.layers.has_entry(look[0]):
+            drawn = self.document.layers.get(look[0])
+            if drawn.is_off() or drawn.is_frozen():
+                self.put_aside[kind, f"on hidden layer {look[0]}"] += 1
+                return
+        if isinstance(entity, Insert):
+            self._insert(entity, T, look, depth)
+            return
+        curves = list(curves_of(entity, T))
+        if not curves:
+            self.left_out[kind, "not a line to cut"] += 1
+        self._counted(len(curves))
+        for curve in curves:
+            self._require_flat(curve, kind, look[0])
+        if curves:
+            self.strokes.setdefault(look, []).append(tuple(curves))
+
+    def _insert(self, insert: Insert, T: Array, look: Look, depth: int) -> None:
+        """Add a block wherever it is inserted, once or in rows and columns."""
+        block = insert.block()
+        if block is None or block.block is None:
+            self.left_out["INSERT", "its block is not in the file"] += 1
+            return
+        if block.block.is_xref:
+            self.left_out["INSERT", "its block is in another file (XREF)"] += 1
+            return
+        if not (insert.dxf.xscale and insert.dxf.yscale):
+            self.left_out["INSERT", "it is scaled by 0"] += 1
+            return
+        if XClip(insert).has_clipping_path:
+            self.left_out["INSERT", "only its clipping: the whole block is read"] += 1
+        ocs, own = insert.ocs(), np.array([*insert.matrix44()]).reshape(4, 4).T
+        rows = max(insert.dxf.row_count, 1) if insert.dxf.row_spacing else 1
+        columns = max(insert.dxf.column_count, 1) if insert.dxf.column_spacing else 1
+        if rows * columns > MOST:
+            raise InputError(f"a block is inserted {rows * columns} times (at most {MOST})")
+        self._counted(rows * columns)
+        for row, column in product(range(rows), range(columns)):
+            place = Vec3(column * insert.dxf.column_spacing, row * insert.dxf.row_spacing)
+            step = np.eye(4)
+            step[:3, 3] = ocs.to_wcs(place.rotate_deg(insert.dxf.rotation)).xyz
+            self.add(block, T @ step @ own, look, depth + 1)
+
+    def _counted(self, more: int) -> None:
+        self.count += more
+        if self.count > MOST:
+            raise InputError(f"more than {MOST} curves and blocks; leave out what is not to be cut")
+
+    def _look(self, entity: DXFGraphic, inside: Look) -> Look:
+        layer = inside[0] if entity.dxf.layer == "0" else str(entity.dxf.layer)
+        if entity.dxf.hasattr("true_color"):
+            return layer, "#{:02x}{:02x}{:02x}".format(*int2rgb(entity.dxf.true_color))
+        index = int(entity.dxf.color)
+        if index == BYBLOCK:
+            return layer, inside[1]
+        if index == BYLAYER:
+            known = self.document.layers.has_entry(layer)
+            index = abs(int(self.document.layers.get(layer).dxf.color)) if known else 7
+        return layer, COLOURS.get(index, f"aci{index}")
+
+    def _require_flat(self, curve: Curve, kind: str, layer: str) -> None:
+        box = curve.bounds()
+        if not (np.abs(box) <= LARGEST).all():
+            raise InputError(
+                f"a {kind} on layer {layer} reaches further than {LARGEST / 1e6:g} km; its numbers "
+                "are damaged, or the unit is wrong"
+            )
+        if self.is_flat and box[1, 2] - box[0, 2] > FLAT:
+            raise InputError(
+                f"a {kind} on layer {layer} leaves the drawing plane, z from {box[0, 2]:g} to "
+                f"{box[1, 2]:g} mm; expected a flat drawing: project it to one plane, or give the "
+                "tool axis with axis"
+            )

@@ -1,0 +1,158 @@
+"""Read moves of Heidenhain's plain-language programs: L and LN, with tool axis TX TY TZ."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from kerfpath.cad.toolpath import Tip, ToolPath, Triple, finite, unit_axis
+from kerfpath.errors import InputError
+
+BEGIN = re.compile(r"\s*\d*\s*BEGIN PGM\s+\S+(?:\s+(\S+))?")
+UNITS = {"MM": "mm", "INCH": "in"}
+AXIS = ("TX", "TY", "TZ")
+NORMAL = ("NX", "NY", "NZ")
+HARMLESS = re.compile(
+    r"BLK FORM\b|TOOL (?:CALL|DEF)\b|STOP\b|CYCL DEF 32(?:\.\d)?\b|M\d+$|FUNCTION TCPM\b|\*"
+)
+TCPM = re.compile(r"FUNCTION TCPM\b|M128\b")
+ENDS = ("M2", "M02", "M30")
+IN_MACHINE = ("M91", "M92")
+CHANGING = ("M89", "M99", "M114", "M118", "M130", "M140", "M144")
+"""Called cycles, compensated tool axes, handwheel, other systems: moves that are not supported."""
+NO_TCPM = re.compile(r"FUNCTION RESET TCPM$|M129$")
+WORD = re.compile(r"([TN]?[XYZ]|[ABCFM])([-+]?[\d.,]+|MAX)|(R[0LR])$")
+
+
+def is_klartext(lines: Sequence[str]) -> bool:
+    """Return whether a program begins as Heidenhain's do."""
+    first = next((line for line in lines if line.strip() and not line.strip().startswith(";")), "")
+    return BEGIN.match(first.upper()) is not None
+
+
+def klartext_path(lines: Sequence[str]) -> ToolPath:
+    """Return the moves of a program.
+
+    Raises
+    ------
+    InputError
+        A block that is not known, that changes the path, or that needs the kinematics of the
+        machine (its line is named).
+    """
+    program = _Program()
+    for number, line in enumerate(lines, start=1):
+        text = re.sub(r"^\s*\d+\b", "", line.upper().partition(";")[0]).strip()
+        if text:
+            program.take(number, f"line {number}", text)
+    return ToolPath(moves=program.tip.moves, unit=program.unit, unused=program.unused)
+
+
+class _Program:
+    """The state of the program, which the next block is read with."""
+
+    def __init__(self) -> None:
+        self.tip = Tip()
+        self.unit = ""
+        self.unused: set[str] = set()
+        self._keeps_tip = False
+        self._end = 0
+
+    def take(self, line: int, where: str, text: str) -> None:
+        """Take one block.
+
+        Raises
+        ------
+        InputError
+            A block that is not known, or that changes the path.
+        """
+        if self._end and not text.startswith("END PGM"):
+            raise InputError(f"{where}: a block after the end of the program in line {self._end}")
+        kind, *words = text.split()
+        if begin := BEGIN.match(text):
+            unit = begin[1] or ""
+            if unit not in UNITS or self.unit:
+                raise InputError(f"{where}: expected one BEGIN PGM NAME MM or INCH, got {text!r}")
+            self.unit = UNITS[unit]
+        elif kind in ("L", "LN"):
+            self._line(line, where, words)
+        elif text.startswith("END PGM") or text.removeprefix("STOP ") in ENDS:
+            self._end = line
+        elif NO_TCPM.match(text):
+            self._keeps_tip = False
+            self.tip.forget(line)
+        elif HARMLESS.match(text) and kind not in CHANGING:
+            if TCPM.match(text) and not self._keeps_tip:
+                self._keeps_tip = True
+                self.tip.forget(line)
+            elif kind == "TOOL":
+                self.tip.forget(line)
+            self.unused.add(kind)
+        else:
+            raise InputError(f"{where}: {text[:40]!r}: {_reason(kind)}")
+
+    def _line(self, line: int, where: str, words: Sequence[str]) -> None:
+        """Take a straight line: its position, tool axis, feed and other words."""
+        values: dict[str, float] = {}
+        extras: set[str] = set()
+        is_rapid = False
+        for word in words:
+            found = WORD.fullmatch(word)
+            if word.startswith("I") or found is None or word in ("RL", "RR"):
+                raise InputError(f"{where}: {word[:40]!r}: {_reason(word)}")
+            name, text = found[1], found[2]
+            if name in ("A", "B", "C"):
+                raise InputError(
+                    f"{where}: {name}: the effect of a rotary axis depends on the kinematics of "
+                    "the machine; have the CAM system write LN with TX TY TZ, or APT"
+                )
+            if name in ("M", "F"):
+                is_rapid |= (name, text) == ("F", "MAX")
+                extras.add(f"M{text}" if name == "M" else "F")
+            elif name is not None:
+                if name in values:
+                    raise InputError(f"{where}: {name} twice in one block")
+                values[name] = finite(text.replace(",", "."), f"{where}: {name}")
+        if changing := [each for each in CHANGING if each in extras]:
+            raise InputError(f"{where}: {changing[0]!r}: {_reason(changing[0])}")
+        if "M128" in extras and not self._keeps_tip:
+            self._keeps_tip = True
+            self.tip.forget(line)
+        self.unused |= {each[0] for each in extras} | {n for n in NORMAL if n in values}
+        self._go(line, where, values, extras, is_rapid)
+        if "M129" in extras:
+            self._keeps_tip = False
+            self.tip.forget(line)
+        if any(each in extras for each in ENDS):
+            self._end = line
+
+    def _go(
+        self, line: int, where: str, values: dict[str, float], extras: set[str], is_rapid: bool
+    ) -> None:
+        place = {name: values[name] for name in "XYZ" if name in values}
+        axis: Triple | None = None
+        if any(name in values for name in AXIS):
+            if missing := [name for name in AXIS if name not in values]:
+                raise InputError(f"{where}: TX, TY and TZ belong together; {missing[0]} is missing")
+            if not self._keeps_tip:
+                raise InputError(f"{where}: TX TY TZ without M128, which they need")
+            axis = unit_axis((values["TX"], values["TY"], values["TZ"]), where)
+        elif any(name in values for name in NORMAL):
+            raise InputError(f"{where}: NX NY NZ without TX TY TZ; expected the tool axis")
+        if any(each in extras for each in IN_MACHINE):
+            if not is_rapid:
+                raise InputError(
+                    f"{where}: M91 at feed: its position is in machine coordinates, not in the part"
+                )
+            self.tip.go_away(line)
+        elif place or axis:
+            self.tip.go(line, feed=not is_rapid, place=place, axis=axis)
+
+
+def _reason(word: str) -> str:
+    if word in ("C", "CC", "CR", "CT", "CP", "RND", "CHF", "APPR", "DEP", "SPL"):
+        return "a curve, or a move that is not written out; have the CAM system write lines only"
+    if word in ("RL", "RR"):
+        return "the controller would offset the path; write the path of the tip"
+    if word.startswith("I"):
+        return "increments; write absolute positions"
+    return "it is not known, and may change the path"

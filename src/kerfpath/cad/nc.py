@@ -1,0 +1,259 @@
+"""Read programs for 5-axis machines with the tool axis as a vector: Siemens, Heidenhain."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from kerfpath.arrays import Array
+from kerfpath.cad.klartext import is_klartext, klartext_path
+from kerfpath.cad.part import Part
+from kerfpath.cad.toolpath import (
+    UNKNOWN,
+    Tip,
+    ToolPath,
+    Triple,
+    lines_of,
+    part_of_tool_path,
+    unit_axis,
+)
+from kerfpath.errors import InputError
+
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+WORD = re.compile(
+    rf"\s*(?:(?P<named>[A-Z]\d*)\s*=\s*(?P<value>{NUMBER})?"
+    rf"|(?P<keyword>[A-Z_][A-Z_][A-Z0-9_]*)\s*(?P<arguments>\([^)]*\))?"
+    rf"|(?P<letter>[A-Z])\s*(?P<number>{NUMBER})"
+    rf"|(?P<comment>\([^)]*\)))"
+)
+TEXT = re.compile(r'MSG\s*\(.*\)|T\s*=\s*"[^"]*"')
+"""Words with text: a message, the name of a tool."""
+HEADER = re.compile(r"%|[O:]\d+\s*$|\$PATH")
+AXIS = ("A3", "B3", "C3")
+UNITS = {20: "in", 21: "mm", 70: "in", 71: "mm", 700: "in", 710: "mm"}
+OFFSETS = (54, 55, 56, 57, 58, 59, 500, *range(505, 600))
+HARMLESS_G = (
+    *(9, 17, 18, 19, 40, 60, 61, 62, 64, 80, 90, 93, 94, 95, 96, 97),
+    *(601, 602, 603, 641, 642, 643, 644, 645),
+)
+REFUSED_G: dict[float, str] = {
+    **dict.fromkeys((2, 3, 5, 6), "a curve; have the CAM system write linear moves only"),
+    **dict.fromkeys((41, 42), "the controller would offset the path; write the path of the tip"),
+    91: "increments; write absolute positions, under G90",
+}
+AWAY = ("G28", "G30", "G74", "G75")
+MACHINE = ("G53", "G153", "SUPA")
+HARMLESS = (
+    *("BRISK", "COMPCAD", "COMPCURV", "COMPOF", "COMPON", "COMPSURF", "CYCLE832", "FFWOF"),
+    *("FFWON", "FIFOCTRL", "FNORM", "ORIAXES", "ORIC", "ORIPLANE", "ORIVECT", "ORIWKS", "SOFT"),
+    *("STOPRE", "UPATH", "WORKPIECE"),
+)
+REFUSED = {
+    **dict.fromkeys(("AROT", "ASCALE", "ATRANS", "MIRROR", "ROT", "SCALE", "TRANS", "CYCLE800"),
+                    "it moves the points that follow; write them in the coordinates of the part"),
+    **dict.fromkeys(("BSPLINE", "CIP", "CSPLINE", "CT", "POLY", "ASPLINE"),
+                    "a curve; have the CAM system write linear moves only"),
+    "ORIMKS": "tool axes in the machine, not in the part; write ORIWKS",
+}  # fmt: skip
+ENDS = (2, 17, 30)
+TOOL_CHANGE = 6
+CALLS = (98, 99)
+UNUSED = "DFHMST"
+ROTARY = re.compile(r"[ABC]\d*")
+
+
+def read_nc(
+    path: Path, content: bytes, unit: str | None, gap: float, axis: Array | None = None
+) -> Part:
+    """Return the cuts of a program for a machine, one per run of feed moves.
+
+    Raises
+    ------
+    InputError
+        A word that is not known, that changes the path, or that needs the kinematics of the machine
+        (its line is named), no unit, no tool axis, no cut.
+    """
+    try:
+        lines = lines_of(content)
+        tool_path = klartext_path(lines) if is_klartext(lines) else _siemens_path(lines)
+        return part_of_tool_path(path, tool_path, unit, gap, axis)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _siemens_path(lines: Sequence[str]) -> ToolPath:
+    program = _Program()
+    for number, line in enumerate(lines, start=1):
+        text = TEXT.sub("", line.upper()).partition(";")[0].strip()
+        if not text or HEADER.match(text):
+            continue
+        if text.startswith("/"):
+            raise InputError(f"line {number}: a block that the machine may skip (/)")
+        block = _Block(number)
+        for name, value in _words(number, text):
+            block.add(name, value)
+        program.take(block)
+    return ToolPath(moves=program.tip.moves, unit=program.unit, unused=program.unused)
+
+
+def _words(line: int, text: str) -> Iterator[tuple[str, str]]:
+    """Yield the words of a block: an address and its number, or a keyword and its arguments."""
+    place = 0
+    while place < len(text):
+        found = WORD.match(text, place)
+        if found is None:
+            raise InputError(
+                f"line {line}: expected words such as X1.5 or A3=0.5, got {text[place:][:30]!r}"
+            )
+        place = found.end()
+        if found["named"]:
+            if found["value"] is None or text[place : place + 1] in tuple("*/+-(.["):
+                raise InputError(f"line {line}: {found['named']}=: expected a number")
+            yield found["named"], found["value"]
+        elif found["keyword"]:
+            yield found["keyword"], found["arguments"] or ""
+        elif found["letter"]:
+            yield found["letter"], found["number"]
+
+
+class _Block:
+    """The words of one block."""
+
+    def __init__(self, line: int) -> None:
+        self.line = line
+        self.where = f"line {line}"
+        self.g: list[float] = []
+        self.m: list[float] = []
+        self.words: dict[str, float] = {}
+        self.keywords: dict[str, str] = {}
+
+    def add(self, name: str, value: str) -> None:
+        """Take one word.
+
+        Raises
+        ------
+        InputError
+            A repeated word.
+        """
+        if len(name) > 1 and not name[1:].isdigit():
+            self.keywords[name] = value
+        elif name in "GM":
+            (self.g if name == "G" else self.m).append(float(value))
+        elif name in self.words:
+            raise InputError(f"{self.where}: {name} twice in one block")
+        else:
+            self.words[name] = float(value)
+
+
+class _Program:
+    """The state of the program, which the next block is read with."""
+
+    def __init__(self) -> None:
+        self.tip = Tip()
+        self.unit = ""
+        self.unused: set[str] = set()
+        self._feed: bool | None = None
+        self._is_oriented = False
+        self._offset = 0.0
+        self._end = 0
+
+    def take(self, block: _Block) -> None:
+        """Take one block.
+
+        Raises
+        ------
+        InputError
+            A word that is not known, or that changes the path.
+        """
+        line, where, words = block.line, block.where, block.words
+        if self._end:
+            raise InputError(f"{where}: a block after the end of the program in line {self._end}")
+        away = self._keywords(block)
+        for g in block.g:
+            away |= self._g(block, g)
+        place = {name: words.pop(name) for name in "XYZ" if name in words}
+        vector = [words.pop(name, 0.0) if name in words else None for name in AXIS]
+        words.pop("N", None)
+        if unknown := [name for name in words if name.rstrip("0123456789") not in UNUSED]:
+            raise InputError(f"{where}: {_word_refusal(unknown[0])}")
+        self.unused |= {name.rstrip("0123456789") for name in words} | ({"M"} if block.m else set())
+        if called := [m for m in block.m if m in CALLS]:
+            raise InputError(f"{where}: M{called[0]:g}: a program that is called is not read")
+        if 4 in block.g and place:
+            raise InputError(f"{where}: G4 with X, Y or Z: expected G4 F")
+        if away and (place or not any(keyword in MACHINE for keyword in block.keywords)):
+            self._away(block)
+        elif place or any(value is not None for value in vector):
+            self._move(block, place, vector)
+        if TOOL_CHANGE in block.m:
+            self.tip.forget(line)
+        if any(m in ENDS for m in block.m):
+            self._end = line
+
+    def _keywords(self, block: _Block) -> bool:
+        """Take the keywords; return whether the positions are in machine coordinates."""
+        for keyword, arguments in block.keywords.items():
+            if keyword == "TRAORI":
+                self._is_oriented = True
+                self.tip.forget(block.line)
+            elif keyword == "TRAFOOF":
+                self._is_oriented = False
+                self.tip.go_away(block.line)
+            elif keyword in HARMLESS:
+                self.unused.add(keyword)
+            elif keyword not in MACHINE and not (keyword == "CYCLE800" and arguments == "()"):
+                raise InputError(
+                    f"{block.where}: {keyword[:40]!r}: {REFUSED.get(keyword, UNKNOWN)}"
+                )
+        return "SUPA" in block.keywords
+
+    def _g(self, block: _Block, g: float) -> bool:
+        """Take one G word; return whether the positions are not in part coordinates."""
+        where = block.where
+        if g in (0, 1):
+            if 1 - g in block.g:
+                raise InputError(f"{where}: G0 and G1 in one block")
+            self._feed = g == 1
+        elif g in UNITS:
+            if self.unit != UNITS[int(g)] and (self.unit or self.tip.has_places):
+                raise InputError(f"{where}: G{g:g} after moves in another unit, or without one")
+            self.unit = UNITS[int(g)]
+        elif g in OFFSETS:
+            if g != self._offset and self.tip.has_places:
+                raise InputError(f"{where}: G{g:g} after moves; write all of them in one system")
+            self._offset = g
+        elif f"G{g:g}" in (*AWAY, *MACHINE):
+            return True
+        elif g not in HARMLESS_G and g != 4:
+            raise InputError(f"{where}: 'G{g:g}': {REFUSED_G.get(g, UNKNOWN)}")
+        return False
+
+    def _away(self, block: _Block) -> None:
+        machine = [f"G{g:g}" for g in block.g if f"G{g:g}" in MACHINE] + list(block.keywords)
+        if self._feed and machine:
+            raise InputError(
+                f"{block.where}: {machine[0]} at feed: its position is in machine coordinates, not "
+                "in the part"
+            )
+        self.tip.go_away(block.line)
+
+    def _move(self, block: _Block, place: dict[str, float], vector: Sequence[float | None]) -> None:
+        if self._feed is None:
+            raise InputError(f"{block.where}: a position before any G0 or G1")
+        axis: Triple | None = None
+        if any(value is not None for value in vector):
+            if not self._is_oriented:
+                raise InputError(f"{block.where}: A3 B3 C3 without TRAORI, which they need")
+            a, b, c = (value or 0.0 for value in vector)  # the controller takes missing ones as 0
+            axis = unit_axis((a, b, c), block.where, any_length=True)
+        self.tip.go(block.line, feed=self._feed, place=place, axis=axis)
+
+
+def _word_refusal(name: str) -> str:
+    if ROTARY.fullmatch(name):
+        return (
+            f"{name}: the effect of a rotary axis or angle depends on the kinematics of the "
+            "machine; have the CAM system write the tool axis as a vector (A3= B3= C3=), or APT"
+        )
+    return f"{name!r}: {UNKNOWN}"

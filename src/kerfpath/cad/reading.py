@@ -1,0 +1,322 @@
+"""Read any drawing, by the suffix of its file, or a shape in memory."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath.arrays import Array, floats, freeze, scalar, short_repr
+from kerfpath.cad.left_out import nothing_drawn
+from kerfpath.cad.part import Part
+from kerfpath.cad.table import TableCells, cells_of
+from kerfpath.cad.units import GAP, MM, UNITS_MM, require_unit
+from kerfpath.errors import InputError
+from kerfpath.extras import require_extra
+from kerfpath.isolated import call_apart, stand_by
+from kerfpath.progress import Progress, no_progress
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
+
+    from kerfpath.cad.shape import NamedShape
+
+
+Columns = Mapping[str, str] | Sequence[str]
+Direction = tuple[float, float, float]
+KEPT = 4
+"""Number of parts, those read last, that are kept in case a file with the same content is read."""
+
+
+class Wrapping(Protocol):
+    """A shape of build123d or CadQuery."""
+
+    @property
+    def wrapped(self) -> Any:
+        """The OCP shape."""
+
+
+def read(
+    path: str | PathLike[str] | Wrapping | TopoDS_Shape | Sequence[Wrapping | TopoDS_Shape],
+    unit: str | None = None,
+    *,
+    gap: float = GAP,
+    outer_towards: ArrayLike | None = None,
+    axis: ArrayLike | None = None,
+    columns: Columns | None = None,
+    progress: Progress = no_progress,
+) -> Part:
+    """Return the part in a drawing (STEP, IGES, DXF, a table of points, a tool path) or a shape.
+
+    Parameters
+    ----------
+    path : str, Path or shape
+        .step, .stp, .iges, .igs, .dxf; a table: .csv, .tsv or .txt; a tool path: .apt, .aptsource,
+        .cl or .cls; a program of a machine: .h, .mpf, .nc, .spf or .tap. Or a shape of OCP in
+        memory, an object with one as `.wrapped` (build123d, CadQuery), or a list of these: faces,
+        or edges. A shape is copied and read in this process, where OCCT may crash if it is damaged.
+    unit : str, optional
+        Unit of the numbers in the file, instead of that in its header: um, mm, cm, dm, m, km, mil,
+        in or ft. A shape has no unit: its numbers are in mm by default.
+    gap : float m
+        Largest distance between the ends of two curves that a loop bridges, and over which loose
+        faces (IGES) are sewn together.
+    outer_towards : (3,), optional
+        Direction in the part that the outer sides of sheets face on the whole. By default the outer
+        side is the one that lies less deep in the part, or faces up if the sheet is flat.
+    axis : (3,), optional
+        Tool axis for drawings without one: lines in space of a DXF, STEP or IGES file, a table
+        without axes, or moves of a tool path without one.
+    columns : mapping of str to str or sequence of str, optional
+        For a table: the names in its header of x, y, z, nx, ...; or, without a header, the columns
+        in their order, "-" for one that is not used.
+    progress : callable
+        Called with the current step and the number of faces; see `kerfpath.progress`.
+
+    Raises
+    ------
+    InputError
+        No such file, another format than its suffix says, a damaged file, nothing to cut in it, no
+        known length unit, a direction of length zero, or an argument that does not suit the file;
+        no shape, an empty one, or one with a point that is not finite.
+    """
+    require_unit(unit)
+    scalar(gap, "gap", unit="m", above=0.0)
+    asked = _Asked(
+        unit=unit,
+        gap=gap,
+        outer_towards=_direction(outer_towards, "outer_towards"),
+        axis=_direction(axis, "axis"),
+        columns=columns,
+    )
+    if not isinstance(path, str | PathLike):
+        if columns is not None:
+            raise InputError("shape: columns: expected a table, got a shape")
+        return _given(path, asked, progress)
+    path = Path(path)
+    content = content_of(path, _EXPECTED)
+    kind = _KINDS.get(path.suffix.lower())
+    if kind is None:
+        raise InputError(f"{path}: expected {_EXPECTED} by its suffix, got {path.suffix!r}")
+    if not content.strip():
+        raise InputError(f"{path}: the file is empty; expected {_EXPECTED}")
+    if outer_towards is not None and kind not in ("STEP", "IGES"):
+        raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
+    if columns is not None and kind != "table":
+        raise InputError(f"{path}: columns: expected a table, got a {kind} file")
+    return _drawn(kind, path, content, asked, progress)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    """Arguments of `read`, which describes them."""
+
+    unit: str | None
+    gap: float
+    outer_towards: Direction | None
+    axis: Direction | None
+    columns: Columns | None
+
+    __repr__ = short_repr
+
+
+def _direction(value: ArrayLike | None, name: str) -> Direction | None:
+    if value is None:
+        return None
+    x, y, z = floats(value, name, (3,)).tolist()
+    if not x * x + y * y + z * z > 0:
+        raise InputError(f"{name}: expected a direction, got a vector of length 0")
+    return x, y, z
+
+
+def content_of(path: Path, expected: str) -> bytes:
+    """Return the bytes of a file, or raise InputError with the `expected` kind of file."""
+    try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise InputError(f"{path}: is not a regular file; expected {expected}")
+        return path.read_bytes()
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; expected {expected}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a directory; expected {expected}") from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path}: cannot be read ({why}); expected {expected}") from None
+
+
+def _drawn(kind: str, path: Path, content: bytes, asked: _Asked, progress: Progress) -> Part:
+    """Return the part; each reader is loaded when it is needed, as OCCT takes over a second.
+
+    STEP and IGES are translated in another process, because OCCT may crash.
+    """
+    progress(f"reading {path.name}", 0, 0)
+    unit, gap = asked.unit, asked.gap
+    axis = None if asked.axis is None else np.array(asked.axis)
+    if kind == "table":
+        from kerfpath.cad.table import read_table
+
+        return read_table(path, content, unit, gap, axis=axis, columns=asked.columns)
+    if kind == "tool path":
+        from kerfpath.cad.apt import read_apt
+
+        return read_apt(path, content, unit, gap, axis)
+    if kind == "NC program":
+        from kerfpath.cad.nc import read_nc
+
+        return read_nc(path, content, unit, gap, axis)
+    require_extra("cad", f"{path}: reading {kind}")
+    if kind == "DXF":
+        from kerfpath.cad.dxf import read_dxf
+
+        return read_dxf(path, content, unit, gap, axis)
+    stand_by()
+    from kerfpath.cad.iges import read_iges
+    from kerfpath.cad.shape import occt, uncollected
+    from kerfpath.cad.step import read_step
+
+    key = (kind, sha256(content).digest(), unit, gap, asked.outer_towards, asked.axis)
+    part = _kept.pop(key, None)
+    if part is None:
+        translate = read_step if kind == "STEP" else read_iges
+        try:
+            drawn = call_apart(translate, path.absolute(), unit, gap, size=len(content))
+            with occt(), uncollected():
+                part = _part_of(path, drawn, asked, progress)
+        except InputError as error:
+            raise InputError(f"{path}: {_in_words(kind, content, error)}") from None
+    _kept[key] = part
+    while len(_kept) > KEPT:
+        _kept.pop(next(iter(_kept)), None)
+    return replace(part, path=path)
+
+
+def _given(given: object, asked: _Asked, progress: Progress) -> Part:
+    """Return the part in a shape in memory."""
+    require_extra("cad", "shape: reading it")
+    from kerfpath.cad.given import drawn_of_given
+    from kerfpath.cad.shape import occt, uncollected
+
+    try:
+        with occt(), uncollected():
+            drawn = drawn_of_given(given, asked.unit, asked.gap)
+            if not drawn.faces and asked.axis is None:
+                raise InputError("it has edges but no face; give the tool axis with axis")
+            return _part_of(Path("shape"), drawn, asked, progress)
+    except InputError as error:
+        raise InputError(f"shape: {error}") from None
+
+
+def _part_of(path: Path, drawn: NamedShape, asked: _Asked, progress: Progress) -> Part:
+    """Return the part made of faces, or of lines with an axis."""
+    from kerfpath.cad.faces import part_of
+    from kerfpath.cad.wires import part_of_wires
+
+    if drawn.faces and asked.axis is not None:
+        raise InputError("axis: expected a drawing of lines, got one of faces")
+    if drawn.faces:
+        return part_of(path, drawn, asked.gap, asked.outer_towards, progress)
+    if asked.axis is None:
+        raise nothing_drawn(drawn.left_out)
+    return part_of_wires(path, drawn, asked.gap, np.array(asked.axis))
+
+
+def _in_words(kind: str, content: bytes, error: InputError) -> InputError:
+    """Return the fault in the grammar of a STEP file that cannot be read, else the error itself."""
+    from kerfpath.cad.part21 import require_grammar
+
+    try:
+        if kind == "STEP" and b"END-ISO-10303-21;" in content:
+            require_grammar(content)
+    except InputError as broken:
+        return broken
+    return error
+
+
+_kept: dict[tuple[object, ...], Part] = {}
+_KINDS = {
+    ".step": "STEP",
+    ".stp": "STEP",
+    ".iges": "IGES",
+    ".igs": "IGES",
+    ".dxf": "DXF",
+    ".csv": "table",
+    ".tsv": "table",
+    ".txt": "table",
+    ".apt": "tool path",
+    ".aptsource": "tool path",
+    ".cl": "tool path",
+    ".cls": "tool path",
+    ".h": "NC program",
+    ".mpf": "NC program",
+    ".nc": "NC program",
+    ".spf": "NC program",
+    ".tap": "NC program",
+}
+_EXPECTED = f"a drawing ({', '.join(_KINDS)})"
+
+
+# -----------------------------------------------------------------------------
+# Read tables of measured points: points of the part as measured in the robot base.
+
+SIDES = ("nominal", "measured")
+COLUMNS = tuple(f"{side}_{axis}" for side in SIDES for axis in "xyz")
+EXPECTED = (
+    "nominal_x_mm nominal_y_mm nominal_z_mm (in the part) and measured_x_mm measured_y_mm "
+    "measured_z_mm (in the robot base)"
+)
+
+
+def read_measured(path: str | Path) -> tuple[Array, Array]:
+    """Return the points of a table: nominal (K, 3) m in the part, measured (K, 3) m in the base.
+
+    The first line names the columns with their unit, such as ``nominal_x_mm``, in any order; a
+    column ``point`` may hold names. Delimiters, decimal commas and comments are as in tables of
+    contours.
+
+    Raises
+    ------
+    InputError
+        No such file, other columns, no unit, or a cell that is not a number (the message has line
+        and column).
+    """
+    path = Path(path)
+    content = content_of(path, "a table of measured points")
+    try:
+        table = cells_of(content, EXPECTED)
+        columns, mm = _header(table)
+        table = table.without_header()
+        table.require_width(len(columns))
+        values = np.array(
+            [
+                [table.number(k, columns.index(name), name) * mm[name] for name in COLUMNS]
+                for k in range(len(table.rows))
+            ]
+        ).reshape(-1, 6)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return freeze(values[:, :3] * MM), freeze(values[:, 3:] * MM)
+
+
+def _header(table: TableCells) -> tuple[list[str], dict[str, float]]:
+    """Return the names of the columns without units, and the unit of each in mm."""
+    columns, mm = [], {}
+    for cell in table.rows[0]:
+        name = cell.lower().strip("\"' ")
+        parts = re.fullmatch(r"(\w+_[xyz])\s*[_\[(]\s*([a-z]+)\s*[\])]?", name)
+        if parts and parts[1] in COLUMNS and parts[2] in UNITS_MM:
+            name, mm[parts[1]] = parts[1], UNITS_MM[parts[2]]
+        elif name != "point":
+            raise InputError(f"line {table.lines[0]}: expected columns {EXPECTED}, got {cell!r}")
+        columns.append(name)
+    if sorted(set(columns) - {"point"}) != sorted(COLUMNS) or len(set(columns)) < len(columns):
+        raise InputError(f"line {table.lines[0]}: expected each of the columns {EXPECTED} once")
+    return columns, mm

@@ -1,0 +1,354 @@
+"""Read tables of points and axes (CSV, TSV and similar), with or without a header."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from kerfpath.arrays import Array, short_repr
+from kerfpath.cad.build import kind_of_points, loop_of, part_without_faces, trace_of_points
+from kerfpath.cad.part import Part
+from kerfpath.cad.units import LARGEST, MM, UNITS_MM
+from kerfpath.errors import InputError
+
+# -----------------------------------------------------------------------------
+# Read tables from text: delimiters, comments, decimal commas and numbers.
+
+COMMENTS = ("#", "%", "//")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableCells:
+    """The cells of a table, and the line number of each row."""
+
+    lines: Sequence[int]
+    rows: Sequence[Sequence[str]]
+    has_decimal_comma: bool
+
+    __repr__ = short_repr
+
+    def is_numbers(self, row: int) -> bool:
+        """Return whether all cells of a row are numbers, so that it is no header."""
+        try:
+            for cell in self.rows[row]:
+                _number(cell, self.has_decimal_comma)
+        except ValueError:
+            return False
+        return True
+
+    def is_number(self, row: int, column: int) -> bool:
+        """Return whether a cell is a number."""
+        try:
+            _number(self.rows[row][column], self.has_decimal_comma)
+        except (ValueError, IndexError):
+            return False
+        return True
+
+    def without_header(self) -> TableCells:
+        """Return the table without its first row."""
+        return TableCells(
+            lines=self.lines[1:], rows=self.rows[1:], has_decimal_comma=self.has_decimal_comma
+        )
+
+    def require_width(self, columns: int) -> None:
+        """Raise InputError if a row has another number of cells."""
+        for line, row in zip(self.lines, self.rows, strict=True):
+            if len(row) != columns:
+                raise InputError(f"line {line}: expected {columns} columns, got {len(row)}")
+
+    def number(self, row: int, column: int, name: str) -> float:
+        """Return a cell as a finite number; `name` is the name of its column.
+
+        Raises
+        ------
+        InputError
+            A cell that is not a finite number (the message has line and column).
+        """
+        where, cell = f"line {self.lines[row]}, column {name}", self.rows[row][column]
+        try:
+            value = _number(cell, self.has_decimal_comma)
+        except ValueError:
+            raise InputError(f"{where}: expected a number, got {cell[:40]!r}") from None
+        if not np.isfinite(value):
+            raise InputError(f"{where}: expected a finite number, got {cell!r}")
+        return value
+
+
+def cells_of(content: bytes, expected: str) -> TableCells:
+    """Return the cells of a table, split at the delimiter of its first line.
+
+    Raises
+    ------
+    InputError
+        Not text, no rows (the message lists the `expected` columns), quotes that span lines.
+    """
+    numbered = [
+        (number, line)
+        for number, line in enumerate(re.split(r"\r\n|\r|\n", _text(content)), start=1)
+        if line.strip() and not line.lstrip().startswith(COMMENTS)
+    ]
+    if not numbered:
+        raise InputError(f"holds no rows; expected columns {expected}")
+    delimiter = next((d for d in (";", "\t", "|", ",") if d in numbered[0][1]), None)
+    lines = [number for number, _ in numbered]
+    if delimiter is None:
+        rows = [line.split() for _, line in numbered]
+    else:
+        try:
+            rows = [
+                [cell.strip() for cell in row]
+                for row in csv.reader((line for _, line in numbered), delimiter=delimiter)
+            ]
+        except csv.Error as error:
+            raise InputError(f"cannot be split into columns ({error})") from None
+        if len(rows) != len(lines):
+            raise InputError("a quoted cell runs over several lines; remove its quotes")
+    return TableCells(lines=lines, rows=rows, has_decimal_comma=delimiter in (";", "\t", "|"))
+
+
+def _text(content: bytes) -> str:
+    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    try:
+        return content.decode("utf-16" if wide else "utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InputError(f"line {line}: expected text in UTF-8; save the table as UTF-8") from None
+
+
+def _number(cell: str, has_decimal_comma: bool) -> float:
+    if has_decimal_comma and "," in cell:
+        if "." in cell:
+            raise ValueError(cell)
+        cell = cell.replace(",", ".")
+    if "_" in cell:  # Python accepts it between digits
+        raise ValueError(cell)
+    return float(cell)
+
+
+# -----------------------------------------------------------------------------
+# Read tables of points and axes (CSV, TSV and similar), with or without a header.
+
+POSITION = ("x", "y", "z")
+NORMAL = ("nx", "ny", "nz")
+AXIS = ("axis_x", "axis_y", "axis_z")
+QUATERNION = ("qx", "qy", "qz", "qw")
+NAME = "contour"
+KNOWN = (*POSITION, *NORMAL, *AXIS, *QUATERNION, NAME)
+UNUSED = "-"
+"""Name of a column that is not used."""
+UNIT = re.compile(r"[_\[( ]\s*([a-z]+)\s*[\])]?$")
+"""The unit at the end of the name of a column."""
+UNNAMED = {6: POSITION + NORMAL, 7: POSITION + QUATERNION}
+"""Columns of a table without a header, by their number."""
+EXPECTED = (
+    "x y z, then nx ny nz (outward normal), axis_x axis_y axis_z (tool axis) or qx qy qz qw (pose, "
+    "its z the tool axis)"
+)
+UNIT_QUATERNION = 1e-2
+"""Largest deviation of a quaternion's length from one: rounded digits pass, other columns fail."""
+
+
+def read_table(
+    path: Path,
+    content: bytes,
+    unit: str | None,
+    gap: float,
+    *,
+    axis: Array | None = None,
+    columns: Mapping[str, str] | Sequence[str] | None = None,
+) -> Part:
+    """Return the contours of a table of points, one per name in its column `contour`.
+
+    `axis` (3,) is the tool axis of tables without columns for it; `columns` is as in `cad.read`.
+
+    Raises
+    ------
+    InputError
+        Anything wrong with a row (its line is named), unknown columns, or no known unit.
+    """
+    try:
+        names, declared, table = _rows(cells_of(content, EXPECTED), columns, axis is not None)
+        if not (unit or declared):
+            raise InputError(
+                f"states no length unit; give it with unit= one of {', '.join(UNITS_MM)}, "
+                "or in the header, as x_mm"
+            )
+        notes = []
+        if unit and declared and unit != declared:
+            notes.append(f"unit {unit} as given; the header says {declared}")
+        if unknown := [name for name in names if name not in (*KNOWN, UNUSED)]:
+            notes.append(f"columns not used: {', '.join(unknown)}")
+        points, normals = _numbers(names, table, UNITS_MM[unit or declared], axis)
+        loops = []
+        for name, chosen in _contours(names, table):
+            lines = np.array(table.lines)[chosen]
+            trace, repaired = trace_of_points(points[chosen], normals[chosen], lines, gap / MM)
+            notes += [f"contour {name!r}: {what}" for what in repaired]
+            kind = kind_of_points(trace)
+            loops.append(
+                loop_of(name=name, face=name, kind=kind, trace=trace, surface="points", gap=gap)
+            )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return part_without_faces(path, unit or declared, loops, gap=gap, notes=notes)
+
+
+def _rows(
+    table: TableCells, given: Mapping[str, str] | Sequence[str] | None, has_axis: bool
+) -> tuple[tuple[str, ...], str, TableCells]:
+    """Return the names of the columns, the unit that they state, and the rows under them."""
+    if isinstance(given, Mapping):
+        table = _renamed(table, given)
+    elif given is not None:
+        return _in_order(table, [str(name) for name in given], has_axis)
+    columns, unit = _header(table, has_axis)
+    if columns:
+        table = table.without_header()
+    elif (count := len(table.rows[0])) in UNNAMED or (has_axis and count == len(POSITION)):
+        columns = UNNAMED.get(count, POSITION)
+    else:
+        raise InputError(
+            f"line {table.lines[0]}: without a header expected 6 columns (x y z nx ny nz) or 7 "
+            f"(x y z qx qy qz qw), got {count}; name them with columns"
+        )
+    if not table.rows:
+        raise InputError("holds a header but no rows of points")
+    table.require_width(len(columns))
+    return columns, unit, table
+
+
+def _renamed(table: TableCells, given: Mapping[str, str]) -> TableCells:
+    """Return the table with the columns of its header renamed to the names known here."""
+    header = [cell.strip("\"' ") for cell in table.rows[0]]
+    chosen: dict[int, str] = {}
+    for name, theirs in given.items():
+        if name not in KNOWN:
+            raise InputError(f"columns: expected names of {' '.join(KNOWN)}, got {name!r}")
+        places = [k for k, cell in enumerate(header) if cell.lower() == str(theirs).lower()]
+        if len(places) != 1:
+            raise InputError(
+                f"line {table.lines[0]}: expected one column {theirs!r} for {name}, "
+                f"got {' '.join(header)}"
+            )
+        chosen[places[0]] = name
+    row = []
+    for k, cell in enumerate(header):
+        unit = UNIT.search(cell.lower())
+        if k not in chosen:
+            row.append(f"{cell} ({UNUSED})" if cell.lower() in KNOWN else cell)
+        elif unit and unit[1] in UNITS_MM and chosen[k] in POSITION:
+            row.append(f"{chosen[k]}_{unit[1]}")
+        else:
+            row.append(chosen[k])
+    return replace(table, rows=[row, *table.rows[1:]])
+
+
+def _in_order(
+    table: TableCells, names: Sequence[str], has_axis: bool
+) -> tuple[tuple[str, ...], str, TableCells]:
+    """Return the given names of the columns, no unit, and the rows without a header."""
+    if unknown := [name for name in names if name not in (*KNOWN, UNUSED)]:
+        raise InputError(
+            f"columns: expected names of {' '.join(KNOWN)}, or {UNUSED}, got {unknown[0]!r}"
+        )
+    _require_columns([name for name in names if name != UNUSED], has_axis)
+    if not table.is_number(0, names.index("x")):
+        table = table.without_header()
+    if not table.rows:
+        raise InputError("holds a header but no rows of points")
+    table.require_width(len(names))
+    return tuple(names), "", table
+
+
+def _require_columns(columns: Sequence[str], has_axis: bool) -> None:
+    for name in columns:
+        if columns.count(name) > 1:
+            raise InputError(f"the header names the column {name!r} twice")
+    has_axes = has_axis or any(set(axes) <= set(columns) for axes in (NORMAL, AXIS, QUATERNION))
+    if not (set(POSITION) <= set(columns) and has_axes):
+        raise InputError(
+            f"expected columns {EXPECTED}; got {' '.join(columns)}; map their names with columns, "
+            "and give the tool axis with axis if there is none"
+        )
+
+
+def _header(table: TableCells, has_axis: bool) -> tuple[tuple[str, ...], str]:
+    """Return the names of the columns and their unit, or nothing if the first row is numbers."""
+    if table.is_numbers(0):
+        return (), ""
+    columns, units = [], []
+    for cell in table.rows[0]:
+        name = cell.lower().strip("\"' ")
+        parts = re.fullmatch(r"([xyz])\s*[_\[( ]\s*([a-z]+)\s*[\])]?", name)
+        columns.append(parts[1] if parts else name)
+        units += [parts[2]] if parts else []
+    _require_columns(columns, has_axis)
+    if len(set(units)) > 1 or (units and (len(units) != 3 or units[0] not in UNITS_MM)):
+        raise InputError(
+            f"the header's units are {', '.join(units)}; expected one for x, y and z, "
+            f"of {', '.join(UNITS_MM)}"
+        )
+    return tuple(columns), units[0] if units else ""
+
+
+def _numbers(
+    columns: Sequence[str], table: TableCells, mm: float, axis: Array | None
+) -> tuple[Array, Array]:
+    """Return points (K, 3) mm and outward unit normals (K, 3), by `axis` if no columns have it."""
+    at = {name: k for k, name in enumerate(columns)}
+    axes = next((a for a in (AXIS, NORMAL, QUATERNION) if set(a) <= set(at)), ())
+    wanted = [at[name] for name in (*POSITION, *axes)]
+    values = np.array(
+        [
+            [table.number(k, column, columns[column]) for column in wanted]
+            for k in range(len(table.rows))
+        ]
+    )
+    points, directions = values[:, :3] * mm, values[:, 3:]
+    if (far := np.flatnonzero((np.abs(points) > LARGEST).any(axis=1))).size:
+        raise InputError(
+            f"line {table.lines[far[0]]}: a point further than {LARGEST / 1e6:g} km from the "
+            "origin; check the unit"
+        )
+    if not axes:
+        assert axis is not None
+        return points, np.tile(-axis / np.linalg.norm(axis), (len(points), 1))
+    size = np.abs(directions).max(axis=1)
+    if (zero := np.flatnonzero(size == 0)).size:
+        raise InputError(f"line {table.lines[zero[0]]}: {' '.join(axes)} are all 0; no direction")
+    directions = directions / size[:, None]  # no square overflows
+    length = np.linalg.norm(directions, axis=1)
+    if axes == QUATERNION:
+        if (off := np.flatnonzero(np.abs(length * size - 1) > UNIT_QUATERNION)).size:
+            raise InputError(
+                f"line {table.lines[off[0]]}: a quaternion of length "
+                f"{(length * size)[off[0]]:.3g}, expected 1; check the columns"
+            )
+        x, y, z, w = (directions / length[:, None]).T
+        z_axis = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], 1)
+        return points, -z_axis
+    return points, directions / (length if axes == NORMAL else -length)[:, None]
+
+
+def _contours(columns: Sequence[str], table: TableCells) -> Iterator[tuple[str, slice]]:
+    """Yield each contour's name and rows."""
+    if NAME not in columns:
+        yield NAME, slice(len(table.rows))
+        return
+    column = columns.index(NAME)
+    first, seen = 0, set()
+    for name, group in groupby(row[column] for row in table.rows):
+        last = first + len(list(group))
+        if not name or name in seen:
+            what = f"rows of contour {name!r} are separated" if name else "no name of a contour"
+            raise InputError(f"line {table.lines[first]}: {what}; put its rows together")
+        seen.add(name)
+        yield name, slice(first, last)
+        first = last

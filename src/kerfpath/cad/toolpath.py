@@ -1,0 +1,313 @@
+"""Contours of a tool path: one for each run of feed moves between two rapid moves."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from kerfpath.arrays import Array, short_repr
+from kerfpath.cad.build import (
+    REPEATED,
+    kind_of_points,
+    loop_of,
+    part_without_faces,
+    trace_of_points,
+)
+from kerfpath.cad.left_out import counted
+from kerfpath.cad.part import Loop, Part
+from kerfpath.cad.units import LARGEST, MM, UNITS_MM
+from kerfpath.contour import angle_between
+from kerfpath.errors import InputError
+
+Triple = tuple[float, float, float]
+UNKNOWN = "the word is not known, and may change the path"
+"""Why an unknown word is refused."""
+ALONG = float(np.radians(1.0))
+"""rad: a move closer to the tool axis than this cuts nothing new: an approach or retract."""
+UNIT_AXIS = 1e-2
+"""Largest deviation of the length of an axis from one: rounded digits pass, angles do not."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Move:
+    """One move of a tool path, in the unit of its file.
+
+    Parameters
+    ----------
+    line : int
+        Line in the file.
+    kind : {"feed", "rapid", "away", "begin"}
+        A feed move; a rapid move or a set position; a move to a position that is not in the file;
+        or no move, but the begin of an operation, wherever the tool comes from.
+    point : (3,) or None
+        Target of the tip.
+    axis : (3,) or None
+        Unit vector from the tip towards the spindle; None if the file has none.
+    operation : str
+        Name of the operation in the file.
+    """
+
+    line: int
+    kind: Literal["feed", "rapid", "away", "begin"]
+    point: Triple | None = None
+    axis: Triple | None = None
+    operation: str = ""
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolPath:
+    """The moves of a file, its unit ("" for none), notes, and the words that are not used."""
+
+    moves: Sequence[Move]
+    unit: str
+    notes: Sequence[str] = ()
+    unused: Collection[str] = ()
+
+    __repr__ = short_repr
+
+
+class Tip:
+    """The tip of a tool, moved by the program of a machine; what a block leaves out is kept."""
+
+    def __init__(self) -> None:
+        self.moves: list[Move] = []
+        self._place: dict[str, float] = {}
+        self._axis: Triple | None = None
+
+    def go(self, line: int, *, feed: bool, place: dict[str, float], axis: Triple | None) -> None:
+        """Move to `place`, of which any of the coordinates "X", "Y" and "Z" may be missing.
+
+        Raises
+        ------
+        InputError
+            A feed move with a coordinate that was never given.
+        """
+        self._place |= place
+        self._axis = axis or self._axis
+        unknown = [name for name in "XYZ" if name not in self._place]
+        if unknown and feed:
+            raise InputError(f"line {line}: a move at feed, but {unknown[0]} was not given before")
+        if unknown:
+            self.moves.append(Move(line=line, kind="away"))
+            return
+        point = self._place["X"], self._place["Y"], self._place["Z"]
+        kind: Literal["feed", "rapid"] = "feed" if feed else "rapid"
+        self.moves.append(Move(line=line, kind=kind, point=point, axis=self._axis))
+
+    def go_away(self, line: int) -> None:
+        """Move to a position that is not known in the part."""
+        self._place, self._axis = {}, None
+        self.moves.append(Move(line=line, kind="away"))
+
+    def forget(self, line: int) -> None:
+        """Forget the position, because earlier coordinates have another meaning from here on."""
+        if self.moves:
+            self.go_away(line)
+
+    @property
+    def has_places(self) -> bool:
+        """Whether any position in the part was given."""
+        return any(move.point is not None for move in self.moves)
+
+
+def lines_of(content: bytes) -> list[str]:
+    """Return the lines of a file; characters that cannot be decoded are replaced."""
+    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    text = content.decode("utf-16" if wide else "utf-8-sig", errors="replace")
+    return re.split(r"\r\n|\r|\n", text)
+
+
+def finite(text: str, where: str) -> float:
+    """Return a finite number as CAM systems write it, also with the exponents of Fortran.
+
+    Raises
+    ------
+    InputError
+        Something else; the message begins with `where`.
+    """
+    try:
+        value = float("_" if "_" in text else text.upper().replace("D", "E"))
+    except ValueError:
+        raise InputError(f"{where}: expected a number, got {text[:40]!r}") from None
+    if not np.isfinite(value):
+        raise InputError(f"{where}: expected a finite number, got {text[:40]!r}")
+    return value
+
+
+def unit_axis(vector: Triple, where: str, *, any_length: bool = False) -> Triple:
+    """Return a tool axis at length one; without `any_length` its length must be nearly one.
+
+    Raises
+    ------
+    InputError
+        A vector of length zero, or of another length than one.
+    """
+    size = max(map(abs, vector))
+    if size == 0:
+        raise InputError(f"{where}: the tool axis is 0 0 0; no direction")
+    x, y, z = (np.array(vector) / size).tolist()  # no square overflows
+    length = float(np.sqrt(x * x + y * y + z * z))
+    if not any_length and abs(length * size - 1) > UNIT_AXIS:
+        raise InputError(f"{where}: a tool axis of length {length * size:.3g}, expected 1")
+    return x / length, y / length, z / length
+
+
+def part_of_tool_path(
+    path: Path, tool_path: ToolPath, unit: str | None, gap: float, axis: Array | None
+) -> Part:
+    """Return the part whose loops are the cuts of a tool path: `cut1`, `cut2`, ...
+
+    Parameters
+    ----------
+    path : Path
+    tool_path : ToolPath
+    unit : str or None
+        Unit of its numbers, instead of the one that the file states.
+    gap : float m
+        Largest distance between the ends of a closed cut.
+    axis : (3,) or None
+        The tool axis, into the part, where the file has none.
+
+    Raises
+    ------
+    InputError
+        No known unit or tool axis, no cut, a cut from an unknown position, or one that is no
+        contour (its line is named).
+    """
+    if not (unit or tool_path.unit):
+        raise InputError(f"states no length unit; give it with unit= one of {', '.join(UNITS_MM)}")
+    notes = list(tool_path.notes)
+    if tool_path.unused:
+        notes.append(f"words not used: {', '.join(sorted(tool_path.unused))}")
+    if unit and tool_path.unit and unit != tool_path.unit:
+        notes.append(f"unit {unit} as given; the file says {tool_path.unit}")
+    if axis is not None and all(move.axis for move in tool_path.moves if move.kind == "feed"):
+        raise InputError("axis: expected a tool path without tool axes, but this one has them")
+    loops: list[Loop] = []
+    holes = 0
+    for run in _runs(tool_path.moves):
+        name = f"cut{len(loops) + 1}"
+        points, normals, lines = _arrays(run, UNITS_MM[unit or tool_path.unit], axis)
+        first, last = _trimmed(points, normals)
+        if last - first < 1:
+            holes += 1
+            continue
+        notes += _left_out_of(name, points, normals, lines, first, last)
+        inner = slice(first, last + 1)
+        trace, repaired = trace_of_points(points[inner], normals[inner], lines[inner], gap / MM)
+        _require_across(points[inner], normals[inner], lines[inner])
+        notes += [f"contour {name!r}: {what}" for what in repaired]
+        if first == 0 and run[0].kind == "feed":
+            notes.append(f"contour {name!r} begins in line {run[0].line}: no position before it")
+        kind = kind_of_points(trace)
+        loops.append(
+            loop_of(
+                name=name, face=name, kind=kind, trace=trace, surface="points", gap=gap,
+                layer=run[-1].operation,
+            )
+        )  # fmt: skip
+    none = Counter({("feed move", "along the tool axis only, as for a hole", True): holes})
+    left_out = counted(+none)
+    if not loops:
+        why = f" ({left_out[0]})" if left_out else ""
+        raise InputError(f"holds no cut{why}; expected feed moves across the tool axis")
+    return part_without_faces(
+        path, unit or tool_path.unit, loops, gap=gap,
+        notes=[*notes, *map(str, left_out)], left_out=left_out,
+    )  # fmt: skip
+
+
+def _runs(moves: Sequence[Move]) -> list[list[Move]]:
+    """Return the runs of consecutive feed moves, each with the position that it starts from."""
+    runs: list[list[Move]] = []
+    before: Move | None = None
+    for move in moves:
+        if move.kind == "feed":
+            if before is not None and before.kind == "feed":
+                runs[-1].append(move)
+            elif before is None or before.kind == "begin":
+                runs.append([move])
+            elif before.kind == "rapid":
+                runs.append([before, move])
+            else:
+                raise InputError(
+                    f"line {move.line}: a move at feed from a place that is not known, after "
+                    f"line {before.line}; put a rapid move before it"
+                )
+        before = move
+    return runs
+
+
+def _arrays(run: Sequence[Move], mm: float, axis: Array | None) -> tuple[Array, Array, Array]:
+    """Return points (K, 3) mm, unit normals (K, 3) and lines (K,) of a run."""
+    normals = []
+    for move in run:
+        if move.axis is not None:
+            normals.append(np.array(move.axis))
+        elif axis is not None:
+            normals.append(-axis / np.linalg.norm(axis))
+        else:
+            raise InputError(
+                f"line {move.line}: no tool axis is known here; give it in the file, or with axis"
+            )
+    points = np.array([move.point for move in run]) * mm
+    if (far := np.flatnonzero((np.abs(points) > LARGEST).any(axis=1))).size:
+        raise InputError(
+            f"line {run[far[0]].line}: a point further than {LARGEST / 1e6:g} km from the "
+            "origin; check the unit"
+        )
+    return points, np.array(normals), np.array([move.line for move in run])
+
+
+def _along(points: Array, normals: Array) -> Array:
+    """Return for each move (K - 1,) whether it is along the tool axis, or has no length."""
+    steps = np.diff(points, axis=0)
+    length = np.linalg.norm(steps, axis=1)
+    aside = np.maximum(
+        np.linalg.norm(np.cross(steps, normals[:-1]), axis=1),
+        np.linalg.norm(np.cross(steps, normals[1:]), axis=1),
+    )
+    return np.asarray((length <= REPEATED) | (aside <= np.sin(ALONG) * length))
+
+
+def _trimmed(points: Array, normals: Array) -> tuple[int, int]:
+    """Return the first and last index of a cut without approach and retract."""
+    across = np.flatnonzero(np.logical_not(_along(points, normals)))
+    return (int(across[0]), int(across[-1]) + 1) if across.size else (0, 0)
+
+
+def _left_out_of(
+    name: str, points: Array, normals: Array, lines: Array, first: int, last: int
+) -> list[str]:
+    """Return notes on what is left out at the start and the end of a cut."""
+    notes = []
+    for where, part in (("start", slice(0, first + 1)), ("end", slice(last, None))):
+        length = float(np.linalg.norm(np.diff(points[part], axis=0), axis=1).sum())
+        turn = float(angle_between(normals[part][:1], normals[part][-1:])[0])
+        what = [f"{length:.6g} mm along the tool axis"] if length > REPEATED else []
+        what += [f"a turn of the axis by {np.degrees(turn):.3g} deg"] if turn > ALONG else []
+        if what:
+            notes.append(
+                f"contour {name!r}: {' and '.join(what)} at its {where}, lines "
+                f"{lines[part][0]} to {lines[part][-1]}, left out"
+            )
+    return notes
+
+
+def _require_across(points: Array, normals: Array, lines: Array) -> None:
+    """Raise InputError if the tip moves along the tool axis within a cut."""
+    moved = np.linalg.norm(np.diff(points, axis=0), axis=1) > REPEATED
+    if (bad := np.flatnonzero(moved & _along(points, normals))).size:
+        raise InputError(
+            f"line {lines[bad[0] + 1]}: a move along the tool axis within a cut; if it is an "
+            "approach or a retract, put a rapid move before or after it"
+        )

@@ -1,0 +1,503 @@
+"""certify(): a lower bound on the cost of every motion along the contour of a plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from time import monotonic
+from typing import Any
+
+import clarabel
+import numpy as np
+from scipy import sparse
+
+from kerfpath.arrays import Array, scalar, short_repr
+from kerfpath.certificate import ALLOWANCE, Certificate, Stage
+from kerfpath.certifier.cells import CellMaker, CellSet
+from kerfpath.certifier.infeasibility import (
+    DEAREST,
+    NARROW,
+    Parts,
+    between,
+    cells_to_divide,
+    largest_step_bound,
+    turning_nodes,
+)
+from kerfpath.certifier.stages import StageResult, Steps, distinct_groups, linked, solve_stage
+from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, rho
+from kerfpath.kernels.reduced import tangents
+from kerfpath.plans import Plan
+from kerfpath.progress import Progress, no_progress
+from kerfpath.search import METRIC_CODES
+
+# -----------------------------------------------------------------------------
+# Multipliers of (6): the gain in cost for a little more acceleration.
+#
+# They are the dual of a convex program around a motion, with joints linear in the change of
+# gamma. A bound is valid with any multipliers; they only decide how close it is.
+
+FAST = 10.0
+"""Price of an increment beyond (5), in largest prices of (6)."""
+NOTHING = 1e-4
+"""Share of a weight below which a price counts as zero."""
+SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
+_Rows = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
+
+
+def limit_prices(u: Array, slope: Array, steps: Steps, reach: float, most: float) -> Array | None:
+    """Return prices (K, n) of (6) for a motion, zero at the first and the last node.
+
+    None if (6) cannot bind, or if the program has no solution.
+
+    Parameters
+    ----------
+    u : (K-1, n) rad
+        Increments of the motion.
+    slope : (K, n) rad/rad
+        Derivatives of its joints by gamma.
+    steps : Steps
+    reach : float rad
+        Largest change of gamma at each node.
+    most : float
+        The largest price, in weights, which is the penalty for breaking (6) in the program. Large
+        prices give better bounds close to the motion, and worse ones farther away from it.
+    """
+    edges, n = u.shape
+    weight, own = np.tile(steps.weight, edges), u.ravel()
+    moved = _moved(slope * reach, n)
+    bent, bend = moved[n:] - moved[:-n], (u[1:] - u[:-1]).ravel()
+    bound, velocity = np.tile(steps.acceleration, edges - 1), np.tile(steps.velocity, edges)
+    span = abs(moved).sum(axis=1)
+    # Constraints that can bind: joints that reverse, increments near (5), changes near (6).
+    turns = np.flatnonzero(np.abs(own) <= span)
+    if steps.metric != MANHATTAN:
+        turns = turns[:0]
+    fast = np.flatnonzero(np.abs(own) + span > velocity)
+    acts = np.flatnonzero(np.abs(bend) + abs(bent).sum(axis=1) > bound)
+    if not len(acts):
+        return None
+    cost, curved = _metric(u, moved, steps)
+    cost[turns] = 0.0
+    linear = np.concatenate(
+        [
+            cost @ moved,
+            np.ones(len(turns)),
+            FAST * most * weight[fast],
+            most * weight[: len(bend)][acts],
+        ]
+    )
+    groups: list[tuple[_Rows, Array, Array | float]] = [
+        (sparse.diags_array(weight[turns]) @ moved[turns], weight[turns] * own[turns], 0.0),
+        (moved[fast], own[fast], velocity[fast]),
+        (bent[acts], bend[acts], bound[acts]),
+    ]
+    dual = _dual(groups, linear, curved)
+    if dual is None:
+        return None
+    prices = np.zeros(len(bend))
+    prices[acts] = dual
+    prices[np.abs(prices) <= NOTHING * weight[: len(bend)]] = 0.0
+    return np.pad(prices.reshape(edges - 1, n), ((1, 1), (0, 0)))
+
+
+def _moved(slope: Array, n: int) -> _Rows:
+    """Return the derivatives of the increments by the nodes' gamma, ((K-1) n, K)."""
+    nodes = len(slope)
+    row = np.arange((nodes - 1) * n)
+    values = np.concatenate([slope[1:].ravel(), -slope[:-1].ravel()])
+    place = np.tile(row, 2), np.concatenate([row // n + 1, row // n])
+    return sparse.csr_array((values, place), shape=(len(row), nodes))
+
+
+def _metric(u: Array, moved: _Rows, steps: Steps) -> tuple[Array, _Rows]:
+    """Return the slope of rho at increments u (K-1, n), ((K-1) n,), and its curvature (K, K).
+
+    The Manhattan metric has no curvature between its kinks; for the others it is estimated.
+    """
+    step, slope = steps.over(1), np.empty_like(u)
+    tangents(u, step, slope)
+    if steps.metric == MANHATTAN:
+        return slope.ravel(), sparse.csr_array((moved.shape[1],) * 2)
+    length = np.array([rho(row, steps.weight, steps.metric) for row in u])
+    share = np.repeat(1 / np.maximum(length, NOTHING), u.shape[1])
+    weight = sparse.diags_array(np.tile(steps.weight**2, len(u)) * share)
+    return slope.ravel(), moved.T @ weight @ moved
+
+
+def _dual(groups: list[tuple[_Rows, Array, Array | float]], cost: Array, curved: _Rows) -> Any:
+    """Return the dual of |value + slope x| <= bound + s, s >= 0, of the last group, or None.
+
+    The program minimises cost (x, s) + x curved x / 2 over x from -1 to 1; every row of each group
+    (slope, value, bound) has its own s.
+    """
+    boxed = curved.shape[0]
+    sizes = [len(value) for _, value, _ in groups]
+    first = boxed + np.cumsum([0, *sizes])
+    unknowns = int(first[-1])
+
+    def own(begin: int, size: int) -> _Rows:
+        place = np.arange(size), np.arange(begin, begin + size)
+        return sparse.csr_array((np.ones(size), place), shape=(size, unknowns))
+
+    rows, bounds = [own(0, boxed), -own(0, boxed)], [np.ones(2 * boxed)]
+    for (slope, value, bound), begin, size in zip(groups, first, sizes, strict=False):
+        slack = own(int(begin), size)
+        wide = sparse.hstack([slope, sparse.csr_array((size, unknowns - boxed))])
+        rows += [-slack, wide - slack, -wide - slack]
+        bounds += [np.zeros(size), bound - value, bound + value]
+    right = np.concatenate(bounds)
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    solver = clarabel.DefaultSolver(
+        sparse.csc_matrix(sparse.block_diag([curved, sparse.csr_array((unknowns - boxed,) * 2)])),
+        cost,
+        sparse.csc_matrix(sparse.vstack(rows)),
+        right,
+        [clarabel.NonnegativeConeT(len(right))],
+        settings,
+    )
+    found = solver.solve()
+    if found.status not in SOLVED:
+        return None
+    size = sizes[-1]
+    above, below = np.array(found.z)[-2 * size :].reshape(2, size)
+    return above - below
+
+
+# -----------------------------------------------------------------------------
+# certify(): a lower bound on the cost of every motion along the contour of a plan.
+
+LONGEST, TURNED = 3.0, 3e-4
+"""Largest rotation of a joint in one step of the first stage, rad: less than half a turn; and the
+share of its cost that the plan may lose with straight steps between the nodes."""
+DROPPED = 0.25
+"""Share of its cells that a stage must rule out to be kept in the certificate."""
+STALLED = 0.5
+"""Share of the gap that a stage must close; if it closes less, nodes are added in between."""
+CARE = 0.05
+"""Share of the cost beyond the cheapest step up to which steps are bounded with care."""
+FINE = 3
+"""Level below which cells are too coarse to show whether more nodes, or (6), are needed."""
+NEAR = 0.9
+"""Share of the target from which (6) may be what is missing."""
+DEEPEST = 12
+"""Largest level: cells of 0.001 deg."""
+MOST_PAIRS, MOST_PER_NODE = 10_000_000, 60_000
+"""Most steps from cell to cell, in all and in addition for each node, unless a time is given."""
+MOST_CELLS = 2_000_000
+"""Most cells of a stage, some 2 GB; the certifier stops before it exceeds them."""
+CLEARLY, USUAL_LEVEL, WIDER = 0.02, 3, 2.0
+"""For checkable certificates: a cell of this level drops out if motions through it cost more than
+the plan by this share, four times the share per coarser level, because a checker's own enclosures
+may give less; and the factor on the curvature. Otherwise only `SAME`, for rounding."""
+SAME = 1e-9
+NOT_KEPT = 'a bound of the objective "max" has no certificate to keep'
+AT_LIMIT = 0.98
+"""Share of the acceleration limit from which (6) may keep the plan from costing less."""
+EARLY, COARSE = 0.3, 1
+"""Share of the work after which motions are always bounded in parts if (6) binds the plan; and the
+largest level of the new cells at further nodes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Certified:
+    """Result of certifying a plan.
+
+    Parameters
+    ----------
+    plan : Plan
+        The plan, with `proof.bound`, `gap` and `certificate` if a bound is proved.
+    done : bool
+        Whether the gap asked for is reached.
+    statement : str
+        The proved bound, or the reason why there is none.
+    stages, pairs : int
+        Number of stages, and of steps from cell to cell bounded in all of them. With the objective
+        "max", `stages` is the number of costs that were tried.
+    """
+
+    plan: Plan
+    done: bool
+    statement: str
+    stages: int = 0
+    pairs: int = 0
+
+    __repr__ = short_repr
+
+
+def certify(
+    plan: Plan,
+    *,
+    gap: float = 0.005,
+    seconds: float | None = None,
+    checkable: bool = True,
+    progress: Progress = no_progress,
+) -> Certified:
+    """Return the plan with a proved lower bound on the cost of any motion along its contour.
+
+    The bound holds for any motion that keeps (5) and (6) at the nodes, the ranges of the joints and
+    their couplings, at any gamma, in the postures that the plan may use, on any turn. Other
+    constraints of the plan (cell, comfort, periodic closure, rotation limits) can only raise the
+    cost of the best motion.
+
+    Parameters
+    ----------
+    plan : Plan
+    gap : float
+        Value of (cost - bound) / cost at which it stops.
+    seconds : float s, optional
+        Time after which no further stage is begun; default: a limit on the work, which does not
+        depend on the machine.
+    checkable : bool
+        Whether the plan gets a certificate that others can check with enclosures that may be wider.
+        Then cells drop out only if their motions clearly cost too much, which is more work, and (6)
+        is left out, as the multipliers of parts do not fit into a certificate.
+    progress : Progress
+        Called with the progress of the proof.
+
+    Raises
+    ------
+    InputError
+        A gap or a time that is not positive.
+    """
+    gap = scalar(gap, "gap", above=0.0)
+    until = np.inf
+    if seconds is not None:
+        until = monotonic() + scalar(seconds, "seconds", unit="s", above=0.0)
+    why = _why_not(plan)
+    if why:
+        return Certified(plan=plan, done=False, statement=f"no bound is proved: {why}")
+    steps = _steps_of(plan)
+    if plan.settings.objective == "max":
+        best, tests = largest_step_bound(plan, steps, gap, lambda: monotonic() > until, progress)
+        found = _certified(plan, best, gap, None, tests, 0)
+        return replace(found, statement=f"{found.statement}; {NOT_KEPT}") if checkable else found
+    course = _Course(plan, steps, gap, until, checkable, progress)
+    course.run()
+    stages = tuple(course.stages) if checkable else None
+    return _certified(plan, course.best, gap, stages, course.count, course.pairs)
+
+
+def _certified(
+    plan: Plan, best: float, gap: float, kept: tuple[Stage, ...] | None, stages: int, pairs: int
+) -> Certified:
+    """Return the plan with its proved bound, and with the stages to keep if there are any."""
+    bound = max(best - ALLOWANCE * plan.cost, 0.0)
+    reached = (plan.cost - bound) / plan.cost
+    certificate = None if kept is None else Certificate(bound=bound, stages=kept)
+    proof = replace(plan.proof, bound=bound, gap=reached, certificate=certificate)
+    return Certified(
+        plan=replace(plan, proof=proof),
+        done=reached <= gap,
+        statement=proof.bound_claim,
+        stages=stages,
+        pairs=pairs,
+    )
+
+
+def _why_not(plan: Plan) -> str:
+    """Return the reason why no bound of a plan can be proved; "" if one can."""
+    robot, asked = plan.robot, plan.settings
+    if robot.externals:
+        return "the joints of an external axis are not enclosed"
+    if not robot.encloses:
+        return f"the joints of a robot of the kind {robot.kinematics!r} are not enclosed"
+    if asked.tilt is not None:
+        return "the tool axis may tilt"
+    if plan.feed is not None:
+        return "the feed is reduced"
+    if not plan.cost > 0:
+        return "its cost is not above 0"
+    return ""
+
+
+def _steps_of(plan: Plan) -> Steps:
+    """Return the costs and limits of the steps of motions along the contour of a plan."""
+    asked, dt = plan.settings, float(np.diff(plan.time).max())
+    limits = asked.limits(plan.robot)
+    return Steps(
+        weight=asked.weights,
+        velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
+        acceleration=limits.acceleration.per_interval(dt) + 2 * LIMIT_TOLERANCE,
+        metric=METRIC_CODES[asked.metric],
+        endless=plan.robot.endless,
+    )
+
+
+class _Course:
+    """The stages of one certificate, from coarse cells at a few nodes to fine cells at more."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        steps: Steps,
+        gap: float,
+        until: float,
+        checkable: bool,
+        progress: Progress,
+    ) -> None:
+        robot, asked = plan.robot, plan.settings
+        self.steps = steps
+        self.margin, width = (CLEARLY, WIDER) if checkable else (SAME, 1.0)
+        self.maker = CellMaker(robot, plan.frames, plan.T_flange_tip, asked.postures, width)
+        self.cost, self.until, self.progress = plan.cost, until, progress
+        self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
+        self.last = len(plan.q) - 1
+        longest = max(1, int(LONGEST / self.steps.velocity.max()))
+        self.nodes = turning_nodes(plan, TURNED, longest)
+        self.best, self.pairs, self.count = 0.0, 0, 0
+        self.at_node = 0.0  # cells of level 0
+        self.stages: list[Stage] = []
+        self.plan, self.checkable = plan, checkable
+        self.proved = 0.0  # by the stages that are kept
+        self.loose: tuple[int, StageResult] | None = None  # the best one left out, and its place
+
+    def run(self) -> None:
+        """Run stages until the gap is reached or the work is spent."""
+        cells = self.maker.coarsest(self.nodes)
+        self.at_node = len(cells) / len(self.nodes)
+        fresh = True  # new cells, which the certificate must contain
+        while True:
+            result = solve_stage(cells, self.steps, care=CARE * self.cost)
+            gained, cells = self._take(result), result.cells
+            clearly = self.margin * np.exp2(2.0 * (USUAL_LEVEL - cells.level))
+            live = result.through <= self.cost * (1 + clearly)
+            if not self.checkable:
+                live = np.logical_or.reduce(distinct_groups(result, live, self.maker))
+            low = result.through < self.target
+            which, singular = cells_to_divide(cells, result.through, self.target, self.steps.weight)
+            which &= cells.level < DEEPEST
+            fine = not singular and low.any() and np.median(cells.level[low]) >= FINE
+            slow = bool(fine) and gained < STALLED
+            if fine and self._late(slow) and self._fits(self.last + 1) and self._priced:
+                self._divide(cells.take(live))
+                return
+            if not low.any() or self._enough(result, float(live.mean() + which.mean())):
+                self._finish(result)
+                return
+            if fresh or 1 - live.mean() > DROPPED:
+                self._keep(result)
+                fresh, kept = False, live
+            else:
+                if result.bound >= self.best:
+                    self.loose = len(self.stages), result
+                kept = np.ones(len(live), np.bool_)
+            which &= kept
+            more = between(self.nodes)
+            if (slow or not which.any()) and len(more) > len(self.nodes) and self._fits(len(more)):
+                self.nodes, fresh = more, True
+                cells = self._with_nodes(cells.take(kept))
+            elif not which.any():
+                self._finish(result)
+                return
+            else:
+                cells = self.maker.divided(cells.take(kept), which[kept])
+
+    @cached_property
+    def _priced(self) -> bool:
+        """Whether (6) adds more to the cost of the plan than the gap that may be left."""
+        if self.checkable:
+            return False
+        share = np.abs(self.plan.acceleration_share)
+        if self.steps.metric == CHEBYCHEV:  # its potentials are too loose for prices to help
+            return False
+        if not (share > AT_LIMIT * self.plan.settings.eta_a).any():
+            return False
+        posture = int(np.bincount(self.plan.posture).argmax())
+        prices = (self._prices(self.plan.gamma, posture, NARROW, most) for most in DEAREST)
+        return max(map(self.steps.price, prices)) > self.cost - self.target
+
+    def _prices(self, gamma: Array, posture: int, reach: float, most: float) -> Array | None:
+        """Return multipliers of (6) for the motion with gamma (K,) in a posture; None if none."""
+        if self._spent(self.pairs):
+            return None
+        motion = self.maker.motion(gamma, posture)
+        if motion is None:
+            return None
+        q, slope = motion
+        u = np.diff(q, axis=0)
+        u -= 2 * np.pi * np.rint(u / (2 * np.pi))
+        return limit_prices(u, slope, self.steps, reach, most)
+
+    def _divide(self, cells: CellSet) -> None:
+        """Continue at all nodes, with multipliers of (6), part by part."""
+        self.nodes = np.arange(self.last + 1)
+        cells = self._with_nodes(cells, COARSE)
+        before = self.pairs
+
+        def enough(pairs: int, held: int) -> bool:
+            short = max(self.target - self.best, 0.0)
+            self.progress("certificate", int(1000 * (1 - short / self.target)), 1000)
+            return held > MOST_CELLS or self._spent(before + pairs)
+
+        parts = Parts(
+            self.maker,
+            self.steps,
+            self._prices,
+            self.plan.gamma,
+            cost=self.cost,
+            target=self.target,
+            enough=enough,
+        )
+        self.best = max(self.best, min(parts.bound(cells, self.best), self.cost))
+        self.pairs, self.count = before + parts.pairs, self.count + parts.count
+
+    def _keep(self, result: StageResult) -> None:
+        """Add a stage to the certificate."""
+        self.stages.append(result.stage())
+        self.proved = max(self.proved, result.bound)
+
+    def _finish(self, result: StageResult) -> None:
+        """Add the last stage, and the stage that proves the bound if no kept one does.
+
+        Stages with more nodes and other potentials may prove less. A stage that was left out ruled
+        no cells out, so the stages after it cover the same motions.
+        """
+        self._keep(result)
+        if self.loose is not None and self.proved < self.best:
+            place, best = self.loose
+            self.stages.insert(place, best.stage())
+
+    def _take(self, result: StageResult) -> float:
+        """Update the bound with a stage; return the share of the gap that it closes."""
+        before, self.best = self.best, max(self.best, min(result.bound, self.cost))
+        self.pairs, self.count = self.pairs + result.pairs, self.count + 1
+        short = max(self.target - self.best, 0.0)
+        self.progress("certificate", int(1000 * (1 - short / self.target)), 1000)
+        return (self.best - before) / max(self.target - before, 1e-300)
+
+    def _late(self, slow: bool) -> bool:
+        """Return whether to use multipliers of (6) from here on."""
+        close = slow and self.best > NEAR * self.target
+        return close or self.pairs > EARLY * (MOST_PAIRS + MOST_PER_NODE * self.last)
+
+    def _enough(self, result: StageResult, left: float) -> bool:
+        """Return whether the next stage, with a share `left` of the cells, is too much work."""
+        if len(result.cells) * left > MOST_CELLS:
+            return True
+        return self._spent(self.pairs + result.pairs * left**2)
+
+    def _fits(self, nodes: int) -> bool:
+        """Return whether coarse cells at this number of nodes are few enough."""
+        return nodes * self.at_node <= MOST_CELLS
+
+    def _spent(self, pairs: float) -> bool:
+        """Return whether the time is over, or this number of steps exceeds the limit on work."""
+        if self.until < np.inf:
+            return monotonic() > self.until
+        return pairs > MOST_PAIRS + MOST_PER_NODE * self.last
+
+    def _with_nodes(self, cells: CellSet, most: int = DEEPEST) -> CellSet:
+        """Return the cells plus those of further nodes, similarly fine where motions may pass."""
+        level = min(most, int(np.median(cells.level))) if len(cells) else 0
+        missing = np.setdiff1d(self.nodes, cells.node)
+        if not len(missing):
+            return cells
+        new = self.maker.coarsest(missing)
+        while True:
+            passed = linked(CellSet.join([cells, new]), self.steps)[len(cells) :]
+            coarse = passed & (new.level < level)
+            if not coarse.any() or len(new) > MOST_CELLS or self._spent(self.pairs):
+                return CellSet.join([cells, new])
+            new = self.maker.divided(new, coarse)

@@ -1,0 +1,478 @@
+"""Compile the kernels of the certified bound by a small stage."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
+from kerfpath.certificate import Stage
+from kerfpath.certifier.cells import CellMaker, CellSet
+from kerfpath.kernels.bends import cross_back, cross_on
+from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.kernels.metric import MANHATTAN
+from kerfpath.kernels.potentials import cross_cells, lay_potential, link_cells, reach_cells
+from kerfpath.kernels.reduced import Cells, Potential, Step, tangents
+
+# -----------------------------------------------------------------------------
+# Costs and limits of the steps of a motion, and the prices of (6).
+
+ROUNDED = 1e-14
+"""Relative rounding error of adding one term to a sum, as a share of the largest term."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Steps:
+    """Costs and limits of the steps of a motion.
+
+    Parameters
+    ----------
+    weight : (n,) 1/rad
+    velocity, acceleration : (n,) rad
+        Bounds (5) and (6) on an increment and on its change, tolerance included.
+    metric : int
+        Code of the metric.
+    endless : (n,) bool
+    most : float
+        Largest cost of a step; infinite for no limit.
+    """
+
+    weight: Array
+    velocity: Array
+    acceleration: Array
+    metric: int
+    endless: Bools
+    most: float = np.inf
+
+    __repr__ = short_repr
+
+    def over(self, intervals: int) -> Step:
+        """Return the step over several intervals, which costs at most their sum (14)."""
+        velocity = intervals * self.velocity
+        tilt, most = np.zeros_like(velocity), intervals * self.most
+        return Step(self.weight, tilt, velocity, self.metric, self.endless, most)
+
+    def tilted(self, multipliers: Array | None, k: int) -> Step:
+        """Return the step from node k to the next, tilted by the multipliers (K, n) of (6)."""
+        step = self.over(1)
+        if multipliers is None:
+            return step
+        return step._replace(tilt=multipliers[k] - multipliers[k + 1])
+
+    def price(self, multipliers: Array | None) -> float:
+        """Return the price of the multipliers (K, n): the most that they add where (6) holds."""
+        if multipliers is None:
+            return 0.0
+        return float((np.abs(multipliers) @ self.acceleration).sum()) * (1 + ROUNDED)
+
+
+# -----------------------------------------------------------------------------
+# Least cost of motions through each cell, without pairs of steps that break (6).
+
+
+def cross_bends(
+    packed: Cells, steps: Steps, begin: Ints, to: Ints, cost: Array,
+    behind: Array, ahead: Array, most: float,
+) -> tuple[Array, int]:  # fmt: skip
+    """Return the least cost through each cell (C,), infinite beyond `most`; and the tests of (6).
+
+    Parameters
+    ----------
+    packed : Cells
+        Cells at neighbouring nodes.
+    steps : Steps
+    begin, to, cost : (C + 1,), (E,), (E,)
+        The steps of cell a are begin[a]..begin[a+1]-1, each to a cell and at a reduced cost.
+    behind, ahead : (C,)
+        Least reduced cost up to each cell and from it on, without (6).
+    most : float
+        Largest cost of the motions of interest.
+    """
+    start, step = packed.start, steps.over(1)
+    bound = steps.acceleration + 2 * LIMIT_TOLERANCE
+    lead = np.argmax(np.abs(packed.slope) / bound, axis=1)
+    origin = np.repeat(np.arange(len(behind)), np.diff(begin))
+    until = np.full(len(to), np.inf)  # up to the end of each step
+    onward = np.full(len(to), np.inf)  # from there on
+    tests = 0
+    layers = len(start) - 1
+    edges = [slice(int(begin[start[k]]), int(begin[start[k + 1]])) for k in range(layers - 1)]
+    until[edges[0]] = behind[origin[edges[0]]] + cost[edges[0]]
+    for k in range(1, layers - 1):
+        first, last = int(start[k]), int(start[k + 1])
+        ending = np.arange(edges[k - 1].start, edges[k - 1].stop)
+        ending = ending[np.isfinite(until[ending])]
+        ending = ending[np.lexsort((until[ending], to[ending]))]
+        in_begin = np.searchsorted(to[ending], np.arange(first, last + 1))
+        tests += cross_on(
+            packed, step, bound, lead, first, last, begin, to, origin, ending, in_begin,
+            cost, ahead, most, until,
+        )  # fmt: skip
+    onward[edges[-1]] = 0.0
+    for k in range(layers - 2, 0, -1):
+        first, last = int(start[k]), int(start[k + 1])
+        leaving = np.arange(edges[k].start, edges[k].stop)
+        total = cost[leaving] + onward[leaving]
+        some = np.isfinite(total) & np.isfinite(until[leaving])
+        leaving, total = leaving[some], total[some]
+        leaving = leaving[np.lexsort((total, origin[leaving]))]
+        on_begin = np.searchsorted(origin[leaving], np.arange(first, last + 1))
+        ending = np.arange(edges[k - 1].start, edges[k - 1].stop)
+        tests += cross_back(
+            packed, step, bound, lead, first, last, to, origin, leaving, on_begin,
+            ending[np.isfinite(until[ending])], cost, until, most, onward,
+        )  # fmt: skip
+    through = np.full(len(behind), np.inf)
+    whole = until + onward
+    np.minimum.at(through, origin, whole)
+    np.minimum.at(through, to[edges[-1]], until[edges[-1]])
+    return through, tests
+
+
+# -----------------------------------------------------------------------------
+# One stage: a potential on cells, and a lower bound on the cost of motions through each cell.
+
+TESTS = 50
+"""Number of pairs of steps whose test by (6) takes as long as bounding one step."""
+IN_ONE = 64
+"""Cells of a layer below which a second thread takes more time than it saves."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StageResult:
+    """The bounds that a stage proves.
+
+    Parameters
+    ----------
+    cells : CellSet
+        The cells, sorted.
+    through : (C,)
+        Lower bound on the cost of a motion through each cell; infinite if no motion passes.
+    level, dual : (C, 2), (C, 2, n)
+        The potential.
+    multipliers : (K, n), optional
+    begin, to : (C + 1,), (E,)
+        The steps of cell a are begin[a]..begin[a+1]-1, each to a cell.
+    tests : int
+        Number of pairs of steps tested.
+    """
+
+    cells: CellSet
+    through: Array
+    level: Array
+    dual: Array
+    multipliers: Array | None
+    begin: Ints
+    to: Ints
+    tests: int = 0
+
+    __repr__ = short_repr
+
+    @property
+    def pairs(self) -> int:
+        """Work of the stage in steps from cell to cell, with the tests of pairs converted."""
+        return len(self.to) + self.tests // TESTS
+
+    @property
+    def bound(self) -> float:
+        """Lower bound on the cost of any motion."""
+        return float(self.through.min(initial=np.inf))
+
+    def cheapest(self) -> Ints:
+        """Return the cells of a motion that may be the cheapest, one per layer."""
+        cell = int(self.through[: int((self.cells.node == self.cells.node[0]).sum())].argmin())
+        motion = [cell]
+        while self.begin[cell] < self.begin[cell + 1]:
+            ahead = self.to[self.begin[cell] : self.begin[cell + 1]]
+            cell = int(ahead[self.through[ahead].argmin()])
+            motion.append(cell)
+        return np.array(motion)
+
+    def stage(self) -> Stage:
+        """Return the stage for a certificate."""
+        cells = self.cells
+        return Stage(
+            node=cells.node,
+            posture=cells.posture,
+            level=cells.level,
+            index=cells.index,
+            lift=cells.lift,
+            value=np.where(np.isfinite(self.level), self.level, 0.0),
+            dual=self.dual.astype(np.float32),
+            multipliers=self.multipliers,
+        )
+
+
+def solve_stage(
+    cells: CellSet,
+    steps: Steps,
+    multipliers: Array | None = None,
+    care: float = np.inf,
+    most: float | None = None,
+) -> StageResult:
+    """Return the bounds that the cells prove for every motion through them.
+
+    Parameters
+    ----------
+    cells : CellSet
+        Their nodes are the layers; at the nodes in between, the motion is arbitrary.
+    steps : Steps
+    multipliers : (K, n), optional
+        Multipliers of (6), zero at the first and the last node; they need cells at all nodes.
+    care : float
+        Cost beyond the cheapest step of a cell up to which steps are bounded with care.
+    most : float, optional
+        If given, pairs of steps that break (6) are excluded for motions that cost at most this; it
+        needs cells at all nodes.
+
+    Raises
+    ------
+    ValueError
+        Multipliers without cells at every node.
+    """
+    cells, packed, nodes, _ = arranged(cells, steps)
+    if multipliers is not None and len(nodes) < len(multipliers):
+        raise ValueError("multipliers of (6) need cells at every node")
+    start = packed.start
+    C, n = cells.center.shape
+    potential = Potential(
+        np.full((C, 2), np.inf),
+        np.zeros((C, 2, n)),
+        np.zeros((C, 2)),
+        np.zeros((C, 2)),
+        np.zeros(C),
+    )
+    potential.level[start[-2] :] = 0.0
+    begin, to, cost = _lay(packed, nodes, potential, steps, multipliers, care)
+    ahead, behind = np.zeros(C), np.full(C, np.inf)
+    first = slice(start[0], start[1])
+    behind[first] = _least_at_first(cells.take(first), potential, first)
+    cross_cells(start, begin, to, cost, ahead, behind)
+    through, price = ahead + behind, steps.price(multipliers)
+    tests = 0
+    if most is not None and len(start) > 2 and np.isfinite(through).any():
+        through, tests = cross_bends(packed, steps, begin, to, cost, behind, ahead, most + price)
+    through -= price
+    finite = np.isfinite(through)
+    largest = np.abs(potential.level[np.isfinite(potential.level)]).max(initial=0.0)
+    through[finite] -= ROUNDED * len(nodes) * (largest + np.abs(through[finite]))
+    return StageResult(
+        cells=cells,
+        through=through,
+        level=potential.level,
+        dual=potential.dual,
+        multipliers=multipliers,
+        begin=begin,
+        to=to,
+        tests=tests,
+    )
+
+
+class Arranged(NamedTuple):
+    """Cells in the order that the kernels need, and packed for them.
+
+    ``cells`` are sorted by node and then by the joint whose windows of (5) leave the fewest;
+    ``nodes`` (M,) are their layers; ``order`` (C,) is the previous index of each cell.
+    """
+
+    cells: CellSet
+    packed: Cells
+    nodes: Ints
+    order: Ints
+
+
+def arranged(cells: CellSet, steps: Steps) -> Arranged:
+    """Return the cells sorted and packed."""
+    box = cells.box
+    key = _widest_apart(cells, box, steps)
+    order = np.lexsort((cells.center[:, key], cells.node))
+    cells, box = cells.take(order), box[order]
+    nodes, start = np.unique(cells.node, return_index=True)
+    widest = np.maximum.reduceat(box[:, key], start) if len(start) else np.zeros(0)
+    curves = cells.center, cells.slope, cells.bend, cells.spread, box, cells.half
+    packed = Cells(np.append(start, len(cells)), *curves, key, widest)
+    return Arranged(cells, packed, nodes.astype(np.int64), order)
+
+
+def linked(cells: CellSet, steps: Steps) -> Bools:
+    """Return which cells (C,) steps within (5) lead to and from."""
+    _, packed, nodes, order = arranged(cells, steps)
+    after, before = np.zeros((2, len(cells)), np.bool_)
+    after[packed.start[-2] :] = before[: packed.start[1]] = True
+    for k in range(len(nodes) - 1):
+        link_cells(packed, steps.over(int(nodes[k + 1] - nodes[k])), k, after, before)
+    found = np.empty(len(cells), np.bool_)
+    found[order] = after & before
+    return found
+
+
+def _widest_apart(cells: CellSet, box: Array, steps: Steps) -> int:
+    """Return the joint whose windows of (5) leave the smallest share of a layer."""
+    if not len(cells):
+        return 0
+    spread = np.where(steps.endless, np.pi / np.sqrt(3), cells.center.std(axis=0))
+    return int(np.argmax(spread / (steps.velocity + 2 * np.median(box, axis=0))))
+
+
+def _lay(
+    packed: Cells,
+    nodes: Ints,
+    potential: Potential,
+    steps: Steps,
+    multipliers: Array | None,
+    care: float,
+) -> tuple[Ints, Ints, Array]:
+    """Compute the potential from the last layer to the first; return steps and reduced costs.
+
+    The steps of cell a are begin[a]..begin[a+1]-1, each to a cell and at a cost.
+    """
+    start, C = packed.start, len(packed.half)
+    count = np.zeros(C, np.int64)
+    layers: list[tuple[Ints, Array]] = []
+    threads = int(os.environ.get("NUMBA_NUM_THREADS") or os.cpu_count() or 1)
+    with ThreadPoolExecutor(threads) as pool:
+        for k in range(len(start) - 3, -1, -1):
+            first, last = int(start[k]), int(start[k + 1])
+            stride = int(nodes[k + 1] - nodes[k])
+            step = steps.over(stride) if stride > 1 else steps.tilted(multipliers, int(nodes[k]))
+            reach_cells(packed, step, k, first, last, potential.level, count)
+            begin = np.zeros(last - first + 1, np.int64)
+            np.cumsum(count[first:last], out=begin[1:])
+            to, cost = np.empty(begin[-1], np.int64), np.empty(begin[-1])
+            shifted = np.zeros(last + 1, np.int64)
+            shifted[first:] = begin
+            parts = threads if last - first >= IN_ONE else 1
+            middle = np.searchsorted(begin, np.linspace(0, begin[-1], parts + 1)[1:-1])
+            ends = [first, *(first + middle).tolist(), last]
+            runs = [
+                pool.submit(
+                    lay_potential, packed, potential, step, k, a, b, care, shifted, to, cost
+                )
+                for a, b in pairwise(ends)
+            ]
+            for run in runs:
+                run.result()
+            layers.append((to, cost))
+    layers.reverse()
+    begin = np.concatenate([[0], np.cumsum(count)])
+    if not layers:
+        return begin, np.zeros(0, np.int64), np.zeros(0)
+    return (
+        begin,
+        np.concatenate([to for to, _ in layers]),
+        np.concatenate([cost for _, cost in layers]),
+    )
+
+
+def _least_at_first(cells: CellSet, potential: Potential, first: slice) -> Array:
+    """Return a lower bound of the potential on each cell of the first layer, from both cuts."""
+    h, best = cells.half, np.full(len(cells), -np.inf)
+    for m in range(2):
+        y = potential.dual[first, m]
+        slope = np.abs((y * cells.slope).sum(axis=1))
+        bend = np.maximum((y * cells.bend).sum(axis=1), 0.0)
+        less = slope * h + bend * h**2 / 2 + (np.abs(y) * cells.spread).sum(axis=1)
+        best = np.maximum(best, potential.level[first, m] - less * (1 + ROUNDED))
+    return np.asarray(best)
+
+
+# -----------------------------------------------------------------------------
+# Groups of cells that no step joins, without groups that only repeat another one.
+
+
+def distinct_groups(result: StageResult, kept: Bools, maker: CellMaker) -> list[Bools]:
+    """Return the groups of kept cells that no step joins, (C,) bool each.
+
+    A group is left out if another one contains it up to whole turns of the joints or a flipped
+    wrist (`Robot.flip`): each motion through it then has a counterpart through the other one at the
+    same cost, as (5), (6) and the cost depend only on the sizes of increments.
+    """
+    labels, count = _joined(result, kept)
+    if count < 2:
+        return [labels == 0]
+    which, turn = _codes(result.cells, maker)
+    order = np.argsort(labels, kind="stable")
+    groups = np.split(order, np.searchsorted(labels[order], np.arange(count)))[1:]
+    found: list[Ints] = []
+    for cells in sorted(groups, key=len, reverse=True):
+        images = [cells + first for first in range(0, len(which), len(labels))]
+        if not any(_contains(which, turn, one, others) for others in found for one in images):
+            found.append(cells)
+    return [labels == labels[cells[0]] for cells in found]
+
+
+def _joined(result: StageResult, kept: Bools) -> tuple[Ints, int]:
+    """Return the group (C,) of each cell, -1 if it is not kept, and the number of groups."""
+    cell = np.repeat(np.arange(len(kept)), np.diff(result.begin))
+    both = kept[cell] & kept[result.to]
+    size = (len(kept),) * 2
+    steps = sparse.csr_array((np.ones(both.sum()), (cell[both], result.to[both])), shape=size)
+    group = connected_components(steps, directed=False)[1]
+    labels = np.full(len(kept), -1)
+    alone, labels[kept] = np.unique(group[kept], return_inverse=True)
+    return labels, len(alone)
+
+
+def _codes(cells: CellSet, maker: CellMaker) -> tuple[Ints, Ints]:
+    """Return a number for each cell up to turns of its joints, and one for the turns, (C,) each.
+
+    Shifting the turns of all cells shifts the second numbers of all by the same amount. If the
+    wrist can be flipped, the numbers of the cells with the wrist flipped follow, (2 C,) each.
+    """
+    sets = [cells] if maker.flip is None else [cells, cells.flipped(*maker.flip)]
+    name = np.concatenate([np.stack([c.node, c.posture, c.level, c.index], axis=1) for c in sets])
+    center = np.concatenate([c.center for c in sets])
+    _, first, which = np.unique(name, axis=0, return_index=True, return_inverse=True)
+    which = which.ravel()
+    halves = np.rint((center - center[first[which]]) / np.pi).astype(np.int64)
+    halves[:, maker.endless] = 0  # all turns are equivalent
+    digits = 4 * np.abs(halves).max() + 1  # keeps turns, shifts and their sums distinct
+    return which, halves @ digits ** np.arange(halves.shape[1])
+
+
+def _contains(which: Ints, turn: Ints, cells: Ints, others: Ints) -> bool:
+    """Return whether cells (A,), with their turns shifted, are all among others (B,)."""
+    if len(cells) > len(others):
+        return False
+    shifts = turn[others[which[others] == which[cells[0]]]] - turn[cells[0]]
+    known = set(zip(which[others].tolist(), turn[others].tolist(), strict=True))
+    return any(
+        known.issuperset(zip(which[cells].tolist(), (turn[cells] + shift).tolist(), strict=True))
+        for shift in np.unique(shifts)
+    )
+
+
+# -----------------------------------------------------------------------------
+# Compile the kernels of the certified bound by a small stage.
+
+
+def compile_bound() -> None:
+    """Compile the kernels of `certify` by a stage of three nodes with one cell each."""
+    nodes, joints = 3, 6
+    none = np.zeros((nodes, joints))
+    cells = CellSet(
+        node=np.arange(nodes, dtype=np.int32),
+        posture=np.zeros(nodes, np.int8),
+        level=np.zeros(nodes, np.int8),
+        index=np.zeros(nodes, np.int32),
+        half=np.full(nodes, 0.1),
+        center=none,
+        slope=none,
+        bend=none,
+        spread=none,
+        floor=np.full(nodes, -np.inf),
+    )
+    ones = freeze(np.ones(joints))
+    steps = Steps(
+        weight=ones, velocity=ones, acceleration=ones, metric=MANHATTAN, endless=freeze(ones > 2)
+    )
+    solve_stage(cells, steps, care=1.0)
+    linked(cells, steps)
+    tangents(none, steps.over(1), none.copy())

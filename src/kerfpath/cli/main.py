@@ -1,0 +1,259 @@
+"""The commands for one job or file: their arguments, help and exit codes.
+
+Exit codes are 0 for done, 1 for no feasible plan or a failed audit, 2 for bad input.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from kerfpath import __version__
+from kerfpath.cli.show import busy, compile_kernels, errors, out, progress_bars, quiet
+from kerfpath.errors import AuditFailed, KerfpathError, NoFeasiblePath
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+    help="Plan laser-cutting robots: from a CAD drawing to an audited robot program.\n\n"
+    "Begin with **kerfpath demo**: it plans the shipped part and writes everything. "
+    "Then copy its job file, put in your part (see **kerfpath contours**) and your robot "
+    "(see **kerfpath robots**), and run **kerfpath plan**.\n\n"
+    "Exit codes: 0 done, 1 no feasible plan or failed audit, 2 bad input.",
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
+Out = Annotated[
+    Path | None, typer.Option("--out", help="Folder for the files; the command makes it if needed.")
+]
+JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Refuse a program that would only give a warning.")
+]
+
+
+def run() -> None:
+    """Run the command line and exit with its exit code."""
+    try:
+        app()
+    except (NoFeasiblePath, AuditFailed) as error:
+        errors.print(f"kerfpath: {escape(str(error))}")
+        sys.exit(1)
+    except KerfpathError as error:
+        for line in (str(error), *getattr(error, "others", ())):
+            errors.print(f"[bold red]kerfpath: error:[/] {escape(line)}")
+        sys.exit(2)
+    except BrokenPipeError:
+        # The reader of a pipe has gone, as in `kerfpath robots | head`; leave stdout unflushed.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        out.print(f"kerfpath {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+    silent: Annotated[
+        bool, typer.Option("--quiet", help="Show results, notes and errors, but no progress.")
+    ] = False,
+) -> None:
+    if silent:
+        quiet.set()
+    else:
+        quiet.clear()
+
+
+@app.command()
+def demo(to: Out = None, as_json: Json = False) -> None:
+    """Plan the shipped B-pillar from its STEP file to an audited ABB program.
+
+    The folder gets report.html (look at it first), plan.json, trajectory.csv and b_pillar.mod.
+
+    Example: kerfpath demo --out my-demo
+    """
+    from kerfpath.cli.plan_output import plan_job
+
+    with as_file(files("kerfpath").joinpath("demo")) as folder:
+        plan_job(folder / "b_pillar.toml", to or Path("kerfpath-demo"), as_json=as_json)
+
+
+@app.command()
+def plan(
+    job: JobArgument,
+    to: Out = None,
+    draw_map: Annotated[
+        bool,
+        typer.Option("--map", help="Draw every pose, coloured by its clearance; needs a cell."),
+    ] = False,
+    strict: Strict = False,
+    as_json: Json = False,
+) -> None:
+    """Plan and audit every contour of a job; write plan, trajectory, report and program.
+
+    The files go to the folder JOB-plan unless --out names another. The program is written only if
+    every contour has a plan that passes its audit; with language = "none" there is no program.
+    If the job has a cell, the motions along the contours are free of collisions.
+
+    Example: kerfpath plan door.toml --out door
+    """
+    from kerfpath.cli.plan_output import plan_job
+
+    plan_job(job, to or Path(f"{job.stem}-plan"), as_json=as_json, draw_map=draw_map, strict=strict)
+
+
+@app.command()
+def check(job: JobArgument, as_json: Json = False) -> None:
+    """Read a job without planning it; print its cell and the poses at the start of each contour.
+
+    The command lists every fault that can be found before planning, with its key; the exit code is
+    then 2.
+
+    The column clear counts the poses at the first node that keep every near-miss distance. The
+    column clearance is the least distance of the best of these poses, over the pairs that keep
+    near_miss_mm.
+
+    Example: kerfpath check door.toml
+    """
+    from kerfpath.cli.check_output import show_check
+    from kerfpath.cli.drawing_output import drawing_of, show_drawing
+    from kerfpath.job import check_job, prepare, read_job, require_foreseen
+
+    read = read_job(job)
+    part = drawing_of(read)
+    if not as_json:
+        show_drawing(part)
+    compile_kernels(read.robot.kinematics)
+    with busy("checking the cell"):
+        checked = check_job(read, part)
+    show_check(checked, as_json=as_json)
+    require_foreseen(prepare(read, part, checked.cell))
+
+
+@app.command()
+def speed(
+    job: JobArgument,
+    as_json: Json = False,
+) -> None:
+    """Find the fastest constant cutting speed of each contour, and the limit that binds.
+
+    The column on the grid is exact on the graph that the job describes (its spacing, rotation step,
+    limits and eta), and free of collisions in its cell, if it has one. The column refined has the
+    speed after the rotation was moved off the grid, if the job refines; the limit shown belongs to
+    that speed. Both keep the limits at the nodes. The column as run has a speed at which the
+    program keeps them between the nodes, too, if the job asks for it. The speeds in the job have no
+    effect.
+
+    Example: kerfpath speed door.toml
+    """
+    from kerfpath.cli.plan_output import show_speeds
+    from kerfpath.job import fastest_speeds, read_job
+
+    read = read_job(job)
+    compile_kernels(read.robot.kinematics)
+    with progress_bars("contours") as progress:
+        answers = fastest_speeds(read, progress=progress)
+    if not show_speeds(answers, as_json=as_json):
+        raise typer.Exit(1)
+
+
+@app.command()
+def contours(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="STEP, IGES, DXF, or a table of points (CSV).")
+    ],
+    unit: Annotated[
+        str | None,
+        typer.Option(help="Length unit, if the file has none or a wrong one: mm, cm, m, in."),
+    ] = None,
+    gap_mm: Annotated[
+        float, typer.Option(help="Largest gap between two curve ends that a loop bridges, mm.")
+    ] = 0.05,
+    outer_towards: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(
+            help="Direction that the outer sides of sheets face, in the part. Default: the side "
+            "that lies less deep in the part; for a flat sheet, the side that faces up."
+        ),
+    ] = None,
+    axis: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(help="Tool axis for lines in space, and for points without one."),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(help='Columns of a table: x,y,z,-,nx,... in order, or x=NAME,"y=A, B",...'),
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(help="HTML page to write: the part with its loops by name."),
+    ] = None,
+    everything: Annotated[
+        bool,
+        typer.Option("--all", help="List loops of single faces of skins and of cut edges, too."),
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """List the loops of a drawing by the names that jobs use.
+
+    Check the bounding box first: it shows a wrong unit in the file's header. A job picks a loop
+    with pick = "NAME" in a table [[contour]].
+
+    Example: kerfpath contours door.step --html door.html
+    """
+    from kerfpath.cli.drawing_output import drawing_in, list_contours
+
+    part = drawing_in(
+        file,
+        unit=unit,
+        gap=gap_mm / 1000,
+        outer_towards=outer_towards,
+        axis=axis,
+        columns=columns,
+    )
+    list_contours(part, html, everything=everything, as_json=as_json)
+
+
+@app.command()
+def robots(
+    name: Annotated[
+        str | None, typer.Argument(help="Id of one robot, rail or positioner; default: all.")
+    ] = None,
+    urdf: Annotated[
+        Path | None,
+        typer.Option(help="Write the joints and limits of the robot as a description (URDF)."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the robots, rails and positioners of the library, or show one with limits and sources.
+
+    A job uses a robot with model = "ID" in its table [robot], and an axis of a rail or positioner
+    with model = "ID" in a table [[robot.external]].
+
+    Example: kerfpath robots abb_irb4600_60_205
+    """
+    from kerfpath.cli.robots_output import list_robots, show_external, show_robot, write_urdf
+    from kerfpath.robots import external_ids
+
+    if urdf is not None:
+        write_urdf(name, urdf, as_json=as_json)
+    elif name is None:
+        list_robots(as_json=as_json)
+    elif name in external_ids():
+        show_external(name, as_json=as_json)
+    else:
+        show_robot(name, as_json=as_json)

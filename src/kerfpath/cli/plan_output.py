@@ -1,0 +1,462 @@
+"""`kerfpath plan`: the run of a job, the result of each contour, and the files written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import typer
+from rich.markup import escape
+
+from kerfpath.arrays import Array
+from kerfpath.cad import Loop, Part, read
+from kerfpath.cli.drawing_output import drawing_entry, drawing_of, show_drawing
+from kerfpath.cli.show import (
+    busy,
+    compile_kernels,
+    errors,
+    merge_notes,
+    out,
+    print_json,
+    progress_bars,
+    show_files,
+    table,
+)
+from kerfpath.errors import InputError
+from kerfpath.files import write_whole
+from kerfpath.job import (
+    AsRun,
+    ContourSpeed,
+    CutResult,
+    JobResult,
+    pose,
+    prepare,
+    python_script,
+    read_job,
+    require_folder,
+    require_foreseen,
+    require_language,
+    run_prepared,
+    sequence_entry,
+    with_map,
+    write_result,
+)
+from kerfpath.planner import FastestSpeed, at_least, at_most
+
+# -----------------------------------------------------------------------------
+# Write a first job for a drawing that has none; all its values are guesses to be changed.
+
+MOST_LOOPS = 8
+"""Most loops in a first job; the longest are taken."""
+NODES = 400
+"""Most nodes of a loop; shorter loops are spaced by `SPACING`."""
+SPACING = 2.0
+"""Least distance between nodes, mm."""
+TURNS = ((0, 0, 0), (180, 0, 0), (90, 0, 0), (-90, 0, 0), (0, 90, 0), (0, -90, 0))
+"""Roll, pitch and yaw in deg of the ways to lay a part down; the first of the best is taken."""
+PLACE = (1300.0, 0.0, 500.0)
+"""x and y of the middle of the part and z of its lowest point, mm, robot base; within reach."""
+HEAD = """\
+# A first job for {drawing}: robot, head, placement, loops and speed are guesses to be changed.
+
+[robot]
+model = "abb_irb4600_60_205"                              # kerfpath robots lists the others
+endless = [4, 6]
+acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]   # assumed: the maker publishes none
+
+[tool]
+head = "laser-head-45"
+
+[part]
+file = {name}
+xyz_mm = {xyz}
+rpy_deg = {rpy}
+
+# {count} of {total} loops; kerfpath contours {drawing} lists them all.
+"""
+TAIL = """\
+[plan]
+gamma_step_deg = 2
+"""
+
+
+def first_job(drawing: Path) -> Path:
+    """Return the job beside a drawing with the same name; write one if there is none.
+
+    Raises
+    ------
+    InputError
+        The drawing cannot be read or has no closed loop; the job cannot be written.
+    """
+    job = drawing.with_suffix(".toml")
+    if job.exists():
+        return job
+    text = job_text(read(drawing))
+    try:
+        write_whole({job: text.encode()})
+    except OSError as error:
+        raise InputError(
+            f"{job}: cannot write a job for the drawing ({error.strerror}); copy the drawing to "
+            "a writable folder"
+        ) from None
+    return job
+
+
+def job_text(part: Part) -> str:
+    """Return a job that cuts the longest closed loops of a part, placed in front of the robot.
+
+    Raises
+    ------
+    InputError
+        The part has no closed loop.
+    """
+    closed = [loop for loop in part.loops if loop.closed and loop.kind != "open"]
+    main = [loop for loop in closed if not loop.skin and loop.side in ("outer", "")] or closed
+    if not main:
+        raise InputError(
+            f"{part.path}: expected a closed loop, got none; write a job that picks its open lines"
+        )
+    chosen = sorted(main, key=lambda loop: loop.length)[-MOST_LOOPS:]
+    xyz, rpy = _place(part, chosen)
+    head = HEAD.format(
+        drawing=part.path.name,
+        name=json.dumps(part.path.name, ensure_ascii=False),
+        xyz=xyz,
+        rpy=list(rpy),
+        count=len(chosen),
+        total=len(part.loops),
+    )
+    return head + "".join(map(_contour, chosen)) + TAIL
+
+
+def _contour(loop: Loop) -> str:
+    spacing = max(SPACING, round(loop.length * 1e3 / NODES, 1))
+    name = json.dumps(loop.name, ensure_ascii=False)
+    return f"[[contour]]\npick = {name}\nspeed_m_min = 3\nspacing_mm = {spacing:g}\n\n"
+
+
+def _place(part: Part, loops: Sequence[Loop]) -> tuple[list[float], tuple[int, ...]]:
+    """Return xyz in mm and rpy in deg with which the beam comes mainly from above."""
+    axes = np.vstack([part.contour(loop.name).axes.mean(axis=0) for loop in loops])
+    weighed = (axes * np.array([[loop.length] for loop in loops])).sum(axis=0)
+
+    def turned(rpy: tuple[int, ...]) -> Array:
+        return np.asarray(pose((0.0, 0.0, 0.0), rpy)[:3, :3])
+
+    rpy = max(TURNS, key=lambda one: round(float(-(turned(one) @ weighed)[2]), 9))
+    corners = np.array(np.meshgrid(*part.bounding_box.T)).reshape(3, -1).T @ turned(rpy).T * 1e3
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    from_middle = np.array([*(low + high)[:2] / 2, low[2]])
+    return (np.array(PLACE) - from_middle).round(1).tolist(), rpy
+
+
+# -----------------------------------------------------------------------------
+# `kerfpath script`: write a job as a Python script.
+
+
+def write_script(path: Path, output: Path | None) -> None:
+    """Write the script of a job to a file, or print it without one.
+
+    Raises
+    ------
+    InputError
+        The job cannot be prepared or written as a script, or the file cannot be written.
+    """
+    job = read_job(path)
+    folder = None if output is None else output.absolute().parent
+    text = python_script(prepare(job, drawing_of(job)), folder)
+    if output is None:
+        print(text, end="")
+        return
+    try:
+        write_whole({output: text.encode()})
+    except OSError as error:
+        raise InputError(f"{output}: cannot write ({error.strerror}); choose another -o") from None
+    out.print(f"wrote {escape(str(output))}")
+
+
+# -----------------------------------------------------------------------------
+# `kerfpath speed`: find the fastest constant speed of each contour, and the limit that binds.
+
+
+def show_speeds(answers: Sequence[ContourSpeed], *, as_json: bool) -> bool:
+    """Print the fastest speed of each contour; return whether every contour has one."""
+    entries: list[dict[str, object]] = []
+    rows = []
+    for answer in answers:
+        task, nodes, found, run = answer.task, answer.nodes, answer.at_nodes, answer.as_run
+        entry: dict[str, object] = {"name": task.name, "asked_m_min": task.speed * 60}
+        row = [escape(task.name), f"{task.speed * 60:g}"]
+        if isinstance(found, FastestSpeed):
+            place = (nodes.points[found.node] * 1000).round(1).tolist()
+            entry |= {
+                "fastest_m_min": found.speed * 60,
+                "on_grid_m_min": None if found.on_grid is None else found.on_grid * 60,
+                "as_run_m_min": None if run is None else run * 60,
+                "impossible_from_m_min": None if found.ceiling is None else found.ceiling * 60,
+                "joint": found.joint + 1,
+                "limit": found.limit,
+                "node": found.node,
+                "point_mm": place,
+            }
+            what = f"joint {found.joint + 1} {found.limit}"
+            at = " ".join(f"{v:g}" for v in place)
+            on_grid = found.speed if found.on_grid is None else found.on_grid
+            off_grid = "-" if found.on_grid is None else at_most(found.speed * 60)
+            never = "-" if found.ceiling is None else at_least(found.ceiling * 60)
+            kept = "-" if run is None else at_most(run * 60)
+            speeds = [at_most(on_grid * 60), off_grid, kept, never]
+            rows.append([*row, *speeds, str(found.node), what, at])
+        else:
+            entry |= {"fastest_m_min": None, "reason": str(found), "proved_for": found.scope}
+            rows.append([*row, "-", "-", "-", "-", str(found.node + 1), "no admissible pose", ""])
+        entries.append(entry)
+    if as_json:
+        print_json({"contours": entries})
+    else:
+        columns = [
+            "contour",
+            "asked m/min",
+            "on the grid",
+            "refined",
+            "as run",
+            "impossible from",
+            "node",
+            "what binds",
+        ]
+        at = "at x y z mm"
+        table([*columns, at], rows, numbers=columns[1:7], spare=[at])
+        out.print(
+            "on the grid: the fastest constant speed there, exact; refined: the fastest speed "
+            "found off the grid, not proved to be the fastest possible; both keep the limits at "
+            "the nodes; as run: a speed at which the program keeps them between the nodes, too, "
+            "if the job asks for it (between_nodes) and one was found; impossible from: at this "
+            "speed and above it is proved that there is no motion, at any rotation"
+        )
+    return all(entry["fastest_m_min"] is not None for entry in entries)
+
+
+# -----------------------------------------------------------------------------
+# `kerfpath plan`: the run of a job, the result of each contour, and the files written.
+
+
+def plan_job(
+    job_file: Path,
+    folder: Path,
+    *,
+    as_json: bool,
+    draw_map: bool = False,
+    strict: bool = False,
+) -> None:
+    """Plan a job, write its files into a folder and print the result.
+
+    Raises
+    ------
+    typer.Exit
+        Code 1: some contour has no plan that passes its audit.
+    """
+    require_folder(folder)
+    job = read_job(job_file)
+    require_language(job)
+    if draw_map:
+        job = with_map(job)
+    part = drawing_of(job)
+    if not as_json:
+        show_drawing(part)
+    prepared = prepare(job, part)
+    compile_kernels(job.robot.kinematics)
+    require_foreseen(prepared)
+    with progress_bars() as progress:
+        outcome = run_prepared(prepared, progress=progress)
+    finish_run(outcome, part, folder, as_json=as_json, strict=strict)
+
+
+def finish_run(
+    outcome: JobResult,
+    part: Part,
+    folder: Path,
+    *,
+    as_json: bool,
+    strict: bool = False,
+    more: Mapping[str, object] | None = None,
+) -> None:
+    """Write the files of a run into a folder and print the result; `more` goes into the JSON.
+
+    Raises
+    ------
+    typer.Exit
+        Code 1: some contour has no plan that passes its audit.
+    """
+    with busy("writing"):
+        written = write_result(outcome, folder, strict=strict)
+    if as_json:
+        print_json(
+            {
+                "passed": outcome.passed,
+                "drawing": drawing_entry(part),
+                "contours": [_cut_entry(cut) for cut in outcome.cuts],
+                "sequence": None if outcome.part is None else sequence_entry(outcome.part),
+                "files": [str(f) for f in written.files],
+                "removed": [str(f) for f in written.removed],
+                "notes": list(written.notes),
+                "faults": list(written.faults),
+                **(more or {}),
+            }
+        )
+    else:
+        _show_cuts(outcome.cuts)
+        for cut in outcome.cuts:
+            if cut.broken is not None:
+                out.print(f"[bold]{escape(cut.name)}[/]: {escape(cut.failure)}")
+            if cut.plan is not None and cut.plan.feed is not None:
+                out.print(f"[bold]{escape(cut.name)}[/]: {cut.plan.feed}")
+            if (tilt := _largest_tilt(cut)) is not None:
+                out.print(f"[bold]{escape(cut.name)}[/]: tool axis tilted by up to {tilt:.2f} deg")
+            for check in (*cut.checks, *cut.as_run.checks):
+                if not check.ok:
+                    out.print(f"[bold]{escape(cut.name)}[/]: {escape(str(check.issue()))}")
+        for note in merge_notes(written.notes, [cut.name for cut in outcome.cuts]):
+            out.print(f"note: {escape(note)}")
+        for fault in written.faults:
+            out.print(f"[bold red]do not cut:[/] {escape(fault)}")
+        show_files(written.files, written.removed, of="an earlier run")
+    if written.stale is not None:
+        errors.print(
+            f"kerfpath: {escape(str(written.stale))} is from an earlier run and does not belong "
+            "to this plan; it was kept, as it was edited or kerfpath may not have written it: "
+            "move it away"
+        )
+    if not outcome.passed:
+        raise typer.Exit(1)
+
+
+def _largest_tilt(cut: CutResult) -> float | None:
+    """Return the largest tilt of the tool axis at the nodes, deg; None if no tilt is allowed."""
+    if cut.plan is None or cut.plan.settings.tilt is None:
+        return None
+    return float(np.degrees(np.hypot(*cut.plan.tilt.T).max()))
+
+
+def _cut_entry(cut: CutResult) -> dict[str, object]:
+    entry: dict[str, object] = {"name": cut.name, "passed": cut.passed}
+    entry |= {
+        "length_m": cut.candidate.path.length,
+        "nodes": len(cut.candidate.nodes),
+        "speed_m_s": cut.request.task.speed,
+    }
+    entry["departure"] = None if cut.departure is None else asdict(cut.departure)
+    if cut.plan is None:
+        assert cut.broken is not None
+        fastest = None if cut.fastest is None else cut.fastest.speed
+        return entry | {
+            "reason": cut.failure,
+            "last_node_reached": cut.broken.node,
+            "proved": cut.broken.proved,
+            "proved_for": cut.broken.scope,
+            "closed": None if cut.broken.closed is None else asdict(cut.broken.closed),
+            "relaxation": None if cut.broken.relaxation is None else asdict(cut.broken.relaxation),
+            "fastest_speed_m_s": fastest,
+        }
+    criteria = cut.plan.criteria
+    return entry | {
+        "time_s": float(cut.plan.time[-1]),
+        "cost": cut.plan.cost,
+        "grid_cost": cut.plan.proof.grid_cost,
+        "optimal": cut.plan.proof.optimal,
+        "bound": cut.plan.proof.bound,
+        "gap": cut.plan.proof.gap,
+        "proof": cut.plan.proof.statement,
+        "feed": None if cut.plan.feed is None else asdict(cut.plan.feed),
+        "largest_tilt_deg": _largest_tilt(cut),
+        "peak_velocity_share": float(criteria.peak_velocity.max()),
+        "peak_acceleration_share": float(criteria.peak_acceleration.max()),
+        "as_run": _as_run_entry(cut.as_run),
+        "issues": [str(c.issue()) for c in (*cut.checks, *cut.as_run.checks) if not c.ok],
+    }
+
+
+def _as_run_entry(run: AsRun) -> dict[str, object]:
+    entry: dict[str, object] = {c.code.removesuffix("-as-run"): c.value for c in run.checks}
+    if run.timing is not None:
+        entry |= {"seconds": run.timing.seconds, "programmed_s": run.timing.programmed}
+        entry |= {"speed_held": run.timing.held, "ramps_m": run.timing.ramps}
+    return entry
+
+
+def _show_cuts(cuts: Sequence[CutResult]) -> None:
+    rows = []
+    for cut in cuts:
+        row = [
+            escape(cut.name),
+            f"{cut.candidate.path.length * 1000:.1f}",
+            str(len(cut.candidate.nodes)),
+            f"{cut.request.task.speed * 60:g}",
+        ]
+        sampling = _sampling(cut)
+        if cut.plan is None:
+            rows.append([*row, *"--------", *sampling, "no feasible path"])
+            continue
+        criteria = cut.plan.criteria
+        rows.append(
+            [
+                *row,
+                f"{cut.plan.time[-1]:.2f}",
+                "" if cut.as_run.timing is None else f"{cut.as_run.timing.seconds:.2f}",
+                "" if cut.plan.proof.grid_cost is None else f"{cut.plan.proof.grid_cost:.2f}",
+                f"{cut.plan.cost:.2f}",
+                cut.plan.proof.bound_shown,
+                cut.plan.proof.gap_shown,
+                f"{criteria.peak_velocity.max():.0%}",
+                f"{criteria.peak_acceleration.max():.0%}",
+                *sampling,
+                "passed" if cut.passed else "FAILED",
+            ]
+        )
+    columns = ["contour", "mm", "nodes", "m/min", "s", "run s", "grid", "cost"]
+    columns += ["bound", "gap %", "vel", "acc", "chord mm", "step deg", "audit"]
+    spare = ["step deg", "chord mm", "grid", "bound", "m/min", "run s"]
+    table(columns, rows, numbers=columns[1:-1], whole=["audit"], spare=spare)
+    out.print(
+        "run s: time from rest to rest, with rounded corners and every joint limit kept; "
+        "cost: value of the objective; grid: lowest cost on the grid of rotations, before the "
+        "refinement; bound: no motion that keeps the limits at the nodes costs less, at any "
+        "rotation, posture and turn; gap: largest share of the cost that may lie above the best "
+        "motion; vel, acc: highest share of a joint's velocity and acceleration limit; chord: "
+        "largest distance of the CAD curve from the chords between nodes; step: largest rotation "
+        "of the tool axis from node to node"
+    )
+    unbound = [cut.name for cut in cuts if _is_unbound(cut)]
+    if unbound:
+        out.print(
+            f"no bound for {escape(', '.join(unbound))}: the report and --json have the reason"
+        )
+    found = [cut.departure for cut in cuts if cut.departure is not None]
+    loops = [each.path for each in found if each.path is not None]
+    if loops:
+        out.print(
+            "*: measured from the path as cut, which differs from the drawn loop; that was within "
+            f"{max(loop.chord_error for loop in loops) * 1e3:.4f} mm of the CAD curve"
+        )
+    rounded = [c.value for cut in cuts for c in cut.checks if c.code == "drawing"]
+    if rounded:
+        out.print(f"rounded corners leave the drawing by up to {max(rounded) * 1e3:.4f} mm")
+    if any(each.against == "points of the drawing" for each in found + loops):
+        out.print("if the drawing has points, the lines through them are taken as the CAD curve")
+
+
+def _is_unbound(cut: CutResult) -> bool:
+    """Return whether a bound was asked for but none could be proved."""
+    plan = cut.plan
+    return plan is not None and plan.settings.certify is not None and plan.proof.bound is None
+
+
+def _sampling(cut: CutResult) -> list[str]:
+    """Return the chord error and the axis step of a cut's nodes."""
+    found = cut.departure
+    if found is None:
+        return ["-", "-"]
+    mark = "*" if found.path is not None else ""
+    return [f"{found.chord_error * 1e3:.4f}{mark}", f"{np.degrees(found.axis_step):.2f}"]

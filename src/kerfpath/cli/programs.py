@@ -1,0 +1,181 @@
+"""The commands that write, audit, compare and touch up programs, or write a job as a script."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kerfpath.cli.main import JobArgument, Json, Out, Strict, app
+
+PlanFileArgument = Annotated[
+    Path, typer.Argument(metavar="PLAN.json", help="The plan.json of a run.")
+]
+
+
+@app.command()
+def post(
+    plan_file: PlanFileArgument,
+    language: Annotated[
+        str | None,
+        typer.Option(
+            help="Robot language: rapid, krl, fanuc, val3, inform, urscript, ros, csv, or your "
+            "own; default: that of the job."
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="File to write, or folder for a program of several files; default: print it.",
+        ),
+    ] = None,
+    job: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="JOB.toml",
+            help="Job with the table [program] to use, and with the cell for the audit.",
+        ),
+    ] = None,
+    strict: Strict = False,
+    dry_share: Annotated[
+        float | None,
+        typer.Option(
+            "--dry-run",
+            metavar="SHARE",
+            help="Write a dry run: no outputs, no waits, this share of the speed.",
+        ),
+    ] = None,
+    measured: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="POINTS.csv", help="Move the plan to the measured part, and audit it there."
+        ),
+    ] = None,
+    residual_mm: Annotated[
+        float, typer.Option(help="Largest distance of a measured point from the fitted placement.")
+    ] = 0.5,
+    as_json: Json = False,
+) -> None:
+    """Write the robot program of a plan, after auditing it again.
+
+    Names, retract, zone and so on come from the table [program] of the job from which the plan was
+    made, or of --job. The table [program.LANGUAGE] has the settings of a language.
+
+    Example: kerfpath post door/plan.json --language rapid -o door.mod
+
+    A table of measured points has columns nominal_x_mm, nominal_y_mm, nominal_z_mm (in the part)
+    and measured_x_mm, measured_y_mm, measured_z_mm (in the robot base), and at least three rows.
+    Collisions are not checked again at the measured placement: its cell is not known.
+
+    Example: kerfpath post door/plan.json --dry-run 0.2 -o dry_door.mod
+
+    Example: kerfpath post door/plan.json --measured points.csv -o door.mod
+    """
+    from kerfpath.cli.program_output import write_post
+
+    write_post(
+        plan_file, language, output, strict=strict, as_json=as_json, job=job,
+        dry_share=dry_share, measured=measured, residual_mm=residual_mm,
+    )  # fmt: skip
+
+
+@app.command()
+def audit(
+    file: Annotated[
+        Path, typer.Argument(metavar="PLAN.json|PROGRAM", help="A plan, or a kerfpath program.")
+    ],
+    job: Annotated[
+        Path | None,
+        typer.Option(metavar="JOB.toml", help="Job to compare with; a program needs it."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Check a plan or a program again, with kinematics that share nothing with the planner.
+
+    With --job a plan is compared with its job, drawing and cell. Without --job the path between the
+    nodes is compared with the straight lines between them.
+
+    A program needs its job. The audit reads the text of the program, edited or not, computes the
+    joints at its targets and checks the motion like that of a plan; it compares frames, speeds,
+    postures, turns, switches and waits with those of the job.
+
+    Example: kerfpath audit door/plan.json --job door.toml
+
+    Example: kerfpath audit door/door.mod --job door.toml
+    """
+    from kerfpath.cli.check_output import show_audit
+
+    if not show_audit(file, job, as_json=as_json):
+        raise typer.Exit(1)
+
+
+@app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(metavar="A", help="A kerfpath program.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Another one, or an edited copy.")],
+    job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job of both programs.")],
+    as_json: Json = False,
+) -> None:
+    """Describe in words how two programs differ, in the same language or in two.
+
+    Contours are matched by their paths, targets by their places. Each kind of difference has a
+    line with its count, the largest one, file and line. Exit code 0: no difference, 1: some.
+
+    Example: kerfpath compare door/door.mod edited.mod --job door.toml
+    """
+    from kerfpath.cli.check_output import show_differences
+
+    if not show_differences(a, b, job, as_json=as_json):
+        raise typer.Exit(1)
+
+
+@app.command()
+def touch_up(
+    program: Annotated[
+        Path, typer.Argument(metavar="PROGRAM", help="A program with moved targets.")
+    ],
+    job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job of the program.")],
+    plan: Annotated[Path, typer.Option(metavar="PLAN.json", help="The plan of the program.")],
+    to: Out = None,
+    ease_mm: Annotated[
+        float, typer.Option(help="Distance along the path over which a shift fades to zero.")
+    ] = 10.0,
+    as_json: Json = False,
+) -> None:
+    """Plan a job again around the targets that a person has moved in its program.
+
+    Moved targets keep tip and tool axis as taught, and the path fades back to the planned one; the
+    rotation about the beam is planned again, in the posture of the plan. The files are those of
+    kerfpath plan and go to the folder PROGRAM-touched unless --out names another; the audit is
+    that of the touched-up path.
+
+    Example: kerfpath touch-up edited.mod --job door.toml --plan door/plan.json --out door-2
+    """
+    from kerfpath.cli.program_output import touch_up_program
+
+    folder = to or Path(f"{program.stem}-touched")
+    touch_up_program(program, job, plan, folder, ease_mm, as_json=as_json)
+
+
+@app.command()
+def script(
+    job: JobArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="File to write; default: print the script."),
+    ] = None,
+) -> None:
+    """Write a job as a Python script that does the same with the public functions.
+
+    The script reads the drawing, plans each contour with the options of the job, audits, and writes
+    the program. Keep it beside the drawing. Jobs with features that a script cannot express, such
+    as an order, are refused.
+
+    Example: kerfpath script door.toml -o door.py
+    """
+    from kerfpath.cli.plan_output import write_script
+
+    write_script(job, output)

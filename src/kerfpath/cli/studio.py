@@ -1,0 +1,65 @@
+"""`kerfpath studio`: open a job in the browser."""
+
+from __future__ import annotations
+
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from rich.markup import escape
+
+from kerfpath.cli.show import out
+from kerfpath.errors import InputError
+from kerfpath.extras import require_extra
+from kerfpath.files import write_whole
+
+SHIPPED = ("b_pillar.toml", "b_pillar.step")
+"""The demo job and its part; the studio copies them, so that they can be changed."""
+DRAWINGS = (
+    *(".step", ".stp", ".iges", ".igs", ".dxf", ".csv", ".tsv", ".txt"),
+    *(".apt", ".aptsource", ".cl", ".cls", ".h", ".mpf", ".nc", ".spf", ".tap"),
+)
+
+
+def open_studio(job: Path | None, *, host: str, port: int, browser: bool) -> None:
+    """Serve a job to the browser until the command is stopped.
+
+    Without a job, a copy of the demo job is served. For a drawing, the job beside it with the same
+    name is served, and written if there is none.
+
+    Raises
+    ------
+    InputError
+        The packages for the studio are not installed, there is no job, or the port is in use.
+    """
+    require_extra("studio", "the studio")
+    if job is None:
+        path = _copy_of_demo()
+    elif job.suffix.lower() in DRAWINGS:
+        from kerfpath.cli.plan_output import first_job
+
+        path = first_job(job)
+    else:
+        path = job
+    from kerfpath.studio import serve
+
+    def show(address: str) -> None:
+        out.print(f"{escape(str(path))} at [bold]{escape(address)}[/] (stop with Ctrl-C)")
+
+    serve(path, host=host, port=port, browser=browser, show=show)
+
+
+def _copy_of_demo() -> Path:
+    """Return the demo job in a subfolder of the current folder, copied there if it is missing."""
+    folder = Path("kerfpath-studio")
+    absent = [name for name in SHIPPED if not (folder / name).exists()]
+    with as_file(files("kerfpath").joinpath("demo")) as source:
+        texts = {folder / name: (source / name).read_bytes() for name in absent}
+    try:
+        folder.mkdir(exist_ok=True)
+        write_whole(texts)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: cannot copy the demo job there ({error.strerror}); run kerfpath studio in "
+            "a writable folder, or name a job"
+        ) from None
+    return folder / SHIPPED[0]

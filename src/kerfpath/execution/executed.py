@@ -1,0 +1,558 @@
+"""Deviation of a run from the contour that it cuts, at its targets and in its zones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from kerfpath.arrays import Array, Bools, short_repr
+from kerfpath.auditor import ENCLOSED, rates_along
+from kerfpath.comfort import jacobian
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError
+from kerfpath.execution.course import ToolCourse
+from kerfpath.post import PLAIN, Controller, JointMove, LinearMove, Program
+from kerfpath.robots import Robot, base_in_part
+
+# -----------------------------------------------------------------------------
+# Joints of a controller that moves the wrist evenly and keeps the tip on its path.
+
+ARM = 3
+"""Number of joints that place the tip; as many joints of the wrist follow."""
+STEPS = 8
+"""Steps of Newton's method, each of which doubles the digits."""
+NEAR = 1e-10
+"""Distance (m) below which the tip is at its point; rounding leaves 1e-15."""
+
+
+def require_wrist(robot: Robot) -> None:
+    """Raise InputError unless a robot has three joints and a wrist of three."""
+    if robot.joints != 2 * ARM:
+        raise InputError(
+            f"robot {robot.id!r}: orientation 'wrist' is modelled for six joints, got "
+            f"{robot.joints}"
+        )
+
+
+def joints_with_wrist(robot: Robot, points: Array, near: Array, tool: Array) -> Array:
+    """Return the joints (m, 6) rad that bring the tip to points, (m, 3) m, with the wrist as given.
+
+    It uses Newton's method in the first three joints; NaN where that does not converge.
+
+    Parameters
+    ----------
+    robot : Robot
+    points : (m, 3) m
+        Points in the robot base.
+    near : (m, 6) rad
+        The first three joints close to the solution, the others as they must be.
+    tool : (4, 4) m
+        T_flange_tip.
+    """
+    q = near.copy()
+    good = ~np.isnan(q).any(axis=1)
+    off = np.full(len(q), np.inf)
+    for _ in range(STEPS):
+        tip = (robot.forward(q[good]) @ tool)[:, :3, 3]
+        gap = points[good] - tip
+        off[good] = np.linalg.norm(gap, axis=1)
+        if (off[good] < NEAR * 1e-4).all():
+            break
+        J = jacobian(robot, q[good], tool=tool)[:, :3, :ARM]
+        step = np.linalg.pinv(J) @ gap[:, :, None]
+        q[good, :ARM] += np.clip(step[:, :, 0], -0.5, 0.5)
+    return np.asarray(np.where((off < NEAR)[:, None], q, np.nan))
+
+
+# -----------------------------------------------------------------------------
+# Motion of the joints as a controller runs a program, also between the targets.
+
+WHERE = (0.1, 0.5, 0.9)
+"""Shares of each smooth stretch at which the joints are sampled."""
+TIGHT = 1.02
+"""Bounds are refined to this multiple of the sampled peak."""
+RESOLVED = 2e-5
+"""Shortest stretch (s) that is sampled: in shorter ones, differences of joints are rounding."""
+STEP = 0.05
+"""Share of a stretch between a sample and the joints before and after it, for the rates."""
+
+
+class Peak(NamedTuple):
+    """The largest share of a limit, its joint (counted from 0), and its time, s."""
+
+    share: float
+    joint: int
+    time: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Executed:
+    """One run of straight and circular moves, from stop to stop, at the programmed speeds.
+
+    Parameters
+    ----------
+    section : str
+        Name of the section of the program.
+    course : ToolCourse
+    time : (m,) s
+        Times of the samples, from the start of the run.
+    planned : (m,) s
+        Planned times of the samples: chords are shorter than the path, so that a run is ahead.
+    q : (m, n) rad
+        Joints; NaN where the posture of the targets does not reach.
+    T : (m, 4, 4) m
+        Poses of the tip, in the part.
+    velocity_share, acceleration_share : (m, n)
+        Signed shares of the full limit of each joint. If one is above 1 in size, the robot cannot
+        run at the programmed speed, and a controller slows down.
+    torque_share : (m, n) or None
+        The same for torques, of rigid links at the samples; None if the robot has no load, see
+        `Robot.with_load`.
+    velocity_bound, acceleration_bound : float
+        Proved bounds: no joint uses a larger share of a limit at any instant, also between samples.
+        They are refined to 2 % above the sampled peak, or to the limit if the peak is below it.
+        Infinite if nothing is proved: next to a singularity, and if there are only samples.
+    sampled : str
+        Why there are only samples; empty if the bounds are proved.
+    controller : Controller
+        The controller that runs it.
+    """
+
+    section: str
+    course: ToolCourse
+    time: Array
+    planned: Array
+    q: Array
+    T: Array
+    velocity_share: Array
+    acceleration_share: Array
+    torque_share: Array | None = None
+    velocity_bound: float
+    acceleration_bound: float
+    sampled: str = ""
+    controller: Controller = PLAIN
+
+    __repr__ = short_repr
+
+    @property
+    def peak_velocity(self) -> Peak:
+        """The largest share of a velocity limit."""
+        return self._peak(self.velocity_share)
+
+    @property
+    def peak_acceleration(self) -> Peak:
+        """The largest share of an acceleration limit."""
+        return self._peak(self.acceleration_share)
+
+    @property
+    def peak_torque(self) -> Peak | None:
+        """The largest share of a torque limit at the samples; nothing is proved between them."""
+        return None if self.torque_share is None else self._peak(self.torque_share)
+
+    @property
+    def most(self) -> float:
+        """The largest share of a limit of velocity or acceleration."""
+        return max(self.peak_velocity.share, self.peak_acceleration.share)
+
+    @property
+    def missed(self) -> float:
+        """The largest distance, m, by which the tip misses a target."""
+        poses = self.course.poses(self.course.time)
+        return float(np.linalg.norm(poses[:, :3, 3] - self.course.T[:, :3, 3], axis=1).max())
+
+    def _peak(self, shares: Array) -> Peak:
+        size = np.abs(shares)
+        size = np.where(np.isnan(size), np.inf, size)
+        m, joint = divmod(int(np.argmax(size)), size.shape[1])
+        return Peak(float(size[m, joint]), joint, float(self.time[m]))
+
+
+def executed(program: Program, *, controller: Controller = PLAIN) -> tuple[Executed, ...]:
+    """Return every run of straight and circular moves of a program, as it is executed.
+
+    The motion is that of `ToolCourse`, at the programmed speeds throughout: neither speeding up
+    from the stop nor slowing down for a limit is modelled. The joints follow it exactly; external
+    axes move evenly from target to target, in zones like the tip. Velocities and accelerations are
+    sampled three times in each smooth stretch, together with bounds that hold everywhere; see
+    `kerfpath.auditor.rates_along`. Torques are those at the samples.
+
+    Parameters
+    ----------
+    program : Program
+    controller : Controller
+        For a language it is `language(name).controller(settings)`.
+
+    Raises
+    ------
+    InputError
+        The velocity and acceleration limits of the robot are not known, or the orientation is
+        "wrist" and the robot has no wrist of three joints.
+    """
+    return tuple(
+        run_along(
+            moves,
+            program.robot,
+            T_base_part=program.T_base_part,
+            T_flange_tip=program.T_flange_tip,
+            controller=controller,
+            section=section.name,
+        )
+        for section in program.sections
+        for moves in from_stop_to_stop(section.moves)
+    )
+
+
+def from_stop_to_stop(moves: Sequence[JointMove | LinearMove]) -> list[list[LinearMove]]:
+    """Return the runs of straight and circular moves, each with the move to its start first."""
+    found: list[list[LinearMove]] = []
+    run: list[LinearMove] = []
+    for move in moves:
+        if isinstance(move, JointMove):
+            run = []
+            continue
+        run.append(move)
+        if move.zone == 0:
+            found += [run] if len(run) > 2 else []
+            run = [move]
+    return found
+
+
+def run_along(
+    moves: Sequence[LinearMove],
+    robot: Robot,
+    *,
+    T_base_part: Array,
+    T_flange_tip: Array,
+    controller: Controller = PLAIN,
+    section: str = "",
+) -> Executed:
+    """Return the run of moves from the target of the first, where the robot is stopped, to a stop.
+
+    Parameters
+    ----------
+    moves : sequence of LinearMove
+        Three or more, each with the joints at its target.
+    robot : Robot
+    T_base_part, T_flange_tip : (4, 4) m
+    controller, section
+        As in `executed` and `Executed`.
+
+    Raises
+    ------
+    InputError
+        As `executed`.
+    """
+    robot.require_no_free_joint("the motion between the nodes")
+    course = ToolCourse.of(moves[0].T_part_tip, moves[1:], controller)
+    borders = course.borders
+    long = np.diff(borders)
+    seen = long > min(RESOLVED, long.max() / 2)
+    begin, long = borders[:-1][seen], long[seen]
+    time = (begin[:, None] + long[:, None] * np.array(WHERE)).ravel()
+    step = np.repeat(STEP * long, len(WHERE))
+    targets = np.array([move.q for move in moves])
+    wrist = controller.orientation == "wrist"
+    joints = _by_wrist if wrist else _by_pose
+    before, q, after = (
+        joints(robot, course, time + sign * step, targets, T_base_part, T_flange_tip)
+        for sign in (-1, 0, 1)
+    )
+    T = course.poses(time)
+    if wrist:
+        reached = ~np.isnan(q).any(axis=1)
+        T[reached] = np.linalg.inv(T_base_part) @ robot.forward(q[reached]) @ T_flange_tip
+    velocity, acceleration = robot.speed_limits()
+    v, a = (after - before) / (2 * step[:, None]), (after - 2 * q + before) / step[:, None] ** 2
+    run = Executed(
+        section=section,
+        course=course,
+        time=time,
+        planned=np.interp(time, course.time, np.cumsum([0.0, *(m.duration for m in moves[1:])])),
+        q=q,
+        T=T,
+        velocity_share=v / velocity,
+        acceleration_share=a / acceleration,
+        torque_share=_torque_share(robot, q, v, a),
+        velocity_bound=np.inf,
+        acceleration_bound=np.inf,
+        sampled=_sampled(robot, controller),
+        controller=controller,
+    )
+    fast, sharp = run.peak_velocity.share, run.peak_acceleration.share
+    if run.sampled or not np.isfinite(max(fast, sharp)):
+        return run
+    middles = (borders[1:] + borders[:-1]) / 2
+    bounds = rates_along(
+        robot,
+        course.pieces(targets[:, robot.family.joints :]),
+        np.stack([np.interp(middles, time, joint) for joint in q.T], axis=1),
+        T_base_part=T_base_part,
+        T_flange_tip=T_flange_tip,
+        enough=(_enough(fast) * velocity, _enough(sharp) * acceleration),
+    )
+    shares = [bound / limit for bound, limit in zip(bounds, (velocity, acceleration), strict=True)]
+    return replace(
+        run,
+        velocity_bound=float(shares[0].max()),
+        acceleration_bound=float(shares[1].max()),
+    )
+
+
+def _by_pose(
+    robot: Robot, course: ToolCourse, time: Array, targets: Array, T_base_part: Array,
+    T_flange_tip: Array,
+) -> Array:  # fmt: skip
+    """Return the joints (m, n) at times (m,) that are close to those at the targets (K, n)."""
+    arm, x, seen = _alone(robot, course, time, targets, T_base_part)
+    near = np.stack([np.interp(time, course.time, joint) for joint in targets.T], axis=1)
+    q = arm.nearest(seen @ np.linalg.inv(T_flange_tip), near[:, : arm.joints])
+    return np.concatenate([q, x], axis=1)
+
+
+def _by_wrist(
+    robot: Robot, course: ToolCourse, time: Array, targets: Array, T_base_part: Array,
+    T_flange_tip: Array,
+) -> Array:  # fmt: skip
+    """Return the joints (m, n) at times (m,), with even motion of the wrist between targets."""
+    arm, x, seen = _alone(robot, course, time, targets, T_base_part)
+    require_wrist(arm)
+    near = course.blended(targets[:, : arm.joints], time)
+    q = joints_with_wrist(arm, seen[:, :3, 3], near, T_flange_tip)
+    return np.concatenate([q, x], axis=1)
+
+
+def _alone(
+    robot: Robot, course: ToolCourse, time: Array, targets: Array, T_base_part: Array
+) -> tuple[Robot, Array, Array]:
+    """Return the arm, its external axes (m, E) at times, and the poses of the tip that it sees.
+
+    The poses are in the robot base, wherever external axes carry it.
+    """
+    arm = robot.alone()
+    x = course.blended(targets[:, arm.joints :], time)
+    base = base_in_part(robot.externals, x)
+    return arm, x, np.linalg.inv(base) @ T_base_part @ course.poses(time)
+
+
+def _sampled(robot: Robot, controller: Controller) -> str:
+    """Return why nothing is proved for a robot and a controller; empty if bounds are proved."""
+    if controller.orientation == "wrist":
+        return "nothing is proved if the controller moves the wrist by its joints"
+    if robot.kinematics not in ENCLOSED:
+        return f"nothing is proved for arms of the family {robot.kinematics}"
+    return ""
+
+
+def _torque_share(robot: Robot, q: Array, v: Array, a: Array) -> Array | None:
+    """Return the shares (m, n) of the torque limits, NaN out of reach; None without a load."""
+    limit = robot.torque_limit()
+    if limit is None:
+        return None
+    there = np.isfinite(q + v + a).all(axis=1)
+    shares = np.full(q.shape, np.nan)
+    shares[there] = limit.dynamics.torque(q[there], v[there], a[there]) / limit.bound
+    return shares
+
+
+def _enough(seen: float) -> float:
+    """Return the share of a limit that a bound need not go below: close, and within the limit."""
+    return min(TIGHT * seen, 1.0) if seen < 1 else TIGHT * seen
+
+
+# -----------------------------------------------------------------------------
+# How long a run takes and where it slows down, if its robot keeps every limit.
+#
+# The path is fixed. The robot follows it at the programmed speed where the joint limits allow,
+# else as fast as they allow: time-optimal path parametrisation by reachable sets (Pham and Pham
+# 2018). With x the square of the rate at which programmed time passes, and u its derivative by
+# that time over two, both limits are linear: q'^2 x <= v^2 and |q' u + q'' x| <= a.
+
+AT_SPEED = 0.995
+"""Share of the programmed speed that counts as holding it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Timing:
+    """A run as fast as its programmed speeds and the joint limits allow.
+
+    Parameters
+    ----------
+    seconds : float s
+        Time from rest to rest.
+    programmed : float s
+        Time at the programmed speeds throughout.
+    time : (m,) s
+        Samples, in programmed time from the start of the run.
+    share : (m,)
+        Share of the programmed speed that the tool has there.
+    length : (m,) m
+        Distance that the tip has moved up to there.
+    """
+
+    seconds: float
+    programmed: float
+    time: Array
+    share: Array
+    length: Array
+
+    __repr__ = short_repr
+
+    @property
+    def under_way(self) -> Bools:
+        """Whether samples are between the ramps, where the speed is reached and left, (m,)."""
+        held = np.flatnonzero(self.share >= AT_SPEED)
+        k = np.arange(len(self.share))
+        first, last = (held[0], held[-1]) if len(held) else (0, len(k))
+        return np.asarray((k >= first) & (k <= last))
+
+    @property
+    def held(self) -> float:
+        """Share of the length between the ramps on which the programmed speed is held."""
+        steps = np.gradient(self.length)[self.under_way]
+        fast = self.share[self.under_way] >= AT_SPEED
+        return float(steps[fast].sum() / steps.sum()) if steps.sum() > 0 else float(fast.all())
+
+    @property
+    def ramps(self) -> tuple[float, float]:
+        """Lengths, m, of the ramps to the speed at the start and from it at the end."""
+        inside = self.length[self.under_way]
+        return float(inside[0] - self.length[0]), float(self.length[-1] - inside[-1])
+
+    @property
+    def slowest(self) -> tuple[float, float]:
+        """The smallest share of the programmed speed between the ramps, and its place, m."""
+        share = np.where(self.under_way, self.share, np.inf)
+        k = int(np.argmin(share))
+        return float(min(share[k], 1.0)), float(self.length[k])
+
+
+def timing_of(run: Executed, robot: Robot, *, eta_v: float = 1.0, eta_a: float = 1.0) -> Timing:
+    """Return how long a run takes if every joint keeps its limits.
+
+    Parameters
+    ----------
+    run : Executed
+    robot : Robot
+        Robot of the run.
+    eta_v, eta_a : float
+        Share of the velocity and acceleration limits that may be used.
+
+    Raises
+    ------
+    InputError
+        The posture does not reach some samples of the run (NaN).
+    """
+    velocity, acceleration = robot.speed_limits()
+    first, second = run.velocity_share * velocity, run.acceleration_share * acceleration
+    if np.isnan(second).any():
+        raise InputError("timing_of: expected a run within reach, got joints that are NaN")
+    steps = np.diff(run.time)
+    room, lean, most = _rows(first, second, eta_v * velocity, eta_a * acceleration)
+    x = _forward(_backward(most, steps, room, lean), steps, room, lean)
+    rate = np.sqrt(x)
+    pace = np.maximum((rate[1:] + rate[:-1]) / 2, 1e-9)
+    gone = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(run.T[:, :3, 3], axis=0), axis=1)))
+    whole = float(run.course.time[-1])
+    return Timing(
+        seconds=float((steps / pace).sum()),
+        programmed=whole,
+        time=run.time,
+        share=rate,
+        length=gone,
+    )
+
+
+def _rows(
+    first: Array, second: Array, velocity: Array, acceleration: Array
+) -> tuple[Array, Array, Array]:
+    """Return room and lean (m, n) of |u + lean x| <= room, and the largest x (m,) of each sample.
+
+    A joint that does not move bounds x alone. Two joints have a common u where
+    |lean_1 - lean_2| x <= room_1 + room_2.
+    """
+    moves = np.abs(first) > 1e-12
+    with np.errstate(divide="ignore", invalid="ignore"):
+        room = np.where(moves, acceleration / np.abs(first), np.inf)
+        lean = np.where(moves, second / first, 0.0)
+        alone = np.where(moves, np.inf, acceleration / np.abs(second)).min(axis=1)
+        most = np.minimum(alone, ((velocity / np.abs(first)) ** 2).min(axis=1))
+        both = room[:, :, None] + room[:, None]
+        pair = both / np.abs(lean[:, :, None] - lean[:, None])
+    return room, lean, np.minimum(np.minimum(most, pair.min(axis=(1, 2))), 1.0)
+
+
+def _backward(most: Array, steps: Array, room: Array, lean: Array) -> Array:
+    """Return the largest x (m,) from which the end is reached at rest.
+
+    A step leads from x to x + 2 step u, which must lie between zero and the x of the next sample.
+    """
+    reach = most.copy()
+    reach[-1] = 0.0
+    rate = 1 / (2 * steps[:, None])
+    with np.errstate(divide="ignore"):
+        rests = np.where(lean[:-1] > rate, room[:-1] / (lean[:-1] - rate), np.inf).min(axis=1)
+        slope = np.where(lean[:-1] < rate, 1 / (rate - lean[:-1]), np.inf)
+    for i in range(len(steps) - 1, -1, -1):
+        left = ((reach[i + 1] * rate[i] + room[i]) * slope[i]).min()
+        reach[i] = min(reach[i], rests[i], left)
+    return reach
+
+
+def _forward(reach: Array, steps: Array, room: Array, lean: Array) -> Array:
+    """Return the largest x (m,) that is reached from rest."""
+    x = reach.copy()
+    x[0] = 0.0
+    for i, step in enumerate(steps):
+        u = (room[i] - lean[i] * x[i]).min()
+        x[i + 1] = min(reach[i + 1], max(x[i] + 2 * step * u, 0.0))
+    return x
+
+
+# -----------------------------------------------------------------------------
+# Deviation of a run from the contour that it cuts, at its targets and in its zones.
+
+SAMPLES = 8
+"""Number of samples of the path for each of its nodes, or each target."""
+
+
+class Deviation(NamedTuple):
+    """Largest distance of the tip, m, and largest angle of the tool axis, rad, with times, s."""
+
+    tip: float
+    tip_time: float
+    axis: float
+    axis_time: float
+
+
+def deviation_of(run: Executed, path: Contour) -> Deviation:
+    """Return how far the tip is from the path, and the tool axis from that of the nearest point.
+
+    Parameters
+    ----------
+    run : Executed
+        Evaluated at its samples.
+    path : Contour
+        The contour as drawn, in the part.
+    """
+    tip, axis = run.T[:, :3, 3], run.T[:, :3, 2]
+    even = np.linspace(path.s[0], path.s[-1], SAMPLES * max(len(path), len(run.course.T)))
+    at = np.unique(np.concatenate([path.s, even]))
+    points = path.at(at)[0]
+    near = np.asarray(cKDTree(points).query(tip)[1])
+    # On one of the two chords beside the nearest sample.
+    starts = np.clip(near[:, None] + [-1, 0], 0, len(at) - 2)
+    chord = points[starts + 1] - points[starts]
+    along = ((tip[:, None] - points[starts]) * chord).sum(-1) / (chord**2).sum(-1)
+    along = np.clip(along, 0.0, 1.0)
+    apart = np.linalg.norm(points[starts] + along[..., None] * chord - tip[:, None], axis=-1)
+    row, side = np.arange(len(tip)), np.argmin(apart, axis=1)
+    s = at[starts] + along * (at[starts + 1] - at[starts])
+    points, axes = path.at(s[row, side])
+    off = np.linalg.norm(tip - points, axis=1)
+    turned = np.arctan2(np.linalg.norm(np.cross(axes, axis), axis=1), (axes * axis).sum(axis=1))
+    k, m = int(np.argmax(off)), int(np.argmax(turned))
+    return Deviation(float(off[k]), float(run.time[k]), float(turned[m]), float(run.time[m]))

@@ -1,0 +1,61 @@
+"""The drawing of a job: its file and how to read it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from kerfpath.arrays import Array, short_repr
+from kerfpath.cad import GAP, Part
+from kerfpath.cad import read as read_drawing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Drawing:
+    """A drawing and how to read it.
+
+    Parameters
+    ----------
+    file : Path
+        The CAD file; it existed when the job was read.
+    unit : str or None
+        Length unit that overrides the CAD file's own.
+    gap : float m
+        Largest gap between the ends of two curves that a loop bridges.
+    outer_towards : (3,) or None
+        Direction that the outer sides of its sheets face, part frame, see `kerfpath.cad.read`.
+    axis : (3,) or None
+        Tool axis for a drawing without one, part frame.
+    columns : mapping or sequence of str, or None
+        Meaning of the columns of a table of points, see `kerfpath.cad.read`.
+    accept_left_out : bool
+        Whether geometry that may have to be cut may be left out.
+    """
+
+    file: Path
+    unit: str | None = None
+    gap: float = GAP
+    outer_towards: Array | None = None
+    axis: Array | None = None
+    columns: Mapping[str, str] | Sequence[str] | None = None
+    accept_left_out: bool = False
+
+    __repr__ = short_repr
+
+    def read(self) -> Part:
+        """Return the part in the drawing.
+
+        Raises
+        ------
+        InputError
+            The drawing cannot be read.
+        """
+        return read_drawing(
+            self.file,
+            unit=self.unit,
+            gap=self.gap,
+            outer_towards=self.outer_towards,
+            axis=self.axis,
+            columns=self.columns,
+        )

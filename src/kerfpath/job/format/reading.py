@@ -1,0 +1,631 @@
+"""Read a TOML job file into a job in SI with all its references resolved."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import date, datetime, time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import tree_sitter_toml
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+from tree_sitter import Language, Node, Parser
+
+from kerfpath.arrays import Array, Ints, freeze, short_repr
+from kerfpath.cad import Part
+from kerfpath.comfort import Comfort
+from kerfpath.contour import Contour
+from kerfpath.dynamics import STANDARD_GRAVITY
+from kerfpath.errors import InputError
+from kerfpath.graph import LayeredGraph
+from kerfpath.job.format.contour import ContourSpec, keys_of_closed_loops, task_of
+from kerfpath.job.format.drawing import Drawing
+from kerfpath.job.format.program import ProgramOptions, Tolerances, program_options, tolerances_of
+from kerfpath.job.format.tables import (
+    LIMITS_MARGIN,
+    REPEATED,
+    TABLES,
+    CellTable,
+    ExternalTable,
+    JobFile,
+    LayoutTable,
+    SequenceTable,
+)
+from kerfpath.job.format.tables.plan import said_in_keys
+from kerfpath.job.format.values import FAULT, LARGEST, SMALLEST, nearest
+from kerfpath.options import OptionConflict, PlanOptions
+from kerfpath.planner import coarse_places, external_course, layered_graph
+from kerfpath.robots import Robot
+
+# -----------------------------------------------------------------------------
+# Locate keys and values in a TOML text, so that messages can name their line.
+
+_TOML = Language(tree_sitter_toml.language())
+_HEADERS = ("table", "table_array_element")
+_KEYS = ("bare_key", "quoted_key", "dotted_key")
+_VALUES = (
+    "array",
+    "boolean",
+    "float",
+    "inline_table",
+    "integer",
+    "local_date",
+    "local_date_time",
+    "local_time",
+    "offset_date_time",
+    "string",
+)
+
+
+class Position(NamedTuple):
+    """Line and column (in characters) in a text, both counted from 1."""
+
+    line: int
+    column: int
+
+
+@dataclass
+class _Place:
+    """One table, array or value: the node it starts at, and what lies inside it by key or index."""
+
+    node: Node
+    inside: dict[str | int, _Place] = field(default_factory=dict)
+    is_array_of_tables: bool = False
+
+    def reach(self, keys: Iterable[str], node: Node) -> _Place:
+        """Return the place at `keys` below this one; new tables on the way start at `node`."""
+        place = self.latest()
+        for key in keys:
+            place = place.inside.setdefault(key, _Place(node)).latest()
+        return place
+
+    def latest(self) -> _Place:
+        """Return what further keys refer to: of an array of tables its last element, as in TOML."""
+        return self.inside[len(self.inside) - 1] if self.is_array_of_tables else self
+
+
+class TomlPlaces:
+    """The places of all keys and values of a TOML document.
+
+    Parameters
+    ----------
+    text : str
+        A valid TOML document.
+    """
+
+    def __init__(self, text: str) -> None:
+        source = text.encode()
+        self._lines = source.split(b"\n")
+        self._root = _tree(source)
+
+    def locate(self, where: Sequence[str | int]) -> Position:
+        """Return the position of the item at `where`, or of the table that should hold it.
+
+        Parameters
+        ----------
+        where : sequence of str and int
+            Keys, and indices from 0, from the document down: ``("contour", 1, "speed_m_min")``.
+            A key is located at its start, an array element at its value, a table at its header,
+            and a table that is missing at line 1.
+        """
+        place = self._root
+        row, column = 0, 0
+        for step in where:
+            if step not in place.inside:
+                break
+            place = place.inside[step]
+            row, column = place.node.start_point
+        before = self._lines[row][:column].decode(errors="replace")
+        return Position(row + 1, len(before) + 1)
+
+
+def _tree(source: bytes) -> _Place:
+    """Return the places of the whole document."""
+    document = Parser(_TOML).parse(source).root_node
+    root = _Place(document)
+    waiting = [(document, root)]
+    while waiting:  # no recursion: a document may nest deeper than Python's stack
+        node, place = waiting.pop()
+        for child, where in _children(node, place, root):
+            waiting.append((child, where))
+    return root
+
+
+def _children(node: Node, place: _Place, root: _Place) -> Iterator[tuple[Node, _Place]]:
+    """Yield the tables and values directly inside `node` with their places, made on the way."""
+    if node.type == "document":
+        for child in node.named_children:
+            if child.type == "pair":
+                yield from _children(child, root, root)
+            elif child.type in _HEADERS:
+                # A table's pairs belong to the element that is the last one now, not later.
+                here = _open_table(child, root)
+                for pair in child.named_children:
+                    if pair.type == "pair":
+                        yield from _children(pair, here, root)
+    elif node.type == "pair":
+        key = next((c for c in node.named_children if c.type in _KEYS), None)
+        value = next((c for c in node.named_children if c.type in _VALUES), None)
+        if key is not None and value is not None:
+            yield value, place.reach(_keys(key), node)
+    elif node.type == "array":
+        elements = (c for c in node.named_children if c.type in _VALUES)
+        for i, element in enumerate(elements):
+            yield element, place.inside.setdefault(i, _Place(element))
+    elif node.type == "inline_table":
+        for pair in node.named_children:
+            if pair.type == "pair":
+                yield from _children(pair, place, root)
+
+
+def _open_table(header: Node, root: _Place) -> _Place:
+    """Return the place of the table that `header` opens."""
+    key = next((c for c in header.named_children if c.type in _KEYS), None)
+    if key is None:
+        return _Place(header)
+    *above, last = _keys(key)
+    parent = root.reach(above, header)
+    if header.type == "table":
+        place = parent.inside.setdefault(last, _Place(header))
+        place.node = header  # a sub-table may have named it earlier; its own header wins
+        return place
+    tables = parent.inside.setdefault(last, _Place(header))
+    tables.is_array_of_tables = True
+    return tables.inside.setdefault(len(tables.inside), _Place(header))
+
+
+def _keys(key: Node) -> list[str]:
+    """Return the parts of a bare, quoted or dotted key, read by TOML's own rules."""
+    text = (key.text or b"").decode()
+    if key.type == "bare_key":
+        return [text]
+    found, keys = tomllib.loads(f"{text} = 0"), []
+    while isinstance(found, dict):
+        ((name, found),) = found.items()
+        keys.append(name)
+    return keys
+
+
+# -----------------------------------------------------------------------------
+# One-line messages about faults in a job file: place, key, expected, got, what to do.
+
+_LONGEST = 60
+"""Characters of a wrong value that a message shows."""
+
+
+def refusal(path: Path, text: str, error: ValidationError) -> InputError:
+    """Return an error with one line for the first problem in the file and one for each other."""
+    details = error.errors(include_url=False)
+    locs, places = [d["loc"] for d in details], TomlPlaces(text)
+    problems = []
+    for detail in details:
+        loc = detail["loc"]
+        # pydantic also reports an array with a wrong element as too short: show the element only.
+        if detail["type"] == "too_short" and any(p[: len(loc)] == loc != p for p in locs):
+            continue
+        where = (*loc, *detail["ctx"]["where"]) if detail["type"] == FAULT else loc
+        # Missing keys come last: a misspelt key explains more.
+        order = detail["type"] == "missing", *places.locate(where)
+        key = ".".join(part for part in where if isinstance(part, str))
+        problems.append((order, f"{key}: {_problem(detail)}"))
+    return all_of([error_at(path, place[1], said) for place, said in sorted(problems)])
+
+
+def refusal_at(path: Path, where: Sequence[str | int], said: str) -> InputError:
+    """Return an error about a place in a job file that was read before."""
+    line = TomlPlaces(path.read_text(encoding="utf-8-sig")).locate(where).line
+    key = ".".join(part for part in where if isinstance(part, str))
+    return error_at(path, line, f"{key}: {said}")
+
+
+def _problem(detail: ErrorDetails) -> str:
+    """Return the words about what was expected, what came and what to do."""
+    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
+    if kind == FAULT:
+        if "said" in context:
+            return str(context["said"])
+        got = context["got"] or _shown(value)
+        return f"expected {context['expected']}, got {got}; {context['remedy']}"
+    table, keys = _table_of([part for part in detail["loc"] if isinstance(part, str)])
+    header = f"[[{table}]]" if table in REPEATED else f"[{table}]"
+    if kind == "extra_forbidden":
+        known = TABLES[table].model_fields if keys else [t for t in TABLES if "." not in t]
+        holder = f"a key of {header}" if keys else "a known table"
+        unknown = keys[0] if keys else table
+        return f"expected {holder}, got an unknown name; {nearest(unknown, known)}"
+    if not keys:
+        if kind == "tuple_type" and isinstance(value, dict):
+            return f"expected tables {header}, got a single one; write it as {header}"
+        got = "none" if kind == "missing" else _shown(value)
+        return f"expected a table {header}, got {got}; write its header and its keys"
+    field = TABLES[table].model_fields[keys[0]]
+    expected, example = field.description, f"{keys[0]} = {(field.examples or [''])[0]}"
+    if kind == "missing":
+        return f"expected {expected}, got nothing; add, for example, {example}"
+    if kind == "literal_error":
+        return f"expected {context['expected']}, got {_shown(value)}; write one of them"
+    bound = context.get("le", context.get("ge"))
+    if bound in (-LARGEST, LARGEST) or (bound == SMALLEST and value > 0):
+        expected = f"{expected}, at {'most' if 'le' in context else 'least'} {bound:g}"
+    last = detail["loc"][-1]
+    number = f" as number {last + 1}" if isinstance(last, int) else ""
+    return f"expected {expected}, got {_shown(value)}{number}; write, for example, {example}"
+
+
+def _table_of(names: list[str]) -> tuple[str, list[str]]:
+    """Return the innermost table that contains a place, and the remaining keys."""
+    for n in range(len(names), 0, -1):
+        if (table := ".".join(names[:n])) in TABLES:
+            return table, names[n:]
+    return names[0], names[1:]
+
+
+def _shown(value: object) -> str:
+    """Return a value in TOML notation, shortened."""
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list):
+        inside = ("..." if isinstance(v, dict | list) else _shown(v) for v in value[:_LONGEST])
+        text = f"[{', '.join(inside)}]"
+    elif isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, str):
+        text = f'"{value}"'
+    elif isinstance(value, date | datetime | time):
+        text = value.isoformat()
+    elif isinstance(value, int) and abs(value) >= 1e20:
+        return "a number of more than 20 digits"
+    else:
+        text = str(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+def error_at(path: Path, line: int | None, said: str) -> InputError:
+    """Return an error with its place in front of the message."""
+    return InputError(f"{path}: {said}" if line is None else f"{path}:{line}: {said}")
+
+
+def all_of(found: Sequence[InputError]) -> InputError:
+    """Return several faults of one job as one error: the first, and lines of the others."""
+    first, *rest = found
+    if not rest:
+        return first
+    others = [*first.others, *(line for one in rest for line in (str(one), *one.others))]
+    return InputError(f"{first} (and {len(others)} more)", others)
+
+
+# -----------------------------------------------------------------------------
+# Read a TOML job file into a job in SI with all its references resolved.
+
+MOST_TEXT = 10_000_000
+"""Largest job file, in characters; enough for many thousand contours."""
+_DOTTED = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){33}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Job:
+    """A job file, read and resolved: all values are in SI, only the part is not read yet.
+
+    Parameters
+    ----------
+    path : Path
+        The job file.
+    robot : Robot
+        The robot, with the limits of the job.
+    tool : (4, 4) m
+        T_flange_tip.
+    placement : (4, 4) m
+        T_base_part.
+    drawing : Drawing
+        The CAD file and how to read it.
+    contours : tuple of ContourSpec
+        The contours, in the order of the file.
+    options : PlanOptions
+        Options for planning every contour.
+    cell : CellTable or None
+        The [cell] table; without one, collisions are not checked.
+    home : (n,) rad, optional
+        Joints at the beginning and the end of the program, external axes last (m if linear).
+    sequence : SequenceTable or None
+        The [sequence] table; without one, the order is that of the file and no moves are planned.
+    layout : LayoutTable
+        The [layout] table: what `kerfpath layout` may move, and how far.
+    tolerances : Tolerances
+        Tolerances of the audit between the nodes.
+    program : ProgramOptions
+        Options of the robot program.
+    source : mapping
+        The parsed file: its tables and keys, with values that JSON can hold.
+    text : str
+        The text of the file, with its comments.
+    """
+
+    path: Path
+    robot: Robot
+    tool: Array
+    placement: Array
+    drawing: Drawing
+    contours: tuple[ContourSpec, ...]
+    options: PlanOptions
+    cell: CellTable | None
+    home: Array | None
+    sequence: SequenceTable | None
+    layout: LayoutTable
+    tolerances: Tolerances
+    program: ProgramOptions
+    source: Mapping[str, Any]
+    text: str = ""
+
+    __repr__ = short_repr
+
+    @property
+    def part_file(self) -> Path:
+        """The CAD file; it existed when the job was read."""
+        return self.drawing.file
+
+    def read_part(self) -> Part:
+        """Return the part in the CAD file.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read, or geometry that may have to be cut is left out.
+        """
+        part = self.drawing.read()
+        doubtful = [str(one) for one in part.left_out if one.may_cut]
+        if doubtful and not self.drawing.accept_left_out:
+            said = (
+                f"expected a drawing that can be read completely; {'; '.join(doubtful)}; repair "
+                f'{self.part_file.name}, or write left_out = "accept"'
+            )
+            raise refusal_at(self.path, ("part", "file"), said)
+        return part
+
+    def graph(
+        self,
+        nodes: Contour,
+        options: PlanOptions | None = None,
+        *,
+        only: Ints | None = None,
+        external: Array | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> LayeredGraph:
+        """Return the layered graph of a contour's nodes, by these options or those of the job.
+
+        With `only` (M,), the graph has the layers of these nodes only. External axes are at
+        `external`, (K, E) or (K, X, E) rad or m; by default the continuous method takes the
+        course of `kerfpath.planner.external_course`.
+        """
+        chosen = options or self.options
+        if self.robot.free.size and external is None and chosen.method == "continuous":
+            external = external_course(
+                nodes, self.robot, tool=self.tool, placement=self.placement, options=chosen
+            )
+        return layered_graph(
+            nodes,
+            self.robot,
+            tool=self.tool,
+            placement=self.placement,
+            options=chosen,
+            nodes=only,
+            external=external,
+            progress=progress,
+        )
+
+    def tasks(self, part: Part) -> tuple[ContourSpec, ...]:
+        """Return the contours to cut, one for each loop of the part that is picked.
+
+        Raises
+        ------
+        InputError
+            A loop does not exist or is picked twice, or an open line has a key that needs a
+            closed loop.
+        """
+        tasks, faults = list[ContourSpec](), list[InputError]()
+        for number, table in enumerate(self.contours):
+            try:
+                for task in table.expanded(part):
+                    if part.loop(task.pick).kind == "open":
+                        self._require_open(task, number)
+                    tasks.append(task)
+            except InputError as fault:
+                faults.append(fault)
+        if faults:
+            raise all_of(faults)
+        names = [task.name for task in tasks]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(
+                    f"{self.path}: contour {name!r} is picked twice; give one of the two another "
+                    "name, or narrow [contour.pick_all]"
+                )
+        return tuple(tasks)
+
+    def _require_open(self, task: ContourSpec, number: int) -> None:
+        """Raise InputError if table `number` has a key that its open line cannot have."""
+        line = f"loop {task.pick!r} is an open line, which"
+        for key, why in keys_of_closed_loops(task.table).items():
+            raise refusal_at(self.path, ("contour", number, key), f"{line} {why}; remove {key}")
+        if self.options.closure == "periodic":
+            said = f'{line} does not return to its start; write closure = "free"'
+            raise refusal_at(self.path, ("plan", "closure"), said)
+
+
+def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
+    """Return the job in a TOML file.
+
+    If the file is a copy beside the job, `copy_of` is the job, which the program is named after.
+
+    Raises
+    ------
+    InputError
+        The file is not a valid job. One line names file, line and key, what was expected, what
+        came and what to do, for the first problem, and how many more there are.
+    """
+    path = Path(path)
+    text = _text(path)
+    source = _tables(path, text)
+    try:
+        file = JobFile.model_validate(source, context={"folder": path.parent})
+    except ValidationError as error:
+        raise refusal(path, text, error) from None
+    described = file.cell is not None and file.cell.links != "capsules"
+    robot = _loaded(path, file, file.robot.resolve(path.parent, bodies=described))
+    if file.plan.rotation_deg is not None and not robot.endless.any():
+        raise refusal_at(
+            path,
+            ("plan", "rotation_deg"),
+            "expected an endless axis to limit, got none; remove rotation_deg, or list endless "
+            "axes with endless in [robot]",
+        )
+    try:
+        moves = file.program.language != "none" or file.sequence is not None
+        options = file.plan.resolve(
+            robot,
+            _comfort(file, robot),
+            retract=file.program.retract_mm / 1000 if moves else None,
+            floor=file.robot.height_of_floor(),
+        )
+    except OptionConflict as conflict:
+        raise refusal_at(path, *said_in_keys(conflict, file.plan)) from None
+    drawing = file.part.drawing(path.parent)
+    return Job(
+        path=path,
+        robot=robot,
+        tool=file.tool.resolve(),
+        placement=file.part.resolve(drawing),
+        drawing=drawing,
+        contours=tuple(task_of(table) for table in file.contour),
+        options=options,
+        cell=file.cell,
+        home=home_of(file.sequence, file.robot.external, robot),
+        sequence=file.sequence,
+        layout=file.layout,
+        tolerances=tolerances_of(file.audit),
+        program=program_options(file.program, (copy_of or path).stem, tolerances_of(file.audit)),
+        source=source,
+        text=text,
+    )
+
+
+def places_of(job: Job, nodes: Contour) -> Array | None:
+    """Return a coarse grid (K, X, E) of the joints that a pose leaves free; None without any."""
+    if not job.robot.free.size:
+        return None
+    places = coarse_places(job.robot)
+    return np.broadcast_to(places, (len(nodes), *places.shape))
+
+
+def home_of(
+    sequence: SequenceTable | None, external: Sequence[ExternalTable], robot: Robot
+) -> Array | None:
+    """Return the joints (n,) at home, external axes last; None where a job has no home.
+
+    An external axis without a home in its table is at zero, or at its limit nearest to zero.
+    """
+    if sequence is None or sequence.home_deg is None:
+        return None
+    said = {table.called: table.home for table in external if table.home is not None}
+    limits = robot.joint_limits()
+    nearest = np.clip(0.0, limits.lower, limits.upper)
+    more = [
+        said.get(axis.name, nearest[i])
+        for i, axis in enumerate(robot.externals, robot.family.joints)
+    ]
+    return freeze(np.append(np.radians(sequence.home_deg), more))
+
+
+def _loaded(path: Path, file: JobFile, robot: Robot) -> Robot:
+    """Return the robot with the load on its flange if the job gives one; torques need it."""
+    table, load = file.robot, file.tool.load()
+    asked = next((k for k in ("torque_nm", "gravity_m_s2") if getattr(table, k) is not None), None)
+    if load is None:
+        if asked is not None:
+            said = (
+                f"expected mass_kg and centre_mm of the load on the flange, as {asked} is given, "
+                "got none; add them, or mass_kg = 0 without a load"
+            )
+            raise refusal_at(path, ("tool", "mass_kg"), said)
+        return robot
+    try:
+        return robot.with_load(load, gravity=table.gravity_m_s2 or STANDARD_GRAVITY)
+    except InputError as error:
+        if robot.torque is None and robot.inertia is not None:
+            said = (
+                f"expected torque limits, as {table.urdf} does not state that of every joint, got "
+                f"none; add torque_nm = [{robot.joints} numbers, N m]"
+            )
+            raise refusal_at(path, ("robot", "torque_nm"), said) from None
+        said = f"{error}; give urdf with inertias in [robot], or remove mass_kg"
+        raise refusal_at(path, ("tool", "mass_kg"), said) from None
+
+
+def _comfort(file: JobFile, robot: Robot) -> Comfort | None:
+    """Return the margins and penalties of plans.
+
+    By default joints keep a margin to their limits, for the digits of a program and for straight
+    joint motions between nodes, unless the range of a joint is too small for it.
+    """
+    limits, own = robot.joint_limits(), slice(robot.family.joints)
+    ranges = (limits.upper - limits.lower)[own][~limits.endless[own]]
+    wide = bool((ranges > np.radians(2 * LIMITS_MARGIN)).all())
+    return file.comfort.resolve({"limits": LIMITS_MARGIN} if wide else None)
+
+
+def _text(path: Path) -> str:
+    try:
+        endless = path.exists() and not (path.is_file() or path.is_dir())  # a device
+        raw = b"" if endless else path.read_bytes()
+    except IsADirectoryError:
+        raise error_at(path, None, "expected a job file, got a folder; name a file in it") from None
+    except FileNotFoundError:
+        raise error_at(path, None, "no such file; give the path of a job file") from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise error_at(path, None, f"cannot be read ({why}); give the path of a job file") from None
+    if endless:
+        raise error_at(path, None, "is not a file; give the path of a job file")
+    try:
+        return raw.decode("utf-8-sig")  # some editors begin a UTF-8 file with a byte order mark
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise error_at(
+            path,
+            line,
+            f"expected UTF-8 text, got the byte 0x{raw[error.start]:02x}; save the file as UTF-8",
+        ) from None
+
+
+def _tables(path: Path, text: str) -> dict[str, Any]:
+    if len(text) > MOST_TEXT:
+        raise error_at(
+            path,
+            None,
+            f"expected a job file of at most {MOST_TEXT / 1e6:.0f} MB, got "
+            f"{len(text) / 1e6:.0f} MB; give the path of a job file",
+        )
+    # The time that the TOML parser takes grows with the square of the number of parts.
+    if (dotted := _DOTTED.search(text)) is not None:
+        line = text.count("\n", 0, dotted.start()) + 1
+        raise error_at(path, line, "expected a key of a job, got one with too many dotted parts")
+    try:
+        tables = tomllib.loads(text)
+    except RecursionError:
+        raise error_at(path, None, "arrays or tables are nested too deeply; flatten them") from None
+    except tomllib.TOMLDecodeError as error:
+        said = str(error)
+        at = re.search(r" \(at line (\d+), column \d+\)$", said)
+        line = int(at[1]) if at else text.rstrip("\n").count("\n") + 1
+        raise error_at(path, line, f"not valid TOML: {said}; correct it there") from None
+    except ValueError:  # what Python's int() refuses
+        raise error_at(path, None, "not valid TOML: an integer is too long; shorten it") from None
+    if not tables:
+        raise error_at(
+            path, 1, "expected [robot], [tool], [part] and [[contour]], got an empty file; add them"
+        )
+    return tables

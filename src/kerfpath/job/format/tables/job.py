@@ -1,0 +1,477 @@
+"""The complete job file: every table, and the rules between tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+
+from kerfpath.comfort import Band, Comfort
+from kerfpath.errors import InputError
+from kerfpath.job.format.tables.cell import (
+    CellTable,
+    FixtureTable,
+    HeadTable,
+    PairTable,
+    Table,
+    ToolTable,
+    given,
+    require_distinct,
+)
+from kerfpath.job.format.tables.part import (
+    ContourTable,
+    CornersTable,
+    LeadTable,
+    MicroJointsTable,
+    PartTable,
+    PickTable,
+    SmoothAxesTable,
+)
+from kerfpath.job.format.tables.plan import PlanTable
+from kerfpath.job.format.tables.robot import ExternalTable, RobotTable
+from kerfpath.job.format.values import (
+    Identifier,
+    Joints,
+    NotNegative,
+    Number,
+    Positive,
+    Text,
+    fault,
+    fault_in_words,
+    folder_of,
+    key,
+    nearest,
+)
+from kerfpath.options import EXACT_OR_BETTER
+from kerfpath.post import PARTNERS, Await, Handshake, LanguageSettings, Partner, Request, languages
+from kerfpath.robots import postures_named
+
+# -----------------------------------------------------------------------------
+# The [comfort] table: margins to singularities, limits and bodies, and penalties beyond them.
+
+LIMITS_MARGIN = 0.1
+"""Margin of the joints to their limits, in deg, unless the table sets another. The digits of a
+program move a joint by some thousandths of a degree, near a singularity by some hundredths."""
+
+Angle = Annotated[
+    Annotated[Positive, Field(lt=90)] | None, key("a number above 0, below 90, in deg", "5")
+]
+Room = Annotated[Positive | None, key("a number above 0, in deg", "5")]
+RoomOrNone = Annotated[NotNegative | None, key("a number not below 0, in deg", "0.1")]
+Length = Annotated[Positive | None, key("a number above 0, in mm", "50")]
+Volume = Annotated[Positive | None, key("a number above 0, in m^3", "0.05")]
+Cost = Annotated[NotNegative | None, key("a number not below 0", "1")]
+
+DEGREE = float(np.radians(1.0))
+UNITS = {
+    "wrist": ("deg", DEGREE),
+    "elbow": ("deg", DEGREE),
+    "shoulder": ("mm", 1e-3),
+    "limits": ("deg", DEGREE),
+    "manipulability": ("m3", 1.0),
+    "clearance": ("mm", 1e-3),
+}
+"""For each band of `kerfpath.Comfort`: the unit of its keys, and the factor to SI."""
+
+
+class ComfortTable(Table):
+    """[comfort]: margins that are kept, and bands beyond them in which a node has a penalty."""
+
+    wrist_margin_deg: Angle = None
+    wrist_band_deg: Angle = None
+    wrist_cost: Cost = None
+    elbow_margin_deg: Angle = None
+    elbow_band_deg: Angle = None
+    elbow_cost: Cost = None
+    shoulder_margin_mm: Length = None
+    shoulder_band_mm: Length = None
+    shoulder_cost: Cost = None
+    limits_margin_deg: RoomOrNone = None
+    limits_band_deg: Room = None
+    limits_cost: Cost = None
+    manipulability_margin_m3: Volume = None
+    manipulability_band_m3: Volume = None
+    manipulability_cost: Cost = None
+    clearance_band_mm: Length = None
+    clearance_cost: Cost = None
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> ComfortTable:
+        """Require that a cost and its band are given together."""
+        for name, (unit, _) in UNITS.items():
+            keys = f"{name}_band_{unit}", f"{name}_cost"
+            for one, other in (keys, keys[::-1]):
+                if getattr(self, one) is not None and getattr(self, other) is None:
+                    raise fault(f"{other} with {one}", "none", f"add {other}", (one,))
+        return self
+
+    def resolve(self, usual: Mapping[str, float] | None = None) -> Comfort | None:
+        """Return the margins and bands of the table, in SI; None if there are none.
+
+        `usual` has default margins by measure, in the unit of its keys, where the table sets none.
+        """
+        bands = {}
+        for name, (unit, si) in UNITS.items():
+            # The margin of clearance is the near-miss distance of the cell.
+            margin = getattr(self, f"{name}_margin_{unit}", None)
+            margin = (usual or {}).get(name) if margin is None else margin
+            width = getattr(self, f"{name}_band_{unit}")
+            if margin or width is not None:
+                bands[name] = Band(
+                    margin=(margin or 0.0) * si,
+                    width=(width or 0.0) * si,
+                    cost=getattr(self, f"{name}_cost") or 0.0,
+                )
+        return Comfort(**bands) if bands else None
+
+
+# -----------------------------------------------------------------------------
+# The [layout] table: what may be moved and how far, and the goal of the best placement.
+
+Goal = Literal["speed", "margin", "motion"]
+VARIABLES = (
+    "x_mm", "y_mm", "z_mm", "yaw_deg", "tilt_x_deg", "tilt_y_deg",
+    "base_x_mm", "base_y_mm", "base_z_mm", "base_yaw_deg",
+    "mount_deg",
+)  # fmt: skip
+"""What may vary: offsets of the part, then of the robot's base, then the rotation of the head."""
+
+
+def rising(value: tuple[float, ...]) -> tuple[float, ...]:
+    """Return a range whose lower end is below its upper end.
+
+    Raises
+    ------
+    PydanticCustomError
+        The range is reversed or empty.
+    """
+    low, high = value
+    if not low < high:
+        what = "an empty range" if low == high else "a reversed one"
+        raise fault("[low, high] with low below high", what, f"write [{high:g}, {low:g}]"
+                    if low > high else "leave it out, or widen it")  # fmt: skip
+    return value
+
+
+Span = Annotated[
+    tuple[Number, ...],
+    Field(strict=False, min_length=2, max_length=2),
+    AfterValidator(rising),
+]
+Millimetres = Annotated[
+    Span | None, key("2 numbers, the least and the largest offset in mm", "[-200, 200]")
+]
+Degrees = Annotated[
+    Span | None, key("2 numbers, the least and the largest rotation in deg", "[-30, 30]")
+]
+
+
+class LayoutTable(Table):
+    """[layout]: the ranges in which `kerfpath layout` looks for the best placement."""
+
+    goal: Goal = "speed"
+    move: Annotated[
+        Text, key('"part", or the name of an external axis that carries it', '"part"')
+    ] = "part"
+    x_mm: Millimetres = None
+    y_mm: Millimetres = None
+    z_mm: Millimetres = None
+    yaw_deg: Degrees = None
+    tilt_x_deg: Degrees = None
+    tilt_y_deg: Degrees = None
+    base_x_mm: Millimetres = None
+    base_y_mm: Millimetres = None
+    base_z_mm: Millimetres = None
+    base_yaw_deg: Degrees = None
+    mount_deg: Degrees = None
+    standing: Annotated[tuple[Text, ...], key("names of fixtures", '["column"]', strict=False)] = ()
+    evaluations: Annotated[
+        int, key("a whole number of placements from 8 to 100000", "240", ge=8, le=100_000)
+    ] = 240
+    seed: Annotated[int, key("a whole number not below 0", "1", ge=0, le=2**31)] = 0
+    tolerance_mm: Annotated[NotNegative, key("a number not below 0, in mm", "2")] = 0.0
+    tolerance_deg: Annotated[NotNegative, key("a number not below 0, in deg", "0.5")] = 0.0
+    map_points: Annotated[int, key("a whole number from 0 (no map) to 101", "15", ge=0, le=101)] = (
+        15
+    )
+
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """The given ranges by variable, in the units of the keys."""
+        spans = {name: getattr(self, name) for name in given(self, *VARIABLES)}
+        return {name: (low, high) for name, (low, high) in spans.items()}
+
+
+# -----------------------------------------------------------------------------
+# The [program] and [audit] tables: the robot program, and the tolerances of its audit.
+
+PARTNERS_SAID = f"a list of {', '.join(PARTNERS)}"
+
+
+class ProgramTable(Table):
+    """[program]: the robot program, its language and process values.
+
+    A table [program.LANGUAGE] in it holds the settings of that language.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    language: Annotated[str, key("a robot language, or none for no program", '"rapid"')] = "rapid"
+    name: Identifier = None
+    retract_mm: Annotated[Positive, key("a number above 0, in mm", "50")] = 50.0
+    zone_mm: Annotated[
+        NotNegative | Literal["auto"], key('"auto" or a number not below 0, in mm', '"auto"')
+    ] = "auto"
+    zone_error_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.1")] = None
+    lead_time_s: Annotated[NotNegative, key("a number not below 0, in s", "0.02")] = 0.02
+    arcs_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.01")] = None
+    gas_lead_s: Annotated[NotNegative | None, key("a number not below 0, in s", "0.3")] = None
+    pierce_time_s: Annotated[NotNegative, key("a number from 0 to 60, in s", "0.3", le=60)] = 0.0
+    approach_mm_s: Annotated[Positive, key("a number above 0, in mm/s", "100")] = 100.0
+    air_speed: Annotated[
+        Positive | None, key("a share of the full speed, from 0.01 to 1", "0.25", ge=0.01, le=1)
+    ] = None
+
+    request: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["shutter"]')] = None
+    wait_for: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["ready"]')] = None
+    wait_timeout_s: Annotated[Positive, key("a number from 0 to 600, in s", "5", le=600)] = 5.0
+
+    @field_validator("request", "wait_for")
+    @classmethod
+    def _is_said_once(cls, partners: list[Partner] | None) -> list[Partner] | None:
+        if partners and len(set(partners)) < len(partners):
+            raise fault("each partner once", repr(partners), "remove the second")
+        return partners
+
+    def handshakes(self) -> tuple[Handshake, ...]:
+        """Return the handshakes before each contour."""
+        requests = (Request(partner=partner, on=True) for partner in self.request or ())
+        timeout = self.wait_timeout_s
+        waits = (Await(partner=partner, timeout=timeout) for partner in self.wait_for or ())
+        return *requests, *waits
+
+    @field_validator("language")
+    @classmethod
+    def _is_known(cls, name: str) -> str:
+        if name not in languages() and name != "none":
+            known = [*languages(), "none"]
+            raise fault("a robot language, or none", None, f"write one; {nearest(name, known)}")
+        return name
+
+    @model_validator(mode="after")
+    def _settings_fit(self) -> ProgramTable:
+        for name, table in (self.model_extra or {}).items():
+            if name not in languages():
+                known = [*type(self).model_fields, *languages()]
+                raise fault("a key of [program]", "an unknown name", nearest(name, known), (name,))
+            _settings(name, table)
+        return self
+
+    def settings(self) -> LanguageSettings | None:
+        """Return the settings of the language; None without a program."""
+        if self.language == "none":
+            return None
+        return _settings(self.language, (self.model_extra or {}).get(self.language, {}))
+
+
+def _settings(name: str, table: Any) -> LanguageSettings:
+    """Return the settings that a table [program.LANGUAGE] holds, or raise at its first fault."""
+    model = languages()[name].settings
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        detail = error.errors(include_url=False)[0]
+    at = str(detail["loc"][0]) if detail["loc"] else ""
+    if at not in model.model_fields:
+        got = "an unknown name" if at else f"{table!r}"
+        remedy = nearest(at, list(model.model_fields))
+        raise fault(f"a key of [program.{name}]", got, remedy, (name, *([at] if at else [])))
+    field = model.model_fields[at]
+    remedy = f"write, for example, {at} = {(field.examples or [''])[0]}"
+    got = f"{detail['input']!r}"[:60]
+    raise fault(field.description or "another value", got, remedy, (name, at))
+
+
+class AuditTable(Table):
+    """[audit]: how far the tool may leave the path between the nodes."""
+
+    path_tolerance_mm: Annotated[Positive, key("a number above 0, in mm", "0.1")] = 0.1
+    axis_tolerance_deg: Annotated[Positive, key("a number above 0, in deg", "1")] = 1.0
+
+
+# -----------------------------------------------------------------------------
+# The [sequence] table: the order of cutting, and the moves between the contours.
+
+
+class SequenceTable(Table):
+    """[sequence]: with it, the moves between contours are planned and audited, too."""
+
+    order: Annotated[
+        Literal["given", "best"], key("the order of the file, or the fastest order", '"best"')
+    ] = "best"
+    inner_first: Annotated[bool, key("true or false", "true")] = True
+    heat_spacing_mm: Annotated[NotNegative, key("a number not below 0, in mm", "40")] = 0.0
+    home_deg: Annotated[
+        Joints | None, key("one number for every joint, in deg", "[0, -20, 10, 0, 60, 0]")
+    ] = None
+    seconds: Annotated[Positive, key("a number above 0, in s", "10")] = 10.0
+
+
+# -----------------------------------------------------------------------------
+# The complete job file: every table, and the rules between tables.
+
+
+class JobFile(Table):
+    """The complete job file: robot, tool, part, contours, plan options, cell and program."""
+
+    robot: RobotTable
+    tool: ToolTable
+    part: PartTable
+    contour: Annotated[tuple[ContourTable, ...], Field(strict=False, min_length=1)]
+    plan: PlanTable = PlanTable()
+    cell: CellTable | None = None
+    sequence: SequenceTable | None = None
+    comfort: ComfortTable = ComfortTable()
+    layout: LayoutTable = LayoutTable()
+    audit: AuditTable = AuditTable()
+    program: ProgramTable = ProgramTable()
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> JobFile:
+        names = [table.name or table.pick for table in self.contour]
+        keys = ["name" if table.name else "pick" for table in self.contour]
+        require_distinct(names, "contour", "contour", keys)
+        return self
+
+    @model_validator(mode="after")
+    def _one_for_every_joint(self, info: ValidationInfo) -> JobFile:
+        home = None if self.sequence is None else self.sequence.home_deg
+        given = {("plan", "weights"): self.plan.weights, ("sequence", "home_deg"): home}
+        arm, more = self.robot.joints(folder_of(info)), len(self.robot.axes(folder_of(info)))
+        for where, numbers in given.items():
+            joints = arm + more * (where[1] == "weights")
+            if numbers is not None and len(numbers) != joints:
+                axes = f", {more} of them for external axes" if joints > arm else ""
+                expected = f"{joints} numbers, one for every joint{axes}"
+                raise fault(expected, f"{len(numbers)}", "give as many", where)
+        return self
+
+    @model_validator(mode="after")
+    def _posture_fits(self, info: ValidationInfo) -> JobFile:
+        if self.plan.posture is not None:
+            try:
+                postures_named(self.plan.posture, self.robot.resolve(folder_of(info)).kinematics)
+            except InputError as error:
+                raise fault_in_words(f"{error}", ("plan", "posture")) from None
+        return self
+
+    @model_validator(mode="after")
+    def _best_is_chosen(self) -> JobFile:
+        """Require [sequence] where a start or a direction is to be chosen."""
+        if self.sequence is not None:
+            return self
+        for i, table in enumerate(self.contour):
+            for name in ("start", "direction"):
+                if getattr(table, name) == "best":
+                    raise fault(
+                        f'[sequence] with {name} = "best"',
+                        "none",
+                        f"add [sequence], or write another {name}",
+                        ("contour", i, name),
+                    )
+        return self
+
+    @model_validator(mode="after")
+    def _cell_fits(self) -> JobFile:
+        """Refuse options that cannot be combined with a cell, at their key."""
+        if self.cell is None:
+            return self
+        if (method := self.plan.method) not in EXACT_OR_BETTER:
+            expected = 'method = "continuous" or "exact" with [cell]'
+            raise fault(expected, f'"{method}"', "change one", ("plan", "method"))
+        if self.cell.links == "description" and self.robot.urdf is None:
+            raise fault(
+                'links = "description" only with urdf in [robot]',
+                "none",
+                'write links = "capsules"',
+                ("cell", "links"),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _standing_are_fixtures(self) -> JobFile:
+        fixtures = [] if self.cell is None else [fixture.name for fixture in self.cell.fixture]
+        for i, name in enumerate(self.layout.standing):
+            if name not in fixtures:
+                raise fault(
+                    "the name of a fixture",
+                    f'"{name}"',
+                    f"there are {', '.join(fixtures) or 'none'}",
+                    ("layout", "standing", i),
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _movable(self) -> JobFile:
+        """Require that a layout moves the part, or an external axis that carries it."""
+        name = self.layout.move
+        carriers = [axis.name for axis in self.robot.external if axis.carries == "part"]
+        if name != "part" and name not in carriers:
+            hint = "vary base_x_mm, base_y_mm, base_z_mm or base_yaw_deg to move the robot"
+            raise fault(
+                f"one of {', '.join(map(repr, ('part', *carriers)))}",
+                f'"{name}"',
+                hint if any(axis.name == name for axis in self.robot.external) else "name one",
+                ("layout", "move"),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _clearance_is_measured(self) -> JobFile:
+        """Refuse a cost of clearance where the planner would not measure it."""
+        here = ("comfort", "clearance_band_mm")
+        if self.comfort.clearance_band_mm is None:
+            return self
+        if self.cell is None:
+            expected = "[cell] with clearance_band_mm, as clearance is measured in the cell"
+            raise fault(expected, "none", "add [cell], or remove clearance_band_mm", here)
+        return self
+
+
+TABLES: dict[str, type[BaseModel]] = {
+    "robot": RobotTable,
+    "tool": ToolTable,
+    "part": PartTable,
+    "contour": ContourTable,
+    "contour.pick_all": PickTable,
+    "contour.lead_in": LeadTable,
+    "contour.lead_out": LeadTable,
+    "contour.micro_joints": MicroJointsTable,
+    "contour.corners": CornersTable,
+    "contour.smooth_axes": SmoothAxesTable,
+    "plan": PlanTable,
+    "cell": CellTable,
+    "cell.head": HeadTable,
+    "cell.fixture": FixtureTable,
+    "robot.external": ExternalTable,
+    "cell.pair": PairTable,
+    "sequence": SequenceTable,
+    "comfort": ComfortTable,
+    "layout": LayoutTable,
+    "audit": AuditTable,
+    "program": ProgramTable,
+}
+"""The model of each table of the file."""
+REPEATED = ("contour", "cell.fixture", "cell.pair", "robot.external")
+"""Tables that a file may have several of."""

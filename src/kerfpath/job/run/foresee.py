@@ -1,0 +1,298 @@
+"""Find the faults of a job that are known before planning, each with its key."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kerfpath.arrays import Array, Bools, Ints, short_repr
+from kerfpath.cad import Part
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.job.format import (
+    CutRequest,
+    Job,
+    PreparedJob,
+    all_of,
+    cell_of_job,
+    chord_error,
+    closer_nodes,
+    places_of,
+    refusal_at,
+)
+from kerfpath.plans import has_room
+from kerfpath.sequence import best_order, distances_between
+
+# -----------------------------------------------------------------------------
+# Check a job without planning it: its cell, and the poses at the start of its contours.
+
+FAR = 0.05
+"""Distance in m beyond the near-miss distance up to which clearances are measured."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContourStart:
+    """The poses at the start of a contour.
+
+    Parameters
+    ----------
+    name : str
+    nodes : int
+    poses : int
+        Admissible poses at its first node.
+    clear : int
+        Poses among them that keep every near-miss distance.
+    clearance : float m
+        Least distance of the best pose, over the pairs that must keep the near-miss distance of
+        the cell, up to 50 mm more than that; NaN without poses.
+    pair : (str, str) or None
+        The two bodies at this distance.
+    """
+
+    name: str
+    nodes: int
+    poses: int
+    clear: int
+    clearance: float
+    pair: tuple[str, str] | None
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JobPreview:
+    """A job with its part, its cell if it has one, and the start of every contour."""
+
+    job: Job
+    part: Part
+    cell: Cell | None
+    starts: tuple[ContourStart, ...]
+
+    __repr__ = short_repr
+
+
+def check_job(job: Job, part: Part | None = None) -> JobPreview:
+    """Return the cell of a job and the start of its contours; `part` if it is read already.
+
+    Raises
+    ------
+    InputError
+        As `run_job`.
+    """
+    part = part or job.read_part()
+    cell = cell_of_job(job, part)
+    starts = []
+    for task in job.tasks(part):
+        nodes = task.sample(task.candidates(part)[0])
+        first = nodes.part(0, 1, job.options.frames)
+        plain = replace(job.options, comfort=None, retract=None, floor=None)
+        graph = job.graph(first, plain, external=places_of(job, first))
+        q = graph.q[: graph.start[1]]
+        starts.append(_start(task.name, len(nodes), q, cell))
+    return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts))
+
+
+def _start(name: str, nodes: int, q: np.ndarray, cell: Cell | None) -> ContourStart:
+    clear, clearance, pair = len(q), np.nan, None
+    if cell is not None and len(q) and len(cell.pairs):
+        apart = cell.distances(q, enough=cell.required + FAR)
+        clear = int((apart > cell.required).all(axis=1).sum())
+        common = np.flatnonzero(~cell.own)
+        if common.size:
+            apart = np.minimum(apart[:, common], cell.near_miss + FAR)
+            best = int(np.argmax(apart.min(axis=1)))
+            nearest = int(np.argmin(apart[best]))
+            clearance, pair = float(apart[best, nearest]), cell.pair_names[common[nearest]]
+    return ContourStart(
+        name=name, nodes=nodes, poses=len(q), clear=clear, clearance=clearance, pair=pair
+    )
+
+
+# -----------------------------------------------------------------------------
+# Find the faults of a job that are known before planning, each with its key.
+
+HALVINGS = 7
+"""Bisections of a length to find one that would do."""
+FINE = np.radians(1.0)
+"""Largest step of gamma, rad, for the poses of both ends, even if that of the job is coarser."""
+SAME_PLACE = 1e-6
+"""Depth in m below the floor that is attributed to rounding."""
+SECONDS = 2.0
+"""Time limit, s, for finding that no order of the contours is possible."""
+
+
+def require_foreseen(prepared: PreparedJob) -> None:
+    """Require that a job has no fault that is known before planning.
+
+    Raises
+    ------
+    InputError
+        Every fault that is known before planning, each in a line.
+    """
+    if found := foresee(prepared):
+        raise all_of(found)
+
+
+def foresee(prepared: PreparedJob) -> list[InputError]:
+    """Return the faults of a job that are known before it is planned, each with its key."""
+    return [
+        *_program_faults(prepared),
+        *_floor_faults(prepared),
+        *(fault for request in prepared.contours for fault in _sampling_faults(prepared, request)),
+        *_order_faults(prepared),
+        *(fault for request in prepared.contours for fault in _retract_faults(prepared, request)),
+    ]
+
+
+def _program_faults(prepared: PreparedJob) -> Iterator[InputError]:
+    """Yield the names, numbers and outputs that the language of the program refuses."""
+    job, p = prepared.job, prepared.job.program
+    if p.language == "none":
+        return
+    said = set()
+    cuts = [(request.task.name, request.task.speed) for request in prepared.contours]
+    for issue in p.issues(cuts, job.robot):
+        words = issue.message
+        if issue.code.startswith("name-") and issue.place == "a contour":
+            words += " by name in [[contour]]"
+        elif issue.code.startswith("name-") and issue.place == "the program":
+            words += " by name in [program]"
+        if words not in said:
+            said.add(words)
+            yield refusal_at(job.path, ("program",), words)
+
+
+def _floor_faults(prepared: PreparedJob) -> Iterator[InputError]:
+    """Yield a fault if contours reach below the floor; it names the lowest."""
+    job, floor = prepared.job, prepared.job.options.floor
+    if floor is None:
+        return
+    up, rise = job.placement[2, :3], job.placement[2, 3]
+    lowest = [
+        min(float((each.nodes.points @ up).min()) for each in request.candidates) + rise
+        for request in prepared.contours
+    ]
+    worst, below = int(np.argmin(lowest)), sum(z < floor - SAME_PLACE for z in lowest)
+    if below:
+        yield refusal_at(
+            job.path,
+            ("part", "xyz_mm"),
+            f"contour {prepared.names[worst]!r} reaches {(floor - lowest[worst]) * 1e3:.4g} mm "
+            f"below the floor, which is at z = {floor * 1e3:g} mm of the robot base ({below} of "
+            f"{len(lowest)} contours reach below it); write floor_mm in [robot] if the floor is "
+            "lower, or floor = false if there is none",
+        )
+
+
+def _sampling_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[InputError]:
+    """Yield a fault if chords between the nodes leave the path by more than the audit allows."""
+    job, task = prepared.job, request.task
+    if job.options.refine_parts > 1:
+        return
+    allowed = job.tolerances.path
+    off = max(chord_error(each.path, each.nodes) for each in request.candidates)
+    if off <= allowed:
+        return
+    key = task.sampled_by
+    finer = closer_nodes(task, [each.path for each in request.candidates], job.tolerances)
+    cure = "sample it more finely"
+    if finer is not None:
+        cure = f"write {key} = {getattr(finer.table, key):.4g}"
+    yield refusal_at(
+        job.path,
+        ("contour", _table_of(job, request), key),
+        f"contour {task.name!r}: chords between its nodes leave the path by {off * 1e3:.3g} mm, "
+        f"but path_tolerance_mm in [audit] allows {allowed * 1e3:g} mm; {cure}, or raise "
+        "path_tolerance_mm",
+    )
+
+
+def _table_of(job: Job, request: CutRequest) -> int:
+    """Return the number of a request's [[contour]] table in the job."""
+    tables = [spec.table for spec in job.contours]
+    return next((i for i, table in enumerate(tables) if table is request.task.table), 0)
+
+
+def _order_faults(prepared: PreparedJob) -> Iterator[InputError]:
+    """Yield a fault if no order keeps the heat spacing; it has the largest that one keeps."""
+    job, sequence = prepared.job, prepared.job.sequence
+    if sequence is None or not sequence.heat_spacing_mm or job.options.interruptions != "none":
+        return
+    between = distances_between([request.candidates[0].nodes for request in prepared.contours])
+    spacing = sequence.heat_spacing_mm / 1000
+    if _has_order(prepared, between < spacing):
+        return
+    apart = np.unique(between[between < spacing])
+    low, high = 0, len(apart)  # bisect the distance up to which an order exists
+    while high - low > 1:
+        middle = (low + high) // 2
+        possible = _has_order(prepared, between < apart[middle])
+        low, high = (middle, high) if possible else (low, middle)
+    most = apart[low] if _has_order(prepared, between < apart[low]) else 0.0
+    order = "the given order has" if sequence.order == "given" else "every order has"
+    yield refusal_at(
+        job.path,
+        ("sequence", "heat_spacing_mm"),
+        f"expected contours that follow each other to be {spacing * 1e3:g} mm apart, but {order} "
+        f"nearer ones; write at most heat_spacing_mm = {np.floor(most * 1e4) / 10:g}"
+        + (', or order = "best"' if sequence.order == "given" else ""),
+    )
+
+
+def _has_order(prepared: PreparedJob, near: Bools) -> bool:
+    """Return whether an order exists in which no contour follows one that is near it, (G, G)."""
+    count = len(near)
+    assert prepared.job.sequence is not None
+    if prepared.job.sequence.order == "given":
+        return not any(near[i, i + 1] for i in range(count - 1))
+    between = np.where(near, np.inf, 0.0)
+    try:
+        best_order(
+            np.arange(count), np.zeros(count), between,
+            before=prepared.inner_first, seconds=SECONDS,
+        )  # fmt: skip
+    except NoFeasiblePath as none:
+        return not none.proved
+    return True
+
+
+def _retract_faults(prepared: PreparedJob, request: CutRequest) -> Iterator[InputError]:
+    """Yield a fault if no pose at an end of a contour leaves room for the retract."""
+    job, asked = prepared.job, prepared.job.options.retract
+    if asked is None:
+        return
+    ends = [_end_poses(job, each.nodes) for each in request.candidates]
+    shut = [[len(q) and not _room(job, q, mu, asked).any() for q, mu in both] for both in ends]
+    if not all(any(both) for both in shut):
+        return
+    end = int(np.argmax(shut[0]))
+    low, high = 0.0, asked
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _room(job, *ends[0][end], middle).any() else (low, middle)
+    cure = f"write at most retract_mm = {np.floor(low * 1e4) / 10:g}" if low else "move the part"
+    yield refusal_at(
+        job.path,
+        ("program", "retract_mm"),
+        f"contour {request.task.name!r}: at its {('start', 'end')[end]} the tool cannot back off "
+        f"by {asked * 1e3:g} mm from any pose within the joint limits; {cure}",
+    )
+
+
+def _end_poses(job: Job, nodes: Contour) -> list[tuple[Array, Ints]]:
+    """Return the admissible joints (B, n) rad of both ends, and their postures (B,)."""
+    ends = np.array([0, len(nodes) - 1])
+    fine = min(job.options.gamma_step, FINE)
+    options = replace(job.options, retract=None, gamma_step=fine)
+    graph = job.graph(nodes, options, only=ends, external=places_of(job, nodes))
+    cut = graph.start[1]
+    posture = graph.posture.astype(np.int64)
+    return [(graph.q[:cut], posture[:cut]), (graph.q[cut:], posture[cut:])]
+
+
+def _room(job: Job, q: Array, posture: Ints, retract: float) -> Bools:
+    options = replace(job.options, retract=retract)
+    return has_room(options, job.robot, q, posture, job.tool)

@@ -1,0 +1,257 @@
+"""Advice for contours without a plan: speeds and shares of the limits, each tried as printed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from kerfpath.arrays import short_repr
+from kerfpath.cell import Cell
+from kerfpath.errors import NoFeasiblePath, Relaxation
+from kerfpath.graph import LayeredGraph
+from kerfpath.job.format import Candidate, CutRequest, Job
+from kerfpath.job.run.speeds import fastest_along, leaves_grid
+from kerfpath.options import PlanOptions
+from kerfpath.planner import (
+    FINER,
+    ON_THIS_GRID,
+    FastestSpeed,
+    at_least,
+    at_most,
+    plan,
+    relaxations,
+)
+
+GIVE = (0.0, 2e-3, 1e-2, 3e-2)
+"""Relative amounts by which a value is relaxed until a plan is found with it."""
+Share = Literal["eta_velocity", "eta_acceleration"]
+"""Keys of a job for the share of a limit that may be used."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Remedy:
+    """What makes a contour feasible, as values for a job; each of them alone has given a plan.
+
+    Parameters
+    ----------
+    other_method : bool
+        Whether all of it holds for method "exact" although the job asks for another one.
+    speed : str or None
+        Feasible speed below the requested one, m/min; None: the requested speed is feasible.
+    binds : str
+        The limit that binds at the higher of both speeds, and where; "" if that is not known.
+    refined : str or None
+        Higher speed, m/min, at which a motion off the grid was found.
+    shares : mapping of str to str
+        Keys of the shares of a limit, and their values above the requested ones.
+    closed : tuple of str
+        Keys for which no share up to 1 is enough.
+    never : str or None
+        Speed, m/min, from which on it is proved that no motion is possible at any rotation.
+    without_windows : bool
+        Whether there is a plan without gamma_windows, whatever the other values.
+    """
+
+    other_method: bool
+    speed: str | None = None
+    binds: str = ""
+    refined: str | None = None
+    shares: Mapping[str, str] = field(default_factory=dict)
+    closed: tuple[str, ...] = ()
+    never: str | None = None
+    without_windows: bool = False
+
+    __repr__ = short_repr
+
+    def __str__(self) -> str:
+        """Return the advice in one line."""
+        if self.without_windows:
+            alone = self.speed is None and not self.other_method
+            rest = "" if alone else f"; with them {replace(self, without_windows=False)}"
+            return f"without gamma_windows there is a plan as asked for{rest}"
+        how = ' with method = "exact"' if self.other_method else ""
+        if self.speed is None:
+            return f"{ON_THIS_GRID} a path exists at the speed asked for{how}"
+        said = f"{ON_THIS_GRID} a path exists up to {self.speed} m/min{how}"
+        if self.refined is not None:
+            said += f", refined up to {self.refined} m/min"
+        said += self.binds and f", {self.binds}"
+        if self.shares:
+            ways = " or ".join(f"{key} = {value}" for key, value in self.shares.items())
+            said += f"; at the speed asked for with {ways}"
+        if self.closed:
+            said += f"; no {' and no '.join(self.closed)} up to 1 is enough there"
+        if self.never is not None:
+            said += f"; proved impossible at any rotation from {self.never} m/min on"
+        return f"{said}; {FINER}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Trial:
+    """A cut without a plan, to be tried at other speeds and shares of the limits."""
+
+    job: Job
+    request: CutRequest
+    candidate: Candidate
+    graph: LayeredGraph
+    cell: Cell | None
+
+    __repr__ = short_repr
+
+    @property
+    def asked(self) -> float:
+        """Speed asked for, m/s."""
+        return self.request.task.speed
+
+    @property
+    def on_grid(self) -> PlanOptions:
+        """The options of the exact search on the grid alone."""
+        return replace(self.job.options, method="exact", refine=False, refine_parts=1)
+
+    def opens(self, options: PlanOptions, speed: float) -> bool:
+        """Return whether there is a plan at a speed (m/s), with the nodes that a job has then."""
+        nodes, graph, task = self.candidate.nodes, self.graph, self.request.task
+        if task.time_step is not None and speed != task.speed:
+            nodes = replace(task, speed=speed).sample(self.candidate.path)
+            graph = self.job.graph(nodes)
+        at = speed if nodes.time is None else None
+        try:
+            plan(
+                nodes, self.job.robot, tool=self.job.tool, placement=self.job.placement,
+                speed=at, options=replace(options, between_nodes="reported"), cell=self.cell,
+                graph=graph,
+            )  # fmt: skip
+        except NoFeasiblePath:
+            return False
+        return True
+
+    def speed(self, options: PlanOptions, most: float, above: float = 0.0) -> str | None:
+        """Return a speed of `most` m/s or slightly less, in m/min, with a plan; None without one.
+
+        It is above `above` and below the requested speed, m/s.
+        """
+
+        def fits(figure: str) -> bool:
+            return above < float(figure) / 60 < self.asked
+
+        values = (at_most(min(most, self.asked) * 60 * (1 - give)) for give in GIVE)
+        return _first(values, lambda v: fits(v) and self.opens(options, float(v) / 60))
+
+    def share(self, options: PlanOptions, key: Share, least: float) -> str | None:
+        """Return a share of a limit of `least` or slightly more with a plan; None without one."""
+        used = options.eta_v if key == "eta_velocity" else options.eta_a
+
+        def found(figure: str) -> bool:
+            value = float(figure)
+            if key == "eta_velocity":
+                raised = replace(options, eta_v=value)
+            else:
+                raised = replace(options, eta_a=value)
+            return self.opens(raised, self.asked)
+
+        values = (at_least(least * (1 + give)) for give in GIVE)
+        return _first(values, lambda v: used < float(v) <= 1 and found(v))
+
+
+def _first(values: Iterator[str], passes: Callable[[str], bool]) -> str | None:
+    return next((value for value in values if passes(value)), None)
+
+
+def find_remedy(
+    job: Job,
+    request: CutRequest,
+    candidate: Candidate,
+    graph: LayeredGraph,
+    cell: Cell | None,
+    relaxation: Relaxation | None = None,
+) -> tuple[Remedy, FastestSpeed | None] | None:
+    """Return what makes a cut without a plan feasible, and its fastest speed; None if unknown.
+
+    The graph must have poses at every node, and the cut a constant speed. `relaxation` is what
+    `NoFeasiblePath` states about a motion off the grid.
+    """
+    trial = _Trial(job=job, request=request, candidate=candidate, graph=graph, cell=cell)
+    continuous = job.options.method == "continuous"
+    # If the continuous search finds nothing, it also searches the grid.
+    other = not continuous and job.options.method != "exact"
+    if other and trial.opens(trial.on_grid, trial.asked):
+        return Remedy(other_method=True), None
+    # With a time step, another speed has other nodes, about which nothing would be proved.
+    ceiling = continuous and request.task.time_step is None
+    try:
+        fastest = fastest_along(
+            job, candidate.nodes, cell, refine=leaves_grid(job), graph=graph, ceiling=ceiling
+        )
+    except NoFeasiblePath:
+        return None
+    grid = fastest.speed if fastest.on_grid is None else fastest.on_grid
+    speed = trial.speed(trial.on_grid, grid)
+    if speed is None:
+        return None
+    refined = None
+    if fastest.on_grid is not None:
+        refined = trial.speed(job.options, fastest.speed, above=float(speed) / 60)
+    # In a cell, shares of the limits are not looked for.
+    shares, closed = ({}, ()) if cell is not None else _shares(trial, relaxation)
+    made = Remedy(
+        other_method=other,
+        speed=speed,
+        binds=_binds(candidate, fastest) if refined or fastest.on_grid is None else "",
+        refined=refined,
+        shares=shares,
+        closed=closed,
+        never=None if fastest.ceiling is None else at_least(fastest.ceiling * 60),
+    )
+    return made, fastest
+
+
+def opens_without_windows(
+    job: Job, request: CutRequest, candidate: Candidate, cell: Cell | None
+) -> bool:
+    """Return whether a cut without a plan would have one without its windows of gamma."""
+    if not job.options.gamma_windows:
+        return False
+    free = replace(job, options=replace(job.options, gamma_windows=()))
+    graph = free.graph(candidate.nodes)
+    trial = _Trial(job=free, request=request, candidate=candidate, graph=graph, cell=cell)
+    return trial.opens(free.options, trial.asked)
+
+
+def _shares(trial: _Trial, relaxation: Relaxation | None) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Return the shares of one limit that are enough, and the keys for which no share is.
+
+    They are those of the grid; for accelerations less, if a motion off the grid needs less.
+    """
+    options = trial.on_grid
+    least = relaxations(
+        trial.candidate.nodes,
+        trial.job.robot,
+        trial.graph,
+        trial.asked,
+        eta_v=options.eta_v,
+        eta_a=options.eta_a,
+    )
+    shares, closed = dict[str, str](), list[str]()
+    keys: tuple[tuple[Share, float | None], ...] = (
+        ("eta_velocity", least.eta_v),
+        ("eta_acceleration", least.eta_a),
+    )
+    for key, value in keys:
+        found = None
+        if key == "eta_acceleration" and relaxation is not None and relaxation.velocity == 1:
+            off_grid = options.eta_a * relaxation.acceleration
+            if value is None or off_grid < value:
+                found = trial.share(trial.job.options, key, off_grid)
+        if found is None and value is not None and value <= 1:
+            found = trial.share(options, key, value)
+        if found is not None:
+            shares[key] = found
+        elif value is None or value > 1:
+            closed.append(key)
+    return shares, tuple(closed)
+
+
+def _binds(candidate: Candidate, found: FastestSpeed) -> str:
+    at = " ".join(f"{v:.1f}" for v in candidate.nodes.points[found.node] * 1000)
+    return f"where the {found.limit} of joint {found.joint + 1} binds at node {found.node}, {at} mm"

@@ -1,0 +1,172 @@
+"""The fastest constant speeds of a job's contours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kerfpath.arrays import short_repr
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.execution import Executed, Kept
+from kerfpath.graph import LayeredGraph
+from kerfpath.job.as_run import keeps_between_nodes, kept_between_nodes
+from kerfpath.job.format import ContourSpec, Job, cell_of_job
+from kerfpath.planner import FastestSpeed, fastest_speed, plan
+from kerfpath.progress import Progress, no_progress
+
+# -----------------------------------------------------------------------------
+# A fast speed of a contour at which its program also keeps the limits between the nodes.
+
+HALVINGS = 2
+"""Bisections between a speed that keeps the limits and one that was not found to."""
+SLOWER = 0.97
+"""Factor on a speed that does not keep the limits, for the next one that is tried."""
+TRIES = 4
+
+
+def speed_as_run(job: Job, nodes: Contour, cell: Cell | None, fastest: float) -> float | None:
+    """Return a speed, m/s, at which the program of a plan keeps the limits between the nodes.
+
+    It is at most `fastest`, m/s, at which a path exists at the nodes. It is found by planning, and
+    proved for that speed; a faster one may exist. None if the job does not ask for it, or if none
+    is found.
+    """
+    if not keeps_between_nodes(job):
+        return None
+    first = _kept(job, nodes, cell, fastest)
+    if first is not None and first.done:
+        return fastest
+    low, high = fastest * _share(first), fastest
+    for _ in range(TRIES):
+        if _keeps(job, nodes, cell, low):
+            break
+        low, high = SLOWER * low, low
+    else:
+        return None
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        if _keeps(job, nodes, cell, middle):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _share(kept: Kept | None) -> float:
+    """Return an estimate of the share of its speed at which a plan keeps the limits."""
+    run: Executed | None = None if kept is None else kept.run
+    if run is None:
+        return SLOWER
+    slower = max(run.velocity_bound, np.sqrt(run.acceleration_bound))
+    return float(0.999 / slower) if np.isfinite(slower) else SLOWER
+
+
+def _keeps(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> bool:
+    kept = _kept(job, nodes, cell, speed)
+    return kept is not None and kept.done
+
+
+def _kept(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Kept | None:
+    """Return a plan at a speed with the limits kept between its nodes; None without a plan."""
+    try:
+        made = plan(
+            nodes, job.robot, tool=job.tool, placement=job.placement, speed=speed,
+            options=replace(job.options, certify=None, between_nodes="reported"), cell=cell,
+        )  # fmt: skip
+    except NoFeasiblePath:
+        return None
+    return kept_between_nodes(job, made)
+
+
+# -----------------------------------------------------------------------------
+# The fastest constant speeds of a job's contours.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContourSpeed:
+    """How fast a contour can be cut.
+
+    Parameters
+    ----------
+    task : ContourSpec
+    nodes : Contour
+    at_nodes : FastestSpeed or NoFeasiblePath
+        The fastest constant speed at which the limits hold at the nodes; or why there is none.
+    as_run : float m/s, optional
+        A speed at which they hold between the nodes, too, see `speed_as_run`; None if the job does
+        not keep them there, or if none was found.
+    """
+
+    task: ContourSpec
+    nodes: Contour
+    at_nodes: FastestSpeed | NoFeasiblePath
+    as_run: float | None = None
+
+    __repr__ = short_repr
+
+
+def fastest_along(
+    job: Job,
+    nodes: Contour,
+    cell: Cell | None,
+    *,
+    refine: bool,
+    graph: LayeredGraph | None = None,
+    ceiling: bool = False,
+    enough: float | None = None,
+) -> FastestSpeed:
+    """Return the fastest constant speed of a contour, free of collisions if there is a cell.
+
+    With `ceiling`, the result also has the speed from which on no motion is possible, if that is
+    proved. Off the grid, a speed of at least `enough`, m/s, may be returned although faster ones
+    exist.
+    """
+    return fastest_speed(
+        nodes,
+        job.robot,
+        tool=job.tool,
+        placement=job.placement,
+        options=replace(job.options.without_penalties, refine=refine),
+        cell=cell,
+        graph=graph,
+        ceiling=ceiling,
+        enough=enough,
+    )
+
+
+def leaves_grid(job: Job) -> bool:
+    """Return whether plans of a job may leave the grid of gamma."""
+    return job.options.refine or job.options.method == "continuous"
+
+
+def fastest_speeds(job: Job, *, progress: Progress = no_progress) -> list[ContourSpeed]:
+    """Return the fastest constant speed of each contour of a job, at its nodes and as run.
+
+    The speeds in the job, shares of them, and the penalties of [comfort] have no effect.
+
+    Raises
+    ------
+    InputError
+        As `run_job`.
+    """
+    part = job.read_part()
+    cell = cell_of_job(job, part)
+    answers = []
+    tasks = job.tasks(part)
+    for i, task in enumerate(tasks):
+        progress("contours", i, len(tasks))
+        progress(f"{task.name}: fastest speed", 0, 0)
+        nodes, own = task.evenly_fast(part), replace(job, options=task.asked(job.options))
+        try:
+            found = fastest_along(own, nodes, cell, refine=leaves_grid(job), ceiling=True)
+        except NoFeasiblePath as broken:
+            answers.append(ContourSpeed(task=task, nodes=nodes, at_nodes=broken))
+            continue
+        progress(f"{task.name}: between the nodes", 0, 0)
+        free = replace(own, options=own.options.without_penalties)
+        as_run = speed_as_run(free, nodes, cell, found.speed)
+        answers.append(ContourSpeed(task=task, nodes=nodes, at_nodes=found, as_run=as_run))
+    return answers

@@ -1,0 +1,294 @@
+"""Plan over continuous gamma: paths by the value function, refined; else from the grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from kerfpath import refiner
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.planner.collision_free import ClearSearch
+from kerfpath.planner.on_grid import plan_on_grid, shaken, thinned
+from kerfpath.planner.quickest import alike, clear_paths, wide
+from kerfpath.planner.statements import plan_off_grid
+from kerfpath.planner.task import PlanningTask
+from kerfpath.plans import Plan, Proof
+from kerfpath.refiner import Refinement
+from kerfpath.search import ContinuousPath, Effort, find_shortest
+
+FIRST_STEP = 5e-3
+"""rad: first change of gamma when a path between the samples is refined."""
+FINE, COARSE = (0.1, 0.25), (1.1, 1.0)
+"""`Effort.alike` of beams for paths that hardly accelerate, and for paths that must."""
+QUICK = (Effort(60, FINE, 2), Effort(200, COARSE, 2))
+"""Efforts of the first paths; a wide search follows if the value function promises more."""
+OTHERWISE = (0.5, 0.5)
+"""`Effort.alike` of a wide search that is to reach other local optima than the first."""
+ENOUGH, POOR = 5e-3, 1e-2
+"""Relative gap to the value function: below the first a motion is good; beyond the second (6) binds
+so much that the promised costs say little, and all paths are refined."""
+COARSE_STEP = np.radians(1.5)
+"""rad: step of gamma from which a search that finds nothing is repeated with half the step."""
+NEARLY = 0.95
+"""Share of the speed at which a motion must have been found for that."""
+GAIN = 5e-3
+"""Relative gain that a refinement may reach beyond the promised cost of a path."""
+NARROWED = 6
+"""Most repetitions of a refinement closer to its path while the result is not clear."""
+FREE = 1.0
+"""rad or m: how far external axes may at first leave their course in a cell."""
+
+
+def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]) -> Plan:
+    """Return the best motion found over continuous gamma, or on the grid if that is not possible.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No motion was found, not even on the grid.
+    """
+    if reason := grid_reason(task):
+        return _from_grid(task, finder, begin, f"planned on the grid: {reason}")
+    begin("search")
+    found = clear_motion(task, finder, begin)
+    if found is not None:
+        return claimed(found, finder)
+    why = "begun from the grid: the search between its samples found no motion"
+    try:
+        made = _from_grid(task, finder, begin, why)
+    except NoFeasiblePath as none:
+        finer = _from_more_samples(task, finder, begin, none)
+        if finer is None:
+            raise
+        made = finer
+    return shaken(made, finder) if made.feed is None else made
+
+
+def claimed(found: Refinement, finder: ClearSearch) -> Plan:
+    """Return the plan of a motion with the claim about it."""
+    claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
+    return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
+
+
+def _from_grid(
+    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None], why: str
+) -> Plan:
+    """Return the best plan of the grid, refined if possible; its proof begins with `why`.
+
+    Raises
+    ------
+    NoFeasiblePath
+        There is none.
+    """
+    comfort = task.settings.comfort
+    # The node costs of a slowed-down motion are known only on the grid.
+    priced = task.settings.feed == "dip" and comfort is not None and comfort.costs
+    refine = task.robot.family.free_rotation and not priced
+    made = plan_on_grid(task, finder, begin, refine=refine)
+    return replace(made, proof=replace(made.proof, statement=f"{why}; {made.proof.statement}"))
+
+
+def _from_more_samples(
+    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None], none: NoFeasiblePath
+) -> Plan | None:
+    """Return a plan found with twice as many samples of gamma; None if there is none.
+
+    This is tried if the samples are not close already and a motion nearly as fast was found.
+    """
+    needed, fine = none.relaxation, _finer(task)
+    if fine is None or needed is None or needed.speed < NEARLY or none.closed is not None:
+        return None
+    there = finder.of(fine)
+    found = clear_motion(fine, there, begin)
+    why = "begun from a finer grid: the search between its samples found no motion"
+    try:
+        made = _from_grid(fine, there, begin, why) if found is None else claimed(found, there)
+    except NoFeasiblePath:
+        return None
+    return replace(made, settings=task.settings)
+
+
+def _finer(task: PlanningTask) -> PlanningTask | None:
+    """Return the task with twice as many samples of gamma; None if they are close already.
+
+    Its graph is built when it is needed.
+    """
+    step = task.settings.gamma_step
+    return task.sampled(step / 2) if step >= COARSE_STEP else None
+
+
+def clear_motion(
+    task: PlanningTask,
+    finder: ClearSearch,
+    begin: Callable[[str], None] = lambda what: None,
+    *,
+    thorough: bool = True,
+) -> Refinement | None:
+    """Return the best clear motion found; None if there is none.
+
+    The value function shows whether a wider search may find a better motion; without `thorough`,
+    the refined first paths are enough. With very many nodes, a motion is first planned along some
+    of them, and the graph of all nodes is built only if that is not enough.
+
+    Raises
+    ------
+    NoFeasiblePath
+        A node has no pose.
+    """
+    starts = _Starts(task, finder)
+    made, least = _from_fewer_nodes(task, finder)
+    starts.start_from(made, least)
+    if starts.best is not None and not starts.above(least, ENOUGH):
+        return starts.best
+    task = task.whole()
+    searched = clear_paths(task, finder, QUICK if starts.best is None else ())
+    if searched is None:
+        return starts.best
+    search, paths = searched
+    if starts.best is not None and starts.above(search.value, ENOUGH):
+        paths = [path for effort in QUICK for path in search.paths(effort)]
+    begin("refinement")
+    starts.refine(paths)
+    if not thorough:
+        return starts.best
+    if starts.above(search.value, ENOUGH):
+        paths += search.paths(wide(task))
+        starts.refine(paths)
+        starts.refine_from_grid(task)
+    if starts.best is not None and starts.above(search.value, POOR):
+        fine = _finer(task) if finder.is_free else None
+        if fine is not None:
+            starts.refine_from_grid(fine)
+        width, _, ways = wide(task)
+        paths += search.paths(Effort(width, OTHERWISE, ways))
+        starts.refine(paths, unpromising=True)
+        made = shaken(starts.best.plan, finder)
+        return replace(starts.best, plan=made, cost_after=made.cost)
+    return starts.best
+
+
+def _from_fewer_nodes(task: PlanningTask, finder: ClearSearch) -> tuple[Plan | None, float]:
+    """Return the motion along some of very many nodes, extended to all, and a cost to compare with.
+
+    None if there is none. No motion along all nodes costs less than the best one along some: its
+    steps together are no shorter, and the thinned nodes impose no more (5), (6). The cost is 0 if
+    this does not apply.
+    """
+    thin = thinned(task)
+    found = None if thin is None else clear_motion(thin.task, finder.of(thin.task))
+    if thin is None or found is None:
+        return None, 0.0
+    comfort = task.settings.comfort
+    told = task.settings.objective == "sum" and (comfort is None or not comfort.costs)
+    return thin.lifted(found.plan), found.cost_after if told else 0.0
+
+
+class _Starts:
+    """Starts of refinements, and the best motion that was reached from them."""
+
+    def __init__(self, task: PlanningTask, finder: ClearSearch) -> None:
+        self._task, self._finder = task, finder
+        self._tried: list[Plan] = []
+        self.best: Refinement | None = None
+
+    def above(self, value: float, share: float) -> bool:
+        """Return whether the best motion costs more than (1 + share) times a value."""
+        return self.best is None or self.best.cost_after > (1 + share) * value
+
+    def start_from(self, made: Plan | None, least: float) -> None:
+        """Refine a motion that is close to the best one, whose cost is at least `least`."""
+        if made is not None:
+            self._tried.append(made)
+            found = refiner.refine(made, first=FIRST_STEP, least=least)
+            self.best = found if found.done and self._finder.is_clear(found.plan) else None
+
+    def refine(self, paths: list[ContinuousPath], *, unpromising: bool = False) -> None:
+        """Refine paths, the most promising first, and of similar paths only one.
+
+        Paths that promise no better motion are refined only if `unpromising`: the cost of bringing
+        a path inside the limits is a guess.
+        """
+        claim = Proof(optimal=False, statement="found over continuous rotation")
+        plans = [self._task.plan_between(path, claim) for path in paths]
+        for promised, i in sorted((refiner.promise(plan), i) for i, plan in enumerate(plans)):
+            best, made = self.best, plans[i]
+            hopeless = best is not None and promised * (1 - GAIN) >= best.cost_after
+            if hopeless and not unpromising:
+                break
+            known = self._tried if best is None else [*self._tried, best.plan]
+            if not any(alike(made, other) for other in known):
+                self._tried.append(made)
+                found = _refine_path(self._task, self._finder, paths[i], made)
+                self.best = _better(best, found)
+
+    def refine_from_grid(self, task: PlanningTask) -> None:
+        """Refine the best path on the grid of a task, if there is already a motion to improve on.
+
+        It leads to other local optima than paths between the samples do.
+        """
+        if self.best is None:
+            return
+        found: Refinement | None
+        try:
+            path = self._finder.find(find_shortest, task.problem)
+        except NoFeasiblePath:
+            found = plan_off_grid(task, self._finder) if task.settings.closure == "free" else None
+        else:
+            claim = Proof(optimal=False, statement="begun from the grid")
+            found = refiner.refine(task.plan(path.index, path.cost, claim))
+        if found is not None and found.done and self._finder.is_clear(found.plan):
+            own = replace(found.plan, settings=self._task.settings)
+            self.best = _better(self.best, replace(found, plan=own))
+
+
+def _refine_path(
+    task: PlanningTask, finder: ClearSearch, path: ContinuousPath, made: Plan
+) -> Refinement | None:
+    """Return the refinement of a path; None if it does not keep the limits or is not clear.
+
+    In a cell, gamma stays between clear samples. Where the refined motion is not clear, gamma and
+    external axes are kept closer to the path, and the refinement is repeated.
+    """
+    clear = finder.corridor(path.one, path.other)
+    if clear is None:
+        found = refiner.refine(made, first=FIRST_STEP)
+        return found if found.done else None
+    graph = task.graph
+    sample = graph.sample[path.one].astype(np.int64)
+    below, above = graph.gamma_at(sample), graph.gamma_at(sample + (path.one != path.other))
+    at = below + path.share * (above - below)
+    low = made.gamma - (at - graph.gamma_at(sample - clear[0]))
+    high = made.gamma + graph.gamma_at(sample + (path.one != path.other) + clear[1]) - at
+    begun = np.column_stack([made.gamma, made.unwrapped[:, made.robot.free]])
+    low, high = (
+        np.column_stack([gamma, begun[:, 1:] + side * FREE])
+        for gamma, side in ((low, -1.0), (high, 1.0))
+    )
+    for _ in range(NARROWED):
+        found = refiner.refine(made, first=FIRST_STEP, within=(low, high))
+        unclear = finder.unclear(found.plan)
+        if not (found.done and unclear.any()):
+            break
+        moved = unclear[:, None]
+        low = np.where(moved, (low + begun) / 2, low)
+        high = np.where(moved, (high + begun) / 2, high)
+    return found if found.done and not unclear.any() else None
+
+
+def _better(one: Refinement | None, other: Refinement | None) -> Refinement | None:
+    """Return the better of two motions, or the one that there is."""
+    if one is None or other is None:
+        return one or other
+    return min(one, other, key=lambda found: found.cost_after)
+
+
+def grid_reason(task: PlanningTask) -> str:
+    """Return why a task must be planned on the grid; "" if it need not be."""
+    comfort = task.settings.comfort
+    if not task.robot.family.free_rotation:
+        return "the robot leaves no rotation free"
+    if comfort is not None and comfort.prices_clearance:
+        return "the cost of clearance is known only there"
+    return ""

@@ -1,0 +1,377 @@
+"""plan(): the best joint motion of a robot along a contour."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Unpack
+
+from numpy.typing import ArrayLike
+
+from kerfpath.arrays import Array
+from kerfpath.cell import Cell
+from kerfpath.certificate import Certify
+from kerfpath.certifier import certify
+from kerfpath.compiling import finish_compiling
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.graph import LayeredGraph
+from kerfpath.options import KEEPS, PlanKeywords, PlanOptions, with_keywords
+from kerfpath.planner.collision_free import ClearSearch
+from kerfpath.planner.continuous import clear_motion, grid_reason, plan_continuous
+from kerfpath.planner.external_motion import along_a_course, plan_over_courses
+from kerfpath.planner.on_grid import plan_on_grid
+from kerfpath.planner.statements import limits_named, refine_plan, with_windows_said
+from kerfpath.planner.task import PlanningTask, task_of
+from kerfpath.plans import Plan, Proof
+from kerfpath.progress import Progress, no_progress
+from kerfpath.robots import Robot
+from kerfpath.search import Piece, find_interrupted
+
+# -----------------------------------------------------------------------------
+# The best motion over continuous gamma, without falling back to the grid and without proofs.
+
+
+def best_motion(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: Array,
+    placement: Array,
+    speed: float | None,
+    options: PlanOptions,
+    graph: LayeredGraph | None = None,
+    cell: Cell | None = None,
+    phase: Callable[[str], None] | None = None,
+) -> Plan:
+    """Return the plan of the best motion found over continuous gamma.
+
+    It is that of `kerfpath.plan`, but not certified. Where `kerfpath.plan` would go to the grid,
+    this raises NoFeasiblePath and spends no time on a proof.
+
+    Parameters
+    ----------
+    contour, robot, tool, placement, speed, options, graph, cell, phase
+        As in `kerfpath.plan`, method "continuous".
+
+    Raises
+    ------
+    NoFeasiblePath
+        No motion is found, or a node has no pose; only the latter is proved.
+    InputError
+        As `kerfpath.plan`.
+    """
+    options = replace(options, certify=None)
+    task = task_of(
+        contour, robot, options, tool=tool, placement=placement, speed=speed, graph=graph
+    )
+    task = along_a_course(task, ClearSearch(task, cell).clear)
+    finder, begin = ClearSearch(task, cell), phase or (lambda what: None)
+    why = grid_reason(task)
+    begin("search")
+    found = None if why else clear_motion(task, finder, begin)
+    if found is None:
+        raise NoFeasiblePath(
+            f"contour {contour.name!r}: no motion over continuous rotation"
+            f"{f': {why}' if why else ' was found'}",
+            proved=False,
+            node=-1,
+            counts={},
+        )
+    claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
+    return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
+
+
+# -----------------------------------------------------------------------------
+# Bound of a plan: its largest possible distance from the best motion.
+
+
+def with_bound(
+    made: Plan,
+    asked: Certify | None,
+    *,
+    phase: Callable[[str], None] | None = None,
+    progress: Progress = no_progress,
+) -> Plan:
+    """Return the plan with a proved bound, or with the reason why there is none.
+
+    The plan keeps the certificate, which is large, only if `asked.keep`.
+
+    Parameters
+    ----------
+    made : Plan
+    asked : Certify or None
+        How to certify it; becomes part of its settings. None: the plan stays without a bound.
+    phase : callable, optional
+        Called with "certificate" when this begins.
+    progress : callable
+        As `kerfpath.certifier.certify` calls it.
+    """
+    settings = replace(made.settings, certify=asked)
+    if asked is None:
+        return replace(made, settings=settings)
+    if phase is not None:
+        phase("certificate")
+    finish_compiling()
+    found = certify(
+        made, gap=asked.gap, seconds=asked.seconds, checkable=asked.keep, progress=progress
+    )
+    proof = replace(
+        found.plan.proof,
+        statement=f"{made.proof.without_bound().statement}; {found.statement}",
+        certificate=found.plan.proof.certificate if asked.keep else None,
+    )
+    return replace(found.plan, settings=settings, proof=proof)
+
+
+# -----------------------------------------------------------------------------
+# plan(): the best joint motion of a robot along a contour.
+
+
+def plan(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    speed: float | None = None,
+    options: PlanOptions | None = None,
+    cell: Cell | None = None,
+    graph: LayeredGraph | None = None,
+    external: ArrayLike | None = None,
+    progress: Callable[[int], None] | None = None,
+    phase: Callable[[str], None] | None = None,
+    **keywords: Unpack[PlanKeywords],
+) -> Plan:
+    """Return the best joint motion along the contour.
+
+    Parameters
+    ----------
+    contour : Contour
+        Nodes in the part frame, evenly spaced (see `Contour.resample`).
+    robot : Robot
+        With joint limits, velocities and accelerations.
+    tool : (4, 4)
+        T_flange_tip, m: tip frame in the flange, z along the beam into the part.
+    placement : (4, 4)
+        T_base_part, m: part frame in the robot base.
+    speed : float m/s
+        Speed along the path; omitted if the contour carries its own times.
+    options : PlanOptions, optional
+        Planning options; default: `PlanOptions()`. Each option may also be given as a keyword,
+        which takes precedence:
+
+        gamma_step : float rad
+            Step of the free rotation about the beam.
+        frames : {"rotation-minimising", "tangent"}
+            Task frames that gamma is measured in.
+        tilt : Tilt, optional
+            Tolerance of the tool axis, which is then searched too; default: the nominal axis only.
+        postures : sequence of int, optional
+            The postures that may be used; default all. See `kerfpath.robots.postures_named`.
+        method : {"continuous", "exact", "paper", "known"}
+            "continuous" (the default): the best motion found over continuous gamma, by a value
+            function between its samples, beam searches that keep the acceleration limits, and
+            refinement. If this is not possible or finds nothing, it plans as "exact" with `refine`,
+            and the proof says so. The others search the grid, as in `shortest_path`.
+        objective, metric, weights, eta_v, eta_a, closure, rotation
+            As in `shortest_path`; "periodic" closure needs a closed contour.
+        feed : {"constant", "dip"}
+            If the limits do not allow the speed everywhere: "constant" refuses, "dip" keeps it
+            where they do and slows down elsewhere, in the least time; `Plan.feed` says where.
+            "dip" needs objective "sum", closure "free" and no rotation limit.
+        refine : bool
+            After a search of the grid, move gamma off it, see `kerfpath.refine`. If the grid has
+            no path (it quantises acceleration), one is looked for off it.
+        comfort : Comfort, optional
+            Margins that the nodes keep from singularities and limits, and the costs near them; see
+            `kerfpath.comfort`. Costs are added at every node visited (objective "max":
+            maximised); with closure "periodic" the first node is visited twice.
+        gamma_windows : sequence of GammaWindow
+            Stretches of the contour on which gamma is kept inside an interval; default none. Their
+            ends are samples of gamma, too.
+        certify : Certify, optional
+            The gap to reach between the plan's cost and a lower bound on every motion's cost, and
+            the time for it; None: nothing is proved beyond the grid. See `Proof.bound`.
+    cell : Cell, optional
+        Cell in which the plan is clear, at the nodes and on straight joint motions between them.
+        Only poses and motions that the search would use are checked. Methods "continuous" and
+        "exact" only; the latter finds the best of all clear paths.
+    graph : LayeredGraph, optional
+        The layered graph of this task, from `layered_graph`.
+    external : (K, E) rad or m, optional
+        Values of the robot's external axes at every node, from which they are refined; for a
+        seven-axis arm, those of joint 3 come first. Default: the method "continuous" looks for a
+        smooth course, the others search a grid in the steps of these joints.
+    progress : callable, optional
+        Called with the number of nodes whose poses have been solved since the last call. With very
+        many nodes some are solved first, and all only if these do not lead to a plan.
+    phase : callable, optional
+        Called with each phase that begins once the poses are solved: "search", "refinement",
+        "certificate".
+
+    Raises
+    ------
+    NoFeasiblePath
+        There is no path; the message names the first node where it breaks, and counts what each
+        test removed there.
+    InputError
+        Limits that are not known, nodes unevenly spaced, values out of range, or `between_nodes`
+        "guaranteed".
+    """
+    asked = with_keywords(options, keywords, PlanKeywords)
+    require_nodes_alone(asked, "plan")
+    if cell is None and asked.comfort is not None and asked.comfort.clearance is not None:
+        raise InputError("comfort clearance: is measured in a cell; give cell=")
+    task = task_of(
+        contour,
+        robot,
+        asked,
+        tool=tool,
+        placement=placement,
+        speed=speed,
+        graph=graph,
+        external=external,
+        progress=progress,
+    )
+    finder = ClearSearch(task, cell)
+    begin = phase or (lambda what: None)
+    try:
+        if asked.method == "continuous" and robot.free.size and not task.placed:
+            made = plan_over_courses(task, finder, begin)
+        elif asked.method == "continuous":
+            made = plan_continuous(task, finder, begin)
+        else:
+            made = plan_on_grid(task, finder, begin, refine=asked.refine)
+    except NoFeasiblePath as broken:
+        raise with_windows_said(broken, asked) from None
+    return with_bound(made, asked.certify, phase=phase)
+
+
+def require_nodes_alone(options: PlanOptions, what: str) -> None:
+    """Raise InputError if `between_nodes` is "guaranteed", which a plan by itself cannot be.
+
+    The guarantee depends on the program and its controller, see `kerfpath.keep_limits` and jobs.
+    """
+    if options.between_nodes == "guaranteed":
+        raise InputError(
+            f'between_nodes: expected "reported" or "kept", got "guaranteed"; {what} holds the '
+            f"limits at the nodes only: leave the option out, and {KEEPS}; or run a job"
+        )
+
+
+# -----------------------------------------------------------------------------
+# Contours that cannot be cut in one go: the fewest interruptions, and a plan for each piece.
+
+
+class PieceKeywords(PlanKeywords, total=False):
+    """The options that `plan_in_pieces` takes as keywords."""
+
+    least_piece: float | None
+
+
+def plan_in_pieces(
+    contour: Contour,
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    speed: float | None = None,
+    options: PlanOptions | None = None,
+    cell: Cell | None = None,
+    graph: LayeredGraph | None = None,
+    progress: Callable[[int], None] | None = None,
+    phase: Callable[[str], None] | None = None,
+    **keywords: Unpack[PieceKeywords],
+) -> tuple[Plan, ...]:
+    """Return the plans of the pieces in which a contour is cut, with the fewest interruptions.
+
+    At an interruption the beam goes off, the robot takes another pose at the same node, and the cut
+    goes on from there. On the graph it is proved that no plan has fewer interruptions, and that
+    none with as many costs less; the grid thus decides where the cut is interrupted. Each piece is
+    then planned on its own over continuous gamma (or refined, with the method "exact" and
+    `refine`), and certified on its own: its bound holds for motions along that piece. The moves
+    between pieces are not planned here and cost nothing.
+
+    Parameters
+    ----------
+    contour, robot, tool, placement, speed, options, cell, graph, progress, phase
+        As in `plan`, with method "continuous" or "exact", closure "free" (a closed contour need
+        not return to its first pose), no rotation limit and no tilt. Comfort: a node in two pieces
+        costs in both.
+    least_piece : float m, optional
+        Least length of every piece, measured along the nodes; the number of interruptions is then
+        the least possible with this length. A cut in one go may be shorter.
+
+    Returns
+    -------
+    plans : tuple of Plan
+        One for each piece, in order; a single one if the cut needs no interruption. The contour of
+        each has the nodes that it cuts, with the arc length `s` of the whole contour.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No number of interruptions helps: a node has no pose, no poses can pass an interval between
+        two nodes, or no pieces have the least length. Or no motion along a piece was found that
+        keeps the jerk limits.
+    InputError
+        As `plan`; another method or closure, a rotation limit, or a tilt.
+    """
+    asked = with_keywords(options, keywords, PieceKeywords, interruptions="fewest")
+    require_nodes_alone(asked, "plan_in_pieces")
+    task = task_of(
+        contour,
+        robot,
+        asked,
+        tool=tool,
+        placement=placement,
+        speed=speed,
+        graph=graph,
+        progress=progress,
+    )
+    task = along_a_course(task, ClearSearch(task, cell).clear).whole()
+    finder = ClearSearch(task, cell)
+    begin = phase or (lambda what: None)
+    begin("search for pieces")
+    try:
+        search = partial(find_interrupted, s=contour.s, least_piece=asked.least_piece)
+        found = finder.find(search, task.problem)
+    except NoFeasiblePath as broken:
+        raise broken.with_message(
+            f"contour {contour.name!r}: no number of interruptions helps: {broken}"
+        ) from None
+    plans = []
+    for number, piece in enumerate(found.pieces, 1):
+        part, made = _plan_piece(task, finder, piece, number, len(found.pieces))
+        if asked.refine or asked.method == "continuous":
+            begin(f"refinement of piece {number} of {len(found.pieces)}")
+            made = _off_grid(part, ClearSearch(part, cell), made)
+        plans.append(with_bound(made, asked.certify, phase=begin))
+    return tuple(plans)
+
+
+def _off_grid(part: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
+    """Return the plan of a piece moved off its grid: the best motion found there."""
+    refined = refine_plan(part, finder, made)
+    found = None
+    if part.settings.method == "continuous" and not grid_reason(part):
+        found = clear_motion(part, finder)
+    if found is None or found.cost_after >= refined.cost:
+        return refined
+    claim = f"{made.proof.statement}; the best motion found over continuous rotation"
+    return replace(found.plan, proof=Proof(optimal=False, statement=claim))
+
+
+def _plan_piece(
+    task: PlanningTask, finder: ClearSearch, piece: Piece, number: int, count: int
+) -> tuple[PlanningTask, Plan]:
+    """Return the task of one piece, and its plan on the grid."""
+    claim = f"the best path on this graph under {limits_named(task.problem)}"
+    if count > 1:
+        last = piece.first + len(piece.index) - 1
+        task = task.part(piece.first, last, f"{task.contour.name}, piece {number} of {count}")
+        claim = f"piece {number} of the cheapest cut with the fewest interruptions, {count - 1}"
+    proof = Proof(optimal=True, statement=finder.claimed(claim))
+    return task, task.plan(piece.index, task.cost(piece.index), proof)

@@ -1,0 +1,200 @@
+"""Quickest motion: the fastest path moved off the grid, then beam searches at higher speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kerfpath.arrays import short_repr
+from kerfpath.kernels.metric import wrap
+from kerfpath.planner.collision_free import ClearSearch
+from kerfpath.planner.task import PlanningTask
+from kerfpath.plans import Plan, Proof
+from kerfpath.refiner import Binding, quicken
+from kerfpath.search import (
+    ContinuousPath,
+    ContinuousSearch,
+    Effort,
+    LeastInterval,
+    edges_allowed,
+    find_least_interval,
+    find_slow_path,
+)
+
+RUNGS = (1.06, 1.0, 1.1)
+"""Multiples of the speed reached at which beam searches look for a quicker motion. If no motion is
+as quick, they keep (6) as far as they can, and end in another local optimum."""
+GAIN = 2e-3
+"""Relative gain of speed below which a rung counts as without gain."""
+WIDE, MOST_STATES = 1600, 5_000_000
+"""Most states kept in a wide search, in each layer and in all layers."""
+ALIKE = (1.1, 0.5)
+"""`Effort.alike` of a wide search."""
+MOST_EDGES = 2e7
+"""Most edges with which the exact search for the fastest path takes at most some ten seconds."""
+SLACK = 1e-6
+"""Share of the interval that is left free, so that the motion keeps the limits after rounding."""
+SAME_VALLEY = 0.05
+"""rad: paths whose gamma differs by less are refined to the same motion."""
+MOST_SEARCHES = 40
+"""Most searches for paths that are clear."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class QuickMotion:
+    """A motion with the least interval between its nodes, and the limit that binds it.
+
+    Parameters
+    ----------
+    plan : Plan
+        The motion with the times of that interval; not refined for its cost.
+    at : Binding
+    on_grid : float s
+        The least interval of a path on the grid.
+    """
+
+    plan: Plan
+    at: Binding
+    on_grid: float
+
+    __repr__ = short_repr
+
+    @property
+    def dt(self) -> float:
+        """Interval between its nodes, s."""
+        return self.plan.dt
+
+    def is_enough(self, dt: float) -> bool:
+        """Return whether it keeps every limit, rounding included, with `dt` s between its nodes."""
+        return self.dt * (1 - SLACK / 2) <= dt
+
+
+def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotion]:
+    """Yield successively quicker motions along the contour of a task, clear and within its margins.
+
+    The first is the fastest path on the grid. The second, if the robot leaves a rotation free, is
+    that path with gamma moved off the grid, or the same again. Beam searches over continuous gamma
+    at the speed reached and above give the others, whatever they cost, until the speed no longer
+    grows. The speed, closure and costs of the task do not matter: tasks that differ only in them
+    have the same motions, in the same order.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No path on the grid is clear at any speed.
+    """
+    task = _without_aim(task)
+    best = _along(task, finder.find(find_least_interval, task.problem))
+    path = best.plan
+    yield best
+    if not task.robot.family.free_rotation:
+        return
+    best = quicker(task, finder, path, best)
+    yield best
+    rung, tried = 0, [path]
+    while rung < len(RUNGS):
+        before, ahead = best.dt, _at(task, best.dt / RUNGS[rung])
+        found = clear_paths(ahead, finder, (wide(task),))
+        for between in () if found is None else found[1]:
+            made = ahead.plan_between(between, _claim())
+            if not any(alike(made, other) for other in tried):
+                tried.append(made)
+                faster = quicker(task, finder, made, best)
+                if faster is not best:
+                    best = faster
+                    yield best
+        rung = 0 if best.dt < (1 - GAIN) * before else rung + 1
+
+
+def slow_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotion]:
+    """Yield motions of a task whose speed is much too high: the quickest if these take little time.
+
+    If the velocities leave very many edges in the time that a path takes, they are the shortest
+    path by the velocities alone, and that path with gamma moved off the grid. Raises as
+    `quick_motions`.
+    """
+    slow = _without_aim(task)
+    path = finder.find(find_slow_path, slow.problem)
+    if edges_allowed(slow.problem, path.dt) <= MOST_EDGES:
+        yield from quick_motions(task, finder)
+        return
+    task, best = slow, _along(slow, path)
+    yield best
+    if task.robot.family.free_rotation:
+        yield quicker(task, finder, best.plan, best)
+
+
+def _along(task: PlanningTask, least: LeastInterval) -> QuickMotion:
+    """Return the motion along a path on the grid."""
+    path = _at(task, least.dt).plan(least.index, 0.0, _claim())
+    at = Binding(least.joint, least.node, least.limit)
+    return QuickMotion(plan=path, at=at, on_grid=least.dt)
+
+
+def _without_aim(task: PlanningTask) -> PlanningTask:
+    """Return the task of the fastest speed: no costs, no closure, default distances."""
+    velocity, _ = task.robot.speed_limits()
+    settings = replace(
+        task.settings.without_penalties,
+        metric="manhattan",
+        objective="sum",
+        closure="free",
+        rotation=None,
+        weights=1 / velocity,
+    )
+    problem = replace(
+        task.problem.free(), metric="manhattan", objective="sum", weights=settings.weights
+    )
+    return replace(task.with_problem(problem), settings=settings)
+
+
+def _at(task: PlanningTask, dt: float) -> PlanningTask:
+    return task.with_problem(replace(task.problem, dt=dt))
+
+
+def _claim() -> Proof:
+    return Proof(optimal=False, statement="the quickest motion found")
+
+
+def quicker(task: PlanningTask, finder: ClearSearch, start: Plan, best: QuickMotion) -> QuickMotion:
+    """Return the better of the best motion so far and a start with its interval minimised."""
+    quickened = quicken(start)
+    if quickened is None:
+        return best
+    made, at = quickened
+    made = replace(made, time=made.time * (1 + SLACK))
+    comfort = task.settings.comfort
+    if made.dt >= best.dt:
+        return best
+    if comfort is not None and comfort.broken(task.robot, made.q, task.T_flange_tip):
+        return best
+    return replace(best, plan=made, at=at) if finder.is_clear(made) else best
+
+
+def wide(task: PlanningTask) -> Effort:
+    """Return the effort of a wide search, less wide over very many nodes."""
+    return Effort(min(WIDE, MOST_STATES // len(task.contour) + 1), ALIKE, 1)
+
+
+def clear_paths(
+    task: PlanningTask, finder: ClearSearch, efforts: tuple[Effort, ...]
+) -> tuple[ContinuousSearch, list[ContinuousPath]] | None:
+    """Return a search over continuous gamma and its paths, clear at the samples that they use.
+
+    Samples that paths would use are checked, and avoided if they collide, until all paths are
+    clear; None if this takes too many searches.
+    """
+    for _ in range(MOST_SEARCHES):
+        search = ContinuousSearch(finder.open_problem(task.problem), task.samples)
+        paths = [path for effort in efforts for path in search.paths(effort)]
+        if not finder.learn([ends for path in paths for ends in (path.one, path.other)]):
+            return search, paths
+    return None
+
+
+def alike(made: Plan, other: Plan) -> bool:
+    """Return whether two motions are so similar that they are refined to the same one."""
+    apart = np.abs(wrap(made.gamma - other.gamma)).max()
+    return bool(apart < SAME_VALLEY and np.array_equal(made.posture, other.posture))

@@ -1,0 +1,567 @@
+"""Build the neutral program from plans."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath.arrays import Array, floats, freeze, not_negative, scalar, short_repr
+from kerfpath.cell import UNPROVED
+from kerfpath.errors import InputError
+from kerfpath.names import identifier, identifiers
+from kerfpath.plans import Plan
+from kerfpath.post.arcs import Zone, euler, from_euler, with_arcs, zones_at
+from kerfpath.post.checks import LOWEST_SHARE
+from kerfpath.post.program import (
+    Await,
+    Comment,
+    Handshake,
+    JointMove,
+    LinearMove,
+    Program,
+    Request,
+    Section,
+    Step,
+    Switch,
+    Wait,
+)
+from kerfpath.robots import ExternalAxis, Robot, carried, posture_name
+from kerfpath.transfer import End, TransferMove, back_off, least_time, speed_share
+
+# -----------------------------------------------------------------------------
+# External axes in programs: their values in the controller's units, and their set-up.
+#
+# The targets of a program are poses of the tip in the part, wherever external axes carry robot
+# and part. Some controllers couple the work object to the axes that carry the part, and have the
+# same poses (RAPID, KRL); others have poses of the tip in the fixed frame (FANUC), see
+# `standing`. In both cases the controller itself takes account of axes that carry the robot.
+
+SAME_DIRECTION = 0.1
+"""Sine below which x of the base does not define how a frame about an axis is turned."""
+
+
+def said_unit(axis: ExternalAxis) -> str:
+    """Return the unit of the values of an axis in programs: mm or deg."""
+    return "mm" if axis.kind == "linear" else "deg"
+
+
+def arm_joints(robot: Robot, q: ArrayLike) -> Array:
+    """Return the joints (K, m) rad of the arm alone from joint vectors q (K, n)."""
+    return floats(q, "q", (None, robot.joints))[:, : robot.family.joints]
+
+
+def said(robot: Robot, q: ArrayLike) -> Array:
+    """Return the values (K, E) of the external axes, mm and deg, from joint vectors q (K, n)."""
+    values = floats(q, "q", (None, robot.joints))[:, robot.family.joints :]
+    return np.asarray(values * _scales(robot))
+
+
+def from_said(robot: Robot, values: ArrayLike) -> Array:
+    """Return values (..., E) of the external axes in m and rad, given in mm and deg."""
+    return freeze(np.asarray(values, dtype=np.float64) / _scales(robot))
+
+
+def _scales(robot: Robot) -> Array:
+    return np.array([1e3 if a.kind == "linear" else np.degrees(1.0) for a in robot.externals])
+
+
+def axes_that_carry(robot: Robot, what: str) -> list[int]:
+    """Return the numbers, from 0, of the external axes that carry "robot" or "part"."""
+    return [i for i, axis in enumerate(robot.externals) if axis.carries == what]
+
+
+def carrier_frame(robot: Robot, values: Sequence[float] | None = None) -> Array:
+    """Return the frame that moves with the part, (4, 4) m in the robot base, all axes at zero.
+
+    It is the identity if no axis carries the part.
+
+    Parameters
+    ----------
+    robot : Robot
+    values : six numbers, optional
+        The frame at the controller: mm, and deg about fixed x, y, z. Default: a frame at the point
+        of the last axis that carries the part. For a linear axis it is parallel to the base; for a
+        rotary one, z is along the axis and x as close as possible to x of the base (to its y if
+        the axis runs along x).
+    """
+    if values is not None:
+        return freeze(from_euler(values, "xyz")[0])
+    T = np.eye(4)
+    for i in axes_that_carry(robot, "part")[-1:]:
+        axis = robot.externals[i]
+        T[:3, 3] = axis.point
+        if axis.kind == "rotary":
+            across = np.eye(3)[:2] - axis.axis[:2, None] * axis.axis
+            x = across[int(np.linalg.norm(across[0]) < SAME_DIRECTION)]
+            x = x / np.linalg.norm(x)
+            T[:3, :3] = np.c_[x, np.cross(axis.axis, x), axis.axis]
+    return freeze(T)
+
+
+def standing(robot: Robot, T_base_part: Array, external: Array) -> Array:
+    """Return the poses (K, 4, 4) m of the part in the part frame with all axes at zero.
+
+    `external` has the values (K, E) m and rad of the external axes.
+    """
+    moved = carried(robot.externals, external, "part")
+    return np.asarray(np.linalg.inv(T_base_part) @ moved @ T_base_part)
+
+
+def words_of(values: Iterable[float], decimals: int) -> str:
+    """Return numbers as text for a remark."""
+    return " ".join(f"{round(float(x), decimals) + 0.0:.10g}" for x in values)
+
+
+def calibration_remarks(robot: Robot, what: str, values: Sequence[float] | None) -> Iterator[str]:
+    """Yield remarks on the required frame of the unit that carries the part, named `what`."""
+    place = words_of(euler(carrier_frame(robot, values)[None], "xyz")[0], 4)
+    yield f"At 0 the frame of {what} stands in the base at {place}"
+    yield "(mm, deg about fixed x, y, z): calibrate it so, or say positioner_frame."
+
+
+def axis_numbers(given: Sequence[int] | None, count: int) -> Sequence[int]:
+    """Return the controller's numbers of `count` external axes; default: from 1 on."""
+    return (given or range(1, count + 1))[:count]
+
+
+def setup_remarks(robot: Robot, *, si: bool = False) -> Iterator[str]:
+    """Yield remarks on the external axes that must be set up at the controller.
+
+    The units are those of the program: mm and deg, or m and rad with `si`.
+    """
+    for axis in robot.externals:
+        unit = axis.unit if si else said_unit(axis)
+        way = "along" if axis.kind == "linear" else "about"
+        yield f"External axis {axis.name} ({unit}): carries the {axis.carries}"
+        yield f"{way} {words_of(axis.axis, 6)} of the base"
+        if axis.kind == "rotary":
+            yield f"through {words_of(axis.point * 1e3, 4)} mm"
+    if robot.externals:
+        yield "Base: where the robot stands with all external axes at 0."
+
+
+# -----------------------------------------------------------------------------
+# Axes of an arm as controllers count them, and the side of the arm on which the wrist lies.
+
+
+def offset_near(robot: Robot, makers_deg: ArrayLike) -> Array:
+    """Return the joint offsets (6,) rad of a robot, each within half a turn of its maker's (deg).
+
+    The geometry of an arm is the same whether joint 6 counts from -180 or from 180 deg, but the
+    axes and turns of its controller are not.
+    """
+    # Slightly less than half a turn, so that halves always round the same way.
+    makers = np.radians(np.asarray(makers_deg, dtype=float))
+    off = robot.offset - makers
+    return np.asarray(makers + off - 2 * np.pi * np.round(off / (2 * np.pi) - 1e-9))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AxisCount:
+    """Axes of an ortho-parallel arm as a controller counts them: matrix @ angles + shift.
+
+    The angles of the model are 0 with the arm upright.
+
+    Parameters
+    ----------
+    counted_from : (6,) deg
+        Joint offsets of the maker's own descriptions.
+    matrix : (6, 6)
+    shift : (6,) rad
+    """
+
+    counted_from: tuple[float, ...] = (0.0,) * 6
+    matrix: Array = field(default_factory=lambda: np.eye(6))
+    shift: Array = field(default_factory=lambda: np.zeros(6))
+
+    __repr__ = short_repr
+
+    def from_joints(self, robot: Robot, q: ArrayLike) -> Array:
+        """Return the controller's axes (K, 6) rad for joint vectors q (K, n) rad."""
+        angles = robot.sign * arm_joints(robot, q)
+        return freeze(np.asarray(angles @ self.matrix.T + self._shift(robot), dtype=np.float64))
+
+    def to_joints(self, robot: Robot, axes: ArrayLike) -> Array:
+        """Return the joints (K, 6) rad of the arm for the controller's axes (K, 6) rad."""
+        rows = floats(axes, "axes", (None, 6)) - self._shift(robot)
+        angles = rows @ np.linalg.inv(self.matrix).T
+        return freeze(np.asarray(robot.sign * angles, dtype=np.float64))
+
+    def _shift(self, robot: Robot) -> Array:
+        """Return the axes (6,) rad at which all joints of the robot are 0."""
+        return np.asarray(self.shift - self.matrix @ offset_near(robot, self.counted_from))
+
+
+def wrist_in_plane(robot: Robot, q: Array) -> tuple[Array, Array]:
+    """Return how far the wrist centre is ahead of axis 1 and of the lower arm, (K,) m each.
+
+    The joint vectors q are (K, n) rad. In the plane of the arm, with x ahead and z up, the lower
+    arm points along u = (sin q2, cos q2) and the wrist centre lies at
+    w = c3 (sin q23, cos q23) + a2 (cos q23, -sin q23) from axis 3. It is behind the lower arm, and
+    the second value is negative, where w turns from u towards the back: u_x w_z > u_z w_x, that is
+    c3 sin q3 + a2 cos q3 < 0.
+    """
+    arm = robot.arm()
+    _, q2, q3, *_ = (arm.sign * arm_joints(robot, q) - arm.offset).T
+    ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
+    bend = arm.c3 * np.sin(q3) + arm.a2 * np.cos(q3)
+    return np.asarray(ahead), np.asarray(bend)
+
+
+# -----------------------------------------------------------------------------
+# A dry run before the first cut: the same motions, slower, with nothing switched.
+
+
+def dry_run(program: Program, share: float) -> Program:
+    """Return the program at a lower speed, without switches, waits and handshakes.
+
+    It stops where the program stops and passes the same targets in the same posture. Its name and
+    those of its sections begin with "dry_", so that neither program ever calls a routine of the
+    other. Each section begins with a comment.
+
+    Parameters
+    ----------
+    program : Program
+    share : float
+        Speed of every move as a share of that in the program, above 0 and at most 1. Joint moves
+        keep at least 1 % of the full speed, because languages cannot express less.
+
+    Raises
+    ------
+    InputError
+        `share` is not above 0 and at most 1.
+    """
+    share = scalar(share, "dry run", above=0.0)
+    if share > 1:
+        raise InputError(f"dry run: expected a share of the speed of at most 1, got {share:g}")
+    said = Comment(f"DRY RUN at {share * 100:g} % of the speed: laser and gas are never switched")
+    title, *names = identifiers(
+        [f"dry_{program.name}", *(f"dry_{section.name}" for section in program.sections)], ()
+    )
+    sections = tuple(
+        Section(name=name, steps=(said, *_slow_steps(section, share)))
+        for name, section in zip(names, program.sections, strict=True)
+    )
+    return replace(program, name=title, sections=sections)
+
+
+def _slow_steps(section: Section, share: float) -> list[Step]:
+    left_out = Wait | Request | Await
+    return [_slow(step, share) for step in section.steps if not isinstance(step, left_out)]
+
+
+def _slow(step: Step, share: float) -> Step:
+    if isinstance(step, LinearMove):
+        return replace(step, speed=share * step.speed, duration=step.duration / share, switches=())
+    if isinstance(step, JointMove):
+        slow = max(share * step.speed, LOWEST_SHARE)
+        took = None if step.duration is None else step.duration * step.speed / slow
+        return replace(step, speed=slow, duration=took)
+    return step
+
+
+# -----------------------------------------------------------------------------
+# Build the neutral program from plans.
+
+CAPSULES = "The links were drawn as capsules: clear of the real ones is not proved."
+"""Comment at the head of a program whose plans were made with capsules for links."""
+PLANNED, UNPLANNED = 1.0, 0.25
+"""Share of the full speed of joint moves, with and without planned transfer moves."""
+MEETS = 1e-5
+"""Largest distance (m) of planned moves from the point to which the tool backs off."""
+PLAN_AND_CONTOUR = 1e-5
+"""Largest distance (m) and sine of an angle by which the planned joints may miss the contour."""
+
+
+def build_program(
+    plans: Sequence[Plan],
+    *,
+    moves: Sequence[TransferMove] = (),
+    name: str | None = None,
+    retract: float = 0.05,
+    zone: Zone = "auto",
+    zone_error: float = 1e-4,
+    lead_time: float = 0.02,
+    gas_lead: float | None = None,
+    pierce_time: float = 0.0,
+    approach_speed: float = 0.1,
+    air_speed: float | None = None,
+    arc_tolerance: float | None = None,
+    handshakes: Sequence[Handshake] = (),
+) -> Program:
+    """Return the program that cuts the planned contours one after the other.
+
+    The steps of each contour are: a joint move to a pose backed off from the start along the tool
+    axis, a straight move to the start with a stop, laser on, straight moves through all nodes with
+    a stop at the last, laser off, and a straight move back along the tool axis. The laser is off
+    along micro joints. The gas, if it is switched, flows from before the start to the end.
+
+    Parameters
+    ----------
+    plans : sequence of Plan
+        Plans in the order of cutting, for the same robot, tool and placement.
+    moves : sequence of TransferMove
+        Transfer moves, as `kerfpath.sequence.plan_part` returns them: one less than plans, or one
+        more from and to a home position. Default: joint moves directly to each start.
+    name : str, optional
+        Name of the program, made an identifier. Default: "cut" and the first contour.
+    retract : float m
+        How far the tool backs off before and after a contour.
+    zone : float m or "auto"
+        Radius within which the corners at the inner nodes may be rounded. It is halved where nodes
+        are close, until zones do not overlap. "auto": up to half way to the next node, which keeps
+        the limits between the nodes; see `kerfpath.execution`.
+    zone_error : float m
+        Largest distance by which the tip may miss a node with `zone` "auto".
+    lead_time : float s
+        Time by which the laser is switched before the tip arrives.
+    gas_lead : float s, optional
+        Time by which the gas is switched on before the tip arrives at the start. Default: the
+        program does not switch the gas.
+    pierce_time : float s
+        Time to wait at the start with the laser on until the beam is through.
+    approach_speed : float m/s
+        Speed along the tool axis before and after a contour.
+    air_speed : float, optional
+        Share of the full speed of joint moves: a move takes its least time within the limits,
+        divided by this share. Default: 1 with `moves`, else 0.25. The first move has 0.25 at most,
+        because its start is not known.
+    arc_tolerance : float m, optional
+        Arcs that stay within this distance of the planned path are written as circular moves; see
+        `with_arcs`. Default: no circular moves.
+    handshakes : sequence of Request or Await
+        Handshakes before each contour, in order, with the tool backed off. Requests are withdrawn
+        after the contour.
+
+    Raises
+    ------
+    InputError
+        There are no plans, plans or moves do not belong together, the joints do not lead the tool
+        along the contour, or the tool cannot back off by `retract`.
+    """
+    if not plans:
+        raise InputError("build_program: expected at least one plan, got none")
+    first = plans[0]
+    if arc_tolerance is not None and first.robot.free.size:
+        raise InputError(
+            f"program: controllers move {first.robot.free_names} along an arc in different ways; "
+            "leave arcs_mm out"
+        )
+    for plan in plans[1:]:
+        _require_same_cell(first, plan)
+    process = _Process(
+        retract=scalar(retract, "retract", unit="m", above=0.0),
+        zone=zone if zone == "auto" else not_negative(zone, "zone", unit="m"),
+        zone_error=scalar(zone_error, "zone_error", unit="m", above=0.0),
+        lead_time=lead_time,
+        gas_lead=gas_lead,
+        pierce_time=not_negative(pierce_time, "pierce_time", unit="s"),
+        approach_speed=scalar(approach_speed, "approach_speed", unit="m/s", above=0.0),
+        handshakes=tuple(handshakes),
+    )
+    title = identifier(f"cut {first.name}" if name is None else name)
+    names = identifiers((plan.name for plan in plans), taken=(title,))
+    *ways, home = _corners(plans, moves, process.retract)
+    air = _Air(first, air_speed or (PLANNED if moves else UNPLANNED))
+    sections = []
+    for plan, section_name, way in zip(plans, names, ways, strict=True):
+        steps = tuple(process.steps(plan, air.moves(way)))
+        sections.append(Section(name=section_name, steps=steps))
+        air.here = back_off(plan, "end", process.retract)
+    if home:
+        back = tuple(air.moves(home))
+        sections[-1] = replace(sections[-1], steps=sections[-1].steps + back)
+    program = Program(
+        name=title,
+        robot=first.robot,
+        T_flange_tip=first.T_flange_tip,
+        T_base_part=first.T_base_part,
+        sections=tuple(sections),
+        air_checked=len(moves) > 0 and all(move.clear for move in moves),
+        caveats=(CAPSULES,) if any(UNPROVED in plan.proof.statement for plan in plans) else (),
+    )
+    if arc_tolerance is None:
+        return program
+    eta_v = min(plan.settings.eta_v for plan in plans)
+    eta_a = min(plan.settings.eta_a for plan in plans)
+    return with_arcs(program, arc_tolerance, eta_v=eta_v, eta_a=eta_a)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Process:
+    """The steps of a contour, with the parameters of `build_program`."""
+
+    retract: float
+    zone: Zone
+    zone_error: float
+    lead_time: float
+    gas_lead: float | None
+    pierce_time: float
+    approach_speed: float
+    handshakes: tuple[Handshake, ...]
+
+    __repr__ = short_repr
+
+    def steps(self, plan: Plan, way: Iterable[JointMove]) -> Iterator[Step]:
+        """Yield the steps of a contour; `way` leads to the pose where the tool is backed off."""
+        _require_on_contour(plan)
+        T = plan.T_part_tip
+        q = plan.unwrapped
+        starts: tuple[Switch, ...] = (self._laser(on=True),)
+        if self.gas_lead is not None:
+            starts = (Switch(signal="gas", on=True, lead_time=self.gas_lead), *starts)
+        yield Comment(
+            f"{plan.name}: {len(q)} nodes, {plan.contour.length * 1e3:.1f} mm, "
+            f"posture {posture_name(int(plan.posture[0]))}"
+        )
+        yield from way
+        yield from self.handshakes
+        yield self._straight(T[0], q[0], starts)
+        if self.pierce_time > 0:
+            yield Wait(time=self.pierce_time)
+        yield from self._cut(plan, T, q)
+        T_out = T[-1].copy()
+        T_out[:3, 3] -= self.retract * T_out[:3, 2]
+        yield self._straight(T_out, back_off(plan, "end", self.retract))
+        for step in reversed(self.handshakes):
+            if isinstance(step, Request) and step.on:
+                yield replace(step, on=False)
+
+    def _laser(self, *, on: bool) -> Switch:
+        return Switch(signal="laser", on=on, lead_time=self.lead_time)
+
+    def _straight(self, T: Array, q: Array, switches: tuple[Switch, ...] = ()) -> LinearMove:
+        """Return a move along the tool axis that ends with a stop."""
+        speed, duration = self.approach_speed, self.retract / self.approach_speed
+        return LinearMove(T_part_tip=T, q=q, speed=speed, duration=duration, switches=switches)
+
+    def _cut(self, plan: Plan, T: Array, q: Array) -> Iterator[LinearMove]:
+        """Yield the moves from the second node of a contour on, laser off along micro joints."""
+        took = np.diff(plan.time)
+        speed = np.diff(plan.contour.s) / took
+        joint = [kind == "micro joint" for kind in plan.contour.kinds]
+        for k, radius in enumerate(zones_at(plan.contour.points, self.zone, self.zone_error), 1):
+            switches: tuple[Switch, ...] = ()
+            if k == len(took):
+                # At the end of a micro joint the laser is off already.
+                switches = () if joint[k - 1] else (self._laser(on=False),)
+                if self.gas_lead is not None:
+                    switches = (*switches, Switch(signal="gas", on=False))
+            elif joint[k] != joint[k - 1]:
+                switches = (self._laser(on=joint[k - 1]),)
+            yield LinearMove(
+                T_part_tip=T[k],
+                q=q[k],
+                speed=float(speed[k - 1]),
+                duration=float(took[k - 1]),
+                zone=radius,
+                switches=switches,
+            )
+
+
+class _Air:
+    """Joint moves that take the planned times.
+
+    A controller runs all joints from stop to stop together: the slowest joint runs at the given
+    share of its full speed and accelerates as fast as it may. The share is chosen so that the move
+    takes the planned time.
+    """
+
+    def __init__(self, plan: Plan, share: float) -> None:
+        self._plan, self._share = plan, share
+        self.here: Array | None = None
+        """Joints from which the next move starts."""
+
+    def moves(self, corners: Sequence[Array]) -> Iterator[JointMove]:
+        """Yield a joint move to each corner."""
+        robot, eta_v, eta_a = self._plan.robot, self._plan.settings.eta_v, self._plan.settings.eta_a
+        for q in corners:
+            here, self.here = self.here, q
+            way = None if here is None else (q - here)[None]
+            if way is None:
+                yield JointMove(q=q, speed=min(self._share, UNPLANNED))
+                continue
+            if not way.any() or robot.velocity is None or robot.acceleration is None:
+                yield JointMove(q=q, speed=self._share)
+                continue
+            limits = robot.speed_limits()
+            took = least_time(way, eta_v * limits[0], eta_a * limits[1]) / self._share
+            speed = np.clip(speed_share(way, *limits, took), LOWEST_SHARE, 1.0)
+            yield JointMove(q=q, speed=float(speed[0]), duration=float(took[0]))
+
+
+def _corners(
+    plans: Sequence[Plan], moves: Sequence[TransferMove], retract: float
+) -> list[list[Array]]:
+    """Return the joint vectors on the way to each of P plans, then those after the last."""
+    if not moves:
+        return [*([back_off(plan, "start", retract)] for plan in plans), []]
+    ways = [list(move.q[1:]) for move in moves]
+    if len(moves) == len(plans) - 1:
+        _require_meeting(plans, moves, retract)
+        return [[back_off(plans[0], "start", retract)], *ways, []]
+    if len(moves) == len(plans) + 1:
+        _require_meeting(plans, moves, retract)
+        return [list(moves[0].q), *ways[1:]]
+    raise InputError(
+        f"build_program: expected {len(plans) - 1} moves between {len(plans)} plans, or "
+        f"{len(plans) + 1} from and to a home position, got {len(moves)}"
+    )
+
+
+def _require_meeting(plans: Sequence[Plan], moves: Sequence[TransferMove], retract: float) -> None:
+    """Raise InputError unless moves begin and end where the tool is backed off."""
+    between = len(moves) < len(plans)
+    into, starts = (moves, plans[1:]) if between else (moves[:-1], plans)
+    out, ends = (moves, plans[:-1]) if between else (moves[1:], plans)
+    meetings: list[tuple[Array, Plan, End]] = []
+    meetings += [(move.q[-1], p, "start") for move, p in zip(into, starts, strict=True)]
+    meetings += [(move.q[0], p, "end") for move, p in zip(out, ends, strict=True)]
+    for q, plan, end in meetings:
+        T = plan.robot.forward(np.array([q, back_off(plan, end, retract)])) @ plan.T_flange_tip
+        if (off := np.linalg.norm(T[0, :3, 3] - T[1, :3, 3])) > MEETS:
+            raise InputError(
+                f"contour {plan.name!r}: the planned transfer move is {off * 1e3:.4g} mm off the "
+                f"point where the tool is backed off by {retract * 1e3:g} mm; set the retract_mm "
+                "that it was planned with, or plan again"
+            )
+
+
+def _require_same_cell(first: Plan, plan: Plan) -> None:
+    same = {
+        "robot": _kinematics(first.robot) == _kinematics(plan.robot),
+        "tool (T_flange_tip)": np.allclose(first.T_flange_tip, plan.T_flange_tip, 0, 1e-9),
+        "placement (T_base_part)": np.allclose(first.T_base_part, plan.T_base_part, 0, 1e-9),
+    }
+    if differing := [what for what, is_same in same.items() if not is_same]:
+        raise InputError(
+            f"contours {first.name!r} and {plan.name!r} differ in {', '.join(differing)}; write "
+            "a program for each"
+        )
+
+
+def _kinematics(robot: Robot) -> tuple[object, ...]:
+    chain = robot.chain
+    parts = [robot.sign, robot.offset, robot.T_base_foot, robot.T_end_flange]
+    parts += [] if chain is None else [chain.origins, chain.axes, chain.end]
+    parts += [x for axis in robot.externals for x in (axis.axis, axis.point)]
+    numbers = np.concatenate([part.ravel() for part in parts])
+    names = [(axis.name, axis.kind, axis.carries) for axis in robot.externals]
+    return robot.id, robot.kinematics, *names, *robot.geometry.values(), *numbers.tolist()
+
+
+def _require_on_contour(plan: Plan) -> None:
+    T = plan.robot.forward(plan.q) @ plan.T_flange_tip
+    off = np.linalg.norm(T[:, :3, 3] - plan.points, axis=1)
+    turned = np.linalg.norm(np.cross(T[:, :3, 2], plan.axes), axis=1)
+    turned[(T[:, :3, 2] * plan.axes).sum(axis=1) < 0] = 1.0
+    k = int(np.argmax(np.maximum(off, turned)))
+    if max(off[k], turned[k]) > PLAN_AND_CONTOUR:
+        raise InputError(
+            f"contour {plan.name!r}, node {k}: the planned joints put the tool tip "
+            f"{off[k] * 1e3:.4f} mm and {np.degrees(np.arcsin(turned[k])):.4f} deg off the "
+            "contour; the plan belongs to another contour, tool or placement"
+        )

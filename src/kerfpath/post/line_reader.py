@@ -1,0 +1,268 @@
+"""Check texts of programs, for all languages: no control characters, no absurdly large numbers."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+from kerfpath.errors import InputError
+from kerfpath.post.languages import LanguageSettings, handshakes
+from kerfpath.post.program import Await, Handshake, Partner, Request, Signal, Switch
+from kerfpath.post.read_program import MoveKind, ReadHandshake, ReadMove, ReadStep, ReadWait
+from kerfpath.robots import Robot
+
+# -----------------------------------------------------------------------------
+# The base of all readers, which read programs line by line.
+
+SHOWN = 60
+"""Characters of a line that a message shows."""
+END_OF_FILE = "the end of the file"
+"""Text of the row after the last one."""
+NOT_TEXT = re.compile(r"[\0-\x08\v\f\x0e-\x1f\x7f-\x9f\u2028\u2029]|\r(?!\n)")
+"""Control characters and separators of lines, without the tab and the ends of lines."""
+
+
+def patterns(by_kind: Mapping[str, str]) -> dict[str, re.Pattern[str]]:
+    """Return regular expressions of lines by their kind, compiled; digits and letters are ASCII."""
+    return {kind: re.compile(pattern, re.ASCII) for kind, pattern in by_kind.items()}
+
+
+def only(by_kind: Mapping[str, re.Pattern[str]], *kinds: str) -> dict[str, re.Pattern[str]]:
+    """Return the regular expressions of some kinds of lines."""
+    return {kind: by_kind[kind] for kind in kinds}
+
+
+def program_lines(file: str, text: str, first: int = 1) -> list[str]:
+    """Return the lines of a program, which end with LF or CR LF as for a controller.
+
+    All readers split their texts here. `str.splitlines` alone also ends a line at characters that
+    do not end it for a controller, for which the rest is still part of a remark.
+
+    Parameters
+    ----------
+    file, text : str
+    first : int
+        Number of the first line in its file.
+
+    Raises
+    ------
+    InputError
+        The text has a control character or another separator of lines; with line and character.
+    """
+    if found := NOT_TEXT.search(text):
+        line = first + text.count("\n", 0, found.start())
+        what = f"U+{ord(found[0]):04X} {unicodedata.name(found[0], '')}".rstrip()
+        raise InputError(
+            f"{file}, line {line}: a program must not contain the character {what}; its lines end "
+            "with LF or CR LF"
+        )
+    return text.splitlines()
+
+
+def statements(lines: Iterable[str], comment: str, first: int = 1) -> list[tuple[int, str]]:
+    """Return the lines that are neither blank nor comments, stripped, with their numbers."""
+    numbered = ((number, line.strip()) for number, line in enumerate(lines, first))
+    return [(n, line) for n, line in numbered if line and not line.startswith(comment)]
+
+
+class LineReader:
+    """Reader of one text; a subclass has a method for each kind of line of its language.
+
+    Parameters
+    ----------
+    file : str
+    robot : Robot
+        Robot to whose joints the controller's axes are converted.
+    settings : LanguageSettings
+        Settings of the language.
+    rows : sequence of (int, str)
+        Numbers and texts of the lines, for readers that `advance` from one to the next.
+    """
+
+    settings: Any
+    too_early = "the text ends too early"
+
+    def __init__(
+        self,
+        file: str,
+        robot: Robot,
+        settings: LanguageSettings,
+        rows: Sequence[tuple[int, str]] = (),
+    ) -> None:
+        self.file, self.robot, self.settings = file, robot, settings
+        self.rows, self.row = rows, -1
+        self.line, self.text = 0, ""
+        self.steps: list[ReadStep] = []
+        """Steps of the routine that is being read."""
+        self.required: list[str] = []
+        """Lines that must come next, exactly."""
+
+    # Lines.
+
+    @property
+    def place(self) -> str:
+        """File and number of the line that is being read."""
+        return f"{self.file}, line {self.line}"
+
+    def fault(self, message: str) -> InputError:
+        """Return an error with the place of this line."""
+        return InputError(f"{self.place}: {message}")
+
+    def advance(self) -> str:
+        """Go to the next row and return it; after the last one it is `END_OF_FILE`."""
+        self.row += 1
+        end = self.rows[-1][0] + 1 if self.rows else 1
+        self.line, self.text = (
+            self.rows[self.row] if self.row < len(self.rows) else (end, END_OF_FILE)
+        )
+        return self.text
+
+    def next_row(self) -> str:
+        """Go to the next row and return it; raise InputError if there is none."""
+        row = self.advance()
+        if self.row >= len(self.rows):
+            raise self.fault(self.too_early)
+        return row
+
+    def take(self, pattern: re.Pattern[str], what: str) -> tuple[str, ...]:
+        """Return the groups of this row, which must match, and go to the next one."""
+        match = pattern.fullmatch(self.text)
+        if match is None:
+            raise self.fault(f"expected {what}, got {self.text[:SHOWN]!r}")
+        self.advance()
+        return match.groups()
+
+    def expect(self, lines: Iterable[str]) -> None:
+        """Pass over lines that must come here, exactly."""
+        for line in lines:
+            self.require_line(self.text, line.strip())
+            self.advance()
+
+    def require_line(self, row: str, expected: str) -> None:
+        """Refuse a row that is not the expected one."""
+        if row != expected:
+            raise self.fault(f"expected {expected!r}, got {row[:SHOWN]!r}")
+
+    def read(self, row: str, kinds: Mapping[str, re.Pattern[str]]) -> None:
+        """Read a row with the method of its kind, unless it is a required row."""
+        if self.required:
+            self.require_line(row, self.required.pop(0))
+            return
+        for kind, pattern in kinds.items():
+            if match := pattern.fullmatch(row):
+                self.admit(kind)
+                getattr(self, kind)(*match.groups())
+                return
+        raise self.fault(f"not expected here: {row[:SHOWN]!r}")
+
+    def admit(self, kind: str) -> None:
+        """Refuse a kind of line that must not come here; each language overrides this."""
+
+    def remark(self) -> None:
+        """Pass over a remark."""
+
+    def require_complete(self) -> None:
+        """Refuse the end while lines are required."""
+        if self.required:
+            raise self.fault(f"{self.required[0]!r} is missing")
+
+    # Steps.
+
+    def require_standing(self, what: str) -> None:
+        """Refuse a wait or handshake while the robot moves; each language overrides this."""
+
+    def add_move(self, kind: MoveKind, speed: float | None, **said: Any) -> None:
+        """Add the move on this line; `said` are further attributes of `ReadMove`."""
+        self.steps.append(ReadMove(kind=kind, speed=speed, file=self.file, line=self.line, **said))
+
+    def wait(self, time: str | float) -> None:
+        """Add a wait (s)."""
+        self.require_standing("a wait")
+        self.steps.append(ReadWait(time=float(time), file=self.file, line=self.line))
+
+    def ask(self, port: object, *, on: bool) -> None:
+        """Add a request through an output that the settings name."""
+        self.add_handshake(Request(partner=self.partner(port, "output"), on=on))
+
+    def expect_answer(self, port: object, timeout: float) -> None:
+        """Add a wait for an input that the settings name, for at most `timeout` (s)."""
+        self.add_handshake(Await(partner=self.partner(port, "input"), timeout=timeout))
+
+    def add_handshake(self, what: Handshake) -> None:
+        """Add a handshake."""
+        self.require_standing("a handshake")
+        self.steps.append(ReadHandshake(what=what, file=self.file, line=self.line))
+
+    def partner(self, port: object, way: Literal["input", "output"]) -> Partner:
+        """Return the partner of an input or output, by the settings."""
+        for (partner, its_way), name in handshakes(self.settings).items():
+            if its_way == way and name == port:
+                return partner
+        raise self.fault(f"the settings name no partner with the {way} {port}")
+
+    def signal(self, output: object) -> Signal:
+        """Return the signal that an output switches, by the settings."""
+        if output == self.settings.gas_output:
+            return "gas"
+        self.require_output(output, self.settings.laser_output)
+        return "laser"
+
+    def require_output(self, output: object, expected: object) -> None:
+        """Refuse an output that is not the expected one."""
+        if output != expected:
+            raise self.fault(f"expected the output {expected} to be switched, got {output}")
+
+    def last_on_path(self) -> ReadMove | None:
+        """Return the last step, if it is a move of the path."""
+        last = self.steps[-1] if self.steps else None
+        return last if isinstance(last, ReadMove) and last.kind != "joint" else None
+
+    def add_switch(self, move: ReadMove, switch: Switch, place: str) -> None:
+        """Add a switch from the line `place` to the last step, a move."""
+        self.steps[-1] = replace(
+            move,
+            switches=(*move.switches, switch),
+            elsewhere={**move.elsewhere, "switches": place},
+        )
+
+
+# -----------------------------------------------------------------------------
+# Check texts of programs, for all languages: no control characters, no absurdly large numbers.
+
+LARGEST = 1e10
+"""Largest number of a program, above ABB's 9E+09 for an axis that does not exist."""
+NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
+LONG = re.compile(r"\d{10,}|[eE]\+?\d", re.ASCII)
+"""What the text of such a large number contains."""
+
+REMARK = re.compile(r"\s*(?:\d+:\s*)?(?:!|;|//|'|#) ", re.ASCII)
+"""Start of a remark in any of the languages; a remark that gives a frame has no space."""
+
+
+class CheckedTexts(Mapping[str, str]):
+    """Texts by name; a control character or a number too large is refused with its line."""
+
+    def __init__(self, files: Mapping[str, str]) -> None:
+        self.files = files
+
+    def __getitem__(self, name: str) -> str:
+        text = self.files[name]
+        for number, line in enumerate(program_lines(name, text), start=1):
+            if not LONG.search(line) or REMARK.match(line):
+                continue
+            for found in NUMBER.finditer(line):
+                if abs(float(found[0])) > LARGEST:
+                    raise InputError(
+                        f"{name}, line {number}: {found[0]} is larger than any number of a "
+                        f"program ({LARGEST:g}); write the program again"
+                    )
+        return text
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.files)
+
+    def __len__(self) -> int:
+        return len(self.files)

@@ -1,0 +1,216 @@
+"""Read back the URScript that `URScript` writes; anything else is refused."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath.arrays import Array, freeze
+from kerfpath.post.build import offset_near
+from kerfpath.post.languages import outputs
+from kerfpath.post.line_reader import END_OF_FILE, LineReader, patterns, program_lines, statements
+from kerfpath.post.program import SIGNALS, Switch
+from kerfpath.post.read_program import MoveKind, ReadProgram, ReadSection, ReadStep
+from kerfpath.post.urscript.writer import (
+    FIRST,
+    URScriptSettings,
+    full_joint_speed,
+    stop_lines,
+    switch_lines,
+    time_ahead,
+    wait_lines,
+)
+from kerfpath.robots import Robot
+
+
+def read(
+    main: str, files: Mapping[str, str], robot: Robot, settings: URScriptSettings
+) -> ReadProgram:
+    """Return the program in a script that `URScript` wrote; see `kerfpath.post.Reader`."""
+    return _Reader(main, files[main], robot, settings).program()
+
+
+DIGIT = 1e-6
+"""Rounding error of an acceleration, m/s^2 or rad/s^2."""
+
+_NUMBER = r"(-?\d+\.\d+)"
+_SIX = ", ".join([_NUMBER] * 6)
+_POSE = rf"p\[{_SIX}\]"
+_MOTION = rf"a={_NUMBER}, v={_NUMBER}, r={_NUMBER}"
+_TARGET = rf"pose_trans\(part_frame, {_POSE}\)"
+_SIGNAL = "(laser|gas)"
+_DEFINITION = re.compile(r"def ([A-Za-z]\w*)\(\):", re.ASCII)
+_CALL = re.compile(r"([A-Za-z]\w*)\(\)", re.ASCII)
+_FIRST = re.compile(rf"global {FIRST} = (\d{{1,6}})", re.ASCII)
+_TOOL = re.compile(rf"set_tcp\({_POSE}\)", re.ASCII)
+_PART = re.compile(rf"global part_frame = {_POSE}", re.ASCII)
+_STEPS = patterns(
+    {
+        "linear": rf"movel\({_TARGET}, {_MOTION}\)",
+        "circular": rf"movec\({_TARGET}, {_TARGET}, {_MOTION}, mode=0\)",
+        "joint": rf"movej\(\[{_SIX}\], a={_NUMBER}, v={_NUMBER}, (?:t={_NUMBER}, )?r={_NUMBER}\)",
+        "switch_ahead": rf"{_SIGNAL}_ahead\({_POSE}, {_NUMBER}, (True|False)\)",
+        "switch": rf"{_SIGNAL}_set\((True|False)\)",
+        "wait": rf"sleep\({_NUMBER}\)",
+        "request": r"set_standard_digital_out\((\d), (True|False)\)",
+        "wait_for": rf"await_input\((\d), {_NUMBER}\)",
+    }
+)
+
+
+class _Reader(LineReader):
+    """Reader of a script, one part after the other."""
+
+    settings: URScriptSettings
+
+    def __init__(self, file: str, text: str, robot: Robot, settings: URScriptSettings) -> None:
+        super().__init__(file, robot, settings, statements(program_lines(file, text), "#"))
+        self.signals: list[str] = []
+        self.can_wait = False
+        self.ahead: dict[str, tuple[tuple[str, ...], float, str]] = {}
+        self.ahead_at: dict[str, str] = {}
+        self.leads: dict[str, tuple[float, str]] = {}
+        self.advance()
+
+    def program(self) -> ReadProgram:
+        (name,) = self.take(_DEFINITION, "def NAME():")
+        tool = _pose(self.take(_TOOL, "set_tcp(p[...])"))
+        part = _pose(self.take(_PART, "global part_frame = p[...]"))
+        begin = int(self.take(_FIRST, f"global {FIRST} = 1")[0])
+        self.expect(stop_lines(outputs(self.settings)))
+        self.can_wait = self.text == wait_lines([])[0]
+        if self.can_wait:
+            self.expect(wait_lines(outputs(self.settings)))
+        signals = self.signals
+        for known in SIGNALS.values():
+            if self.text != f"global {known}_waits = False":
+                continue
+            output = getattr(self.settings, f"{known}_output")
+            if output is None:
+                raise self.fault(f"the {known} is switched; name its output with {known}_output")
+            signals.append(known)
+            self.expect(switch_lines(known, output))
+        sections: dict[str, ReadSection] = {}
+        while match := _DEFINITION.fullmatch(self.text):
+            if match[1] in sections:
+                raise self.fault(f"{match[1]} is defined twice")
+            self.advance()
+            sections[match[1]] = ReadSection(name=match[1], steps=self.section())
+        for signal in signals:
+            self.expect([f"{signal}_set(False)", f"{signal}_run = run {signal}_thread()"])
+        calls: list[str] = []
+        while self.text == f"if {FIRST} <= {len(calls) + 1}:":
+            self.advance()
+            calls += self.take(_CALL, "the call of a contour")
+            self.expect(["end"])
+        if not 1 <= begin <= len(calls):
+            raise self.fault(f"{FIRST} must be the number of a contour")
+        if calls != list(sections):
+            raise self.fault("the contours must be called once each, in their order")
+        self.expect([*(f"kill {signal}_run" for signal in signals), "end", END_OF_FILE])
+        robot = self.robot
+        return ReadProgram(
+            name=name,
+            sections=tuple(sections.values())[begin - 1 :],
+            T_flange_tip=freeze(np.linalg.inv(robot.T_end_flange) @ tool),
+            T_base_part=freeze(robot.T_base_foot @ part),
+        )
+
+    def section(self) -> tuple[ReadStep, ...]:
+        """Return the steps of a contour, to its end."""
+        self.steps = []
+        while self.text != "end":
+            self.read(self.text, _STEPS)
+            self.advance()
+        self.require_standing("a move")
+        self.advance()
+        return tuple(self.steps)
+
+    def joint(self, *said: str | None) -> None:
+        self.require_standing("a move")
+        *angles, a, v, _, r = (float(word or "nan") for word in said)
+        self.require_acceleration(a, np.radians(self.settings.joint_acceleration_deg_s2))
+        timed, robot = said[-2], self.robot
+        self.add_move(
+            "joint",
+            v / full_joint_speed(robot) if timed is None else None,
+            duration=None if timed is None else float(timed),
+            q=freeze(robot.sign * (np.array(angles) + offset_near(robot, 0.0))),
+            zone=r,
+        )
+
+    def require_acceleration(self, said: float, expected: float) -> None:
+        """Refuse an acceleration that is not that of the settings."""
+        if abs(said - expected) > DIGIT:
+            raise self.fault(f"expected the acceleration a={expected:.6f}, got {said:g}")
+
+    def linear(self, *said: str) -> None:
+        self.path(said[:6], said[6:])
+
+    def circular(self, *said: str) -> None:
+        self.path(said[6:12], said[12:], _pose(said[:6]))
+
+    def path(
+        self, target: tuple[str, ...], motion: tuple[str, ...], via: Array | None = None
+    ) -> None:
+        armed, self.ahead = self.ahead, {}
+        self.require_standing("a move")
+        a, v, r = (float(word) for word in motion)
+        if min(a, v) <= 0:
+            raise self.fault("speed and acceleration must be above 0")
+        self.require_acceleration(a, self.settings.acceleration)
+        for signal, (point, near, on) in armed.items():
+            if point != target:
+                raise self.fault(f"the {signal} is switched ahead of another point than the target")
+            self.leads[signal] = time_ahead(near, v, a, stops=r == 0), on
+        kind: MoveKind = "linear" if via is None else "circular"
+        self.add_move(kind, v, T_part_tip=_pose(target), T_part_via=via, zone=r)
+
+    def switch_ahead(self, signal: str, *said: str) -> None:
+        *target, near, on = said
+        self.require_signal(signal)
+        if signal in self.ahead:
+            raise self.fault(f"the {signal} is switched ahead twice")
+        self.ahead[signal] = tuple(target), float(near), on
+        self.ahead_at[signal] = self.place
+
+    def switch(self, signal: str, on: str) -> None:
+        self.require_signal(signal)
+        move = self.last_on_path()
+        if self.ahead or move is None:
+            raise self.fault("a switch must follow a linear or circular move")
+        lead, before = self.leads.pop(signal, (0.0, on))
+        if before != on:
+            raise self.fault(f"the {signal} is switched to {before} ahead, but to {on} here")
+        place = move.elsewhere.get("switches", self.ahead_at.pop(signal, self.place))
+        switch = Switch(signal=SIGNALS[signal], on=on == "True", lead_time=lead)
+        self.add_switch(move, switch, place)
+
+    def request(self, port: str, on: str) -> None:
+        self.ask(int(port), on=on == "True")
+
+    def wait_for(self, port: str, timeout: str) -> None:
+        if not self.can_wait:
+            raise self.fault("the program does not define how it waits for an input")
+        self.expect_answer(int(port), float(timeout))
+
+    def require_standing(self, what: str) -> None:
+        """Require that a signal switched ahead of the end of a move is also switched at its end."""
+        if ahead := [*self.ahead, *self.leads]:
+            raise self.fault(f"the {ahead[0]} is switched ahead of a move, but not at its end")
+
+    def require_signal(self, signal: str) -> None:
+        if signal not in self.signals:
+            raise self.fault(f"the program does not define how it switches the {signal}")
+
+
+def _pose(words: tuple[str, ...]) -> Array:
+    """Return the pose (4, 4) m of six numbers."""
+    values = np.array([float(word) for word in words])
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec(values[3:]).as_matrix()
+    T[:3, 3] = values[:3]
+    return freeze(T)

@@ -1,0 +1,680 @@
+"""refine(): move gamma and external axes of a plan off the grid; tilts and postures stay."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from kerfpath.arrays import Array, scalar, short_repr
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError
+from kerfpath.kernels.metric import wrap
+from kerfpath.kernels.turns import JointLimits
+from kerfpath.losses import Loss, Reason
+from kerfpath.plans import Plan, Proof, has_room, on_turns, path_cost
+from kerfpath.progress import may_stop
+from kerfpath.refiner.convex_program import (
+    MARGIN,
+    PRICE,
+    JointCurves,
+    LinearModel,
+    Target,
+    room_at_ends,
+    solve,
+)
+from kerfpath.refiner.rows import KeptShares, RateLimits
+from kerfpath.robots import lowest_joint
+from kerfpath.search import Metric, ObjectiveKind, rotation_limits
+from kerfpath.windows import nearest_inside, room_beside
+
+# -----------------------------------------------------------------------------
+# Sequential convex programming: solve a linear model, test the step by the true kinematics.
+
+MOST_PROGRAMS = 60
+"""Most programs of one descent, which converges with far fewer."""
+CORRECTIONS = 3
+"""Most corrections of a step, through the joints it reached, before it is shortened."""
+CONVERGED = 1e-4
+"""Relative gain promised by the model below which a descent has converged."""
+SMALLEST_RADIUS = 1e-7
+"""rad: no controller resolves a smaller change."""
+NEARBY = (5e-3, 5e-4)
+"""rad: largest changes of gamma tried to bring a nearly admissible motion within the limits."""
+WIDER = 4.0
+"""Factor by which a radius grows if it promises little because it is small."""
+AWAY = 1e3
+"""1/rad: price of being out of a range, above any share of a limit."""
+ENOUGH = 0.1
+"""Share of the promised gain that a step must bring to be taken."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MotionState:
+    """A motion by the true kinematics.
+
+    Parameters
+    ----------
+    free : (K, F) rad or m
+        Gamma, and the values of the external axes.
+    q : (K, n) rad
+        Joints, not wrapped.
+    cost : float
+        Objective of the motion.
+    excess : float
+        Largest share of a rate or torque limit, or of the cap, minus one.
+    lost : float
+        Sum over intervals and nodes of the excess over rate and torque limits, in shares of them.
+    outside : float rad
+        Largest distance of a joint or a coupling outside its range; negative inside.
+    """
+
+    free: Array
+    q: Array
+    cost: float
+    excess: float
+    lost: float
+    outside: float
+
+    __repr__ = short_repr
+
+    @property
+    def admitted(self) -> bool:
+        """Whether every limit is kept."""
+        return self.excess <= 0 and self.outside <= 0
+
+    def value(self, target: Target) -> float:
+        """Return the value that is minimised: the excess, the cost, or the cost with `lost`."""
+        away = AWAY * max(self.outside, 0)
+        if target == "excess":
+            return self.excess + away
+        return self.cost + PRICE * self.lost + away if target == "lost" else self.cost
+
+
+class _Step(NamedTuple):
+    """Result of a step: admissible motion or None, promised gain, largest change, programs."""
+
+    to: MotionState | None
+    promised: float
+    longest: float
+    programs: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Descent:
+    """Minimisation over the free variables of a motion: objective and constraints.
+
+    Parameters
+    ----------
+    curves : JointCurves
+    rates : RateLimits
+    limits : JointLimits
+    rotation : (n,) rad
+        Largest rotation of a joint away from where it begins.
+    weight : (n,) 1/rad
+    metric : str
+    objective : {"sum", "max"}
+    radius : float rad or m
+        Largest change in the first iteration; a descent must have tried it to count as converged.
+    first : float rad, optional
+        Largest change in the first iteration, if smaller.
+    low, high : (K, F) rad or m
+        Bounds on the free variables; infinite for none.
+    node_cost : (K,), optional
+        Cost of each node, taken as fixed; the cost after gamma has moved is computed at the end.
+    cap : float
+        Largest distance that is allowed in a step.
+    most : int
+        Programs after which a descent ends.
+    """
+
+    curves: JointCurves
+    rates: RateLimits
+    limits: JointLimits
+    rotation: Array
+    weight: Array
+    metric: Metric
+    objective: ObjectiveKind
+    radius: float
+    low: Array
+    high: Array
+    first: float | None = None
+    node_cost: Array | None = None
+    cap: float = np.inf
+    most: int = MOST_PROGRAMS
+
+    __repr__ = short_repr
+
+    def stand(self, free: Array, near: Array) -> MotionState:
+        """Return the motion at `free` on the turns near `near`; infinite values if out of reach."""
+        q = self.curves.at(free, near)
+        if not np.isfinite(q).all():
+            return MotionState(
+                free=free, q=q, cost=np.inf, excess=np.inf, lost=np.inf, outside=np.inf
+            )
+        excess = self.rates.excess(q)
+        if self.cap < np.inf:
+            longest = path_cost(np.diff(q, axis=0), self.weight, self.metric, "max")
+            excess = max(excess, longest / self.cap - 1)
+        return MotionState(
+            free=free,
+            q=q,
+            cost=self.cost(q),
+            excess=excess,
+            lost=self.rates.lost(q),
+            outside=self._outside(q),
+        )
+
+    def cost(self, q: Array) -> float:
+        """Return the objective (14) or (15) of joints (K, n) rad, not wrapped."""
+        dq = np.diff(q, axis=0)
+        return path_cost(dq, self.weight, self.metric, self.objective, self.node_cost)
+
+    def admitted(self, at: MotionState) -> tuple[MotionState, int]:
+        """Return the first motion found that keeps every limit, and the number of programs.
+
+        It looks for one of little cost: from the motion as it is, then from the motion eased to
+        exceed the limits little; else at any cost. If none is found, it returns the motion that
+        breaks the limits least.
+        """
+        programs = 0
+        if at.admitted:
+            return at, 0
+        for near in self._nearer(at):
+            for radius in NEARBY:
+                step = self._step(near, radius, self.objective)
+                programs += step.programs
+                if step.to is not None:
+                    return step.to, programs
+        found, more = self._run(at, "excess", enough=0.0)
+        return found, programs + more
+
+    def _nearer(self, at: MotionState) -> Iterator[MotionState]:
+        """Yield motions to bring inside the limits: the motion as it is, then eased."""
+        yield at
+        eased = self.eased(at)
+        if eased.outside <= 0:
+            yield eased
+
+    def gentlest(self, at: MotionState) -> MotionState:
+        """Return the motion with the least largest share of a limit."""
+        return self._run(at, "excess")[0]
+
+    def eased(self, at: MotionState) -> MotionState:
+        """Return a motion of little cost that exceeds the limits in few places and by little."""
+        return self._run(at, "lost")[0]
+
+    def best(self, at: MotionState) -> tuple[MotionState, int]:
+        """Return the best motion found from an admissible one, and the number of programs.
+
+        With the objective "max", of motions with the same maximum it takes the least sum.
+        """
+        found, programs = self._run(at, self.objective)
+        if self.objective == "max":
+            tie = replace(self, objective="sum", cap=found.cost)
+            smooth, more = tie._run(tie.stand(found.free, found.q), "sum")
+            found, programs = self.stand(smooth.free, smooth.q), programs + more
+        return found, programs
+
+    def _run(
+        self, at: MotionState, target: Target, enough: float = -np.inf
+    ) -> tuple[MotionState, int]:
+        """Descend in steps within a radius, which grows and shrinks with the model's accuracy."""
+        radius, programs, failed = self.first or self.radius, 0, np.inf
+        while radius > SMALLEST_RADIUS and programs < self.most:
+            step = self._step(at, radius, target)
+            programs += step.programs
+            gained = 0.0 if step.to is None else at.value(target) - step.to.value(target)
+            if step.to is not None and step.promised <= CONVERGED * abs(at.value(target)):
+                if WIDER * radius > min(self.radius, failed):
+                    break
+                at, radius = step.to if gained > 0 else at, WIDER * radius
+                continue
+            if step.to is not None and gained > ENOUGH * step.promised:
+                at = step.to
+                if at.value(target) <= enough:
+                    break
+                radius *= 2 if step.programs == 1 else 1
+            else:
+                failed = min(radius, step.longest)
+                radius = failed / 3
+        return at, programs
+
+    def _step(self, at: MotionState, radius: float, target: Target) -> _Step:
+        """Solve the model and correct it at the joints reached, until the motion is admissible."""
+        model, promised, longest = self._model(at, radius), 0.0, radius
+        for programs in range(1, 2 + CORRECTIONS):
+            may_stop()
+            delta = solve(model, self.rates, target)
+            if delta is None:
+                break
+            if programs == 1:
+                promised = at.value(target) - self._modelled(model, delta, target)
+            longest = float(np.abs(delta).max())
+            there = self.stand(self._within(at.free + delta), at.q)
+            soft = target in ("excess", "lost")
+            if there.admitted or (soft and there.outside <= max(at.outside, 0)):
+                return _Step(there, promised, longest, programs)
+            if there.outside == np.inf:
+                break
+            model = self._model(there, radius).through(delta)
+        return _Step(None, promised, longest, programs)
+
+    def _within(self, free: Array) -> Array:
+        """Return `free` with axes clipped to their bounds, which solvers keep only nearly."""
+        free[:, 1:] = np.clip(free[:, 1:], self.low[:, 1:], self.high[:, 1:])
+        return free
+
+    def _modelled(self, model: LinearModel, delta: Array, target: Target) -> float:
+        q = model.q + model.moved(delta)
+        if target == "excess":
+            return self.rates.excess(q)
+        return self.cost(q) + (PRICE * self.rates.lost(q) if target == "lost" else 0.0)
+
+    def _model(self, at: MotionState, radius: float) -> LinearModel:
+        slope = self.curves.slope(at.free, at.q)
+        # A node at the edge of reach does not move.
+        movable = np.asarray(np.isfinite(slope).all(axis=(1, 2)))
+        slope = np.where(movable[:, None, None], slope, 0.0)
+        endless = self.limits.endless
+        # A range may be a single point.
+        room = np.minimum(MARGIN, (self.limits.upper - self.limits.lower) / 2)
+        return LinearModel(
+            q=at.q,
+            slope=slope,
+            radius=np.repeat(np.where(movable, radius, 0.0)[:, None], at.free.shape[1], axis=1),
+            least=np.clip((self.low - at.free) / radius, -1.0, 0.0),
+            most=np.clip((self.high - at.free) / radius, 0.0, 1.0),
+            lower=np.where(endless, -np.inf, self.limits.lower + room),
+            upper=np.where(endless, np.inf, self.limits.upper - room),
+            rotation=self.rotation - MARGIN,
+            rows=self.limits.rows,
+            row_lower=self.limits.row_lower + MARGIN,
+            row_upper=self.limits.row_upper - MARGIN,
+            weight=self.weight,
+            metric=self.metric,
+            cap=self.cap,
+            torque=self.rates.linear_torque(at.q, slope[..., 0]),
+        )
+
+    def _outside(self, q: Array) -> float:
+        limits = self.limits
+        beyond = np.where(limits.endless, -np.inf, np.maximum(limits.lower - q, q - limits.upper))
+        value = q @ limits.rows.T
+        over = np.maximum(limits.row_lower - value, value - limits.row_upper)
+        turned = np.abs(q - q[0]) - self.rotation
+        return float(max(beyond.max(), over.max(initial=-np.inf), turned.max()))
+
+
+# -----------------------------------------------------------------------------
+# refine(): move gamma and external axes of a plan off the grid; tilts and postures stay.
+
+MOST_INTERVALS = 10
+"""Most times that the interval is shortened; convergence to the least is quadratic."""
+SAME_INTERVAL = 1e-4
+"""Relative change of the interval below which it counts as the least."""
+
+FIRST_STEPS = 2
+"""Grid steps by which gamma may move in the first iteration; later steps adapt to the gain."""
+REPAIR = 0.2
+"""Estimated relative extra cost of a motion for each limit that it exceeds by once the limit."""
+CLOSE = 3e-5
+"""Relative cost above the lower bound up to which a motion is not refined further: a third of the
+gain below which a descent ends."""
+SAME_NODE = 1e-6
+"""m: a node of a finer contour counts as one of the plan's up to this distance."""
+
+
+class Binding(NamedTuple):
+    """The limit that binds: its kind, its joint (0-based) and its node."""
+
+    joint: int
+    node: int
+    limit: Literal["velocity", "acceleration"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Refinement:
+    """Result of a refinement.
+
+    Parameters
+    ----------
+    plan : Plan
+        The refined plan, or the original plan if `done` is False.
+    done : bool
+        Whether the refined plan keeps every limit by the true kinematics.
+    cost_before, cost_after : float
+        Objective of the original motion and of `plan`.
+    programs : int
+        Number of convex programs solved.
+    statement : str
+        What was done, or why it could not be done.
+    """
+
+    plan: Plan
+    done: bool
+    cost_before: float
+    cost_after: float
+    programs: int
+    statement: str
+
+    __repr__ = short_repr
+
+
+def refine(
+    plan: Plan,
+    *,
+    nodes: Contour | None = None,
+    eta_v: float | None = None,
+    eta_a: float | None = None,
+    kept: KeptShares | None = None,
+    first: float | None = None,
+    within: tuple[Array, Array] | None = None,
+    least: float = 0.0,
+    most: int | None = None,
+) -> Refinement:
+    """Move gamma of a plan off its grid, to a lower cost or within limits that the grid breaks.
+
+    Sequential convex programming on the true kinematics. (5), (6), limits on torque and jerk, the
+    ranges of joints and couplings and a periodic closure are hard constraints of every iteration. A
+    motion is accepted only if it keeps all of them by the kinematics and the dynamics themselves,
+    not only by the linear model.
+
+    Parameters
+    ----------
+    plan : Plan
+        It may break (5) or (6), for example after a change of eta; the limits are met first, if
+        possible.
+    nodes : Contour, optional
+        The same contour with every interval divided into the same number of parts; the refined plan
+        keeps (5) and (6) at the shorter time step.
+    eta_v, eta_a : float, optional
+        Share of the velocity and acceleration limits; default: the plan's.
+    kept : KeptShares, optional
+        Shares of the usable limits, in every interval and where two meet; default: all.
+    first : float rad, optional
+        Largest change of gamma in the first iteration, for a motion that is close to the best;
+        default: two steps of the plan's grid.
+    within : two of (K, 1 + E) rad or m, optional
+        Least and largest gamma of each node, on the turn of the plan's gamma, and of its external
+        axes.
+    least : float
+        Known lower bound on the cost of such motions; a motion that costs hardly more is not
+        refined further.
+    most : int, optional
+        Convex programs after which a descent ends early; default: when it has converged.
+
+    Returns
+    -------
+    Refinement
+        If it fails, `done` is False, `plan` is the original plan, and `statement` says why.
+
+    Raises
+    ------
+    InputError
+        Nodes that do not divide the plan's intervals evenly, or values out of range.
+    """
+    settings = replace(
+        plan.settings,
+        eta_v=plan.settings.eta_v if eta_v is None else scalar(eta_v, "eta_v", above=0.0),
+        eta_a=plan.settings.eta_a if eta_a is None else scalar(eta_a, "eta_a", above=0.0),
+    )
+    if not plan.robot.family.free_rotation:
+        return _unrefined(plan, "the robot leaves no rotation free that could be refined")
+    asked = replace(plan, settings=settings)
+    if nodes is not None:
+        divided = _divide_plan(asked, nodes)
+        if isinstance(divided, str):
+            return _unrefined(plan, divided)
+        asked = divided
+    comfort = plan.settings.comfort
+    if comfort is not None and comfort.prices_clearance:
+        return _unrefined(plan, "the cost of clearance is known on the grid only")
+    descent, start = _descent(asked, kept)
+    low, high = descent.low.copy(), descent.high.copy()
+    if within is not None:
+        low, high = np.maximum(low, within[0]), np.minimum(high, within[1])
+    descent = replace(descent, first=first, low=low, high=high)
+    descent = descent if most is None else replace(descent, most=most)
+    found, programs = _lowest(descent, start, least)
+    if found.admitted and not _room_kept(asked, found):
+        descent = _ends_held(descent, start)
+        found, programs = _lowest(descent, start, least)
+    if not found.admitted:
+        return _unrefined(plan, _closest(descent, found))
+    refined = _plan_with_motion(asked, found)
+    broken = [] if comfort is None else [*comfort.broken(plan.robot, refined.q, plan.T_flange_tip)]
+    if settings.floor is not None and (lowest_joint(plan.robot, refined.q) < settings.floor).any():
+        broken.append(Reason(Loss.FLOOR))
+    if broken:
+        return _unrefined(plan, f"off the grid it would break: {' and '.join(broken)}")
+    grid_cost = plan.proof.grid_cost
+    if grid_cost is None and start.admitted and plan.settings.method != "continuous":
+        grid_cost = plan.cost
+    proof = Proof(
+        optimal=plan.proof.optimal and start.admitted and refined.cost <= (grid_cost or 0.0),
+        statement=f"{refined.proof.statement}; {_describe(plan, asked, start, refined.cost)}",
+        grid_cost=grid_cost,
+    )
+    return Refinement(
+        plan=replace(refined, proof=proof),
+        done=True,
+        cost_before=start.cost,
+        cost_after=refined.cost,
+        programs=programs,
+        statement=proof.statement,
+    )
+
+
+def _lowest(descent: Descent, start: MotionState, least: float) -> tuple[MotionState, int]:
+    """Return the best motion found, or the one that breaks the limits least; number of programs."""
+    begun, programs = descent.admitted(start)
+    if not begun.admitted or begun.cost <= (1 + CLOSE) * least:
+        return begun, programs
+    found, more = descent.best(begun)
+    return found, programs + more
+
+
+def _room_kept(plan: Plan, found: MotionState) -> bool:
+    """Return whether the tool can still back off at both ends after external axes have moved."""
+    if plan.settings.retract is None or not plan.robot.free.size:
+        return True  # the bounds on gamma ensure it
+    ends = [0, -1]
+    q, _ = on_turns(plan.robot, found.q)
+    room = has_room(plan.settings, plan.robot, q[ends], plan.posture[ends], plan.T_flange_tip)
+    return bool(room.all())
+
+
+def _ends_held(descent: Descent, start: MotionState) -> Descent:
+    """Return the descent with the external axes fixed at both ends to where they start."""
+    low, high = descent.low.copy(), descent.high.copy()
+    low[[0, -1], 1:] = high[[0, -1], 1:] = start.free[[0, -1], 1:]
+    return replace(descent, low=low, high=high)
+
+
+def promise(plan: Plan) -> float:
+    """Return an estimate of the refined cost of a plan: its cost, plus a share for broken limits.
+
+    It is by the true kinematics, and infinite if a node is out of reach or a joint out of range.
+    """
+    _, start = _descent(plan)
+    return start.cost * (1 + REPAIR * start.lost) if start.outside <= 0 else np.inf
+
+
+def ease(plan: Plan) -> Plan:
+    """Return the plan with gamma moved so that it exceeds the limits little, at little cost.
+
+    The excess of every interval and every node over the limits has a price on top of the cost.
+    """
+    descent, start = _descent(plan)
+    return _plan_with_motion(plan, descent.eased(start))
+
+
+def quicken(plan: Plan) -> tuple[Plan, Binding] | None:
+    """Return the plan with gamma moved for the least interval between nodes, and what binds there.
+
+    All intervals change by the same factor; the cost is not minimised. None if a node of the plan
+    is out of reach in its posture, as a node between two samples may be.
+    """
+    for _ in range(MOST_INTERVALS):
+        descent, start = _descent(plan)
+        if start.outside == np.inf:
+            return None
+        found = descent.gentlest(start)
+        fast, sharp = descent.rates.shares(np.diff(found.q, axis=0))
+        shorter, binding = _binding(descent, fast, sharp)
+        plan = replace(_plan_with_motion(plan, found), time=plan.time * shorter)
+        if shorter > 1 - SAME_INTERVAL:
+            break
+    return plan, binding
+
+
+def _binding(descent: Descent, fast: Array, sharp: Array) -> tuple[float, Binding]:
+    """Return the share of the interval that would be enough, and the limit that binds there."""
+    velocity, acceleration = float(fast.max()), float(np.sqrt(sharp.max(initial=0.0)))
+    if velocity >= acceleration:
+        edge, joint = np.unravel_index(np.argmax(fast), fast.shape)
+        return velocity, Binding(int(joint), int(edge) + 1, "velocity")
+    change, joint = np.unravel_index(np.argmax(sharp), sharp.shape)
+    return acceleration, Binding(int(joint), int(descent.rates.meetings[1][change]), "acceleration")
+
+
+def _describe(plan: Plan, asked: Plan, start: MotionState, cost: float) -> str:
+    """Return text on what was done, with the cost before and after."""
+    parts = (len(asked.q) - 1) // (len(plan.q) - 1)
+    what = "refined off the grid" if parts == 1 else f"held at {parts} parts of every interval"
+    if not start.admitted:
+        what = f"brought inside limits that it did not keep and {what}"
+    return f"{what}: cost {plan.cost:.6g} to {cost:.6g}"
+
+
+def _unrefined(plan: Plan, why: str) -> Refinement:
+    return Refinement(
+        plan=plan,
+        done=False,
+        cost_before=plan.cost,
+        cost_after=plan.cost,
+        programs=0,
+        statement=f"not refined: {why}",
+    )
+
+
+def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, MotionState]:
+    """Return the descent of a plan, and the motion that it starts from."""
+    settings, comfort = plan.settings, plan.settings.comfort
+    low, high = room_at_ends(plan)
+    gamma, windows, q = plan.gamma, settings.gamma_windows, plan.unwrapped
+    limits, mine = plan.robot.joint_limits(), plan.robot.free
+    x, free = q[:, mine], np.where(limits.endless, np.inf, 0.0)
+    ends = (limits.lower - free)[mine], (limits.upper + free)[mine]
+    if windows:
+        inside = nearest_inside(windows, plan.contour.s, gamma)
+        gamma = np.full(len(gamma), np.nan) if inside is None else inside
+        room = room_beside(windows, plan.contour.s, gamma)
+        low, high = np.maximum(low, room[0]), np.minimum(high, room[1])
+    descent = Descent(
+        curves=JointCurves(plan.robot, plan.frames, plan.T_flange_tip, plan.posture),
+        rates=RateLimits(
+            tau=np.diff(plan.time),
+            limits=settings.limits(plan.robot),
+            periodic=settings.closure == "periodic",
+            kept=kept,
+        ),
+        limits=limits if comfort is None else comfort.narrowed(plan.robot, plan.q),
+        rotation=rotation_limits(settings.rotation, plan.robot.endless),
+        weight=settings.weights,
+        metric=settings.metric,
+        objective=settings.objective,
+        node_cost=plan.node_cost,
+        radius=FIRST_STEPS * settings.gamma_step,
+        low=np.column_stack([low, np.broadcast_to(ends[0], x.shape)]),
+        high=np.column_stack([high, np.broadcast_to(ends[1], x.shape)]),
+    )
+    return descent, descent.stand(np.column_stack([gamma, x]), q)
+
+
+def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
+    """Return the plan with the motion found and its cost.
+
+    The bound of the plan is dropped, as its gap is that of another motion.
+    """
+    q, turn = on_turns(plan.robot, found.q)
+    proof = plan.proof.without_bound()
+    moved = replace(plan, q=q, gamma=wrap(found.free[:, 0]), turn=turn, proof=proof)
+    s, dq = plan.settings, np.diff(found.q, axis=0)
+    return replace(moved, cost=path_cost(dq, s.weights, s.metric, s.objective, moved.node_cost))
+
+
+def _divide_plan(plan: Plan, nodes: Contour) -> Plan | str:
+    """Return the plan on finer nodes, with gamma by a spline; or the reason why it cannot be."""
+    K, parts = len(plan.contour), (len(nodes) - 1) // (len(plan.contour) - 1)
+    if len(nodes) != (K - 1) * parts + 1:
+        raise InputError(
+            f"nodes: expected a whole number of intervals for each of the plan's {K - 1}, got "
+            f"{len(nodes) - 1}; resample the contour with count={(K - 1) * (parts + 1) + 1}"
+        )
+    own = slice(None, None, parts)
+    off = float(np.linalg.norm(nodes.points[own] - plan.contour.points, axis=1).max())
+    if off > SAME_NODE:
+        raise InputError(
+            f"nodes: the plan's nodes are not among them (off by {off * 1e3:.3g} mm); resample the "
+            "contour that the plan's was sampled from"
+        )
+    kind, index = plan.settings.frames, np.arange(len(nodes)) / parts
+    x = nodes.frames(kind)[own, :3, :2]
+    before = plan.contour.frames(kind)[:, :3, 0]
+    twist = np.arctan2((x[:, :, 1] * before).sum(1), (x[:, :, 0] * before).sum(1))
+    coarse = np.arange(K)
+    changes = np.flatnonzero(np.diff(plan.posture))
+    if changes.size:
+        return f"the posture changes after node {changes[0]}, an interval that cannot be divided"
+    if parts == 1:
+        return plan
+    if plan.tilt.any():
+        return "the tilts hold at the plan's own nodes, not between them"
+    if plan.feed is not None:
+        return "the times of a reduced feed hold at its own nodes, not between them"
+    gamma = CubicSpline(coarse, np.unwrap(plan.gamma + twist))(index)
+    near = np.stack([np.interp(index, coarse, q) for q in plan.unwrapped.T], axis=1)
+    if (free := plan.robot.free).size:
+        near[:, free] = CubicSpline(coarse, plan.unwrapped[:, free])(index)
+    return replace(
+        plan,
+        contour=nodes,
+        q=near,
+        gamma=gamma,
+        tilt=np.zeros((len(nodes), 2)),
+        posture=np.repeat(plan.posture[:1], len(nodes)),
+        turn=np.zeros((len(nodes), plan.robot.joints), np.int64),
+        time=np.interp(index, coarse, plan.time),
+    )
+
+
+def _closest(descent: Descent, at: MotionState) -> str:
+    """Return text on the limit that the motion breaking them least still breaks, and where."""
+    if at.outside == np.inf:
+        return "the motion leaves the reach of its posture between the nodes"
+    rates = descent.rates
+    fast, sharp = rates.shares(np.diff(at.q, axis=0))
+    if at.outside > 0:
+        return f"a joint stays out of its range by {np.degrees(at.outside):.3g} deg"
+    after = rates.meetings[1]
+    more = {
+        "torque": np.abs(rates.torque_share(at.q)),
+        "jerk": np.abs(rates.jerk_share(np.diff(at.q, axis=0))),
+    }
+    what, share = max(more.items(), key=lambda each: float(each[1].max(initial=0.0)))
+    if share.max(initial=0.0) > max(fast.max(), sharp.max(initial=0.0)):
+        row, joint = np.unravel_index(np.argmax(share), share.shape)
+        return (
+            f"the {what} of joint {joint + 1} at node {after[row]} could not be brought below "
+            f"{share.max():.4f} of its limit"
+        )
+    _, worst = _binding(descent, fast, sharp)
+    return (
+        f"the {worst.limit} of joint {worst.joint + 1} at node {worst.node} could not be brought "
+        f"below {1 + at.excess:.4f} of its limit"
+    )

@@ -1,0 +1,170 @@
+"""The page of a drawing: the part with all loops and their names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import ArrayLike
+
+from kerfpath.arrays import Array, floats, short_repr
+from kerfpath.report.maps import ACCENT, ALERT, FAINT, JOINT_COLOURS, base_layout
+from kerfpath.report.page import Figures, header, page
+from kerfpath.report.scene import add_part, checked, space_axis, xyz
+
+HEIGHT = 720
+LABELS = 80
+"""Number of names that are drawn; the others show on hover."""
+COLOURS = {"outer": ACCENT, "inner": JOINT_COLOURS[0], "open": JOINT_COLOURS[4]}
+CAPTIONS = {"outer": "trim lines", "inner": "holes", "open": "open lines"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DrawnLoop:
+    """One loop of the picture.
+
+    Parameters
+    ----------
+    name : str
+    kind : "outer", "inner" or "open"
+    points : (K, 3) m
+        Points along the loop; a closed loop repeats the first one at the end.
+    facts : str
+        Hover text.
+    fault : bool
+        Whether it is drawn as a loop that cannot be cut.
+    aside : bool
+        Whether it is hidden at first: a piece of a skin, or around the thickness of a sheet.
+    """
+
+    name: str
+    kind: str
+    points: Array
+    facts: str = ""
+    fault: bool = False
+    aside: bool = False
+
+    __repr__ = short_repr
+
+
+def render_drawing(
+    title: str,
+    loops: Sequence[DrawnLoop],
+    *,
+    mesh: tuple[ArrayLike, ArrayLike],
+    facts: Sequence[tuple[str, str]] = (),
+    notes: Sequence[str] = (),
+) -> str:
+    """Return a self-contained HTML page of a part and its loops.
+
+    Parameters
+    ----------
+    title : str
+    loops : sequence of DrawnLoop
+    mesh : (vertices (V, 3) m, triangles (F, 3))
+        The part; without triangles only the loops are drawn.
+    facts : sequence of (what, value)
+    notes : sequence of str
+    """
+    figures = Figures()
+    body = [
+        header("Drawing", title, facts=facts, notes=notes),
+        "<section><h2>Loops by name</h2>",
+        '<p class="caption">Part frame, all axes to the same scale. Each name is at the start of '
+        "its loop. Drag to turn, scroll to zoom, point at a loop to see its size, and click in "
+        "the legend to hide or show loops.</p>",
+        figures.place(_figure(loops, mesh), "scene"),
+        "</section>",
+    ]
+    return page(title, body, figures)
+
+
+def _figure(loops: Sequence[DrawnLoop], mesh: tuple[ArrayLike, ArrayLike]) -> go.Figure:
+    legend = {"x": 0, "y": 1, "bgcolor": "rgba(255, 255, 255, 0.8)"}
+    figure = go.Figure(layout=base_layout(HEIGHT, showlegend=True, legend=legend))
+    vertices, triangles = checked(mesh)
+    if len(triangles):
+        add_part(figure, vertices * 1e3, triangles)
+    for aside in (False, True):
+        for kind, caption in CAPTIONS.items():
+            for fault in (False, True):
+                alike = [
+                    loop
+                    for loop in loops
+                    if (loop.aside, loop.kind, loop.fault) == (aside, kind, fault)
+                ]
+                if alike:
+                    colour = ALERT if fault else FAINT if aside else COLOURS[kind]
+                    what = caption + (" of single faces and cut edges" if aside else "")
+                    _add(figure, alike, what + (" with faults" if fault else ""), colour, aside)
+    figure.update_layout(
+        margin={"l": 0, "r": 0, "t": 0, "b": 0},
+        scene=_view(
+            np.vstack([vertices, *(floats(loop.points, "points", (None, 3)) for loop in loops)])
+        )
+        | {"annotations": _labels([loop for loop in loops if not loop.aside][:LABELS])},
+    )
+    return figure
+
+
+def _view(points: Array) -> dict[str, object]:
+    """Return a scene around `points` (m), to scale; a flat drawing is seen from above."""
+    low, high = points.min(axis=0) * 1e3, points.max(axis=0) * 1e3
+    size = float((high - low).max())
+    # plotly has no scale for an axis of zero length.
+    half = np.maximum((high - low) * 0.55, 0.05 * size)
+    middle, is_flat = (low + high) / 2, bool(high[2] - low[2] < 1e-3 * size)
+    look = {"eye": {"x": 0.0, "y": 0.0, "z": 1.3}, "up": {"x": 0.0, "y": 1.0, "z": 0.0}}
+    if not is_flat:
+        look = {"eye": {"x": 0.9, "y": -1.3, "z": 1.0}}
+    return {
+        "aspectmode": "manual",
+        "aspectratio": dict(zip("xyz", (1.5 * half / half.max()).tolist(), strict=True)),
+        "dragmode": "turntable" if not is_flat else "pan",
+        "camera": look | {"projection": {"type": "orthographic"}},
+        **{
+            f"{a}axis": space_axis(a) | {"range": [float(m - h), float(m + h)]}
+            for a, m, h in zip("xyz", middle, half, strict=True)
+        },
+    }
+
+
+def _labels(loops: Sequence[DrawnLoop]) -> list[dict[str, object]]:
+    """Return the names at the starts of loops, in front of the part, at alternating heights."""
+    return [
+        {
+            **dict(zip("xyz", (loop.points[0] * 1e3).tolist(), strict=True)),
+            "text": escape(loop.name),
+            "font": {"size": 12, "color": ALERT if loop.fault else COLOURS[loop.kind]},
+            "bgcolor": "rgba(255, 255, 255, 0.8)",
+            "showarrow": True,
+            "arrowhead": 0,
+            "arrowwidth": 1,
+            "arrowcolor": FAINT,
+            "ax": 24,
+            "ay": (-24, 24, -48, 48)[i % 4],
+            "xanchor": "left",
+        }
+        for i, loop in enumerate(loops)
+    ]
+
+
+def _add(
+    figure: go.Figure, loops: Sequence[DrawnLoop], caption: str, colour: str, aside: bool
+) -> None:
+    """Add loops as one line with breaks."""
+    lines = [floats(loop.points, f"loop {loop.name}", (None, 3)) * 1e3 for loop in loops]
+    broken = [np.vstack([line, np.full((1, 3), np.nan)]) for line in lines]
+    texts = [f"<b>{escape(loop.name)}</b><br>{escape(loop.facts)}" for loop in loops]
+    figure.add_scatter3d(
+        **xyz(np.vstack(broken)),
+        mode="lines",
+        line={"color": colour, "width": 6},
+        text=np.repeat(texts, [len(line) for line in broken]).tolist(),
+        hovertemplate="%{text}<extra></extra>",
+        name=f"{len(loops)} {caption}",
+        visible="legendonly" if aside else True,
+    )

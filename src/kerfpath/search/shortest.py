@@ -1,0 +1,469 @@
+"""The best path through a layered graph given as arrays (section 3.2 of the paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.kernels import search as kernel
+from kerfpath.kernels.exact import count_closing
+from kerfpath.kernels.metric import increments_between
+from kerfpath.kernels.search import Aim, SortedLayers
+from kerfpath.kernels.states import States
+from kerfpath.limits import AccelerationLimit, Limits, TorqueLimit
+from kerfpath.search.branch import best_closed_path
+from kerfpath.search.exact import BestPath, best_path, dead_end
+from kerfpath.search.problem import (
+    Closure,
+    Layers,
+    Method,
+    Metric,
+    ObjectiveKind,
+    SearchProblem,
+    best_within_rotation,
+    broken_edge,
+    closed_before,
+    empty_layer,
+    require_joined,
+    reverse,
+    sort_layers,
+    too_far,
+    why_closed,
+)
+from kerfpath.search.slowed import (
+    LeastInterval,
+    aim_at_least_time,
+    binding,
+    find_least_interval,
+    first_guess,
+    quickest,
+    sampled_steps,
+)
+
+SAME_END = 1e-6
+"""rad: joint difference up to which the ends of a closed contour count as the same vertex."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LayeredPath:
+    """One vertex per layer, and the cost of the path.
+
+    Parameters
+    ----------
+    index : (K,) int
+        Vertex of each layer, 0-based inside its layer.
+    cost : float
+        Objective (14) or (15), vertex costs included.
+    optimal : bool
+        True only if the path is proved to be the best on this graph under (5), (6) and torque
+        limits.
+    """
+
+    index: Ints
+    cost: float
+    optimal: bool
+
+    __repr__ = short_repr
+
+
+def shortest_path(
+    q: ArrayLike,
+    start: ArrayLike,
+    *,
+    dt: float,
+    velocity: ArrayLike,
+    acceleration: ArrayLike,
+    endless: ArrayLike | None = None,
+    posture: ArrayLike | None = None,
+    vertex_cost: ArrayLike | None = None,
+    shut: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+    metric: Metric = "manhattan",
+    objective: ObjectiveKind = "sum",
+    method: Method = "exact",
+    closure: Closure = "free",
+    rotation: ArrayLike | None = None,
+    eta_v: float = 1.0,
+    eta_a: float = 1.0,
+    torque: TorqueLimit | None = None,
+) -> LayeredPath:
+    """Return the best path through a layered graph, with one vertex of each layer, in order.
+
+    Parameters
+    ----------
+    q : (N, n) rad
+        Joint vectors of all vertices, layer after layer.
+    start : (K+1,) int
+        Layer k is ``q[start[k]:start[k+1]]``.
+    dt : float s
+        Time from layer to layer.
+    velocity, acceleration : (n,) rad/s, rad/s^2
+        Limits of each joint, used in (5) and (6) with `eta_v` and `eta_a`.
+    endless : (n,) bool, optional
+        Joints that turn without end, compared modulo 2 pi (13); default none. Half a turn goes in
+        the direction of the values in `q`.
+    posture : (N,) int, optional
+        Posture of each vertex; the "known" method stays in one.
+    vertex_cost : (N,), optional
+        Cost added for each visited vertex (with objective "max": maximised); infinite: the vertex
+        is closed.
+    shut : (E, 2) int, optional
+        Edges that may not be used, as rows of q: from a vertex to one of the next layer.
+    weights : (n,) 1/rad, optional
+        Weights of the distance; default 1 / (velocity dt).
+    metric : {"manhattan", "chebychev", "euclid"}
+        Distance rho_a in the weighted joint space.
+    objective : {"sum", "max"}
+        (14) or (15).
+    method : {"exact", "paper", "known"}
+        "paper": the procedure of section 3.2, whose acceleration test sees only the best
+        predecessor. "known": the technique of 2004, without (5) and (6), in one posture.
+        "exact": the proved optimum under (5) and (6); of several with the same maximum, the one
+        with the least sum.
+    closure : {"free", "periodic"}
+        "periodic": the last layer repeats the first, the path returns to the vertex it left
+        (endless joints modulo 2 pi), and (6) holds across the seam; exact method only.
+    rotation : (n,) rad, optional
+        Largest angle that an endless joint may turn away from where the path begins, in either
+        direction; infinity: no limit (default); exact method only.
+    eta_v, eta_a : float
+        Share of the velocity and acceleration limits that may be used.
+    torque : TorqueLimit, optional
+        Kept at the nodes where (6) holds, by central differences; exact method only.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No admissible path was found; the message says where, and which limits forbid it.
+    InputError
+        Arrays whose shapes do not fit, NaN, limits or dt that are not positive, unknown names,
+        a periodic closure whose end layers differ, or a finite rotation of a joint that is not
+        endless.
+
+    Notes
+    -----
+    Nothing is stored per edge that is not shut. Besides `q`, the search takes about 100 bytes per
+    vertex with six joints, at most 80 MB for the states (p, j) remembered under a loose bound, and
+    finally 8 bytes for each state within the cost of the answer. The time grows with the number of
+    layers. The search runs on the calling thread, without the interpreter lock: several may run at
+    once, and each answer is the same to the bit.
+    """
+    problem = SearchProblem(
+        q=q,
+        start=start,
+        dt=dt,
+        limits=Limits.of(velocity, acceleration, eta_v=eta_v, eta_a=eta_a, torque=torque),
+        endless=endless,
+        vertex_cost=vertex_cost,
+        shut=shut,
+        weights=weights,
+        metric=metric,
+        objective=objective,
+        closure=closure,
+        rotation=rotation,
+        method=method,
+        posture=posture,
+    )
+    return find_shortest(problem)
+
+
+def find_shortest(problem: SearchProblem) -> LayeredPath:
+    """Return the best path through the layers of a problem; see `shortest_path`."""
+    given, aim = problem.layers, problem.aim
+    if problem.method == "known":
+        free = freeze(np.full(len(aim.weight), np.inf))
+        aim = aim._replace(velocity=free, acceleration=free)
+        key = np.zeros(len(given.q)) if problem.posture is None else problem.posture.astype(float)
+        layers = sort_layers(given, free, key, 0.5)
+        del key  # as large as the graph
+    else:
+        layers = sort_layers(given, aim.velocity)
+    if _filled(layers) == 0:
+        raise empty_layer(given, 0)
+    if problem.method != "exact":
+        return _follow_procedure(given, layers, aim, may_prove=problem.method == "paper")
+    closed = problem.closure == "periodic"
+    if closed:
+        _require_same_ends(given)
+    try:
+        found = _find_exactly(given, layers, aim, closed=closed)
+    except NoFeasiblePath as broken:
+        if (sooner := closed_before(given, aim, problem.rotation, broken)) is not None:
+            raise sooner from None
+        if np.isinf(problem.rotation).all():
+            broken.back, broken.leaving = _from_the_back(given, aim)
+        else:
+            broken.reached = None  # within the rotation limits there may be fewer vertices
+        raise
+    over = too_far(given.q[given.start[:-1] + found.index], given.endless, problem.rotation)
+    return _turn_less(given, aim, problem.rotation, over, closed=closed) if over.any() else found
+
+
+def _filled(layers: SortedLayers) -> int:
+    """Return the first layer that has no vertex, or the number of layers if all have some."""
+    sizes = np.diff(layers.start)
+    return int(np.argmin(sizes)) if (sizes == 0).any() else len(sizes)
+
+
+def _find_exactly(given: Layers, layers: SortedLayers, aim: Aim, *, closed: bool) -> LayeredPath:
+    """Return the proved optimum; raise NoFeasiblePath, proved, where the path breaks."""
+    filled = _filled(layers)
+    whole = filled == len(layers.start) - 1
+    if closed and whole:
+        found = best_closed_path(layers, aim)
+    else:
+        found = best_path(layers._replace(start=layers.start[: filled + 1]), aim)
+    if isinstance(found, BestPath):
+        if not whole:
+            raise empty_layer(given, filled)
+        index = layers.rank[found.path]
+        return LayeredPath(index=freeze(index), cost=found.cost, optimal=True)
+    breaks = found.counts.any() or found.shut
+    if closed and found.layers >= filled - 1 and not breaks:
+        raise NoFeasiblePath(
+            "paths reach the last node, but none returns to the vertex that it left"
+            " with an admissible acceleration across the seam",
+            proved=True,
+            node=len(layers.start) - 2,
+        )
+    broken = broken_edge(found.layers, found.counts, found.shut, proved=True)
+    broken.reached = freeze(layers.rank[found.reached])
+    raise broken
+
+
+def _turn_less(
+    given: Layers, aim: Aim, rotation: Array, over: Bools, *, closed: bool
+) -> LayeredPath:
+    """Return the proved optimum within rotation limits, which the joints `over` (n,) exceed."""
+    unrolled, found = best_within_rotation(given, aim, rotation, over, closed=closed)
+    if found is None:
+        raise why_closed(given, aim, rotation, unrolled, closed=closed)
+    index, cost = found
+    return LayeredPath(index=freeze(index), cost=cost, optimal=True)
+
+
+def _from_the_back(given: Layers, aim: Aim) -> tuple[int, Ints | None]:
+    """Return the first node from which admissible paths reach the end, and their vertices there.
+
+    (5) and (6) hold for a path and its reverse alike, so this is as far as any path goes backwards
+    from the last layer.
+    """
+    layers = sort_layers(reverse(given), aim.velocity)
+    K, filled = len(layers.start) - 1, _filled(layers)
+    if filled == 0:
+        return K, None
+    found = dead_end(layers._replace(start=layers.start[: filled + 1]), aim)
+    return K - found.layers, freeze(layers.rank[found.reached])
+
+
+def _follow_procedure(
+    given: Layers, layers: SortedLayers, aim: Aim, *, may_prove: bool
+) -> LayeredPath:
+    """Run steps (1) to (5) of the procedure and trace the path; NoFeasiblePath if it breaks."""
+    start, filled = layers.start, _filled(layers)
+    dist, before = np.full(len(layers.low), np.inf), np.full(len(layers.low), -1)
+    to_search = layers._replace(start=start[: filled + 1])
+    reached, turned_away = kernel.path_planning(to_search, aim, dist, before)
+    if reached < filled:
+        ends = _ends(layers, dist, before, reached - 1)
+        counts, shut = count_closing(layers, aim, ends, reached)
+        raise broken_edge(reached, counts, int(shut), proved=not turned_away)
+    if filled < len(start) - 1:
+        raise empty_layer(given, filled)
+    a, b = start[-2], start[-1]
+    best = np.flatnonzero(dist[a:b] == dist[a:b].min()) + a
+    j = int(best[np.argmin(layers.rank[best])])
+    cost = float(dist[j])
+    path = np.empty(len(start) - 1, dtype=np.int64)
+    for k in range(len(path) - 1, -1, -1):
+        path[k] = layers.rank[j]
+        j = int(before[j])
+    return LayeredPath(index=freeze(path), cost=cost, optimal=may_prove and not turned_away)
+
+
+def _ends(layers: SortedLayers, dist: Array, before: Ints, k: int) -> States:
+    """Return the last edges of the paths into layer k that the procedure has found."""
+    a, b = layers.start[k : k + 2]
+    vertex = a + np.flatnonzero(dist[a:b] < np.inf)
+    parent = before[vertex]
+    dq = increments_between(layers.given[:, parent].T, layers.given[:, vertex].T, layers.endless)
+    first = np.searchsorted(vertex, np.arange(a, b + 1))
+    return States(vertex, dist[vertex], np.ascontiguousarray(dq), parent, first)
+
+
+def _require_same_ends(given: Layers) -> None:
+    first, last = given.q[: given.start[1]], given.q[given.start[-2] :]
+    if len(first) != len(last):
+        raise InputError(
+            "closure: periodic needs a last layer that repeats the first, but they have "
+            f"{len(first)} and {len(last)} vertices"
+        )
+    gap = np.abs(increments_between(first, last, given.endless))
+    if gap.max(initial=0.0) > SAME_END:
+        i = int(np.argmax(gap.max(axis=1)))
+        raise InputError(
+            "closure: periodic needs a last layer that repeats the first, but their vertices "
+            f"{i} differ by {gap[i].max():.3g} rad"
+        )
+
+
+# -----------------------------------------------------------------------------
+# Relaxations for a graph without a path: the exact least one of each limit on its own.
+
+LARGEST_ETA_V = 2.0
+"""Largest eta_v that is tried; no robot exceeds its velocity limits by more."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Relaxations:
+    """The least change of each limit with which a path exists, with the other limits unchanged.
+
+    Parameters
+    ----------
+    eta_v : float or None
+        Least share of the velocity limits; None if no share up to 2 gives a path.
+    eta_a : float or None
+        Least share of the acceleration limits; None if the velocity limits alone leave no path.
+    slower : LeastInterval
+        Least node interval, and the limit that binds there.
+    """
+
+    eta_v: float | None
+    eta_a: float | None
+    slower: LeastInterval
+
+    __repr__ = short_repr
+
+    @property
+    def dt(self) -> float:
+        """Least node interval, s."""
+        return self.slower.dt
+
+
+def find_relaxations(problem: SearchProblem) -> Relaxations:
+    """Return the least eta_v, eta_a and dt, each on its own, with which a path exists.
+
+    Each is the exact solution of a second-order minimax problem on the graph.
+
+    Parameters
+    ----------
+    problem : SearchProblem
+        As in `find_least_interval`.
+
+    Raises
+    ------
+    NoFeasiblePath
+        A layer is empty, so no limit helps.
+    InputError
+        As `find_least_interval`.
+    """
+    slower = find_least_interval(problem)
+    # Velocity limits unchanged; of all paths the one whose sharpest change needs the least time.
+    velocity, limits = problem.aim.velocity, problem.limits
+    changes = aim_at_least_time(np.zeros(len(velocity)), limits.acceleration.bound)
+    sharpest = quickest(problem.layers, changes, velocity, np.inf)
+    return Relaxations(
+        eta_v=_least_eta_v(problem),
+        eta_a=None if sharpest is None else (sharpest[1] / problem.dt) ** 2,
+        slower=slower,
+    )
+
+
+def _least_eta_v(problem: SearchProblem) -> float | None:
+    """Return the least eta_v with which a path exists; None if it is above `LARGEST_ETA_V`."""
+    limits, tried = problem.limits, problem.limits.velocity.share
+    while True:
+        # Within the share tried, the share needed is a Chebychev distance to be minimised.
+        asked = replace(
+            problem,
+            limits=replace(limits, velocity=replace(limits.velocity, share=tried)),
+            weights=1.0 / (limits.velocity.bound * problem.dt),
+            metric="chebychev",
+            objective="max",
+        )
+        try:
+            return find_shortest(asked).cost
+        except NoFeasiblePath:
+            if tried >= LARGEST_ETA_V:
+                return None
+            tried = min(2 * tried, LARGEST_ETA_V)
+
+
+# -----------------------------------------------------------------------------
+# A path for speeds far below the one asked for, by first-order recursions alone.
+#
+# The exact search for the least interval remembers edges. If nodes must be far apart in time, the
+# velocity limits leave nearly all edges and it takes minutes; a recursion over vertices does not.
+
+LAYERS_SAMPLED = 16
+"""Layers sampled to estimate the number of edges."""
+ROUNDING = 1e-9
+"""Relative slack of an interval, so that a path that needs exactly this interval passes."""
+
+
+def velocity_allows(problem: SearchProblem, dt: float) -> bool:
+    """Return whether some path keeps (5), at any acceleration, with `dt` s from node to node."""
+    try:
+        find_shortest(_first_order(problem, dt))
+    except NoFeasiblePath:
+        return False
+    return True
+
+
+def find_slow_path(problem: SearchProblem) -> LeastInterval:
+    """Return the shortest path that keeps (5) in the least interval in which any path does.
+
+    Its `dt` is the interval in which that path keeps (6), too. Another path may keep both in less,
+    but none in less than the least interval for (5) alone.
+
+    Raises
+    ------
+    NoFeasiblePath
+        A layer is empty, or closed vertices and shut edges leave no path; the message says where.
+    """
+    require_joined(problem.layers)
+    v, a = problem.limits.velocity.usable, problem.limits.acceleration.usable
+    quickest, dt = None, first_guess(problem.layers, v)
+    while quickest is None:
+        try:
+            quickest = find_shortest(_slowest_step(problem, dt))
+        except NoFeasiblePath:
+            dt *= 2
+    least = quickest.cost * (1 + ROUNDING) or dt
+    path: LayeredPath = find_shortest(_first_order(problem, least))
+    return binding(problem.layers, path.index, v, a)
+
+
+def edges_allowed(problem: SearchProblem, dt: float) -> float:
+    """Return an estimate, from samples, of the edges that keep (5) with `dt` s between nodes."""
+    sizes = np.diff(problem.start)
+    most = problem.limits.velocity.per_interval(dt)
+    looked_at, kept = 0, 0
+    for steps in sampled_steps(problem.layers, LAYERS_SAMPLED):
+        for step in steps:
+            kept += int((step <= most).all(axis=1).sum())
+            looked_at += len(step)
+    return float((sizes[:-1] * sizes[1:]).sum()) * kept / max(looked_at, 1)
+
+
+def _first_order(problem: SearchProblem, dt: float) -> SearchProblem:
+    """Return the problem of the shortest path under the velocity limits at an interval."""
+    free = AccelerationLimit(bound=np.full(len(problem.weights), np.inf))
+    return replace(
+        problem.free(),
+        dt=dt,
+        limits=replace(problem.limits, acceleration=free),
+        metric="manhattan",
+        objective="sum",
+        weights=1 / problem.limits.velocity.usable,
+        method="paper",
+    )
+
+
+def _slowest_step(problem: SearchProblem, dt: float) -> SearchProblem:
+    """Return the problem of the path whose longest step takes the least time, s."""
+    return replace(_first_order(problem, dt), metric="chebychev", objective="max")

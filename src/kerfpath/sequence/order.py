@@ -1,0 +1,441 @@
+"""The order of cutting: a generalised travelling-salesman problem over groups of candidates.
+
+Each group (a contour) has candidates (a start, a direction, a posture), of which one is chosen. The
+objective is the time of the chosen candidates and of the moves between them. The solver (CP-SAT of
+OR-tools) proves that its order is best, or gives a bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kerfpath.arrays import Array, Bools, Ints, floats, freeze, integers, short_repr
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.extras import require_extra
+from kerfpath.kernels.metric import increments_between
+from kerfpath.plans import Plan
+from kerfpath.progress import may_stop
+from kerfpath.robots import posture_name
+from kerfpath.transfer import TransferMove, back_off, least_time, transfer_move
+
+# -----------------------------------------------------------------------------
+# Find contours that lie inside others: a piece must not fall out before its holes are cut.
+
+COMMON = 0.1
+"""Length of the mean tool axis from which on the axes have a common direction."""
+
+
+def inner_first(contours: Sequence[Contour]) -> list[tuple[int, int]]:
+    """Return the pairs (i, j) of contours where i lies inside the closed contour j.
+
+    The contours are seen along the mean tool axis of j. Both must be on the same side of the part:
+    their mean axes differ by less than 90 deg. Open contours contain nothing, so pass the loops of
+    the drawing without their leads. A loop around a tube, whose axes have no common direction,
+    contains nothing either.
+    """
+    pairs = []
+    for j, outer in enumerate(contours):
+        if not outer.closed:
+            continue
+        n = outer.axes.mean(axis=0)
+        if np.linalg.norm(n) < COMMON:
+            continue
+        x = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
+        plane = np.array([x / np.linalg.norm(x), np.cross(n, x) / np.linalg.norm(np.cross(n, x))]).T
+        ring = outer.points @ plane
+        for i, inner in enumerate(contours):
+            faces = i != j and float(inner.axes.mean(axis=0) @ n) > 0
+            at = inner.points @ plane
+            # The first point is enough for most contours, which are far outside.
+            if faces and _inside(ring, at[:1])[0] and _inside(ring, at).all():
+                pairs.append((i, j))
+    return pairs
+
+
+def _inside(ring: Array, points: Array) -> Bools:
+    """Return which points (B, 2) are inside a ring (K, 2), by the parity of ray crossings."""
+    a, b = ring[:-1], ring[1:]
+    above = a[:, 1] > points[:, None, 1], b[:, 1] > points[:, None, 1]
+    rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
+    at = a[:, 0] + (points[:, None, 1] - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
+    crossed = (above[0] != above[1]) & (points[:, None, 0] < at)
+    return np.asarray(crossed.sum(axis=1) % 2 == 1)
+
+
+# -----------------------------------------------------------------------------
+# Transfer moves between candidates: least times, and the moves planned so far.
+
+PATIENCE = 12
+"""Number of searches for a way that may fail; each failed search takes its full time limit."""
+LOCKED_AFTER = 2
+"""Number of failures after which an end is locked, if no move from or to it was ever found."""
+HOME = -1
+"""Number that means home instead of a candidate."""
+
+
+class MoveTimes:
+    """Times of the transfer moves between candidates: a lower bound until a move is planned.
+
+    Attributes
+    ----------
+    failed : dict of (int, int) to NoFeasiblePath
+        The moves (from candidate, to candidate) for which no way was found, and why.
+    """
+
+    def __init__(
+        self,
+        plans: Sequence[Plan],
+        group: Ints,
+        cell: Cell | None,
+        retract: float,
+        seconds: float,
+        air_speed: float = 1.0,
+    ) -> None:
+        self._robot, self._plans, self._cell, self._seconds = plans[0].robot, plans, cell, seconds
+        self._retract, self._air_speed = retract, air_speed
+        self._eta_v, self._eta_a = plans[0].settings.eta_v, plans[0].settings.eta_a
+        self._starts = np.array([back_off(p, "start", retract) for p in plans])
+        self._ends = np.array([back_off(p, "end", retract) for p in plans])
+        C = len(plans)
+        self.between = np.array([self._least(self._ends[[i] * C], self._starts) for i in range(C)])
+        self.between[group[:, None] == group] = np.inf
+        self._moves: dict[tuple[int, int], TransferMove] = {}
+        self.failed: dict[tuple[int, int], NoFeasiblePath] = {}
+        self._home: Array | None = None
+        self.first, self.last = np.zeros(C), np.zeros(C)
+
+    @property
+    def home(self) -> Array | None:
+        """Home position of the robot, (n,) rad; None where there is none."""
+        return self._home
+
+    @home.setter
+    def home(self, q: Array) -> None:
+        self._home = q
+        everywhere = np.tile(q, (len(self._plans), 1))
+        self.first = self._least(everywhere, self._starts)
+        self.last = self._least(self._ends, everywhere)
+
+    def extended(self, plans: Sequence[Plan], group: Ints) -> MoveTimes:
+        """Return the moves between more candidates, the first of which are those of this object.
+
+        Planned moves and `failed` are shared with this object.
+        """
+        more = MoveTimes(plans, group, self._cell, self._retract, self._seconds, self._air_speed)
+        C = len(self._plans)
+        more.between[:C, :C] = self.between
+        more._moves, more.failed = self._moves, self.failed
+        if self._home is not None:
+            more.home = self._home
+            more.first[:C], more.last[:C] = self.first, self.last
+        return more
+
+    def forbid(self, pairs: Bools) -> None:
+        """Forbid that candidate j follows candidate i where pairs[i, j] of (C, C) is true."""
+        self.between[pairs] = np.inf
+
+    def look_at(self, candidates: Ints) -> bool:
+        """Plan the unplanned moves of an order; return whether one takes longer than assumed.
+
+        A move without a way is forbidden. So are all other moves from or to an end for which
+        `LOCKED_AFTER` moves failed and none was found.
+
+        Raises
+        ------
+        NoFeasiblePath
+            An end of a move, such as home, is not clear (proved).
+        """
+        changed = False
+        for leg in self._legs(candidates):
+            if leg in self._moves:
+                continue
+            may_stop()
+            a, b = leg
+            one = self._home if a == HOME else self._ends[a]
+            two = self._home if b == HOME else self._starts[b]
+            assert one is not None
+            assert two is not None
+            try:
+                move = self._moves[leg] = self._planned(one, two)
+                took = move.duration
+            except NoFeasiblePath as broken:
+                if broken.proved:
+                    raise broken.with_message(f"{self.between_which(leg)}: {broken}") from None
+                self.failed[leg], took = broken, np.inf
+                self._shut(leg)
+            times, at = self._place(leg)
+            changed |= bool(took > times[at] + 1e-9)
+            times[at] = took
+            if not np.isfinite(took):
+                return True  # another order avoids this move, so the other moves can wait
+        return changed
+
+    def why_no_order(self, none: NoFeasiblePath | None) -> NoFeasiblePath:
+        """Return a failure that names the first move without a way, its obstacle, and the others.
+
+        `none` says why no order is left without these moves; None means that the search ended after
+        `PATIENCE` failures.
+        """
+        if not self.failed:
+            assert none is not None
+            return none
+        leg, broken = next(iter(self.failed.items()))
+        others = len(self.failed) - 1
+        also = f"; no way for {others} more move{'s' * (others > 1)}" if others else ""
+        return NoFeasiblePath(
+            f"{self.between_which(leg)}: {broken}{also}, and "
+            + ("no order is left without them" if none else "the search has ended"),
+            proved=False,
+            node=-1,
+        )
+
+    def between_which(self, leg: tuple[int, int]) -> str:
+        """Return the ends of a move in words: the contours, and the postures there."""
+        words = []
+        for candidate, end, node in ((leg[0], "end", -1), (leg[1], "start", 0)):
+            if candidate == HOME:
+                words.append("home")
+                continue
+            made = self._plans[candidate]
+            posture = posture_name(int(made.posture[node]))
+            words.append(f"the {end} of contour {made.name!r} in posture {posture}")
+        return f"from {words[0]} to {words[1]}"
+
+    def _shut(self, leg: tuple[int, int]) -> None:
+        """Forbid all moves of an end whose moves have failed often enough and never succeeded."""
+        for side, candidate in enumerate(leg):
+            often = sum(failed[side] == candidate for failed in self.failed)
+            ever = any(made[side] == candidate for made in self._moves)
+            if candidate == HOME or ever or often < LOCKED_AFTER:
+                continue
+            if side == 0:
+                self.between[candidate] = self.last[candidate] = np.inf
+            else:
+                self.between[:, candidate] = self.first[candidate] = np.inf
+
+    def _place(self, leg: tuple[int, int]) -> tuple[Array, int]:
+        """Return the array that holds the time of a move, and the index in it."""
+        a, b = leg
+        return (
+            (self.first, b) if a == HOME else (self.last, a) if b == HOME else (self.between[a], b)
+        )
+
+    def unrolled(self, candidates: Ints) -> tuple[tuple[Plan, ...], tuple[TransferMove, ...]]:
+        """Return the plans and moves of an order, with endless joints not wrapped between them."""
+        legs = self._legs(candidates)
+        here = self._ends[candidates[0]] if self._home is None else self._home
+        plans, moves, shift = [], [], np.zeros_like(here)
+        for k, (a, b) in enumerate(legs):
+            move = self._moves[a, b]
+            moves.append(replace(move, q=freeze(move.q + (here - move.q[0]))))
+            shift = moves[-1].q[-1] - (0 if b == HOME else self._starts[b])
+            if k == 0 and a != HOME:
+                plans.append(self._plans[a])
+            if b != HOME:
+                plans.append(self._shifted(b, shift))
+                here = self._ends[b] + shift
+        if not legs:
+            plans = [self._plans[int(candidates[0])]]
+        return tuple(plans), tuple(moves)
+
+    def _legs(self, candidates: Ints) -> list[tuple[int, int]]:
+        around = candidates.tolist() if self._home is None else [HOME, *candidates.tolist(), HOME]
+        return list(pairwise(around))
+
+    def _planned(self, one: Array, two: Array) -> TransferMove:
+        move = transfer_move(
+            self._robot, one, one + increments_between(one, two, self._robot.endless),
+            cell=self._cell, eta_v=self._eta_v, eta_a=self._eta_a, seconds=self._seconds,
+        )  # fmt: skip
+        return replace(move, time=freeze(move.time / self._air_speed))
+
+    def _least(self, one: Array, two: Array) -> Array:
+        velocity, acceleration = self._robot.speed_limits()
+        dq = increments_between(one, two, self._robot.endless)
+        least = least_time(dq, self._eta_v * velocity, self._eta_a * acceleration)
+        return np.asarray(least / self._air_speed)
+
+    def _shifted(self, candidate: int, shift: Array) -> Plan:
+        made, turns = self._plans[candidate], np.round(shift / (2 * np.pi)).astype(np.int64)
+        own = np.arange(len(turns)) < self._robot.family.joints  # an external axis has no turns
+        return replace(made, q=made.q + 2 * np.pi * turns, turn=made.turn + own * turns)
+
+
+# -----------------------------------------------------------------------------
+# The order of cutting: a generalised travelling-salesman problem over groups of candidates.
+
+TICK = 1e-4
+"""s: resolution of times in the solver."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Order:
+    """An order of cutting.
+
+    Parameters
+    ----------
+    candidates : (G,) int
+        The chosen candidate of each group, in the order of cutting.
+    duration : float s
+        Time of those candidates and of the moves between them.
+    at_least : float s
+        Lower bound: no order takes less. Equal to `duration` where the order is proved best.
+    """
+
+    candidates: Ints
+    duration: float
+    at_least: float
+
+    __repr__ = short_repr
+
+    @property
+    def optimal(self) -> bool:
+        """Whether the order is proved best within the solver's resolution for each move."""
+        return self.duration - self.at_least <= 2 * TICK * (len(self.candidates) + 1)
+
+
+def best_order(
+    group: ArrayLike,
+    own: ArrayLike,
+    between: ArrayLike,
+    *,
+    first: ArrayLike | None = None,
+    last: ArrayLike | None = None,
+    before: Sequence[tuple[int, int]] = (),
+    seconds: float = 10.0,
+) -> Order:
+    """Return the order of least time that visits one candidate of every group.
+
+    Parameters
+    ----------
+    group : (C,) int
+        Group of each candidate, 0 to G - 1; every group has at least one candidate.
+    own : (C,) s
+        Time of each candidate itself.
+    between : (C, C) s
+        Time from the end of candidate i to the start of candidate j; infinite where j may not
+        follow i.
+    first, last : (C,) s, optional
+        Time to reach each candidate as the first, and to return home from it as the last; infinite
+        where that is not allowed. Default: 0.
+    before : sequence of (g, h)
+        Group g comes before group h.
+    seconds : float s
+        Time limit of the solver.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No order satisfies all of this (proved), or none was found in time.
+    InputError
+        The shapes do not fit, a group has no candidates, or `before` has an unknown group.
+    """
+    g = integers(group, "group", (None,))
+    C, G = len(g), int(g.max(initial=-1)) + 1
+    if set(g.tolist()) != set(range(G)) or G == 0:
+        raise InputError(f"group: expected every number from 0 to {max(G - 1, 0)}, got {set(g)}")
+    move = np.asarray(between, dtype=np.float64)
+    if move.shape != (C, C) or np.isnan(move).any() or (move < 0).any():
+        raise InputError(f"between: expected times >= 0 of shape ({C}, {C}), got {move.shape}")
+    if any(not 0 <= h < G for pair in before for h in pair):
+        raise InputError(f"before: expected pairs of numbers from 0 to {G - 1}, got {list(before)}")
+    cost = floats(own, "own", (C,))
+    ends = []
+    for name, given in (("first", first), ("last", last)):
+        time = np.zeros(C) if given is None else np.asarray(given, dtype=np.float64)
+        if time.shape != (C,) or not (time >= 0).all():
+            raise InputError(f"{name}: expected {C} times >= 0, got {time.tolist()}")
+        ends.append(time)
+    enter, leave = ends
+    return _solve(g, cost, move, enter, leave, before, seconds)
+
+
+def _solve(
+    group: Ints, own: Array, move: Array, enter: Array, leave: Array,
+    before: Sequence[tuple[int, int]], seconds: float,
+) -> Order:  # fmt: skip
+    require_extra("programs", "the order of cuts")
+    from ortools.sat.python import cp_model  # loaded where it is needed: half a second
+
+    C, G = len(group), int(group.max()) + 1
+    earlier = np.zeros((G, G), bool)
+    for g, h in before:
+        earlier[g, h] = True
+    time = _times(group, own, move, enter, leave, earlier)
+    model = cp_model.CpModel()
+    ways = np.argwhere(np.isfinite(time)).tolist()
+    taken = {(a, b): model.new_bool_var(f"{a} to {b}") for a, b in ways}
+    without = [model.new_bool_var(f"without {i}") for i in range(C)]
+    model.add_circuit(
+        [(a, b, taken[a, b]) for a, b in ways] + [(i + 1, i + 1, without[i]) for i in range(C)]
+    )
+    for h in range(G):
+        members = np.flatnonzero(group == h).tolist()
+        model.add(sum(without[i] for i in members) == len(members) - 1)
+    # A group that comes after all others is last since only it may go home; others need a place.
+    last = (earlier.sum(axis=0) == G - 1) & ~earlier.diagonal()
+    waiting = [(g, h) for g, h in before if not last[h]]
+    if waiting:
+        place = [model.new_int_var(0, G - 1, f"place {h}") for h in range(G)]
+        model.add_all_different(place)
+        for (a, b), way in taken.items():
+            here = -1 if a == 0 else place[group[a - 1]]
+            there = G if b == 0 else place[group[b - 1]]
+            model.add(there == here + 1).only_enforce_if(way)
+        for g, h in waiting:
+            model.add(place[g] < place[h])
+    model.minimize(sum(round(time[ends] / TICK) * way for ends, way in taken.items()))
+    solver = cp_model.CpSolver()
+    solver.parameters.max_time_in_seconds = seconds
+    solver.parameters.num_workers = 1  # reproducible
+    solver.parameters.random_seed = 1
+    # Circuit cuts prove a plain tour about ten times faster; with places they only cost time.
+    solver.parameters.linearization_level = 1 if waiting else 2
+    status = solver.solve(model)
+    if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
+        proved = status == cp_model.INFEASIBLE
+        why = (
+            "its constraints (which contour may follow or must come before another) contradict "
+            "each other"
+            if proved
+            else f"none that keeps the constraints was found within {seconds:g} s"
+        )
+        raise NoFeasiblePath(
+            f"no order of cutting: {why}",
+            proved=proved,
+            node=-1,
+        )
+    following = {a: b for (a, b), way in taken.items() if solver.boolean_value(way)}
+    chosen, here = [], following[0]
+    while here:
+        chosen.append(here - 1)
+        here = following[here]
+    order = np.array(chosen)
+    duration = enter[order[0]] + own[order].sum() + move[order[:-1], order[1:]].sum()
+    return Order(
+        candidates=order,
+        duration=float(duration + leave[order[-1]]),
+        at_least=float(min(solver.best_objective_bound * TICK, duration + leave[order[-1]])),
+    )
+
+
+def _times(
+    group: Ints, own: Array, move: Array, enter: Array, leave: Array, earlier: Bools
+) -> Array:
+    """Return times (C + 1, C + 1) of the move to each candidate and its cut; 0 is home.
+
+    Infinity means not allowed.
+    """
+    time = np.full((len(group) + 1, len(group) + 1), np.inf)
+    same = group[:, None] == group
+    time[1:, 1:] = np.where(same | earlier[group[None], group[:, None]], np.inf, move + own)
+    time[0, 1:] = np.where(earlier[:, group].any(axis=0), np.inf, enter + own)
+    time[1:, 0] = np.where(earlier[group].any(axis=1), np.inf, leave)
+    return time

@@ -1,0 +1,477 @@
+"""A whole part: a plan for every contour, their order, and the transfer moves between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import TypedDict, TypeVar, Unpack, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from kerfpath.arrays import Array, Bools, Ints, floats, not_negative, scalar, short_repr
+from kerfpath.cell import Cell
+from kerfpath.contour import Contour
+from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
+from kerfpath.planner import plan, with_bound
+from kerfpath.plans import Plan
+from kerfpath.robots import Robot, posture_name
+from kerfpath.sequence.order import HOME, PATIENCE, MoveTimes, Order, best_order
+from kerfpath.transfer import End, TransferMove, back_off, explain_collision
+
+# -----------------------------------------------------------------------------
+# Select the candidates that the tool can approach and leave, and plan more where none is left.
+
+BACK_BY = (0.0, 0.1, 0.4, 0.7, 1.0)
+"""Shares of the retract between which the joints are assumed to move linearly."""
+
+
+def unused_postures(made: Sequence[Plan], wanted: Sequence[int] | None) -> list[int]:
+    """Return the wanted postures (None: all) in which no plan of a contour begins or ends."""
+    used = {int(p) for one in made for p in one.posture[[0, -1]]}
+    every = range(made[0].robot.postures) if wanted is None else wanted
+    return [int(p) for p in every if p not in used]
+
+
+class MorePlans:
+    """Further plans of contours, requested once for each contour, and how many were found."""
+
+    def __init__(self, every: list[list[Plan]], more: Callable[[int], Sequence[Plan]]) -> None:
+        self._every, self._more = every, more
+        self._got: dict[int, int] = {}
+
+    def of(self, contour: int) -> range:
+        """Request further plans of a contour, once; return the numbers of the new candidates."""
+        made = self._every[contour]
+        first = len(made)
+        if contour not in self._got:
+            made += self._more(contour)
+            self._got[contour] = len(made) - first
+        return range(first, len(made))
+
+    def mentioned_in(self, broken: NoFeasiblePath) -> NoFeasiblePath:
+        """Return the failure with the further plans that were tried added to its message."""
+        tried = [
+            f"{self._every[i][0].name!r} in {count} other postures"
+            for i, count in self._got.items()
+            if count
+        ]
+        if not tried:
+            return broken
+        return broken.with_message(f"{broken}; also tried: {', '.join(tried)}")
+
+
+def reachable(
+    every: Sequence[Sequence[Plan]], cell: Cell | None, retract: float, further: MorePlans
+) -> list[tuple[int, int]]:
+    """Return (contour, candidate) of each plan that the tool can approach and leave."""
+    places: list[tuple[int, int]] = []
+    for i, made in enumerate(every):
+        broken, found = _reachable(made, range(len(made)), cell, retract)
+        if broken is not None and not found:
+            _, found = _reachable(made, further.of(i), cell, retract)
+            if not found:
+                raise further.mentioned_in(broken)
+        places += [(i, c) for c in found]
+    return places
+
+
+def more_reachable(
+    every: Sequence[Sequence[Plan]], cell: Cell | None, retract: float, further: MorePlans,
+    contours: Sequence[int],
+) -> list[tuple[int, int]]:  # fmt: skip
+    """Return (contour, candidate) of each further plan that the tool can approach and leave."""
+    return [(i, c) for i in contours for c in _reachable(every[i], further.of(i), cell, retract)[1]]
+
+
+def _reachable(
+    made: Sequence[Plan], which: range, cell: Cell | None, retract: float
+) -> tuple[NoFeasiblePath | None, list[int]]:
+    """Return the first failure and the candidates that the tool can approach and leave."""
+    broken, found = None, []
+    for c in which:
+        try:
+            _require_clear_ends(made[c], cell, retract)
+            found.append(c)
+        except NoFeasiblePath as error:
+            broken = broken or error
+    return broken, found
+
+
+def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
+    """Raise NoFeasiblePath where the tool cannot approach a cut or back off from it."""
+    ends: tuple[tuple[End, int], ...] = (("start", 0), ("end", len(made.q) - 1))
+    for end, node in ends:
+        try:
+            way = np.array([back_off(made, end, part * retract) for part in BACK_BY])
+        except InputError as broken:
+            raise NoFeasiblePath(str(broken), proved=True, node=node) from broken
+        if cell is None:
+            continue
+        if not cell.clear_through(way):
+            raise NoFeasiblePath(
+                f"contour {made.name!r}: in posture {posture_name(int(made.posture[node]))} the "
+                f"tool is not clear while it backs off node {node} by {retract * 1e3:g} mm: "
+                f"{explain_collision(cell, way)}",
+                proved=True,
+                node=node,
+            )
+
+
+# -----------------------------------------------------------------------------
+# A whole part: a plan for every contour, their order, and the transfer moves between them.
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PartPlan:
+    """The plans of a part's contours in the order of cutting, and the moves between them.
+
+    Parameters
+    ----------
+    plans : tuple of Plan
+        Plans in the order of cutting; endless joints are not wrapped from contour to contour.
+    moves : tuple of TransferMove
+        One move between each plan and the next, from backed off to backed off. With a home
+        position there is also one before the first plan and one after the last.
+    order : Order
+        The order and what is proved about it.
+    chosen : tuple of (int, int)
+        Contour and candidate of each plan, by number.
+    retract, approach_speed : float m, m/s
+        How far and how fast the tool backs off before and after each contour.
+    pierce_time : float s
+        Time to pierce at each contour.
+    """
+
+    plans: tuple[Plan, ...]
+    moves: tuple[TransferMove, ...]
+    order: Order
+    chosen: tuple[tuple[int, int], ...]
+    retract: float
+    approach_speed: float
+    pierce_time: float
+
+    __repr__ = short_repr
+
+    @property
+    def cutting_time(self) -> float:
+        """Time on the contours (s)."""
+        return float(sum(p.time[-1] - p.time[0] for p in self.plans))
+
+    @property
+    def air_time(self) -> float:
+        """Time of the transfer moves (s), including approaches and retracts."""
+        down_and_up = 2 * len(self.plans) * self.retract / self.approach_speed
+        return sum(move.duration for move in self.moves) + down_and_up
+
+    @property
+    def piercing_time(self) -> float:
+        """Time for piercing at all contours (s)."""
+        return len(self.plans) * self.pierce_time
+
+    @property
+    def cycle_time(self) -> float:
+        """Time for cutting, transfer moves and piercing together (s)."""
+        return self.cutting_time + self.air_time + self.piercing_time
+
+
+class OrderKeywords(TypedDict, total=False):
+    """The keywords of `order_plans` for the order and the moves."""
+
+    home: ArrayLike | None
+    cell: Cell | None
+    before: Sequence[tuple[int, int]]
+    heat_spacing: float
+    given_order: bool
+    retract: float
+    approach_speed: float
+    air_speed: float
+    pierce_time: float
+    seconds: float
+
+
+class PartKeywords(OrderKeywords, PlanKeywords, total=False):
+    """The keywords of `plan_part`."""
+
+
+def plan_part(
+    contours: Sequence[Contour | Sequence[Contour]],
+    robot: Robot,
+    *,
+    tool: ArrayLike,
+    placement: ArrayLike,
+    speed: float | Sequence[float | None] | None = None,
+    options: PlanOptions | None = None,
+    progress: Callable[[int], None] | None = None,
+    **keywords: Unpack[PartKeywords],
+) -> PartPlan:
+    """Plan all contours of a part and return them in the order that takes the least time.
+
+    Every candidate is planned, and the plans are ordered by `order_plans`. Where no way to or from
+    a contour is found, its first candidate is also planned in each of the other `postures`. Only
+    the chosen plans are certified.
+
+    Parameters
+    ----------
+    contours : sequence of Contour, or of sequences of Contour
+        The contours, or the candidates of each: other starts, directions, leads.
+    robot, tool, placement, options
+        As in `kerfpath.plan`, for every contour, as are its other keywords.
+    speed : float m/s, or one for each contour
+    progress : callable, optional
+        Called with the number of candidates planned since the last call.
+    home, cell, before, heat_spacing, given_order, retract, approach_speed, air_speed, pierce_time,
+    seconds
+        As in `order_plans`; the plans are also clear in the cell.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No candidate of a contour has a plan, there is no order, or there is no way between two
+        contours.
+    InputError
+        As `kerfpath.plan` and `order_plans`.
+    """
+    groups = [[c] if isinstance(c, Contour) else list(c) for c in contours]
+    speeds = list(speed) if isinstance(speed, Sequence) else [speed] * len(groups)
+    if not groups or not all(groups) or len(speeds) != len(groups):
+        raise InputError(
+            "plan_part: expected at least one contour, candidates for each contour, and one speed "
+            f"or one per contour; got {len(groups)} contours and {len(speeds)} speeds"
+        )
+    of_order = keywords.keys() & OrderKeywords.__annotations__.keys()
+    order = cast(OrderKeywords, {k: v for k, v in keywords.items() if k in of_order})
+    rest = {k: v for k, v in keywords.items() if k not in of_order}
+    asked = with_keywords(options, rest, PartKeywords)
+    wanted = replace(asked, certify=None)  # only the chosen candidates are certified
+
+    def planned(i: int, contour: Contour, options: PlanOptions) -> Plan:
+        return plan(
+            contour, robot, tool=tool, placement=placement, options=options,
+            speed=None if contour.time is not None else speeds[i], cell=order.get("cell"),
+        )  # fmt: skip
+
+    tried: list[list[Plan]] = []
+    for i, candidates in enumerate(groups):
+        tried.append([])
+        broken = None
+        for contour in candidates:
+            try:
+                tried[i].append(planned(i, contour, wanted))
+            except NoFeasiblePath as error:
+                broken = broken or error
+            if progress is not None:
+                progress(1)
+        if broken is not None and not tried[i]:
+            raise broken
+
+    def in_posture(i: int, posture: int) -> Plan:
+        return planned(i, groups[i][0], replace(wanted, postures=(posture,)))
+
+    postures = [wanted.postures] * len(groups)
+    found = order_candidates(tried, lambda made: made, in_posture, postures, **order)
+    return replace(found, plans=tuple(with_bound(made, asked.certify) for made in found.plans))
+
+
+def order_candidates(
+    tried: Sequence[list[T]],
+    plan_of: Callable[[T], Plan],
+    in_posture: Callable[[int, int], T | None],
+    postures: Sequence[Sequence[int] | None],
+    progress: Callable[[int, int, int], None] = lambda contour, done, total: None,
+    **order: Unpack[OrderKeywords],
+) -> PartPlan:
+    """Order candidates by `order_plans`, and plan contours in other postures where needed.
+
+    Parameters
+    ----------
+    tried : sequence of lists
+        The planned candidates of each contour; candidates in other postures are appended.
+    plan_of : callable
+        Returns the plan of a candidate.
+    in_posture : callable
+        Plans a contour in one posture, both given by number; returns None or raises NoFeasiblePath
+        where that is not possible.
+    postures : sequence of sequences of int, or None
+        Postures that each contour may be cut in; None: all.
+    progress : callable
+        Called with the number of a contour, how many other postures of it are done, and how many
+        there are.
+    order
+        The other keywords of `order_plans`.
+
+    Returns
+    -------
+    PartPlan
+
+    Raises
+    ------
+    NoFeasiblePath, InputError
+        As `order_plans`.
+    """
+
+    def more(i: int) -> list[Plan]:
+        made = len(tried[i])
+        unused = unused_postures([plan_of(one) for one in tried[i]], postures[i])
+        for k, posture in enumerate(unused):
+            progress(i, k, len(unused))
+            with suppress(NoFeasiblePath):
+                one = in_posture(i, posture)
+                tried[i] += [] if one is None else [one]
+        return [plan_of(one) for one in tried[i][made:]]
+
+    return order_plans([[plan_of(one) for one in each] for each in tried], more=more, **order)
+
+
+def order_plans(
+    candidates: Sequence[Sequence[Plan]],
+    *,
+    home: ArrayLike | None = None,
+    cell: Cell | None = None,
+    before: Sequence[tuple[int, int]] = (),
+    heat_spacing: float = 0.0,
+    given_order: bool = False,
+    retract: float = 0.05,
+    approach_speed: float = 0.1,
+    air_speed: float = 1.0,
+    pierce_time: float = 0.0,
+    seconds: float = 10.0,
+    more: Callable[[int], Sequence[Plan]] = lambda contour: (),
+) -> PartPlan:
+    """Return one plan for each contour, chosen from its candidates, in the order of least time.
+
+    Order, candidates and moves are chosen together. Each move is first assumed to be straight,
+    which no way around beats. The moves of the best order are then planned in the cell, until all
+    moves of the best order are planned. A move for which no way is found is not used. Where no
+    order is left without it, `more` plans of the two contours are requested, once.
+
+    Parameters
+    ----------
+    candidates : sequence of sequences of Plan
+        Candidates of each contour, all of one robot.
+    home : (n,) rad, optional
+        Where the robot comes from and goes back to.
+    cell : Cell, optional
+        Cell in which moves, approaches and retracts are clear.
+    before : sequence of (i, j)
+        Contour i is cut before contour j; see `inner_first`.
+    heat_spacing : float m
+        Contours nearer to each other than this are not cut directly one after the other.
+    given_order : bool
+        Keep the order of `candidates`; `before` must agree with it.
+    retract, approach_speed : float m, m/s
+        How far and how fast the tool backs off along its axis.
+    air_speed : float
+        Share of the full speed of transfer moves; their least time is divided by it.
+    pierce_time : float s
+        Time to pierce at each contour.
+    seconds : float s
+        Time limit of the order solver, and of each search for a way around; searches without a
+        result end after `longest_search(seconds)` in total.
+    more : callable, optional
+        Returns further plans of a contour, given its number, in other postures. They become
+        candidates of the contour and are numbered after the others.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No candidate of a contour can be approached and left; there is no order; or there is no way
+        between two contours: the message names them, what is in the way and what was tried.
+    InputError
+        A length, speed or time is out of range.
+    """
+    retract = scalar(retract, "retract", unit="m", above=0.0)
+    approach_speed = scalar(approach_speed, "approach_speed", unit="m/s", above=0.0)
+    heat_spacing = not_negative(heat_spacing, "heat_spacing", unit="m")
+    pierce_time = not_negative(pierce_time, "pierce_time", unit="s")
+    air_speed = scalar(air_speed, "air_speed", above=0.0)
+    every = [list(made) for made in candidates]
+    further = MorePlans(every, more)
+    places = reachable(every, cell, retract, further)
+    if given_order:
+        before = [*before, *((i, i + 1) for i in range(len(every) - 1))]
+    warm = _too_warm([c[0].contour for c in every], heat_spacing)
+    air: MoveTimes | None = None
+    while True:
+        plans = [every[i][c] for i, c in places]
+        group = np.array([i for i, _ in places])
+        air = (
+            MoveTimes(plans, group, cell, retract, seconds, air_speed)
+            if air is None
+            else air.extended(plans, group)
+        )
+        air.forbid(warm[np.ix_(group, group)])
+        if home is not None and air.home is None:
+            air.home = floats(home, "home", (plans[0].robot.joints,))
+        own = np.array([p.time[-1] - p.time[0] for p in plans])
+        own += pierce_time + 2 * retract / approach_speed
+        found = _settle_order(air, group, own, before, seconds)
+        if not isinstance(found, NoFeasiblePath):
+            order = found
+            break
+        contours = sorted({int(group[c]) for leg in air.failed for c in leg if c != HOME})
+        fresh = more_reachable(every, cell, retract, further, contours) if air.failed else []
+        if not fresh:
+            raise further.mentioned_in(found)
+        places += fresh
+    made, moves = air.unrolled(order.candidates)
+    return PartPlan(
+        plans=made,
+        moves=moves,
+        order=order,
+        chosen=tuple(places[k] for k in order.candidates.tolist()),
+        retract=retract,
+        approach_speed=approach_speed,
+        pierce_time=pierce_time,
+    )
+
+
+def longest_search(seconds: float) -> float:
+    """Return the total time (s) that searches for ways around may take without a result.
+
+    It covers the searches before and after other postures are planned.
+    """
+    return 2 * PATIENCE * seconds
+
+
+def _settle_order(
+    air: MoveTimes, group: Ints, own: Array, before: Sequence[tuple[int, int]], seconds: float
+) -> Order | NoFeasiblePath:
+    """Return the best order in which every move has a way, or why none is found."""
+    failed = len(air.failed)
+    while len(air.failed) - failed < PATIENCE:
+        try:
+            order = best_order(
+                group, own, air.between,
+                first=air.first, last=air.last, before=before, seconds=seconds,
+            )  # fmt: skip
+        except NoFeasiblePath as none:
+            return air.why_no_order(none)
+        if not air.look_at(order.candidates):
+            return order
+    return air.why_no_order(None)
+
+
+def _too_warm(contours: Sequence[Contour], spacing: float) -> Bools:
+    """Return which contours (G, G) are nearer to each other than `spacing` (m)."""
+    if spacing <= 0:
+        return np.zeros((len(contours), len(contours)), bool)
+    return distances_between(contours) < spacing
+
+
+def distances_between(contours: Sequence[Contour]) -> Array:
+    """Return the least distance between the nodes of each two contours, (G, G) m.
+
+    The diagonal is infinite.
+    """
+    apart = np.full((len(contours), len(contours)), np.inf)
+    trees = [cKDTree(contour.points) for contour in contours]
+    for i, j in combinations(range(len(contours)), 2):
+        apart[i, j] = apart[j, i] = np.min(trees[i].query(contours[j].points)[0])
+    return apart

@@ -1,0 +1,399 @@
+"""The web application: one WebSocket, the files of the page, meshes, and downloads."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import hmac
+import re
+from base64 import b64encode
+from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager, suppress
+from hashlib import sha256
+from http.cookies import CookieError, SimpleCookie
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import parse_qs, quote
+
+from pydantic import ValidationError
+from starlette.applications import Starlette
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import (
+    FileResponse,
+    HTMLResponse,
+    PlainTextResponse,
+    RedirectResponse,
+    Response,
+)
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from kerfpath.errors import KerfpathError
+from kerfpath.studio.document import Document
+from kerfpath.studio.entries import File
+from kerfpath.studio.hub import OfContour, Page, PointOf, ReasonOf, TextOf, parse
+from kerfpath.studio.messages import ErrorMessage
+
+# -----------------------------------------------------------------------------
+# Access to the server: allowed hosts, allowed origins, and the token.
+
+PAGE = Path(__file__).parent / "client" / "index.html"
+
+
+def _import_map(page: bytes) -> str:
+    """Return the hash of a page's import map, its only inline script."""
+    (text,) = re.findall(rb'<script type="importmap">(.*?)</script>', page, re.DOTALL)
+    return f"'sha256-{b64encode(sha256(text).digest()).decode()}'"
+
+
+POLICY = (
+    f"default-src 'none'; script-src 'self' {_import_map(PAGE.read_bytes())}; "
+    "style-src 'self'; img-src 'self' data: blob:; "
+    "font-src 'self'; connect-src 'self'; media-src blob:; worker-src 'self'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'"
+)
+"""What a page may load: only files of this server, no other inline code, and no eval."""
+HEADERS = {
+    "content-security-policy": POLICY,
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+}
+REFUSED = 4403
+"""Close code of a refused WebSocket."""
+
+
+class Guard:
+    """Refuses requests for another host, from other sites, and without the token.
+
+    A page of another site cannot read the answers of this server, but a browser would still send
+    its requests and open a WebSocket for it.
+
+    Parameters
+    ----------
+    app : ASGI application
+    hosts : iterable of str
+        Allowed values of the Host header, with ports.
+    token : str or None
+        Token that the first request has in its query, and later ones in a cookie; None if no token
+        is required.
+    """
+
+    def __init__(self, app: ASGIApp, *, hosts: Iterable[str], token: str | None) -> None:
+        self._app, self._hosts, self._token = app, frozenset(hosts), token
+        # Cookies do not distinguish ports: each server needs a name of its own.
+        own = "" if token is None else hashlib.sha256(token.encode()).hexdigest()[:8]
+        self._cookie = f"kerfpath-studio-{own}"
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve a request, or refuse it."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        headers = Headers(scope=scope)
+        if why := self._refusal(headers):
+            await self._refuse(scope, receive, send, why)
+            return
+        if not self._knows_token(headers):
+            asked = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
+            if scope["type"] == "http" and scope["path"] == "/" and self._is_token(asked):
+                # The cookie now holds the token, so that the address no longer shows it.
+                answer = RedirectResponse("/", status_code=303, headers=HEADERS)
+                answer.set_cookie(self._cookie, asked, httponly=True, samesite="strict")
+                await answer(scope, receive, send)
+                return
+            why = "a token is needed: open the address that kerfpath studio has printed"
+            await self._refuse(scope, receive, send, why)
+            return
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                own = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    own.setdefault(name, value)
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers)
+
+    def _refusal(self, headers: Headers) -> str:
+        """Return the reason to refuse a request by its headers, or ""."""
+        host = headers.get("host", "")
+        if host not in self._hosts:
+            return f"{host!r:.60} is not a name of this server"
+        origin = headers.get("origin")
+        if origin is not None and origin != f"http://{host}":
+            return f"requests from {origin!r:.60} are not answered"
+        if headers.get("sec-fetch-site", "none") not in ("none", "same-origin"):
+            return "requests from other sites are not answered"
+        return ""
+
+    def _knows_token(self, headers: Headers) -> bool:
+        if self._token is None:
+            return True
+        try:
+            cookie = SimpleCookie(headers.get("cookie", "")).get(self._cookie)
+        except CookieError:
+            return False
+        return cookie is not None and self._is_token(cookie.value)
+
+    def _is_token(self, text: str) -> bool:
+        return self._token is not None and hmac.compare_digest(text.encode(), self._token.encode())
+
+    async def _refuse(self, scope: Scope, receive: Receive, send: Send, why: str) -> None:
+        if scope["type"] == "websocket":
+            await receive()  # the connection request
+            await send({"type": "websocket.close", "code": REFUSED, "reason": why})
+            return
+        answer = PlainTextResponse(f"kerfpath: {why}\n", status_code=403, headers=HEADERS)
+        await answer(scope, receive, send)
+
+
+# -----------------------------------------------------------------------------
+# The web application: one WebSocket, the files of the page, meshes, and downloads.
+
+if TYPE_CHECKING:
+    from kerfpath.studio.session import Session
+
+
+CLIENT = Path(__file__).parent / "client"
+MODULES = sorted(
+    file.relative_to(CLIENT).as_posix()
+    for file in CLIENT.rglob("*.js")
+    if file.name != "early.js"  # not a module
+)
+"""The modules of the page."""
+KINDS = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".woff2": "font/woff2",
+    ".txt": "text/plain; charset=utf-8",
+}
+"""Media types of the page's files that are served, by suffix."""
+LONGEST = 12_000_000
+"""Largest message in bytes: a job of the largest size, quoted as JSON."""
+MOST_LOOKS = 8
+"""Number of questions of a page that are answered at the same time; further ones wait."""
+MOST_SAID = 300
+"""Largest number of characters in the error about an invalid message."""
+NO_TEXT = 1003
+"""Close code of a connection that sends anything except text."""
+REPORT_POLICY = (
+    "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; "
+    "style-src 'unsafe-inline'; img-src data: blob:; font-src data:"
+)
+"""Policy of a report, which has inline scripts: a sandbox without origin and network access."""
+
+
+def application(document: Document, *, hosts: Iterable[str], token: str | None = None) -> Starlette:
+    """Return the application that serves one job.
+
+    Parameters
+    ----------
+    document : Document
+        The job.
+    hosts : iterable of str
+        Allowed values of the Host header, with ports.
+    token : str, optional
+        Token that requests must have.
+    """
+    worker = _Worker(document)
+
+    @asynccontextmanager
+    async def at_work(app: Starlette) -> AsyncIterator[None]:
+        work = asyncio.create_task(worker.work())
+        try:
+            yield
+        finally:
+            work.cancel()
+            with suppress(asyncio.CancelledError):
+                await work
+
+    app = Starlette(
+        routes=[
+            Route("/", _index),
+            Route("/client/{name:path}", _client),
+            Route("/mesh/{name}", _mesh),
+            Route("/kept/{number:int}", _kept),
+            Route("/export/{name}", _export),
+            Route("/report", _report),
+            WebSocketRoute("/ws", _socket),
+        ],
+        middleware=[Middleware(Guard, hosts=tuple(hosts), token=token)],
+        lifespan=at_work,
+    )
+    app.state.worker = worker
+    return app
+
+
+class _Worker:
+    """The session of a document; its import takes a second, in which the page already loads."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._session: Session | None = None
+        self._lock = asyncio.Lock()
+
+    async def session(self) -> Session:
+        """Return the session once it is imported."""
+        async with self._lock:
+            if self._session is None:
+                self._session = await asyncio.to_thread(_session_of, self._document)
+        return self._session
+
+    async def work(self) -> None:
+        """Work on the document."""
+        await (await self.session()).work()
+
+
+def _session_of(document: Document) -> Session:
+    from kerfpath.studio.session import Session
+
+    return Session(document)
+
+
+async def _session(app: Starlette) -> Session:
+    worker: _Worker = app.state.worker
+    return await worker.session()
+
+
+async def _index(request: Request) -> Response:
+    html = (CLIENT / "index.html").read_text()
+    # Preload all modules: otherwise each is requested only after one that imports it has loaded.
+    links = "".join(f'<link rel="modulepreload" href="client/{quote(each)}">\n' for each in MODULES)
+    page = html.replace("</head>", f"{links}</head>")
+    return HTMLResponse(page, headers={"cache-control": "no-cache"})
+
+
+async def _client(request: Request) -> Response:
+    return _own_file(request.path_params["name"])
+
+
+def _own_file(name: str) -> Response:
+    """Return a file of the page, and no other file of this machine."""
+    none = PlainTextResponse("there is no such file\n", status_code=404)
+    if "\0" in name:
+        return none
+    place = (CLIENT / name).resolve()
+    kind = KINDS.get(place.suffix)
+    if kind is None or not place.is_relative_to(CLIENT.resolve()) or not place.is_file():
+        return none
+    return FileResponse(place, media_type=kind, headers={"cache-control": "no-cache"})
+
+
+async def _mesh(request: Request) -> Response:
+    session = await _session(request.app)
+    data = session.meshes.get(request.path_params["name"])
+    if data is None:
+        return PlainTextResponse("there is no such mesh\n", status_code=404)
+    kept = {"cache-control": "private, max-age=31536000, immutable"}
+    return Response(data, media_type="application/octet-stream", headers=kept)
+
+
+async def _kept(request: Request) -> Response:
+    session = await _session(request.app)
+    try:
+        text = session.kept.plans(request.path_params["number"])
+    except KerfpathError as error:
+        return PlainTextResponse(f"{error}\n", status_code=404)
+    return Response(text, media_type="application/json", headers={"cache-control": "no-store"})
+
+
+async def _export(request: Request) -> Response:
+    session = await _session(request.app)
+    name, language = request.path_params["name"], request.query_params.get("language")
+    if name == "job":
+        document = session.document
+        return _download(File(document.path.name, "text/plain", document.text.encode()))
+    if name == "script":
+        try:
+            return _download(await session.script())
+        except KerfpathError as error:
+            return PlainTextResponse(f"{error}\n", status_code=409)
+    if name not in ("program", "plan.json", "trajectory.csv"):
+        return PlainTextResponse("there is no export of this name\n", status_code=404)
+    try:
+        if name == "program":
+            from kerfpath.studio.entries import zipped
+
+            result, texts = await session.program(language)
+            return _download(zipped(result.job.program.name, texts))
+        texts = await session.files()
+    except KerfpathError as error:
+        return PlainTextResponse(f"{error}\n", status_code=409)
+    kind = "application/json" if name == "plan.json" else "text/csv"
+    return _download(File(name, kind, texts.files[name].encode()))
+
+
+async def _report(request: Request) -> Response:
+    session = await _session(request.app)
+    try:
+        texts = await session.files()
+    except KerfpathError as error:
+        return PlainTextResponse(f"{error}\n", status_code=409)
+    own = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
+    return Response(texts.files["report.html"], media_type="text/html", headers=own)
+
+
+def _download(file: File) -> Response:
+    named = {
+        "content-disposition": f"attachment; filename*=UTF-8''{quote(file.name)}",
+        "cache-control": "no-store",
+    }
+    return Response(file.content, media_type=file.kind, headers=named)
+
+
+async def _socket(socket: WebSocket) -> None:
+    await socket.accept()
+    session = await _session(socket.app)
+    page = session.hub.open()
+    sending, looking = asyncio.create_task(_send(socket, page)), set[asyncio.Task[None]]()
+    try:
+        while (received := await socket.receive())["type"] == "websocket.receive":
+            text = received.get("text")
+            if text is None:
+                await socket.close(NO_TEXT, "expected text")
+                break
+            try:
+                ask = parse(text)
+            except ValidationError as error:
+                page.say(ErrorMessage(message=_not_understood(error)))
+                continue
+            if (
+                isinstance(ask, OfContour | PointOf | ReasonOf | TextOf)
+                and len(looking) < MOST_LOOKS
+            ):
+                # Slow questions that change nothing do not delay changes.
+                look = asyncio.create_task(session.hear(ask, page))
+                looking.add(look)
+                look.add_done_callback(looking.discard)
+            else:
+                await session.hear(ask, page)
+    finally:
+        session.leave(page)
+        for look in looking:
+            look.cancel()
+        sending.cancel()
+        # Errors are expected here if the page has gone in the middle of a message.
+        with suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
+            await sending
+
+
+async def _send(socket: WebSocket, page: Page) -> None:
+    while True:
+        await socket.send_text(await page.next())
+
+
+def _not_understood(error: ValidationError) -> str:
+    """Return in one line why a message is invalid, without quoting it."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    if first["type"].startswith("union_tag"):
+        return "a message was not understood: unknown type"
+    where = "".join(f"{part}: " for part in first["loc"])
+    return f"a message was not understood: {where}{first['msg']}"[:MOST_SAID]
