@@ -49,7 +49,7 @@ def test_planning_from_arrays_needs_no_extra():
         ("import kerfpath.job", "jobs: ortools, pydantic, rich"),
         ("import kerfpath.post", "robot programs: ortools, pydantic"),
         ("from kerfpath import read_plan_file", "kerfpath[programs]"),
-        ("import kerfpath.report", "reports: plotly is needed and not installed"),
+        ("import kerfpath.report", "reports: jinja2, plotly is needed and not installed"),
         ("from kerfpath.cad import read; read('{part}')", "kerfpath[cad]"),
     ],
 )

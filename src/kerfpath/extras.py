@@ -16,7 +16,7 @@ NEEDS = {
     "programs": (
         "ortools", "pydantic", "rich", "tomlkit", "tree_sitter", "tree_sitter_toml", "typer",
     ),
-    "report": ("plotly",),
+    "report": ("jinja2", "plotly"),
     "studio": ("starlette", "uvicorn", "websockets"),
     "tables": ("pandas",),
 }  # fmt: skip

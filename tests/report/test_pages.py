@@ -27,7 +27,6 @@ from kerfpath.report.maps import (
     shown_postures,
 )
 from kerfpath.report.motion import cutting_speed, joint_positions, limit_shares, posture_runs
-from kerfpath.report.page import audit_table, counts_table, criteria_table, summary_table
 from kerfpath.report.scene import scene
 from kerfpath.robots import posture_name, robot
 
@@ -75,6 +74,11 @@ def _own(html: str) -> str:
     """Return the page without plotly's own code."""
     assert html.count(get_plotlyjs()) == 1
     return html.replace(get_plotlyjs(), "")
+
+
+def _table(html: str, heading: str) -> str:
+    """Return the page from below a heading to the end of the next table."""
+    return html.split(f">{heading}</h")[1].split("</table>")[0]
 
 
 def _figures(html: str) -> list[dict]:
@@ -254,7 +258,7 @@ def test_every_joint_has_its_colour_everywhere(section: ContourSection) -> None:
     shares = limit_shares(section.plan)
     assert tuple(t.line.color for t in shares.data) == JOINT_COLOURS * 2
     assert tuple(t.line.color for t in joint_positions(section.plan).data) == JOINT_COLOURS
-    table = criteria_table(section.plan)
+    table = _table(render("Part", [section]), "Criteria by joint")
     assert all(table.count(colour) == 1 for colour in JOINT_COLOURS)
 
 
@@ -383,13 +387,9 @@ def test_scene_draws_moves_between_contours_and_marks_in_their_measure(
     assert "transfer moves" not in render("Part", [section])
 
 
-def test_audit_table_speaks_millimetres_degrees_and_per_cent() -> None:
-    table = audit_table(
-        [
-            *CHECKS,
-            Check(code="d", title="axis", value=np.pi, limit=np.pi / 180, unit="rad", node=-1),
-        ]
-    )
+def test_audit_table_speaks_millimetres_degrees_and_per_cent(section: ContourSection) -> None:
+    turned = Check(code="d", title="axis", value=np.pi, limit=np.pi / 180, unit="rad", node=-1)
+    table = _table(render("Part", [replace(section, checks=[*CHECKS, turned])]), "Audit")
     assert "0.02 mm" in table
     assert "≤ 0.1 mm" in table
     assert "14.5 %" in table
@@ -401,10 +401,11 @@ def test_audit_table_speaks_millimetres_degrees_and_per_cent() -> None:
 
 def test_tables_add_up(section: ContourSection) -> None:
     counts = section.graph.counts()
-    table = counts_table(section.graph)
+    page = render("Part", [section])
+    table = _table(page, "Candidates")
     assert sum(counts.values()) == section.graph.reason.size
     assert all(word in table for word in counts)
-    row = summary_table([section])
+    row = _table(page, "Contours")
     assert "3.00" in row, "0.05 m/s is 3 m/min"
     assert f"{section.path.length * 1e3:.1f}" in row
 
@@ -414,11 +415,12 @@ def test_the_table_of_contours_has_bound_and_gap_and_the_page_says_what_they_are
 ) -> None:
     proof = replace(section.plan.proof, bound=None, gap=None)
     plain = replace(section, plan=replace(section.plan, proof=proof))
-    assert summary_table([plain]).count('<td class="n">-</td>') == 2
-    assert "no motion that keeps" not in render("x", [plain])
+    page = render("x", [plain])
+    assert _table(page, "Contours").count('<td class="n">-</td>') == 2
+    assert "no motion that keeps" not in page
     proof = replace(proof, bound=12.3456, gap=0.00123)
     bounded = replace(section, plan=replace(section.plan, proof=proof))
-    row = summary_table([bounded])
+    row = _table(render("x", [bounded]), "Contours")
     assert "12.34<" in row, "never more than is proved"
     assert "0.13<" in row, "never less than it may be, in per cent"
     page = render("x", [plain, bounded])

@@ -16,7 +16,8 @@ from kerfpath.report.maps import (
     shown_postures,
 )
 from kerfpath.report.motion import plot
-from kerfpath.report.page import render, render_table, with_library, without_library
+from kerfpath.report.page import render_table, with_library, without_library
+from kerfpath.report.plan import render
 
 __all__ = [
     "ContourSection",

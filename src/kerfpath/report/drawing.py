@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from kerfpath.arrays import Array, floats, short_repr
 from kerfpath.report.maps import ACCENT, ALERT, FAINT, JOINT_COLOURS, base_layout
-from kerfpath.report.page import Figures, header, page
+from kerfpath.report.page import render_page
 from kerfpath.report.scene import add_part, checked, space_axis, xyz
 
 HEIGHT = 720
@@ -69,17 +69,10 @@ def render_drawing(
     facts : sequence of (what, value)
     notes : sequence of str
     """
-    figures = Figures()
-    body = [
-        header("Drawing", title, facts=facts, notes=notes),
-        "<section><h2>Loops by name</h2>",
-        '<p class="caption">Part frame, all axes to the same scale. Each name is at the start of '
-        "its loop. Drag to turn, scroll to zoom, point at a loop to see its size, and click in "
-        "the legend to hide or show loops.</p>",
-        figures.place(_figure(loops, mesh), "scene"),
-        "</section>",
-    ]
-    return page(title, body, figures)
+    return render_page(
+        "drawing.html", kind="Drawing", title=title, facts=facts, notes=notes,
+        picture=_figure(loops, mesh),
+    )  # fmt: skip
 
 
 def _figure(loops: Sequence[DrawnLoop], mesh: tuple[ArrayLike, ArrayLike]) -> go.Figure:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from importlib.metadata import version
 
 import numpy as np
 import plotly.graph_objects as go
+from markupsafe import Markup
 
 from kerfpath.arrays import Array, floats, short_repr
 from kerfpath.errors import InputError
@@ -26,7 +26,7 @@ from kerfpath.report.maps import (
     axis_title,
     base_layout,
 )
-from kerfpath.report.page import Figures, header, job_part, number, page, shown_unit, table, td
+from kerfpath.report.page import number, render_page, shown_unit
 
 # -----------------------------------------------------------------------------
 # The data on the page of a Pareto set: its criteria and its plans.
@@ -217,7 +217,6 @@ def parallel(
 # The page of a Pareto set: linked views for comparing its plans and picking one.
 
 NUMBER = "{number}"
-_BEATEN = " Grey points are dominated: some plan is as good in every criterion and better in one."
 AXIS_WIDTH = 112
 """Least distance of parallel axes, px: the height of a line of a label."""
 
@@ -262,33 +261,26 @@ def render_front(
         occurs twice, a mark has the number of no plan, or the command lacks "{number}".
     """
     values, beaten = _shown_values(axes, plans, dominated, marks, command)
-    figures = Figures()
-    views = [
-        f"<section><h2>{'Criteria in pairs' if len(axes) > 1 else 'The criterion'}</h2>",
-        '<p class="caption">Each point is a plan; click a point to pick its plan. Darker colours '
-        f"are better.{_BEATEN if len(beaten) else ''}</p>",
-        _choices(axes),
-        figures.place(scatter(axes), "front-scatter"),
-        "</section>",
-        *(_parallel_part(axes, values, figures) if len(axes) > 1 else ()),
-        "<section><h2>Plans</h2>",
-        '<p class="caption">Click a heading to sort; ↓ less is better, ↑ more is better, the best '
-        "value of each criterion is bold. Click a row, or press Enter on it, to pick its plan.</p>",
-        _plan_table(axes, plans, values, marks),
-        "</section>",
-    ]
-    body = [
-        header("Pareto set", title, facts=facts, notes=notes),
-        '<div class="front"><div class="views">',
-        *views,
-        "</div>",
-        _panel(axes, marks),
-        "</div>",
-        job_part(job_text),
-        f"<footer>kerfpath {escape(version('kerfpath'))}</footer>",
-        _data(axes, plans, values, beaten, marks, command),
-    ]
-    return page(title, body, figures, also="front")
+    labels = axis_labels(axes)
+    return render_page(
+        "front.html",
+        kind="Pareto set",
+        title=title,
+        facts=facts,
+        notes=notes,
+        job_text=job_text,
+        axes=axes,
+        values=values,
+        dominated=beaten,
+        marks=marks,
+        labels=labels,
+        axis_width=AXIS_WIDTH,
+        menus=_menus(axes),
+        rows=_rows(axes, plans, values, marks),
+        scatter=scatter,
+        parallel=parallel,
+        data=_data(axes, plans, values, beaten, marks, command),
+    )
 
 
 def _shown_values(
@@ -324,99 +316,31 @@ def _decimals(column: Array) -> int:
     return max(0, 2 - math.floor(math.log10(size or 1.0)))
 
 
-def _parallel_part(axes: Sequence[FrontAxis], values: Array, figures: Figures) -> list[str]:
-    labels = axis_labels(axes)
-    lines = len(labels[0])
-    width = AXIS_WIDTH * len(axes) + 40
-    return [
-        "<section><h2>All criteria at once</h2>",
-        '<p class="caption">Each line is a plan. On every axis better is at the bottom: if more is '
-        "better (↑), the axis points down. Drag along an axis to show only plans in a range, "
-        "click on the axis to remove the range; drag a name to move its axis.</p>",
-        '<p class="kept"><span role="status"></span>'
-        '<button type="button" hidden>Show all</button></p>',
-        # plotly places labels as if they had two lines.
-        f'<div class="wide"><div style="min-width:{width}px;--lift:{1.3 * (2 - lines):.1f}em">',
-        figures.place(parallel(axes, values, labels), "front-parallel"),
-        "</div></div>",
-        "</section>",
-    ]
+def _menus(
+    axes: Sequence[FrontAxis],
+) -> list[tuple[str, str, list[tuple[int, str]], int]]:
+    """Return the menus that choose the plotted criteria: key, words, options, chosen option.
 
-
-def _choices(axes: Sequence[FrontAxis]) -> str:
-    """Return the menus that choose the plotted criteria; their values are indices of criteria."""
+    The values of the options are indices of criteria.
+    """
     none = [(-1, "none")]
     every = [(i, criterion.words) for i, criterion in enumerate(axes)]
-    boxes = (
+    return [
         ("x", "Horizontal", every, 0),
         ("y", "Vertical", every if len(axes) > 1 else none, min(1, len(axes) - 1) or -1),
         ("colour", "Colour", every + none, 2 if len(axes) > 2 else -1),
-    )
-    parts = []
-    for key, words, options, first in boxes:
-        inner = "".join(
-            f'<option value="{i}"{" selected" if i == first else ""}>{escape(text)}</option>'
-            for i, text in options
-        )
-        parts.append(f'<label>{words} <select data-choice="{key}">{inner}</select></label>')
-    return f'<p class="choices">{"".join(parts)}</p>'
+    ]
 
 
-def _plan_table(
+def _rows(
     axes: Sequence[FrontAxis], plans: Sequence[FrontPlan], values: Array, marks: Mapping[str, int]
-) -> str:
-    """Return the table of the plans; the script sorts it by the column that a head names."""
-    heads = [('<button type="button" data-sort="-1">Plan</button>', "")]
-    for i, criterion in enumerate(axes):
-        button = (
-            f'<button type="button" data-sort="{i}" title="{escape(criterion.name)}">'
-            f"{escape(criterion.words)}</button>"
-        )
-        heads.append((button, escape(criterion.unit_and_arrow)))
-    heads.append(("Remarks", ""))
+) -> Iterator[tuple[FrontPlan, list[tuple[str, bool]], list[str]]]:
+    """Yield each plan, its values and whether each is the best one, and its marks."""
     decimals = [_decimals(column) for column in values.T]
     best = values == (values * _sense(axes)).min(axis=0) * _sense(axes)
-    rows = []
-    for i, plan in enumerate(plans):
-        cells = []
-        for value, digits, is_best in zip(values[i], decimals, best[i], strict=True):
-            text = number(float(value), digits)
-            cells.append(td(f"<b>{text}</b>" if is_best else text))
-        chips = "".join(f"<span>{escape(mark)}</span>" for mark in _marks_of(plan, marks))
-        rows.append(
-            f'<tr data-plan="{plan.number}" tabindex="{0 if i == 0 else -1}">'
-            f'<th scope="row">{plan.number}</th>{"".join(cells)}<td class="chips">{chips}</td></tr>'
-        )
-    return f'<div class="plans">{table(heads, rows, text_columns=(0, len(heads) - 1))}</div>'
-
-
-def _panel(axes: Sequence[FrontAxis], marks: Mapping[str, int]) -> str:
-    """Return the empty panel of the picked plan, which the script fills."""
-    buttons = "".join(
-        f'<li><button type="button" data-plan="{chosen}">{escape(mark)} '
-        f"<small>plan {chosen}</small></button></li>"
-        for mark, chosen in marks.items()
-    )
-    rows = "".join(
-        f'<tr><th scope="row">{escape(criterion.words)}</th><td class="n"></td></tr>'
-        '<tr class="place"><td colspan="2"><i><i></i></i></td></tr>'
-        for criterion in axes
-    )
-    return "\n".join(
-        [
-            '<aside class="picked" aria-label="Picked plan">',
-            f'<ul class="marks">{buttons}</ul>' if buttons else "",
-            '<p class="hint quiet">No plan is picked: click a point or a row.</p>',
-            '<div class="plan" hidden>',
-            '<h2 aria-live="polite"></h2>',
-            f'<table class="values">{rows}</table>',
-            '<p class="ends"><span>best</span><span>worst of the set</span></p>',
-            '<div class="asked"><h4>Settings of its run</h4><dl></dl></div>',
-            "<h4>Command that writes it</h4><pre></pre>",
-            '<button type="button" class="copy">Copy the command</button>',
-            "</div></aside>",
-        ]
-    )
+    for plan, own, is_best in zip(plans, values, best, strict=True):
+        shown = [number(value, digits) for value, digits in zip(own, decimals, strict=True)]
+        yield plan, list(zip(shown, is_best, strict=True)), _marks_of(plan, marks)
 
 
 def _data(
@@ -426,7 +350,7 @@ def _data(
     beaten: Array,
     marks: Mapping[str, int],
     command: str,
-) -> str:
+) -> Markup:
     """Return the data of the script; titles and names of marks are HTML, as plotly reads them."""
     data = {
         "axes": [
@@ -447,8 +371,7 @@ def _data(
         "look": {"accent": ACCENT, "chosen": CHOSEN, "scale": SCALE, "label": LABEL_LOOK},
     }
     # Nothing in a text may end the element.
-    packed = json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")
-    return f'<script type="application/json" id="front">{packed}</script>'
+    return Markup(json.dumps(data, ensure_ascii=False).replace("<", "\\u003c"))
 
 
 def _marks_of(plan: FrontPlan, marks: Mapping[str, int]) -> list[str]:

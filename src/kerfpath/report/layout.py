@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from html import escape
+from collections.abc import Iterator
 from typing import Literal, TypedDict
 
 import numpy as np
 import plotly.graph_objects as go
+from markupsafe import Markup
 
 from kerfpath.report.maps import ACCENT, ALERT, FAINT, INK, QUIET, axis, axis_title, base_layout
-from kerfpath.report.page import (
-    FAIL,
-    PASS,
-    WARN,
-    Figures,
-    header,
-    job_part,
-    number,
-    page,
-    sign,
-    table,
-    td,
-)
+from kerfpath.report.page import FAIL, PASS, WARN, number, render_page, with_minus
 
 # -----------------------------------------------------------------------------
 # The data of layout.json: `kerfpath.study` writes them, the page and the command read them.
@@ -366,7 +355,6 @@ STAGES = {
     "planned": "planned over continuous gamma",
 }
 
-DOTS = " Small dots are the placements that were tried, at any value of the other variables."
 LONGEST = 160
 """Largest number of characters of a reason that are shown."""
 
@@ -381,37 +369,26 @@ def render_layout(entry: LayoutEntry, *, job_text: str = "") -> str:
     job_text : str
         The job file as read.
     """
-    figures = Figures()
-    verdict = f'<p class="verdict {(state := _verdict(entry))[0]}">{sign(*state)}</p>'
-    body = [
-        header(
-            "Placement", entry["job"], facts=_facts(entry), notes=_notes(entry), verdict=verdict
-        ),
-        *_placement(entry),
-        *_contours(entry),
-        *_map(entry, figures),
-        "<section><h2>Search</h2>",
-        f'<p class="caption">Each dot is a placement, in the order in which they were tried: '
-        f"{_dots(entry)}; the line is the best so far. {_foot(entry)}</p>",
-        figures.place(convergence(entry), "convergence"),
-        _tallies(entry),
-        "</section>",
-        job_part(job_text),
-        f"<footer>kerfpath {escape(entry['kerfpath'])} · seed {entry['seed']}</footer>",
-    ]
-    return page(f"{entry['job']}: placement", body, figures)
-
-
-def _dots(entry: LayoutEntry) -> str:
-    if entry["off_grid"]:
-        return "its height is the estimated value. Filled ones were planned"
-    return "its height is the bound on its value. Filled ones were solved exactly"
-
-
-def _foot(entry: LayoutEntry) -> str:
-    lost = "Infeasible placements are at the bottom. " if entry["reasons"] else ""
-    of_map = f"Placements from {entry['evolved']} on belong to the map." if entry["map"] else ""
-    return lost + of_map
+    state, verdict = _verdict(entry)
+    return render_page(
+        "layout.html",
+        kind="Placement",
+        title=entry["job"],
+        facts=_facts(entry),
+        notes=_notes(entry),
+        job_text=job_text,
+        state=state,
+        verdict=verdict,
+        entry=entry,
+        motion=entry["goal"] == "motion",
+        offsets=_offsets(entry),
+        contours=_contours(entry),
+        placement_map=placement_map,
+        convergence=convergence,
+        tallies=[("Decided by", STAGES, entry["stages"]), ("Outcome", STATUSES, entry["statuses"])],
+        statuses=STATUSES,
+        longest=LONGEST,
+    )
 
 
 def _value(entry: LayoutEntry, value: float | None) -> str:
@@ -479,49 +456,20 @@ def _notes(entry: LayoutEntry) -> list[str]:
     return notes
 
 
-def _placement(entry: LayoutEntry) -> list[str]:
-    best = entry["best"]
-    at = best or entry["nearest"]
+def _offsets(entry: LayoutEntry) -> Iterator[tuple[str, Markup, Markup, Markup, bool]]:
+    """Yield each variable: its name, range, value, and whether that is at an end of the range."""
+    at = entry["best"] or entry["nearest"]
     assert at is not None, "a layout has a best placement or a nearest one"
-    what = "Best" if best else "Nearest to feasible"
-    rows = []
     for name, (low, high) in entry["ranges"].items():
-        value, unit = at["offsets"][name], name.rpartition("_")[2]
-        at_end = min(value - low, high - value) < 0.01 * (high - low)
-        shown = number(value, 2 if unit == "mm" else 3)
-        shown += " <small>at the end</small>" if at_end else ""
-        rows.append(
-            f'<tr><th scope="row">{escape(name)}</th>{td(f"{low:g}".replace("-", "&minus;"))}'
-            f"{td(f'{high:g}'.replace('-', '&minus;'))}{td(shown)}</tr>"
-        )
-    parts = [
-        "<section><h2>The placement</h2>",
-        '<p class="caption">Offsets from the placement of the job, along the axes of the robot '
-        "base. The part turns about the middle of its contours. Fixtures move with it, except any "
-        "that are listed above. If the best value is at the end of a range, a wider range may "
-        "contain a better one.</p>",
-        table((("Variable", ""), ("From", ""), ("To", ""), (what, "")), rows),
-    ]
-    if best:
-        numbers = "".join(
-            f"<li><b>{escape(key)}</b> = {escape(str(value))}</li>"
-            for key, value in best["numbers"].items()
-        )
-        parts.append(
-            f'<ul class="others">{numbers or "<li>The job stays as it is.</li>"}</ul>'
-            '<p class="caption"><b>placed.toml</b> is the job with these numbers.</p>'
-        )
-    return [*parts, "</section>"]
+        value = at["offsets"][name]
+        shown = number(value, 2 if name.endswith("_mm") else 3)
+        is_at_end = min(value - low, high - value) < 0.01 * (high - low)
+        yield name, with_minus(f"{low:g}"), with_minus(f"{high:g}"), shown, is_at_end
 
 
-def _contours(entry: LayoutEntry) -> list[str]:
-    if not entry["contours"]:
-        return []
-    motion = entry["goal"] == "motion"
-    unit = "displacement" if motion else "m/min"
-    heads = [("Contour", ""), ("As the job has it", unit), ("Best", unit), ("Change", "%")]
-    heads += [] if motion else [("Binding limit, before", ""), ("after", "")]
-    rows = []
+def _contours(entry: LayoutEntry) -> list[tuple[str, list[str], list[ContourSide | None]]]:
+    """Return each contour: its name, its values before and after and their change, both sides."""
+    motion, rows = entry["goal"] == "motion", []
     for contour in entry["contours"]:
         sides = [contour["before"], contour["after"]]
         values = [
@@ -530,71 +478,7 @@ def _contours(entry: LayoutEntry) -> list[str]:
         ]
         change = ""
         if values[0] is not None and values[1] is not None:
-            change = f"{(values[1] / values[0] - 1) * 100:+.1f}".replace("-", "&minus;")
+            change = with_minus(f"{(values[1] / values[0] - 1) * 100:+.1f}")
         shown = [number(v, 2 if motion else 3) if v is not None else "" for v in values]
-        cells = "".join(td(text) for text in [*shown, change])
-        binds = "" if motion else "".join(f"<td>{_binds(side)}</td>" for side in sides)
-        rows.append(f'<tr><th scope="row">{escape(contour["name"])}</th>{cells}{binds}</tr>')
-    return [
-        "<section><h2>Contours</h2>",
-        f'<p class="caption">{_how(entry)}{"" if motion else ": the fastest constant speed"}.</p>',
-        table(heads, rows, text_columns=(0, 4, 5)),
-        "</section>",
-    ]
-
-
-def _how(entry: LayoutEntry) -> str:
-    if entry["off_grid"]:
-        return "Best motion found over continuous gamma"
-    return "Optimum of each contour on the grid of the job"
-
-
-def _binds(side: ContourSide | None) -> str:
-    if side is None or "joint" not in side:
-        return ""
-    return f"joint {side['joint']} {side['limit']} <small>node {side['node']}</small>"
-
-
-def _map(entry: LayoutEntry, figures: Figures) -> list[str]:
-    drawn = entry["map"]
-    if drawn is None:
-        return []
-    others = [name for name in entry["ranges"] if name not in drawn["variables"]]
-    held = f", {' and '.join(others)} as in the best placement" if others else ""
-    over = f"{' and '.join(drawn['variables'])}{held}"
-    known = "Value of the goal, mostly estimated," if entry["off_grid"] else "Bound on the goal"
-    return [
-        "<section><h2>Map</h2>",
-        f'<p class="caption">{known} over {over}; infeasible placements show the reason.'
-        f"{DOTS if drawn['y'] else ''}</p>",
-        figures.place(placement_map(entry, drawn), "placements"),
-        "</section>",
-    ]
-
-
-def _tallies(entry: LayoutEntry) -> str:
-    parts, total = [], len(entry["tried"])
-    for title, words, counts in (
-        ("Decided by", STAGES, entry["stages"]),
-        ("Outcome", STATUSES, entry["statuses"]),
-    ):
-        tally = {name: count for name in words if (count := counts.get(name))}
-        rows = [
-            f'<tr><th scope="row">{words[name]}</th>{td(str(count))}'
-            f"{td(f'{100 * count / total:.0f}')}</tr>"
-            for name, count in tally.items()
-        ]
-        heads = [("", ""), ("Placements", ""), ("", "%")]
-        parts += [f"<h4>{title}</h4>", table(heads, rows)]
-    reasons = [
-        f'<tr><th scope="row">{STATUSES[why["status"]]}</th>'
-        f"<td>{escape(why['contour'] or '')}</td>"
-        f"{td('' if why['node'] is None else str(why['node']))}{td(str(why['count']))}"
-        f"<td>{escape(why['reason'][:LONGEST])}</td></tr>"
-        for why in entry["reasons"]
-    ]
-    if reasons:
-        heads = [("", ""), ("Contour", ""), ("Node, most often", ""), ("Placements", "")]
-        why_not = table([*heads, ("Example", "")], reasons, text_columns=(0, 1, 4))
-        parts += ["<h4>Reasons of infeasible placements</h4>", why_not]
-    return "\n".join(parts)
+        rows.append((contour["name"], [*shown, change], sides))
+    return rows
