@@ -80,7 +80,7 @@ def _bare(path: Path) -> None:
 
 
 def _ours(path: Path) -> None:
-    reading._kept.clear()
+    reading._cache.clear()
     read(path)
 
 

@@ -8,7 +8,7 @@ from kerfpath.cad import reading as module
 
 
 def test_the_same_content_is_the_same_part_by_its_own_name(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "_kept", {})
+    monkeypatch.setattr(module, "_cache", {})
     first = read(DEMO / "b_pillar.step")
     (tmp_path / "copy.step").write_bytes((DEMO / "b_pillar.step").read_bytes())
     monkeypatch.setattr(module, "call_apart", None)  # it is not read again
@@ -31,9 +31,9 @@ def test_another_unit_or_another_content_is_another_part(tmp_path):
     assert not np.allclose(other, size)
 
 
-def test_no_more_parts_are_kept_than_that(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "_kept", {})
-    monkeypatch.setattr(module, "KEPT", 1)
+def test_no_more_parts_are_cached_than_that(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "_cache", {})
+    monkeypatch.setattr(module, "CACHED", 1)
     for unit in (None, "in"):
         read(DEMO / "b_pillar.step", unit)
-    assert [key[2] for key in module._kept] == ["in"]
+    assert [key[2] for key in module._cache] == ["in"]

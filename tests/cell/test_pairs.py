@@ -20,7 +20,7 @@ from kerfpath.cell import (
     box_between,
     cell_of,
     frustum,
-    odd_sizes,
+    unlikely_sizes,
 )
 from kerfpath.cell.links import shave
 from kerfpath.cell.pairs import BY_DESIGN
@@ -234,15 +234,15 @@ def swivel_pair(gap):
 
 def test_a_body_of_a_wrong_unit_is_warned_of():
     tool = at([0, 0, 0.3])
-    assert odd_sizes(cell_of(ARM, tool=tool)) == ()
+    assert unlikely_sizes(cell_of(ARM, tool=tool)) == ()
     for scale, odd in ((1.0, False), (1e-3, True), (100.0, True)):
         bench = box(scale * np.array([0.8, 0.5, 0.3]), at([60, 0, 0]))
         cell = cell_of(ARM, tool=tool, fixtures={"bench": bench})
-        found = odd_sizes(cell)
+        found = unlikely_sizes(cell)
         assert bool(found) == odd
         assert all("'bench' is " in said and "is its unit right?" in said for said in found)
     links = [Body(name="forearm", shape=box([30, 20, 20], at([0, 0, 100])), frame=3, kind="robot")]
-    (said,) = odd_sizes(cell_of(ARM, tool=tool, links=links))
+    (said,) = unlikely_sizes(cell_of(ARM, tool=tool, links=links))
     assert "'forearm' is 3e+04 mm long, and the arm" in said
 
 

@@ -33,22 +33,22 @@ from kerfpath.errors import InputError
 # -----------------------------------------------------------------------------
 # Find loops that lie on each other, however each is drawn.
 
-SAME = 1e-3
+COINCIDENT = 1e-3
 """Lines whose extent, length and points differ by less (mm) are the same."""
 CHORD = 1e-4
 """Deviation (mm) of chords from the curves that are compared."""
-LOOKED_AT = 100
+MOST_COMPARED = 100
 """Largest number of points of a line that are compared with the other."""
 
 
-def same_lines(traces: Sequence[Trace]) -> Iterator[tuple[int, int]]:
+def coincident_pairs(traces: Sequence[Trace]) -> Iterator[tuple[int, int]]:
     """Yield pairs (i, j) of traces with i < j that lie on each other."""
     if len(traces) < 2:
         return
     facts = np.array(
         [[*trace.bounds().ravel().tolist(), float(trace.lengths.sum())] for trace in traces]
     )
-    for i, j in sorted(cKDTree(facts).query_pairs(SAME, p=np.inf)):
+    for i, j in sorted(cKDTree(facts).query_pairs(COINCIDENT, p=np.inf)):
         if _lies_on(traces[i].around, traces[j]) and _lies_on(traces[j].around, traces[i]):
             yield i, j
 
@@ -57,8 +57,10 @@ def _lies_on(points: Array, trace: Trace) -> bool:
     chords = trace.sample(CHORD, np.pi)[0]
     if trace.gaps.size == len(trace.lengths):
         chords = np.vstack([chords, chords[:1]])
-    step = -(-len(points) // LOOKED_AT)
-    return all(off_chord(chords[:-1], chords[1:], point).min() <= SAME for point in points[::step])
+    step = -(-len(points) // MOST_COMPARED)
+    return all(
+        off_chord(chords[:-1], chords[1:], point).min() <= COINCIDENT for point in points[::step]
+    )
 
 
 # -----------------------------------------------------------------------------
@@ -69,15 +71,15 @@ def _lies_on(points: Array, trace: Trace) -> bool:
 # place are separated there: squares drawn side by side, each with all its sides, become squares
 # again.
 
-NEAR = 0.02
+PROBE = 0.02
 """Distance from a place at which curves are ordered around it, as a share of the shortest curve."""
 SAMPLED = 0.05
 """Chord error of curves for enclosed regions, as a share of that distance."""
-LOOK = 257
+ANGLE_SAMPLES = 257
 """Number of points on a curve among which the one at that distance is searched."""
 
 
-def partners(
+def continuations(
     strokes: Sequence[Sequence[Curve]], alike: Sequence[int], place: Ints
 ) -> dict[int, int]:
     """Return for each end (2 k: start of stroke k, 2 k + 1: its end) the end that continues it.
@@ -105,7 +107,7 @@ def partners(
         if len(ends) == 2:
             pairs = [(ends[0], ends[1])]
         else:
-            pairs = _across(strokes, alike, place, ends, chords) if is_even else []
+            pairs = _continuations_at(strokes, alike, place, ends, chords) if is_even else []
         for a, b in pairs:
             found[a], found[b] = b, a
     return found
@@ -114,12 +116,12 @@ def partners(
 def _chords(strokes: Sequence[Sequence[Curve]]) -> tuple[Array, Array]:
     """Return the chords of all curves, from (K, 3) to (K, 3), which bound the regions."""
     curves = [curve for stroke in strokes for curve in stroke]
-    chord = SAMPLED * NEAR * min(curve.length for curve in curves)
+    chord = SAMPLED * PROBE * min(curve.length for curve in curves)
     lines = [sample_curve(curve, chord, np.pi)[1] for curve in curves]
     return np.vstack([line[:-1] for line in lines]), np.vstack([line[1:] for line in lines])
 
 
-def _across(
+def _continuations_at(
     strokes: Sequence[Sequence[Curve]],
     alike: Sequence[int],
     place: Ints,
@@ -129,14 +131,14 @@ def _across(
     """Return the pairs of ends at a place that have a filled region between them."""
     curves = {end: strokes[end // 2][-1 if end % 2 else 0] for end in ends}
     at = np.mean([curve.ends[end % 2] for end, curve in curves.items()], axis=0)
-    near = NEAR * min(curve.length for curve in curves.values())
+    near = PROBE * min(curve.length for curve in curves.values())
     angle_of: dict[tuple[int, bool], float] = {}
     keys = {}
     for end, curve in curves.items():
         # Strokes that lie on each other have opposite orders at their two ends.
         starts_here = bool(place[end] < place[end ^ 1])
         line = alike[end // 2], starts_here
-        angle = angle_of.setdefault(line, _angle(curve, end % 2, at, near))
+        angle = angle_of.setdefault(line, _departure_angle(curve, end % 2, at, near))
         keys[end] = angle, end if starts_here else -end
     around = sorted(ends, key=keys.__getitem__)
     angles = np.array([keys[end][0] for end in around])
@@ -144,15 +146,15 @@ def _across(
     widest, count = int(np.argmax(wide)), len(around)
     middle = angles[widest] + wide[widest] / 2
     point = at + near * np.array([np.cos(middle), np.sin(middle), 0.0])
-    is_filled = _crossings(chords[0] - point, chords[1] - point) % 2 == 1
+    is_filled = _ray_crossings(chords[0] - point, chords[1] - point) % 2 == 1
     first = widest if is_filled else widest + 1
     return [(around[k % count], around[(k + 1) % count]) for k in range(first, first + count, 2)]
 
 
-def _angle(curve: Curve, is_end: int, at: Array, near: float) -> float:
+def _departure_angle(curve: Curve, is_end: int, at: Array, near: float) -> float:
     """Return the direction (rad) in which a curve leaves a place (3,), at distance `near` (mm)."""
     start, stop = (curve.end, curve.start) if is_end else (curve.start, curve.end)
-    points = curve.at(np.linspace(start, stop, LOOK)) - at
+    points = curve.at(np.linspace(start, stop, ANGLE_SAMPLES)) - at
     away = np.linalg.norm(points[:, :2], axis=1)
     k = max(1, int(np.argmax(away >= near)))
     part = np.clip((near - away[k - 1]) / max(away[k] - away[k - 1], 1e-300), 0.0, 1.0)
@@ -163,10 +165,10 @@ def _angle(curve: Curve, is_end: int, at: Array, near: float) -> float:
 def encloses(polygon: Array, point: Array) -> bool:
     """Return whether a point (3,) lies within a polygon (K, 3), both seen from above."""
     around = polygon - point
-    return _crossings(around, np.roll(around, -1, axis=0)) % 2 == 1
+    return _ray_crossings(around, np.roll(around, -1, axis=0)) % 2 == 1
 
 
-def inner_point(polygon: Array) -> Array:
+def interior_point(polygon: Array) -> Array:
     """Return a point (3,) well inside a polygon (K, 3), seen from above."""
     levels = np.unique(polygon[:, 1])
     if len(levels) < 2:
@@ -181,7 +183,7 @@ def inner_point(polygon: Array) -> Array:
     return np.array([(x[k] + x[k + 1]) / 2, level, polygon[0, 2]])
 
 
-def _crossings(p: Array, q: Array) -> int:
+def _ray_crossings(p: Array, q: Array) -> int:
     """Return how many of the segments p q (K, 3) the ray from 0 along x crosses."""
     crosses = (p[:, 1] > 0) != (q[:, 1] > 0)
     (x, y), (x1, y1) = p[crosses, :2].T, q[crosses, :2].T
@@ -191,21 +193,21 @@ def _crossings(p: Array, q: Array) -> int:
 # -----------------------------------------------------------------------------
 # Build named, nested, consistently oriented loops from loose flat curves.
 
-SAID = 3
+MOST_REPORTED = 3
 """Number of open lines whose ends are reported, those with the nearest next end."""
 LARGER = 1.05
 """Of two loops in the same box, one with an area larger by this factor lies around the other."""
-Look = tuple[str, str]
+Style = tuple[str, str]
 """Layer and colour; only curves with the same ones are chained."""
 Stroke = tuple[Curve, ...]
 """The curves of one entity, each of which ends where the next starts."""
 Chain = EdgeChain[Curve]
 
 
-def loops_in(
+def part_of_strokes(
     path: Path,
     unit: str,
-    drawn: Mapping[Look, Sequence[Stroke]],
+    drawn: Mapping[Style, Sequence[Stroke]],
     *,
     gap: float,
     notes: Sequence[str],
@@ -222,46 +224,46 @@ def loops_in(
     InputError
         Nothing to cut.
     """
-    R = np.eye(3) if axis is None else _against(axis)
-    chains: list[tuple[Look, Chain]] = []
+    R = np.eye(3) if axis is None else _rotation_to_axis(axis)
+    chains: list[tuple[Style, Chain]] = []
     notes = [*notes, *map(str, left_out)]
-    for look, strokes in drawn.items():
+    for style, strokes in drawn.items():
         if axis is not None:
             strokes = [tuple(turned(curve, R, UP) for curve in stroke) for stroke in strokes]
-        found, repaired = _chains(strokes, gap / MM, R)
-        notes += [f"layer {look[0]}, {look[1]}: {what}" for what in repaired]
-        chains += [(look, chain) for chain in found]
+        found, repaired = _chained(strokes, gap / MM, R)
+        notes += [f"layer {style[0]}, {style[1]}: {what}" for what in repaired]
+        chains += [(style, chain) for chain in found]
     if not chains:
         why = f"; {left_out[0]}" if left_out else ""
         raise InputError(
             f"{path}: holds nothing to cut: no line, arc, polyline, ellipse or spline{why}"
         )
-    depth = iter(_depths([chain for _, chain in chains if chain.is_closed]))
+    depth = iter(_nesting_depths([chain for _, chain in chains if chain.is_closed]))
     kinds: list[Kind] = []
-    for k, (look, chain) in enumerate(chains):
+    for k, (style, chain) in enumerate(chains):
         kind: Kind = "open"
         if chain.is_closed:
             kind = "inner" if next(depth) % 2 else "outer"
             if (chain.area[2] > 0) != (kind == "outer"):
                 other_way = tuple(backwards(curve) for curve in chain.edges[::-1])
-                chains[k] = look, EdgeChain(edges=other_way)
+                chains[k] = style, EdgeChain(edges=other_way)
         kinds.append(kind)
     if axis is not None:
-        chains = [(look, _turned_back(chain, R)) for look, chain in chains]
+        chains = [(style, _rotated_back(chain, R)) for style, chain in chains]
     loops: list[Loop] = []
-    for layer in dict.fromkeys(look[0] for look, _ in chains):
+    for layer in dict.fromkeys(style[0] for style, _ in chains):
         drawn_here = [
-            (kind, chain, look[1])
-            for (look, chain), kind in zip(chains, kinds, strict=True)
-            if look[0] == layer
+            (kind, chain, style[1])
+            for (style, chain), kind in zip(chains, kinds, strict=True)
+            if style[0] == layer
         ]
         surface = "plane" if axis is None else "lines"
         loops += named_loops(drawn_here, face=layer, surface=surface, gap=gap, layer=layer)
-    notes += [*_cut_twice(loops), *_hanging(loops)]
+    notes += [*_coincident_notes(loops), *_open_end_notes(loops)]
     return part_without_faces(path, unit, loops, gap=gap, notes=notes, left_out=left_out)
 
 
-def _against(axis: Array) -> Array:
+def _rotation_to_axis(axis: Array) -> Array:
     """Return the rotation (3, 3) that turns a tool axis to -z."""
     z = -axis / np.linalg.norm(axis)
     x = np.eye(3)[0 if abs(z[0]) < 0.9 else 1]
@@ -270,55 +272,55 @@ def _against(axis: Array) -> Array:
     return np.stack([x, np.cross(z, x), z])
 
 
-def _turned_back(chain: Chain, R: Array) -> Chain:
+def _rotated_back(chain: Chain, R: Array) -> Chain:
     up = tuple(R[2].tolist())
     return replace(chain, edges=[turned(curve, R.T, up) for curve in chain.edges])
 
 
-def _cut_twice(loops: Sequence[Loop]) -> Iterator[str]:
+def _coincident_notes(loops: Sequence[Loop]) -> Iterator[str]:
     """Yield a note for each loop that lies on one of another layer or colour."""
-    for i, j in same_lines([loop._trace for loop in loops]):
+    for i, j in coincident_pairs([loop._trace for loop in loops]):
         yield f"{loops[i].name} and {loops[j].name} lie on each other: cut twice if both are picked"
 
 
-def _hanging(loops: Sequence[Loop]) -> Iterator[str]:
+def _open_end_notes(loops: Sequence[Loop]) -> Iterator[str]:
     """Yield notes on where open lines end."""
     chains = [(loop.name, loop._trace) for loop in loops if loop.kind == "open"]
     hanging = [(c.next_away, name, c.next_end) for name, c in chains if isinstance(c, EdgeChain)]
-    for _, name, where in sorted(hanging)[:SAID]:
+    for _, name, where in sorted(hanging)[:MOST_REPORTED]:
         yield f"open line: {name} {where}"
-    if len(hanging) > SAID:
-        yield f"open lines: {len(hanging) - SAID} more"
+    if len(hanging) > MOST_REPORTED:
+        yield f"open lines: {len(hanging) - MOST_REPORTED} more"
 
 
-def _chains(strokes: Sequence[Stroke], gap: float, R: Array) -> tuple[list[Chain], list[str]]:
+def _chained(strokes: Sequence[Stroke], gap: float, R: Array) -> tuple[list[Chain], list[str]]:
     """Return the chains of strokes whose ends meet within `gap` (mm), and what was repaired.
 
     A stroke that lies on another is left out, unless it is a side that two loops share.
     """
-    drawn = [stroke for given in strokes if (stroke := _in_line(given))]
-    kept, spare, left = _doubles(drawn)
+    drawn = [stroke for given in strokes if (stroke := _head_to_tail(given))]
+    kept, spare, left = _split_duplicates(drawn)
     chains = [EdgeChain(edges=stroke) for stroke in kept if _is_closed(stroke)]
     loose = [stroke for stroke in kept if not _is_closed(stroke)]
-    next_end = _NextEnd(loose, gap, R)
-    for own, on_others in _hanging_together(loose, spare, gap):
-        if _is_even(own, gap):
-            chains += _linked(own, gap, next_end)
-            for _, together in _hanging_together([], on_others, gap):
-                if _is_even(together, gap):
-                    chains += _linked(together, gap, next_end)
+    next_end = _OpenEnds(loose, gap, R)
+    for own, on_others in _connected_groups(loose, spare, gap):
+        if _all_junctions_even(own, gap):
+            chains += _trace_chains(own, gap, next_end)
+            for _, together in _connected_groups([], on_others, gap):
+                if _all_junctions_even(together, gap):
+                    chains += _trace_chains(together, gap, next_end)
                 else:
                     left += together
-        elif _is_even([*own, *on_others], gap):
-            chains += _linked([*own, *on_others], gap, next_end)
+        elif _all_junctions_even([*own, *on_others], gap):
+            chains += _trace_chains([*own, *on_others], gap, next_end)
         else:
             left += on_others
-            chains += _linked(own, gap, next_end)
-    again = {j for _, j in same_lines(chains)}
+            chains += _trace_chains(own, gap, next_end)
+    again = {j for _, j in coincident_pairs(chains)}
     repaired = []
-    if count := _count(strokes) - _count(drawn):
+    if count := _count_curves(strokes) - _count_curves(drawn):
         repaired.append(f"{count} curves without length left out")
-    if count := _count(left) + _count([chains[j].edges for j in again]):
+    if count := _count_curves(left) + _count_curves([chains[j].edges for j in again]):
         repaired.append(f"{count} curves drawn twice left out")
     chains = [chain for k, chain in enumerate(chains) if k not in again]
     marks = Counter(curve.mark for chain in chains for curve in chain.edges)
@@ -327,14 +329,16 @@ def _chains(strokes: Sequence[Stroke], gap: float, R: Array) -> tuple[list[Chain
     return chains, repaired
 
 
-def _count(strokes: Sequence[Sequence[Curve]]) -> int:
+def _count_curves(strokes: Sequence[Sequence[Curve]]) -> int:
     return sum(map(len, strokes))
 
 
-def _in_line(stroke: Stroke) -> Stroke:
+def _head_to_tail(stroke: Stroke) -> Stroke:
     """Return the curves that have a length, each reversed if needed to continue the one before."""
     left = [curve for curve in stroke if curve.length > NOTHING]
-    if len(left) > 1 and _far(left[0].ends[1], left[1]) > _far(left[0].ends[0], left[1]):
+    if len(left) > 1 and _distance_to_end(left[0].ends[1], left[1]) > _distance_to_end(
+        left[0].ends[0], left[1]
+    ):
         left[0] = backwards(left[0])
     for k in range(1, len(left)):
         end = left[k - 1].ends[1]
@@ -343,8 +347,8 @@ def _in_line(stroke: Stroke) -> Stroke:
     return tuple(left)
 
 
-def _far(point: Array, curve: Curve) -> float:
-    """Return how far a point (3,) is from the nearer end of a curve, mm."""
+def _distance_to_end(point: Array, curve: Curve) -> float:
+    """Return the distance (mm) of a point (3,) from the nearer end of a curve."""
     return float(np.linalg.norm(curve.ends - point, axis=1).min())
 
 
@@ -352,8 +356,8 @@ def _is_closed(stroke: Stroke) -> bool:
     return bool(np.linalg.norm(stroke[0].ends[0] - stroke[-1].ends[1]) <= NOTHING)
 
 
-def _doubles(strokes: Sequence[Stroke]) -> tuple[list[Stroke], list[Stroke], list[Stroke]]:
-    """Return strokes that lie on no other, open ones that lie on one, and those to leave out."""
+def _split_duplicates(strokes: Sequence[Stroke]) -> tuple[list[Stroke], list[Stroke], list[Stroke]]:
+    """Return single strokes, open strokes drawn a second time, and those to leave out."""
     marks = [tuple(curve.mark for curve in stroke) for stroke in strokes]
     within = {mark for each in marks if len(each) > 1 for mark in each}
     times: Counter[tuple[Mark, ...]] = Counter()
@@ -376,11 +380,11 @@ def _ends(strokes: Sequence[Stroke]) -> Array:
     return np.array(ends).reshape(-1, 3)
 
 
-def _hanging_together(
+def _connected_groups(
     loose: Sequence[Stroke], spare: Sequence[Stroke], gap: float
 ) -> Iterator[tuple[list[Stroke], list[Stroke]]]:
-    """Yield each group of connected strokes, with the spare strokes that end where they do."""
-    places = [_places(_ends(strokes), gap) for strokes in (loose, spare)]
+    """Yield each connected group of strokes, with the spare strokes that end where they do."""
+    places = [_junctions(_ends(strokes), gap) for strokes in (loose, spare)]
     first = len(loose) + len(spare)  # the first number of a place
     links = [[end // 2, first + at] for end, at in enumerate(places[0].tolist())]
     first += len(places[0])
@@ -395,19 +399,19 @@ def _hanging_together(
     yield from together.values()
 
 
-def _is_even(strokes: Sequence[Stroke], gap: float) -> bool:
-    """Return whether an even number of ends meet at each place."""
-    return not (np.bincount(_places(_ends(strokes), gap)) % 2).any()
+def _all_junctions_even(strokes: Sequence[Stroke], gap: float) -> bool:
+    """Return whether every junction has even degree."""
+    return not (np.bincount(_junctions(_ends(strokes), gap)) % 2).any()
 
 
-def _linked(strokes: Sequence[Stroke], gap: float, next_end: _NextEnd) -> Iterator[Chain]:
+def _trace_chains(strokes: Sequence[Stroke], gap: float, next_end: _OpenEnds) -> Iterator[Chain]:
     """Yield the chains of connected open strokes."""
-    place = _places(_ends(strokes), gap)
+    place = _junctions(_ends(strokes), gap)
     marks: dict[tuple[Mark, ...], int] = {}
     alike = [
         marks.setdefault(tuple(sorted(curve.mark for curve in s)), len(marks)) for s in strokes
     ]
-    partner = partners(strokes, alike, place)
+    partner = continuations(strokes, alike, place)
     used = np.zeros(len(strokes), dtype=bool)
 
     def walk(end: int) -> list[int]:
@@ -429,7 +433,7 @@ def _linked(strokes: Sequence[Stroke], gap: float, next_end: _NextEnd) -> Iterat
             yield EdgeChain(edges=edges, is_closed=False, next_end=words, next_away=away)
     for k in range(len(strokes)):
         if entered := walk(2 * k):
-            for loop in _parted(entered, place):
+            for loop in _split_at_repeats(entered, place):
                 yield EdgeChain(edges=_edges(strokes, loop))
 
 
@@ -442,8 +446,8 @@ def _edges(strokes: Sequence[Stroke], entered: Sequence[int]) -> list[Curve]:
     return edges
 
 
-def _parted(entered: Sequence[int], place: Ints) -> Iterator[list[int]]:
-    """Split a loop that passes a place more than once, and yield the parts."""
+def _split_at_repeats(entered: Sequence[int], place: Ints) -> Iterator[list[int]]:
+    """Split a loop that passes a junction more than once, and yield the parts."""
     path: list[int] = []
     since: dict[int, int] = {}
     for end in entered:
@@ -456,8 +460,8 @@ def _parted(entered: Sequence[int], place: Ints) -> Iterator[list[int]]:
             del path[first:]
 
 
-def _places(ends: Array, gap: float) -> Ints:
-    """Return a number (E,) for each end, the same for those that meet.
+def _junctions(ends: Array, gap: float) -> Ints:
+    """Return the number (E,) of the junction of each end, the same for ends that meet.
 
     Ends that coincide meet; only the remaining ends are joined within `gap`, as the two ends of a
     curve shorter than it would meet otherwise.
@@ -472,8 +476,8 @@ def _places(ends: Array, gap: float) -> Ints:
     return label_connected(touching, len(ends))
 
 
-class _NextEnd:
-    """Reasons why open chains end.
+class _OpenEnds:
+    """Where open chains end, and why.
 
     Parameters
     ----------
@@ -487,7 +491,7 @@ class _NextEnd:
     def __init__(self, loose: Sequence[Stroke], gap: float, R: Array) -> None:
         self._R = R
         ends = _ends(loose)
-        place = _places(ends, gap)
+        place = _junctions(ends, gap)
         self._crowd, self._tree = np.bincount(place)[place], cKDTree(ends)
 
     def of(self, chain: Sequence[Curve]) -> tuple[float, str]:
@@ -508,7 +512,7 @@ class _NextEnd:
         return min(breaks)
 
 
-def _depths(chains: Sequence[Chain]) -> list[int]:
+def _nesting_depths(chains: Sequence[Chain]) -> list[int]:
     """Return how many of the others enclose each closed chain.
 
     Chains may touch or coincide, so a point inside each decides.
@@ -517,11 +521,11 @@ def _depths(chains: Sequence[Chain]) -> list[int]:
     areas = np.array([abs(chain.area[2]) for chain in chains])
     depths = []
     for k, chain in enumerate(chains):
-        point = inner_point(chain.around)
+        point = interior_point(chain.around)
         larger = np.stack([boxes[k, 0] - boxes[:, 0], boxes[:, 1] - boxes[k, 1]])
-        is_around = (larger > -SAME).all(axis=(0, 2))
+        is_around = (larger > -COINCIDENT).all(axis=(0, 2))
         # Of two chains in one box, such as a circle and an inscribed one, the larger is around.
-        is_around &= (larger > SAME).any(axis=(0, 2)) | (areas > LARGER * areas[k])
+        is_around &= (larger > COINCIDENT).any(axis=(0, 2)) | (areas > LARGER * areas[k])
         is_around[k] = False
         around = np.flatnonzero(is_around).tolist()
         depths.append(sum(encloses(chains[j].around, point) for j in around))

@@ -39,7 +39,7 @@ from ezdxf.xclip import XClip
 from scipy.interpolate import BSpline
 
 from kerfpath.arrays import Array, freeze
-from kerfpath.cad.chains import Look, Stroke, loops_in
+from kerfpath.cad.chains import Stroke, Style, part_of_strokes
 from kerfpath.cad.curves import Arc, Curve, Line, Spline
 from kerfpath.cad.left_out import LeftOut
 from kerfpath.cad.part import Part
@@ -283,7 +283,7 @@ def read_dxf(
     except DAMAGED as error:
         raise InputError(f"{path}: damaged ({_reason(error)}); repair it in CAD") from None
     sheet.left_out.update(lost)
-    part = loops_in(
+    part = part_of_strokes(
         path, unit or declared, sheet.strokes, gap=gap, notes=notes, left_out=sheet.summed(),
         axis=axis,
     )  # fmt: skip
@@ -308,7 +308,7 @@ class _Sheet:
 
     document: Drawing
     is_flat: bool = True
-    strokes: dict[Look, list[Stroke]] = field(default_factory=dict)
+    strokes: dict[Style, list[Stroke]] = field(default_factory=dict)
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
     put_aside: Counter[tuple[str, str]] = field(default_factory=Counter)
     count: int = 0
@@ -332,7 +332,7 @@ class _Sheet:
                     self.put_aside[entity.dxftype(), f"on the sheet {layout.name}"] += 1
 
     def add(
-        self, entities: Iterable[DXFGraphic], T: Array, inside: Look = LOOSE, depth: int = 0
+        self, entities: Iterable[DXFGraphic], T: Array, inside: Style = LOOSE, depth: int = 0
     ) -> None:
         """Add entities; `inside` is the layer and colour of the insertion of their block.
 
@@ -349,7 +349,7 @@ class _Sheet:
             except DAMAGED as error:
                 self.left_out[kind, f"it cannot be read: {_reason(error)}"] += 1
 
-    def _entity(self, entity: DXFGraphic, kind: str, T: Array, inside: Look, depth: int) -> None:
+    def _entity(self, entity: DXFGraphic, kind: str, T: Array, inside: Style, depth: int) -> None:
         look = self._look(entity, inside)
         if self.document.layers.has_entry(look[0]):
             drawn = self.document.layers.get(look[0])
@@ -368,7 +368,7 @@ class _Sheet:
         if curves:
             self.strokes.setdefault(look, []).append(tuple(curves))
 
-    def _insert(self, insert: Insert, T: Array, look: Look, depth: int) -> None:
+    def _insert(self, insert: Insert, T: Array, look: Style, depth: int) -> None:
         """Add a block wherever it is inserted, once or in rows and columns."""
         block = insert.block()
         if block is None or block.block is None:
@@ -399,7 +399,7 @@ class _Sheet:
         if self.count > MOST:
             raise InputError(f"more than {MOST} curves and blocks; leave out what is not to be cut")
 
-    def _look(self, entity: DXFGraphic, inside: Look) -> Look:
+    def _look(self, entity: DXFGraphic, inside: Style) -> Style:
         layer = inside[0] if entity.dxf.layer == "0" else str(entity.dxf.layer)
         if entity.dxf.hasattr("true_color"):
             return layer, "#{:02x}{:02x}{:02x}".format(*int2rgb(entity.dxf.true_color))

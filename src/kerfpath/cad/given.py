@@ -11,7 +11,7 @@ from OCP.gp import gp_Pnt, gp_Trsf
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
 
-from kerfpath.cad.sewing import drawn_of
+from kerfpath.cad.sewing import sewn_shape
 from kerfpath.cad.shape import NamedFace, NamedShape, list_shapes
 from kerfpath.cad.units import LARGEST, UNITS_MM
 from kerfpath.errors import InputError
@@ -23,7 +23,7 @@ EXPECTED = (
 )
 
 
-def drawn_of_given(given: object, unit: str | None, gap: float) -> NamedShape:
+def shape_in_memory(given: object, unit: str | None, gap: float) -> NamedShape:
     """Return a copy of the content of one or several shapes; numbers are in `unit`, or in mm.
 
     Raises
@@ -50,7 +50,7 @@ def drawn_of_given(given: object, unit: str | None, gap: float) -> NamedShape:
     if not faces and not list_shapes(shape, TopAbs_ShapeEnum.TopAbs_EDGE):
         raise InputError("it is empty: it has neither faces nor edges")
     named = [NamedFace(face=TopoDS.Face(face)) for face in faces]
-    return drawn_of(unit or "mm", shape, named, gap=gap)
+    return sewn_shape(unit or "mm", shape, named, gap=gap)
 
 
 def _whole(given: object) -> TopoDS_Shape:

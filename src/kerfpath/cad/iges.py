@@ -17,7 +17,7 @@ from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath.cad.left_out import LOST, LeftOut, counted, kind_of
-from kerfpath.cad.sewing import drawn_of
+from kerfpath.cad.sewing import sewn_shape
 from kerfpath.cad.shape import NamedFace, NamedShape, failures, list_shapes, occt
 from kerfpath.cad.units import UNITS_MM
 from kerfpath.errors import InputError
@@ -118,7 +118,7 @@ def _read(path: Path, unit: str | None, gap: float) -> NamedShape:
             for named in faces
         ]
         notes.append(f"unit {unit} as given; the header says {header or 'nothing'}")
-    return drawn_of(unit or header, shape, faces, gap=gap, notes=notes, left_out=left_out)
+    return sewn_shape(unit or header, shape, faces, gap=gap, notes=notes, left_out=left_out)
 
 
 def _damaged(reader: IGESControl_Reader) -> list[LeftOut]:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 Columns = Mapping[str, str] | Sequence[str]
 Direction = tuple[float, float, float]
-KEPT = 4
+CACHED = 4
 """Number of parts, those read last, that are kept in case a file with the same content is read."""
 
 
@@ -89,7 +89,7 @@ def read(
     """
     require_unit(unit)
     scalar(gap, "gap", unit="m", above=0.0)
-    asked = _Asked(
+    options = _ReadOptions(
         unit=unit,
         gap=gap,
         outer_towards=_direction(outer_towards, "outer_towards"),
@@ -99,7 +99,7 @@ def read(
     if not isinstance(path, str | PathLike):
         if columns is not None:
             raise InputError("shape: columns: expected a table, got a shape")
-        return _given(path, asked, progress)
+        return _read_shape(path, options, progress)
     path = Path(path)
     content = content_of(path, _EXPECTED)
     kind = _KINDS.get(path.suffix.lower())
@@ -111,11 +111,11 @@ def read(
         raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
     if columns is not None and kind != "table":
         raise InputError(f"{path}: columns: expected a table, got a {kind} file")
-    return _drawn(kind, path, content, asked, progress)
+    return _read_file(kind, path, content, options, progress)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Asked:
+class _ReadOptions:
     """Arguments of `read`, which describes them."""
 
     unit: str | None
@@ -153,18 +153,20 @@ def content_of(path: Path, expected: str) -> bytes:
         raise InputError(f"{path}: cannot be read ({why}); expected {expected}") from None
 
 
-def _drawn(kind: str, path: Path, content: bytes, asked: _Asked, progress: Progress) -> Part:
+def _read_file(
+    kind: str, path: Path, content: bytes, options: _ReadOptions, progress: Progress
+) -> Part:
     """Return the part; each reader is loaded when it is needed, as OCCT takes over a second.
 
     STEP and IGES are translated in another process, because OCCT may crash.
     """
     progress(f"reading {path.name}", 0, 0)
-    unit, gap = asked.unit, asked.gap
-    axis = None if asked.axis is None else np.array(asked.axis)
+    unit, gap = options.unit, options.gap
+    axis = None if options.axis is None else np.array(options.axis)
     if kind == "table":
         from kerfpath.cad.table import read_table
 
-        return read_table(path, content, unit, gap, axis=axis, columns=asked.columns)
+        return read_table(path, content, unit, gap, axis=axis, columns=options.columns)
     if kind == "tool path":
         from kerfpath.cad.apt import read_apt
 
@@ -183,53 +185,53 @@ def _drawn(kind: str, path: Path, content: bytes, asked: _Asked, progress: Progr
     from kerfpath.cad.shape import occt, uncollected
     from kerfpath.cad.step import read_step
 
-    key = (kind, sha256(content).digest(), unit, gap, asked.outer_towards, asked.axis)
-    part = _kept.pop(key, None)
+    key = (kind, sha256(content).digest(), unit, gap, options.outer_towards, options.axis)
+    part = _cache.pop(key, None)
     if part is None:
         translate = read_step if kind == "STEP" else read_iges
         try:
             drawn = call_apart(translate, path.absolute(), unit, gap, size=len(content))
             with occt(), uncollected():
-                part = _part_of(path, drawn, asked, progress)
+                part = _part_of(path, drawn, options, progress)
         except InputError as error:
-            raise InputError(f"{path}: {_in_words(kind, content, error)}") from None
-    _kept[key] = part
-    while len(_kept) > KEPT:
-        _kept.pop(next(iter(_kept)), None)
+            raise InputError(f"{path}: {_grammar_fault(kind, content, error)}") from None
+    _cache[key] = part
+    while len(_cache) > CACHED:
+        _cache.pop(next(iter(_cache)), None)
     return replace(part, path=path)
 
 
-def _given(given: object, asked: _Asked, progress: Progress) -> Part:
+def _read_shape(shape: object, options: _ReadOptions, progress: Progress) -> Part:
     """Return the part in a shape in memory."""
     require_extra("cad", "shape: reading it")
-    from kerfpath.cad.given import drawn_of_given
+    from kerfpath.cad.given import shape_in_memory
     from kerfpath.cad.shape import occt, uncollected
 
     try:
         with occt(), uncollected():
-            drawn = drawn_of_given(given, asked.unit, asked.gap)
-            if not drawn.faces and asked.axis is None:
+            drawn = shape_in_memory(shape, options.unit, options.gap)
+            if not drawn.faces and options.axis is None:
                 raise InputError("it has edges but no face; give the tool axis with axis")
-            return _part_of(Path("shape"), drawn, asked, progress)
+            return _part_of(Path("shape"), drawn, options, progress)
     except InputError as error:
         raise InputError(f"shape: {error}") from None
 
 
-def _part_of(path: Path, drawn: NamedShape, asked: _Asked, progress: Progress) -> Part:
+def _part_of(path: Path, drawn: NamedShape, options: _ReadOptions, progress: Progress) -> Part:
     """Return the part made of faces, or of lines with an axis."""
     from kerfpath.cad.faces import part_of
     from kerfpath.cad.wires import part_of_wires
 
-    if drawn.faces and asked.axis is not None:
+    if drawn.faces and options.axis is not None:
         raise InputError("axis: expected a drawing of lines, got one of faces")
     if drawn.faces:
-        return part_of(path, drawn, asked.gap, asked.outer_towards, progress)
-    if asked.axis is None:
+        return part_of(path, drawn, options.gap, options.outer_towards, progress)
+    if options.axis is None:
         raise nothing_drawn(drawn.left_out)
-    return part_of_wires(path, drawn, asked.gap, np.array(asked.axis))
+    return part_of_wires(path, drawn, options.gap, np.array(options.axis))
 
 
-def _in_words(kind: str, content: bytes, error: InputError) -> InputError:
+def _grammar_fault(kind: str, content: bytes, error: InputError) -> InputError:
     """Return the fault in the grammar of a STEP file that cannot be read, else the error itself."""
     from kerfpath.cad.part21 import require_grammar
 
@@ -241,7 +243,7 @@ def _in_words(kind: str, content: bytes, error: InputError) -> InputError:
     return error
 
 
-_kept: dict[tuple[object, ...], Part] = {}
+_cache: dict[tuple[object, ...], Part] = {}
 _KINDS = {
     ".step": "STEP",
     ".stp": "STEP",

@@ -207,7 +207,7 @@ def _lies_on(points: Array, edge: TopoDS_Edge, gap: float) -> bool:
 EDGE, FACE = TopAbs_ShapeEnum.TopAbs_EDGE, TopAbs_ShapeEnum.TopAbs_FACE
 
 
-def drawn_of(
+def sewn_shape(
     unit: str,
     shape: TopoDS_Shape,
     faces: Sequence[NamedFace],

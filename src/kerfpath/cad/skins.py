@@ -51,7 +51,7 @@ class Patches(NamedTuple):
     normal: Array
 
 
-def weighed(face: TopoDS_Face) -> tuple[float, gp_Pnt]:
+def area_and_middle(face: TopoDS_Face) -> tuple[float, gp_Pnt]:
     """Return the area of a face, mm^2, and its centre of mass."""
     props = GProp_GProps()
     BRepGProp.SurfaceProperties_s(face, props, ACCURACY)
@@ -93,7 +93,7 @@ def patches_of(face: TopoDS_Face, area: float, middle: gp_Pnt) -> Patches:
     )
 
 
-def joined(parts: Sequence[Patches]) -> Patches:
+def concatenated(parts: Sequence[Patches]) -> Patches:
     """Return the patches of several faces in one."""
     return Patches(*map(np.concatenate, zip(*parts, strict=True)))
 
@@ -294,7 +294,7 @@ def _sides(
 
     Two opposite skins that are large and close are the sides of a sheet.
     """
-    weights = [weighed(face) for face in faces]
+    weights = [area_and_middle(face) for face in faces]
     areas = np.array([sum(weights[f][0] for f in numbers) for numbers in members])
     vector = np.zeros((len(members), 3))
     low, high = np.full((len(members), 3), NOWHERE), np.full((len(members), 3), -NOWHERE)
@@ -326,7 +326,7 @@ def _sides(
         h = min(away, key=away.__getitem__, default=g)
         if h != g and away[h] < THIN * np.sqrt(areas[g]):
             both = [
-                joined([patches_of(faces[f], *weights[f]) for f in members[skin]])
+                concatenated([patches_of(faces[f], *weights[f]) for f in members[skin]])
                 for skin in (g, h)
             ]
             ends = np.vstack([points[g], points[h], *(patches.middle for patches in both)])

@@ -25,7 +25,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath.cad.left_out import nothing_drawn
 from kerfpath.cad.part21 import require_grammar
-from kerfpath.cad.sewing import drawn_of
+from kerfpath.cad.sewing import sewn_shape
 from kerfpath.cad.shape import NamedFace, NamedShape, children, occt, uncollected, unique
 from kerfpath.cad.step_model import (
     Entities,
@@ -182,7 +182,7 @@ def _read(path: Path, content: bytes, unit: str | None, gap: float) -> NamedShap
         raise nothing_drawn(left_out)
     styles = styles_in(entities) if has_styles else ({}, {})
     faces = list(_faces(Origins(reader, entities), shape, *styles))
-    drawn = drawn_of(unit or header, shape, faces, gap=gap, notes=notes, left_out=left_out)
+    drawn = sewn_shape(unit or header, shape, faces, gap=gap, notes=notes, left_out=left_out)
     return replace(drawn, frames=step_frames(entities, UNITS_MM[unit or header]))
 
 

@@ -18,7 +18,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge
 from scipy.interpolate import BSpline
 
 from kerfpath.arrays import Array
-from kerfpath.cad.chains import loops_in
+from kerfpath.cad.chains import part_of_strokes
 from kerfpath.cad.curves import Arc, Curve, Line, Spline
 from kerfpath.cad.part import Part
 from kerfpath.cad.shape import NamedShape, list_shapes
@@ -45,7 +45,7 @@ def part_of_wires(path: Path, drawn: NamedShape, gap: float, axis: Array) -> Par
         edges.Add(edge)
     numbers = range(1, edges.Extent() + 1)
     strokes = [(_curve(TopoDS.Edge(edges.FindKey(number))),) for number in numbers]
-    part = loops_in(
+    part = part_of_strokes(
         path, drawn.unit, {WIRE_STYLE: strokes}, gap=gap, notes=drawn.notes,
         left_out=drawn.left_out, axis=axis,
     )  # fmt: skip

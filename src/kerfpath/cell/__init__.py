@@ -5,7 +5,7 @@ from kerfpath.cell.build import CuttingHead as CuttingHead
 from kerfpath.cell.build import MeshHead as MeshHead
 from kerfpath.cell.build import caveats as caveats
 from kerfpath.cell.build import cell_of as cell_of
-from kerfpath.cell.build import odd_sizes as odd_sizes
+from kerfpath.cell.build import unlikely_sizes as unlikely_sizes
 from kerfpath.cell.cell import Cell as Cell
 from kerfpath.cell.checker import CollisionChecker as CollisionChecker
 from kerfpath.cell.clearance_map import Clearances as Clearances

@@ -47,7 +47,7 @@ def caveats(cell: Cell) -> tuple[str, ...]:
     left = {pair: why for pair, why in cell.unjudged.items() if why == BY_DESIGN}
     heads = [pair for pair in left if "head" in (kind[pair[0]], kind[pair[1]])]
     if heads:
-        said.append(f"Not judged, as they touch at every pose by design: {_listed(heads)}.")
+        said.append(f"Not judged, as they touch at every pose by design: {_pairs_in_words(heads)}.")
     allowed = {frozenset(pair) for pair in cell.may_touch}
     if meant := [
         f"{a} - {b}" + (f" ({why})" if why != MEANT else "")
@@ -71,7 +71,7 @@ def caveats(cell: Cell) -> tuple[str, ...]:
     return tuple(said)
 
 
-def odd_sizes(cell: Cell) -> tuple[str, ...]:
+def unlikely_sizes(cell: Cell) -> tuple[str, ...]:
     """Return a sentence for each body whose size is unlikely, given the arm's length."""
     arm = cell.chain.length
     said = []
@@ -86,7 +86,7 @@ def odd_sizes(cell: Cell) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _listed(pairs: list[tuple[str, str]]) -> str:
+def _pairs_in_words(pairs: list[tuple[str, str]]) -> str:
     return ", ".join(f"{a} - {b}" for a, b in pairs)
 
 
@@ -303,7 +303,7 @@ def cell_of(
         said = {frozenset(pair) for pair in (*own, *may_touch)}
         if not isinstance(head, Sequence) and {"nozzle", "part"} not in said:
             own["nozzle", "part"] = head.keeps
-    stands = _stands(chain, fixtures or {}, on or {})
+    stands = _fixture_frames(chain, fixtures or {}, on or {})
     things = tuple(
         Body(name=name, shape=shape, frame=stands[name], kind="fixture")
         for name, shape in (fixtures or {}).items()
@@ -336,7 +336,7 @@ def _require_solid(shape: object, what: str) -> None:
         )
 
 
-def _stands(
+def _fixture_frames(
     chain: KinematicChain, fixtures: Mapping[str, Shape], on: Mapping[str, str]
 ) -> dict[str, int]:
     """Return the frame that each fixture stands in: on the ground, or on an external axis."""

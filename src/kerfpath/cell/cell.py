@@ -16,9 +16,9 @@ from kerfpath.cell.pairs import (
     DesignClearance,
     MotionBounds,
     Places,
-    designs,
-    say_kept_all_round,
-    stand_still,
+    clearance_at_every_angle,
+    design_clearances,
+    reason_not_judged,
 )
 from kerfpath.cell.scene import Body, Scene
 from kerfpath.errors import InputError
@@ -245,11 +245,11 @@ class Cell:
         why = {self._pair(pair, "may_touch"): words for pair, words in reasons.items()}
         asked: dict[Places, float] = {}
         for a, b in combinations(range(len(bodies)), 2):
-            if words := why.get((a, b)) or stand_still(bodies[a], bodies[b]):
+            if words := why.get((a, b)) or reason_not_judged(bodies[a], bodies[b]):
                 why[a, b] = words
             else:
                 asked[a, b] = _distance(own.get((a, b), self.near_miss), names, (a, b))
-        left = designs(self.chain, bodies, asked)
+        left = design_clearances(self.chain, bodies, asked)
         judged: dict[Places, tuple[float, DesignClearance]] = {}
         for pair, distance in asked.items():
             design = left.get(pair, DesignClearance())
@@ -264,7 +264,7 @@ class Cell:
                     f"{why[a, b]}; leave the pair out"
                 )
         for pair, (distance, design) in [*judged.items()]:
-            if words := say_kept_all_round(self.chain, bodies, pair, distance, design):
+            if words := clearance_at_every_angle(self.chain, bodies, pair, distance, design):
                 del judged[pair]
                 why[pair] = words
         return why, judged

@@ -237,12 +237,12 @@ class DesignClearance:
         return min(asked, self.most - max(SPARED * self.most, TOUCH))
 
 
-def stand_still(one: Body, two: Body) -> str:
+def reason_not_judged(one: Body, two: Body) -> str:
     """Return why two bodies need not be judged whatever their shapes, or "" if they must be."""
     return "they do not move against each other" if one.frame == two.frame else ""
 
 
-def designs(
+def design_clearances(
     chain: KinematicChain, bodies: Sequence[Body], asked: Mapping[Places, float]
 ) -> dict[Places, DesignClearance]:
     """Return the design clearance of the pairs of the arm's bodies with few joints between them.
@@ -280,7 +280,7 @@ def designs(
     return found
 
 
-def say_kept_all_round(
+def clearance_at_every_angle(
     chain: KinematicChain,
     bodies: Sequence[Body],
     pair: Places,

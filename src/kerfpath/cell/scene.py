@@ -70,7 +70,7 @@ PARALLEL = 1e-12
 """Squared sine of the angle below which two segments are parallel, and nearest at an end."""
 
 
-class CapsuleLines:
+class CapsuleAxes:
     """The axes of capsules, each in a frame of an arm.
 
     Parameters
@@ -99,12 +99,12 @@ class CapsuleLines:
         return start, (turned @ self._along[:, :, None])[..., 0]
 
 
-def lines_apart(p: Array, u: Array, q: Array, v: Array) -> Array:
+def segment_distances(p: Array, u: Array, q: Array, v: Array) -> Array:
     """Return distances (...) m between segments from p to p + u and from q to q + v, (..., 3) m."""
     uu, vv, uv = (u * u).sum(-1), (v * v).sum(-1), (u * v).sum(-1)
     ends = [
-        _to_line(p - q, v, vv), _to_line(p + u - q, v, vv),
-        _to_line(q - p, u, uu), _to_line(q + v - p, u, uu),
+        _square_to_segment(p - q, v, vv), _square_to_segment(p + u - q, v, vv),
+        _square_to_segment(q - p, u, uu), _square_to_segment(q + v - p, u, uu),
     ]  # fmt: skip
     # If the nearest points lie between the ends of both segments, their distance is smaller.
     w = p - q
@@ -119,7 +119,7 @@ def lines_apart(p: Array, u: Array, q: Array, v: Array) -> Array:
     return np.asarray(np.sqrt(np.minimum(np.min(ends, axis=0), square)))
 
 
-def _to_line(w: Array, v: Array, vv: Array) -> Array:
+def _square_to_segment(w: Array, v: Array, vv: Array) -> Array:
     """Return squared distances of points w from segments from the origin to v; vv is v . v."""
     t = np.clip((w * v).sum(-1) / np.where(vv > 0, vv, 1.0), 0.0, 1.0)
     return np.asarray(((w - t[..., None] * v) ** 2).sum(-1))
@@ -191,7 +191,7 @@ class Scene:
         round_ = [all(isinstance(bodies[i].shape, Capsule) for i in pair) for pair in self._pairs]
         self.round = np.array(round_, dtype=np.bool_)
         self._lines = [
-            CapsuleLines([bodies[i].frame for i in side], [bodies[i].shape for i in side])
+            CapsuleAxes([bodies[i].frame for i in side], [bodies[i].shape for i in side])
             for side in self._ends[:, self.round]
             if side.size
         ]
@@ -276,7 +276,7 @@ class Scene:
         if self._lines:
             one, two = self._lines
             low[:, self.round] = (
-                lines_apart(*one.at(frames), *two.at(frames)) - one.thick - two.thick
+                segment_distances(*one.at(frames), *two.at(frames)) - one.thick - two.thick
             )
         return np.asarray(low)
 

@@ -9,7 +9,7 @@ import numpy as np
 from rich.markup import escape
 
 from kerfpath.auditor import format_value
-from kerfpath.cell import Body, Capsule, Cell, Mesh, caveats, odd_sizes
+from kerfpath.cell import Body, Capsule, Cell, Mesh, caveats, unlikely_sizes
 from kerfpath.cli.drawing_output import drawing_entry
 from kerfpath.cli.show import busy, out, print_json, table
 from kerfpath.errors import InputError, about
@@ -178,7 +178,7 @@ def _show_cell(cell: Cell) -> None:
         for i, body in enumerate(cell.bodies)
     ]
     table(["body", "kind", "moves with", "box mm", "shape", "pairs"], rows, numbers=["pairs"])
-    for warning in odd_sizes(cell):
+    for warning in unlikely_sizes(cell):
         out.print(f"warning: {escape(warning)}")
     kept = f"{cell.near_miss * 1e3:g} mm"
     out.print(f"{len(cell.pairs)} pairs are judged; all keep {kept}, except for:")
@@ -235,7 +235,7 @@ def _cell_entry(cell: Cell) -> dict[str, object]:
             }
             for b in cell.bodies
         ],
-        "warnings": list(odd_sizes(cell)),
+        "warnings": list(unlikely_sizes(cell)),
         "judged": [
             {
                 "between": list(pair),
