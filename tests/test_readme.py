@@ -26,7 +26,7 @@ def test_every_link_leads_somewhere():
 
 def test_every_command_it_shows_exists():
     from kerfpath.cli import programs, studies
-    from kerfpath.cli.main import app
+    from kerfpath.cli.app import app
 
     assert programs, studies  # their commands
 

@@ -9,7 +9,7 @@ from typer.core import TyperArgument, TyperCommand, TyperGroup, TyperOption
 from typer.main import get_command
 
 from kerfpath.cli import programs, studies
-from kerfpath.cli.main import app
+from kerfpath.cli.app import app
 from reference.markdown import code, prose, table
 
 __all__ = ["page", "program"]

@@ -18,7 +18,7 @@ def main() -> None:
             print(f"kerfpath: error: {error}", file=sys.stderr)
             sys.exit(2)
         from kerfpath.cli import programs, studies
-        from kerfpath.cli.main import run
+        from kerfpath.cli.app import run
 
         assert programs, studies  # their commands
         run()

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kerfpath.cli.main import JobArgument, Json, Out, Strict, app
+from kerfpath.cli.app import JobArgument, Json, Out, Strict, app
 
 PlanFileArgument = Annotated[
     Path, typer.Argument(metavar="PLAN.json", help="The plan.json of a run.")

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from kerfpath.cli.main import JobArgument, Json, Out, Strict, app
+from kerfpath.cli.app import JobArgument, Json, Out, Strict, app
 from kerfpath.errors import InputError
 
 Scheduler = Annotated[
