@@ -16,8 +16,9 @@ import pytest
 from ruamel.yaml import YAML
 from tests.post.external_cells import moving_plan
 
+import kerfpath
 from conftest import ROOT
-from kerfpath import InputError, Tilt, robot
+from kerfpath import InputError, Tilt, plot, robot
 from kerfpath.job.output.writing import trajectory_text
 from kerfpath.post import joint_trajectory, post
 from kerfpath.post.ros import RosSettings
@@ -194,7 +195,7 @@ def test_a_model_of_other_joints_is_refused(plain, arm):
 def test_the_ros_message_is_the_one_that_is_written(arm, names):
     plan = carried(arm, *names)
     (text, _) = post([plan], "ros").values()
-    made = plan.to_ros()
+    made = joint_trajectory([plan])
     assert made == YAML(typ="safe").load(text)
     assert made["joint_names"] == [f"joint_{i}" for i in range(1, 7)] + [*names, "table"]
     urdf = plan.robot.to_urdf()
@@ -205,7 +206,7 @@ def test_settings_of_the_ros_message_and_its_refusals_are_those_of_the_program(p
     settings = RosSettings(joint_names=[f"a{i}" for i in range(6)], step_ms=100)
     coarse = joint_trajectory([plain], settings)
     assert coarse["joint_names"] == settings.joint_names
-    assert len(coarse["points"]) < len(plain.to_ros()["points"])
+    assert len(coarse["points"]) < len(joint_trajectory([plain])["points"])
     with pytest.raises(InputError, match="expected 6 names in joint_names, got 5"):
         joint_trajectory([plain], RosSettings(joint_names=[f"a{i}" for i in range(5)]))
 
@@ -270,9 +271,9 @@ def test_names_are_text_in_notebooks_and_nothing_else(plain):
 
 
 @pytest.mark.parametrize(("what", "drawn"), [("joints", 7), ("limits", 14), ("speed", 1)])
-def test_a_plan_draws_itself_as_reports_draw_it(arm, what, drawn):
+def test_a_plan_is_drawn_as_in_reports(arm, what, drawn):
     plan = carried(arm)
-    figure = plan.plot(what)
+    figure = plot(plan, what)
     assert isinstance(figure, go.Figure)
     assert len(figure.data) == drawn
     own = {"joints": joint_positions, "limits": limit_shares, "speed": cutting_speed}[what]
@@ -281,12 +282,13 @@ def test_a_plan_draws_itself_as_reports_draw_it(arm, what, drawn):
 
 def test_another_figure_is_refused_and_a_missing_library_said(plain, monkeypatch):
     with pytest.raises(InputError, match="plot: expected one of joints, limits, speed, got 'all'"):
-        plain.plot("all")
+        plot(plain, "all")
     for name in [name for name in sys.modules if name.startswith("kerfpath.report")]:
         monkeypatch.delitem(sys.modules, name)
+    monkeypatch.delitem(vars(kerfpath), "plot")
     monkeypatch.setitem(sys.modules, "plotly", None)
     with pytest.raises(InputError, match=r"reports: plotly is needed .* 'kerfpath\[report\]'"):
-        plain.plot()
+        kerfpath.plot(plain)
 
 
 # The page.

@@ -24,14 +24,15 @@ def public_classes():
     found = {}
     for module in pkgutil.walk_packages(kerfpath.__path__, "kerfpath."):
         inner = module.name.split(".")[1:]
-        # The kernels take tuples of arrays by the million; nobody prints them.
-        if any(part.startswith("_") for part in inner) or inner[0] in ("cli", "kernels"):
+        # Public is what packages list; the kernels' tuples of arrays are nobody's to print.
+        if not (module.ispkg or len(inner) == 1) or inner[0] in ("cli", "kernels"):
             continue
         for value in vars(importlib.import_module(module.name)).values():
             if (
                 isinstance(value, type)
                 and dataclasses.is_dataclass(value)
                 and value.__name__[0] != "_"
+                and value.__module__.startswith("kerfpath.")
             ):
                 found[f"{value.__module__}.{value.__qualname__}"] = value
     return found

@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     from kerfpath.planner import plan as plan
     from kerfpath.planner import plan_in_pieces as plan_in_pieces
     from kerfpath.plans import Plan as Plan
+    from kerfpath.post import joint_trajectory as joint_trajectory
     from kerfpath.refiner import Refinement as Refinement
     from kerfpath.refiner import refine as refine
+    from kerfpath.report import plot as plot
     from kerfpath.robots import Robot as Robot
     from kerfpath.robots import external as external
     from kerfpath.robots import robot as robot
@@ -64,12 +66,14 @@ _HOME = {
     "external": "robots",
     "fastest_speed": "planner",
     "join": "contour",
+    "joint_trajectory": "post",
     "keep_limits": "execution",
     "pareto": "front",
     "placed": "placement",
     "placement_from_points": "placement",
     "plan": "planner",
     "plan_in_pieces": "planner",
+    "plot": "report",
     "read_plan_file": "job",
     "refine": "refiner",
     "robot": "robots",

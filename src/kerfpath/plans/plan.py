@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -285,7 +284,6 @@ def path_cost(
 
 if TYPE_CHECKING:
     import pandas
-    from plotly.graph_objects import Figure
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -539,34 +537,6 @@ class Plan:
             No pinocchio model, or one with other joints.
         """
         return in_model(self.motion, joint_identifiers(self.robot), model)
-
-    def to_ros(self) -> dict[str, object]:
-        """Return a program of this plan as the fields of a trajectory_msgs/JointTrajectory.
-
-        `kerfpath.post.joint_trajectory` does the same for several plans and with settings.
-
-        Raises
-        ------
-        InputError
-            The extra `programs` is not installed; a program that its preflight refuses.
-        """
-        return dict(import_module("kerfpath.post").joint_trajectory([self]))
-
-    def plot(self, what: Literal["joints", "limits", "speed"] = "joints") -> Figure:
-        """Return a figure of the report as a plotly figure, to show, change or save.
-
-        Parameters
-        ----------
-        what : {"joints", "limits", "speed"}
-            "joints": each joint over time with its limits, deg or mm. "limits": joint speeds and
-            accelerations over time, % of their limits. "speed": the speed along the contour, m/min.
-
-        Raises
-        ------
-        InputError
-            The extra `report` is not installed, or `what` is unknown.
-        """
-        return import_module("kerfpath.report").plot(self, what)
 
     def _repr_html_(self) -> str:
         """Return a small table for notebooks: displacement, range and limit shares by joint."""

@@ -395,13 +395,14 @@ _FIGURES = {"joints": joint_positions, "limits": limit_shares, "speed": cutting_
 
 
 def plot(plan: Plan, what: str = "joints") -> go.Figure:
-    """Return a figure of a plan, see `Plan.plot`.
+    """Return a figure of a plan as the report draws it, to show, change or save.
 
     Parameters
     ----------
     plan : Plan
     what : "joints", "limits" or "speed"
-        Joint positions, shares of the joint limits, or the cutting speed.
+        "joints": each joint over time with its limits, deg or mm. "limits": joint speeds and
+        accelerations over time, % of their limits. "speed": the speed along the contour, m/min.
 
     Raises
     ------
