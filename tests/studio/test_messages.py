@@ -1,56 +1,32 @@
 """What server and page say to each other: nothing in it that its page does not say."""
 
 import json
-import re
+from typing import get_args
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from conftest import ROOT
-from kerfpath.studio import hub, messages
-from kerfpath.studio.messages import Message, flat
+from kerfpath.studio import messages
+from kerfpath.studio.messages import flat, flat_or_none
+from reference import studio_messages
 
-PAGE = (ROOT / "src" / "kerfpath" / "studio" / "README.md").read_text()
 SAMPLE = json.loads((ROOT / "tests" / "studio" / "sample.json").read_text())
-SAID = {
-    kind.model_fields["type"].default: kind
-    for kind in vars(messages).values()
-    if isinstance(kind, type) and issubclass(kind, Message) and "type" in kind.model_fields
-}
+SAID = {kind.model_fields["type"].default: kind for kind in get_args(messages.Said)}
+TYPES = ROOT / "src" / "kerfpath" / "studio" / "client" / "messages.d.ts"
 
 
-@pytest.mark.parametrize("kind", sorted(SAID))
-def test_every_key_of_a_message_is_on_the_page(kind):
-    entry = re.search(rf"\*\*`{kind}`\*\*(.*?)(?=\n\n\*\*`|\n## )", PAGE, re.DOTALL)
-    words = set(re.findall(r"[A-Za-z_]+", " ".join(re.findall(r"`([^`]*)`", entry[1]))))
-    keys, tables = set(), [SAID[kind]]
-    while tables:
-        for name, field in tables.pop().model_fields.items():
-            keys.add(name)
-            tables += _messages_in(field.annotation)
-    assert keys - {"type"} <= words
+def test_the_types_of_the_page_are_those_of_the_messages():
+    assert TYPES.read_text() == studio_messages.types()
 
 
-def _messages_in(annotation):
-    if isinstance(annotation, type) and issubclass(annotation, Message):
-        return [annotation]
-    inner = getattr(annotation, "__args__", ())
-    return [found for part in inner for found in _messages_in(part)]
-
-
-def test_what_a_page_may_say_is_on_the_page():
-    asked = set()
-    for kind in vars(hub).values():
-        if isinstance(kind, type) and issubclass(kind, hub._Strict) and "type" in kind.model_fields:
-            asked |= set(kind.model_fields["type"].annotation.__args__)
-            keys = set(kind.model_fields) - {"type"}
-            for word in kind.model_fields["type"].annotation.__args__:
-                line = next(x for x in PAGE.splitlines() if x.startswith("| ") and f"`{word}`" in x)
-                assert all(f"`{key}`" in line for key in keys), word
-    table = PAGE.partition("## From the server")[0]
-    first = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
-    assert asked == set(re.findall(r"`(\w+)`", " ".join(first)))
+def test_every_message_and_every_key_of_it_is_in_the_documentation():
+    page = studio_messages.page()
+    for kind in (*SAID.values(), *get_args(messages.Request)):
+        for key in kind.model_fields.keys() - {"type"}:
+            assert f"| `{key}` |" in page
+    assert page.count("### ") >= len(SAID) + len(get_args(messages.Request))
 
 
 @pytest.mark.parametrize("message", SAMPLE, ids=lambda m: m["type"])
@@ -84,10 +60,10 @@ def test_the_recorded_messages_are_those_that_the_server_says(message):
 )
 def test_what_a_page_may_not_say_is_refused(text):
     with pytest.raises(ValidationError):
-        hub.parse(text)
+        messages.parse(text)
 
 
 def test_numbers_are_flat_and_null_where_they_are_not_finite():
     assert flat(np.arange(6).reshape(2, 3)) == [0, 1, 2, 3, 4, 5]
-    assert flat([0.1 + 0.2, np.inf, np.nan]) == [0.3, None, None]
+    assert flat_or_none([0.1 + 0.2, np.inf, np.nan]) == [0.3, None, None]
     assert flat([1e-12, 1.00000000049]) == [0.0, 1.0]

@@ -8,7 +8,7 @@ import pytest
 from kerfpath import plan, refine
 from kerfpath.progress import may_stop, stopped_by
 from kerfpath.studio.hub import Newest, Seldom, Stop, Superseded
-from kerfpath.studio.planning import Kept
+from kerfpath.studio.planning import Cache
 
 
 @pytest.fixture
@@ -99,7 +99,7 @@ def test_seldom_lets_through_now_and_then():
 
 
 def test_what_the_last_two_rounds_used_is_kept_and_the_eldest_of_the_rest_goes():
-    kept = Kept(len, 10)
+    kept = Cache(len, 10)
     kept.begin()
     for name in "abcdef":
         kept.put(name, name * 3)

@@ -34,8 +34,15 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from kerfpath.errors import KerfpathError
 from kerfpath.studio.document import Document
 from kerfpath.studio.entries import File
-from kerfpath.studio.hub import OfContour, Page, PointOf, ReasonOf, TextOf, parse
-from kerfpath.studio.messages import ErrorMessage
+from kerfpath.studio.hub import Page
+from kerfpath.studio.messages import (
+    CandidateRequest,
+    ContourRequest,
+    ErrorMessage,
+    PoseRequest,
+    ProgramRequest,
+    parse,
+)
 
 # -----------------------------------------------------------------------------
 # Access to the server: allowed hosts, allowed origins, and the token.
@@ -366,7 +373,7 @@ async def _socket(socket: WebSocket) -> None:
                 page.say(ErrorMessage(message=_not_understood(error)))
                 continue
             if (
-                isinstance(ask, OfContour | PointOf | ReasonOf | TextOf)
+                isinstance(ask, ContourRequest | CandidateRequest | PoseRequest | ProgramRequest)
                 and len(looking) < MOST_LOOKS
             ):
                 # Slow questions that change nothing do not delay changes.

@@ -31,6 +31,7 @@ from kerfpath.studio.messages import (
     PlanMessage,
     TechniqueMessage,
     flat,
+    flat_or_none,
 )
 
 # -----------------------------------------------------------------------------
@@ -166,8 +167,8 @@ def technique_message(
         "gamma": flat(made.gamma),
         "posture": made.posture.tolist(),
         "cost": made.cost,
-        "peak_velocity": flat(criteria.peak_velocity),
-        "peak_acceleration": flat(criteria.peak_acceleration),
+        "peak_velocity": flat_or_none(criteria.peak_velocity),
+        "peak_acceleration": flat_or_none(criteria.peak_acceleration),
         "statement": made.proof.statement,
     }
     return base.model_copy(update=found)
@@ -380,6 +381,8 @@ def _set(tables: Any, key: Key, value: object) -> None:
     if value is None:
         if isinstance(last, int) or last in node:
             del node[last]
+        if not node and len(way) > 1 and isinstance(way[-1], str):
+            _set(tables, tuple(way), None)  # no empty table stays inside another one
         return
     if isinstance(last, int) and not 0 <= last < len(node):
         raise LookupError(last)
@@ -445,7 +448,7 @@ class _Copy(NamedTuple):
     cycle: Cycle | None
 
 
-class Kept:
+class KeptJobs:
     """The kept jobs, and the newest plans and outcome of the current one."""
 
     def __init__(self) -> None:

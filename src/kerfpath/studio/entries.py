@@ -1,4 +1,4 @@
-"""The message about the job: its text, values with defaults, allowed words, and errors."""
+"""Entries of messages: plans, contours without one, files, the text of a program, the job."""
 
 from __future__ import annotations
 
@@ -7,17 +7,15 @@ import re
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from kerfpath.arrays import Array
 from kerfpath.auditor import Check
 from kerfpath.comfort import MEASURES
 from kerfpath.errors import InputError
-from kerfpath.front import CRITERIA
 from kerfpath.job import (
     CutResult,
     FileTexts,
@@ -31,12 +29,12 @@ from kerfpath.job import (
 )
 from kerfpath.plans import Plan
 from kerfpath.post import Line, ProgramIssue, TimedLine, languages
-from kerfpath.robots import Robot
 from kerfpath.studio.document import Document
 from kerfpath.studio.messages import (
     CheckEntry,
     ContourName,
     CriteriaEntry,
+    EditEntry,
     Export,
     Fault,
     FileEntry,
@@ -45,9 +43,9 @@ from kerfpath.studio.messages import (
     LossEntry,
     NearestEntry,
     NoPathMessage,
-    Option,
     PlanMessage,
     ProgramTextMessage,
+    Relaxation,
     flat,
 )
 
@@ -303,7 +301,12 @@ def check_entries(checks: Sequence[Check]) -> list[CheckEntry]:
 
 
 def no_path_message(
-    cut: CutResult, placement: Array, *, revision: int, graph: str, ways: list[Option] | None
+    cut: CutResult,
+    placement: Array,
+    *,
+    revision: int,
+    graph: str,
+    relaxations: list[Relaxation] | None,
 ) -> NoPathMessage:
     """Return the message about the reason why a cut has no plan.
 
@@ -317,7 +320,7 @@ def no_path_message(
         Revision of the job.
     graph : str
         Id of its map.
-    ways : list of Option or None
+    relaxations : list of Relaxation or None
         Changes that would make a path; None while they are being searched for.
     """
     broken, nodes = cut.broken, cut.candidate.nodes
@@ -334,13 +337,70 @@ def no_path_message(
         scope=broken.scope,
         reasons=[LossEntry(name=str(why), count=count) for why, count in broken.counts.items()],
         graph=graph,
-        relaxations=ways,
+        relaxations=relaxations,
         remedy=cut.remedy,
     )
 
 
 # -----------------------------------------------------------------------------
-# The message about the job: its text, values with defaults, allowed words, and errors.
+# Changes that may make a path where there is none, as edits of the job.
+
+
+def alternatives(cut: CutResult, index: int) -> list[Relaxation]:
+    """Return possible changes for a cut without a plan, first those that gave one.
+
+    Parameters
+    ----------
+    cut : CutResult
+        A cut without a plan, with its advice.
+    index : int
+        Index of its [[contour]] table in the job.
+    """
+    found, advice = list[Relaxation](), cut.advice
+    if advice is not None:
+        if advice.without_windows:
+            pins = EditEntry(path=["contour", index, "gamma_windows"], value=None)
+            found.append(Relaxation(label="remove the pinned windows of gamma", edits=[pins]))
+        if advice.other_method:
+            found.append(_plan('search the grid exactly: method = "exact"', "method", "exact"))
+        for speed in (advice.refined, advice.speed):
+            if speed is not None:
+                found.append(
+                    Relaxation(
+                        label=f"cut slower: {speed} m/min instead of "
+                        f"{cut.request.task.speed * 60:g} m/min",
+                        edits=[
+                            EditEntry(path=["contour", index, "speed_m_min"], value=float(speed))
+                        ],
+                    )
+                )
+        for key, value in advice.shares.items():
+            which = "velocity" if key == "eta_velocity" else "acceleration"
+            words = f"use more of the {which} limits: {key} = {value}"
+            found.append(_plan(words, key, float(value)))
+    return found + _untried(cut)
+
+
+def _untried(cut: CutResult) -> list[Relaxation]:
+    """Return changes that have not been tried and that the other options allow."""
+    found, options = list[Relaxation](), cut.request.options
+    plain = options.closure == "free" and options.rotation is None and options.objective == "sum"
+    grid = options.method in ("continuous", "exact")
+    if plain and grid and options.feed == "constant" and options.interruptions == "none":
+        found.append(_plan('not tried: slow down where needed: feed = "dip"', "feed", "dip"))
+        words = 'not tried: cut in the fewest pieces: interruptions = "fewest"'
+        found.append(_plan(words, "interruptions", "fewest"))
+    if options.postures is not None:
+        found.append(_plan("not tried: allow every posture", "posture", None))
+    return found
+
+
+def _plan(label: str, key: str, value: object) -> Relaxation:
+    return Relaxation(label=label, edits=[EditEntry(path=["plan", key], value=value)])
+
+
+# -----------------------------------------------------------------------------
+# The message about the job: its text, values with defaults, and errors.
 
 _PLACE = re.compile(r"^.*?\.toml:(?:(\d+):)? ?(?:([a-z_][\w.]*): )?(.*)$", re.DOTALL)
 """File, line, key and text of an error message about a job."""
@@ -375,14 +435,13 @@ def job_message(
         revision=document.revision,
         name=document.path.name,
         text=document.text,
-        values=None if job is None else _values(job),
+        values=None if job is None else job_file(job).model_dump(mode="json"),
         given=[] if job is None else list(_given(job.source)),
         contours=contours,
         undo=document.can_undo,
         redo=document.can_redo,
         saved=document.saved,
         faults=faults,
-        choices=_choices() | ({} if job is None else {"plan.posture": _postures(job.robot)}),
         weights=[] if weights is None else flat(weights),
     )
 
@@ -405,9 +464,9 @@ def _fault(said: str, lines: list[str]) -> Fault:
     return Fault(key=way, message=words)
 
 
-def _values(job: Job) -> dict[str, object]:
-    file = JobFile.model_validate(dict(job.source), context={"folder": job.path.parent})
-    return file.model_dump(mode="json")
+def job_file(job: Job) -> JobFile:
+    """Return the tables of a job, with all defaults."""
+    return JobFile.model_validate(dict(job.source), context={"folder": job.path.parent})
 
 
 def _given(value: object, way: str = "") -> Iterator[str]:
@@ -421,43 +480,3 @@ def _given(value: object, way: str = "") -> Iterator[str]:
         entries = list(enumerate(value))
     for name, inner in entries:
         yield from _given(inner, f"{way}.{name}" if way else str(name))
-
-
-@cache
-def _choices() -> dict[str, list[str]]:
-    """Return the allowed words of each key that takes one of a fixed list."""
-    found: dict[str, list[str]] = {}
-    _gather(JobFile, (), found)
-    found["pareto.criteria"] = list(CRITERIA)
-    found["program.language"] = [*sorted(languages()), "none"]
-    return found
-
-
-def _gather(table: type[BaseModel], way: tuple[str, ...], found: dict[str, list[str]]) -> None:
-    for name, field in table.model_fields.items():
-        words, tables = _words(field.annotation)
-        if words:
-            found[".".join((*way, name))] = words
-        for inner in tables:
-            _gather(inner, (*way, name), found)
-
-
-def _words(annotation: Any) -> tuple[list[str], list[type[BaseModel]]]:
-    """Return the words that a type allows, and the tables in it."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [], [annotation]
-    words, tables = list[str](), list[type[BaseModel]]()
-    for part in get_args(annotation):
-        if isinstance(part, str):
-            words.append(part)
-        else:
-            more, inner = _words(part)
-            words += more
-            tables += inner
-    return words, tables
-
-
-def _postures(robot: Robot) -> list[str]:
-    """Return the names by which postures may be requested, the least specific first."""
-    names = [name.split("/") for name in robot.family.postures]
-    return list(dict.fromkeys("/".join(name[:n]) for n in (1, 2, 3) for name in names))

@@ -23,7 +23,7 @@ from kerfpath.job import CutResult, Job, PreparedJob
 from kerfpath.plans import Plan
 from kerfpath.studio.document import Change, with_values
 from kerfpath.studio.entries import plan_message
-from kerfpath.studio.hub import LayoutOf, Newest, Place, ReachOf, Seldom, Stop
+from kerfpath.studio.hub import Newest, Seldom, Stop
 from kerfpath.studio.messages import (
     AxisEntry,
     CandidateMessage,
@@ -31,12 +31,16 @@ from kerfpath.studio.messages import (
     EditEntry,
     FrontMessage,
     LayoutMessage,
+    LayoutRequest,
     Message,
     OutOfReach,
+    Place,
     PointEntry,
     ReachMessage,
+    ReachRequest,
     TryEntry,
     flat,
+    flat_or_none,
 )
 from kerfpath.study import digest, problem_of_job
 from kerfpath.study.placing import (
@@ -91,8 +95,8 @@ def clearance_message(
         revision=revision,
         contour=cut.contour,
         name=cut.plan.name,
-        distance=flat(distance),
-        over=flat(distance - cell.required[pair]),
+        distance=flat_or_none(distance),
+        over=flat_or_none(distance - cell.required[pair]),
         pair=index.tolist(),
         pairs=[list(cell.pair_names[k]) for k in used.tolist()],
     )
@@ -301,7 +305,7 @@ class Layouts:
         """Take the job of the scene that is sent now; offsets refer to it."""
         self._stands = revision, prepared
 
-    def reach(self, ask: ReachOf, answer: Say) -> None:
+    def reach(self, ask: ReachRequest, answer: Say) -> None:
         """Answer which nodes are out of reach, unless a newer question comes first.
 
         Raises
@@ -346,7 +350,7 @@ class Layouts:
             raise InputError("place: the scene has changed meanwhile; repeat the move")
         return _changes(placement_of(prepared), ask.offsets)
 
-    def look(self, prepared: PreparedJob, ask: LayoutOf, revision: int) -> None:
+    def look(self, prepared: PreparedJob, ask: LayoutRequest, revision: int) -> None:
         """Start the search for the best placement; it replaces a running search."""
         self._search.ask(partial(self._look, prepared, ask, revision))
 
@@ -380,7 +384,7 @@ class Layouts:
             raise InputError("the job is not read yet; wait until its part is shown")
         return self._stands
 
-    def _look(self, prepared: PreparedJob, ask: LayoutOf, revision: int, stop: Stop) -> None:
+    def _look(self, prepared: PreparedJob, ask: LayoutRequest, revision: int, stop: Stop) -> None:
         """Search on a copy of the job, as the job itself may be saved meanwhile."""
         folder = Path(tempfile.mkdtemp(prefix="kerfpath-layout-"))
         study: _LayoutStudy | None = None
@@ -420,7 +424,7 @@ class _LayoutStudy:
     """The placements that one search has tried so far."""
 
     def __init__(
-        self, placement: Placement, ask: LayoutOf, revision: int, say: Say, stop: Stop
+        self, placement: Placement, ask: LayoutRequest, revision: int, say: Say, stop: Stop
     ) -> None:
         self.placement, self.revision = placement, revision
         self.trials: list[PlacementTrial] = []

@@ -42,26 +42,19 @@ from kerfpath.job import (
 from kerfpath.planner import at_most, draft
 from kerfpath.plans import Plan
 from kerfpath.studio.document import PROVING, cut_key, graph_key, motion_key, part_key, setup_key
-from kerfpath.studio.entries import exports_of, no_path_message, plan_message
+from kerfpath.studio.entries import alternatives, exports_of, no_path_message, plan_message
 from kerfpath.studio.front import Fronts, Layouts, clearance_message
-from kerfpath.studio.hub import (
-    FrontOf,
-    LayoutOf,
-    Newest,
-    PointOf,
-    Seldom,
-    Stop,
-    cycle_of,
-    program_message,
-    said_of,
-)
+from kerfpath.studio.hub import Newest, Seldom, Stop, cycle_of, program_message, said_of
 from kerfpath.studio.messages import (
     CandidateMessage,
+    CandidateRequest,
     ClearanceMessage,
     EditEntry,
     ErrorMessage,
     FaceEntry,
     FastestMessage,
+    FrontRequest,
+    LayoutRequest,
     LoopEntry,
     Message,
     OutcomeMessage,
@@ -70,7 +63,6 @@ from kerfpath.studio.messages import (
     ProgressMessage,
     SceneMessage,
     flat,
-    ways_of,
 )
 from kerfpath.studio.pose_map import map_id
 from kerfpath.studio.scene import Meshes, scene_of, scene_of_robot, tables_of
@@ -90,7 +82,7 @@ class _Used(Generic[_T]):
         self.thing, self.last = thing, last
 
 
-class Kept(Generic[_T]):
+class Cache(Generic[_T]):
     """A cache that drops the oldest objects once they are too large together.
 
     Objects used in the current or the previous round are never dropped: a run uses the same
@@ -139,16 +131,16 @@ class Kept(Generic[_T]):
                 total -= self._size(self._things.pop(eldest).thing)
 
 
-class Bench:
+class ResultCache:
     """The intermediate results that successive plans of a job share."""
 
     def __init__(self) -> None:
         self._part: tuple[str, Part] | None = None
         self._prepared: tuple[str, PreparedJob] | None = None
-        self._graphs: Kept[LayeredGraph] = Kept(lambda graph: len(graph.q), MOST_VERTICES)
-        self.cuts: Kept[tuple[CutResult, ...]] = Kept(_vertices, MOST_VERTICES)
+        self._graphs: Cache[LayeredGraph] = Cache(lambda graph: len(graph.q), MOST_VERTICES)
+        self.cuts: Cache[tuple[CutResult, ...]] = Cache(_vertices, MOST_VERTICES)
         """Results of contours, by `cut_key` and candidate."""
-        self.proved: Kept[CutResult] = Kept(lambda cut: len(cut.graph.q), MOST_VERTICES)
+        self.proved: Cache[CutResult] = Cache(lambda cut: len(cut.graph.q), MOST_VERTICES)
         """Results with their bounds."""
 
     def begin(self) -> None:
@@ -330,7 +322,7 @@ class Run:
 
     Parameters
     ----------
-    bench : Bench
+    cache : ResultCache
     prepared : PreparedJob
     revision : int
         Revision of the job.
@@ -340,9 +332,9 @@ class Run:
     """
 
     def __init__(
-        self, bench: Bench, prepared: PreparedJob, revision: int, say: Say, stop: Stop
+        self, cache: ResultCache, prepared: PreparedJob, revision: int, say: Say, stop: Stop
     ) -> None:
-        self._bench, self._prepared, self._revision = bench, prepared, revision
+        self._cache, self._prepared, self._revision = cache, prepared, revision
         self._say, self._stop, self._seldom = say, stop, Seldom(SHOWN_EVERY)
         self._tables = dict(zip(prepared.names, tables_of(prepared), strict=True))
         self._seconds: dict[str, float] = {}
@@ -424,12 +416,12 @@ class Run:
         self, request: CutRequest, number: int, candidate: Candidate
     ) -> tuple[CutResult, ...]:
         key = f"{cut_key(self._prepared.job, request)} {number}"
-        found = self._bench.cuts.get(key)
+        found = self._cache.cuts.get(key)
         if found is None:
             found = cut_candidate(
-                self._prepared, request, candidate, self.progress, graph_of=self._bench.graph
+                self._prepared, request, candidate, self.progress, graph_of=self._cache.graph
             )
-            self._bench.cuts.put(key, found)
+            self._cache.cuts.put(key, found)
         self._stop.check()
         # The requested proof and the index of the table may have changed.
         return tuple(replace(cut, request=request) for cut in found)
@@ -440,10 +432,10 @@ class Run:
         source = self._prepared.job.source.get("plan", {})
         asked = sorted((k, source[k]) for k in PROVING if k in source)
         key = f"{cut_key(self._prepared.job, cut.request)} {asked} {hash(made.q.tobytes())}"
-        found = self._bench.proved.get(key)
+        found = self._cache.proved.get(key)
         if found is None:
             found = certified(cut, self.progress)
-            self._bench.proved.put(key, found)
+            self._cache.proved.put(key, found)
         return replace(found, request=cut.request)
 
     def _show(self, cuts: Sequence[CutResult]) -> None:
@@ -456,7 +448,7 @@ class Run:
 
     def _plan(self, cut: CutResult, pieces: Sequence[CutResult], *, settled: bool) -> None:
         assert cut.plan is not None
-        _, graph = self._bench.whole(self._prepared.job, pieces)
+        _, graph = self._cache.whole(self._prepared.job, pieces)
         self._say(
             plan_message(
                 cut,
@@ -471,14 +463,14 @@ class Run:
         )
 
     def _broken(self, cut: CutResult, *, settled: bool) -> None:
-        ways = ways_of(cut, self._tables[cut.contour]) if settled else None
+        relaxations = alternatives(cut, self._tables[cut.contour]) if settled else None
         self._say(
             no_path_message(
                 cut,
                 self._prepared.job.placement,
                 revision=self._revision,
                 graph=map_id(cut.graph),
-                ways=ways,
+                relaxations=relaxations,
             )
         )
 
@@ -578,7 +570,7 @@ class Planning:
         refused: Callable[[InputError, int], None],
     ) -> None:
         self._say, self._ready, self._refused = say, ready, refused
-        self._bench = Bench()
+        self._cache = ResultCache()
         self._runs = Newest("run", self._failed)
         self._drafts = Newest("draft", self._failed)
         self._speeds = Newest("speed", self._failed)
@@ -620,7 +612,7 @@ class Planning:
         cuts, prepared = self.cuts.get(contour), self.prepared
         if cuts is None or prepared is None:
             raise InputError(f"contour {contour!r:.60} is not planned yet; wait until it is")
-        return prepared, cuts, *self._bench.whole(prepared.job, cuts)
+        return prepared, cuts, *self._cache.whole(prepared.job, cuts)
 
     def fastest(self, contour: str, revision: int) -> None:
         """Search for the fastest constant speed of a contour.
@@ -647,7 +639,7 @@ class Planning:
 
         self._speeds.ask(work)
 
-    def front(self, ask: FrontOf, revision: int) -> None:
+    def front(self, ask: FrontRequest, revision: int) -> None:
         """Search for the Pareto set of a contour.
 
         Raises
@@ -661,7 +653,7 @@ class Planning:
             raise InputError("front: the current job is not planned yet; wait until it is")
         self._fronts.look(self.prepared, cuts[0], ask.criteria, ask.runs, revision)
 
-    def look(self, ask: LayoutOf, revision: int) -> None:
+    def look(self, ask: LayoutRequest, revision: int) -> None:
         """Search for the best placement.
 
         Raises
@@ -674,7 +666,7 @@ class Planning:
             raise InputError("layout: the current job is not planned yet; wait until it is")
         self.layouts.look(self.prepared, ask, revision)
 
-    def candidate(self, ask: PointOf) -> CandidateMessage:
+    def candidate(self, ask: CandidateRequest) -> CandidateMessage:
         """Return the motion of a point of the Pareto set.
 
         Raises
@@ -725,13 +717,13 @@ class Planning:
             if self.prepared is None:
                 self._show(*scene_of_robot(job, revision))
             self._show_part(job, revision)
-            prepared = self._bench.prepared(job)
+            prepared = self._cache.prepared(job)
         except InputError as fault:
             self._refused(fault, revision)
             self._say(ProgressMessage(busy=False))
             return
         stop.check()
-        self._bench.begin()
+        self._cache.begin()
         self.prepared = prepared
         self._show_scene(prepared, revision)
         self._ready(prepared, revision)
@@ -739,7 +731,7 @@ class Planning:
         if not is_compiled(kinematics):
             self._say(ProgressMessage(busy=True, label="compiling the kernels, first run only"))
             warm_up(kinematics, later=FOR_BOUNDS)
-        run = Run(self._bench, prepared, revision, self._say, stop)
+        run = Run(self._cache, prepared, revision, self._say, stop)
         tried = run.contours(first, partial(self._took, motion_key(job), revision))
         self._look_ahead(prepared, revision, run)
         self._settle(run.ordered(tried), revision, settled=False)
@@ -807,7 +799,7 @@ class Planning:
 
     def _show_part(self, job: Job, revision: int) -> None:
         """Send the loops that can be picked, unless they are unchanged."""
-        part = self._bench.part(job)
+        part = self._cache.part(job)
         key = f"{part_key(job)} {job.placement.tolist()}"
         # Keep it before sending: a page may ask for a loop as soon as it knows of it.
         before, self._part = self._part, (key, part)

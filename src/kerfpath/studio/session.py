@@ -22,49 +22,53 @@ from kerfpath.job import (
     with_loops,
     without_contour,
 )
-from kerfpath.studio.document import Change, Document, Kept, technique_message
-from kerfpath.studio.entries import WAIT, File, faults_of, in_language, job_message, program_text
-from kerfpath.studio.hub import (
-    Ask,
-    Cut,
+from kerfpath.studio.document import Change, Document, KeptJobs, technique_message
+from kerfpath.studio.entries import (
+    WAIT,
+    File,
+    faults_of,
+    in_language,
+    job_file,
+    job_message,
+    program_text,
+)
+from kerfpath.studio.hub import Hub, Newest, Page, Stop, said_of
+from kerfpath.studio.messages import (
+    CandidateRequest,
+    Command,
+    ContourName,
+    ContourRequest,
+    CutLoops,
     Edit,
     Edits,
-    FrontOf,
-    Hub,
-    Keep,
-    LayoutOf,
-    Leave,
-    Newest,
-    OfContour,
-    OfKept,
-    Page,
-    Place,
-    Plain,
-    PointOf,
-    ReachOf,
-    ReasonOf,
-    Relax,
-    Rename,
-    Save,
-    ShadeOf,
-    Stop,
-    Take,
-    TechniqueOf,
-    Text,
-    TextOf,
-    said_of,
-)
-from kerfpath.studio.messages import (
-    ContourName,
     ErrorMessage,
     Fault,
+    FrontRequest,
+    Keep,
+    KeptCommand,
+    LayoutRequest,
     MapMessage,
     Message,
     NoPathMessage,
+    OptionsMessage,
+    Place,
     PlanMessage,
     PoseMessage,
+    PoseRequest,
+    ProgramRequest,
+    ReachRequest,
+    Relax,
+    RemoveContour,
+    Rename,
+    ReplaceText,
+    Request,
+    Save,
     SceneMessage,
+    ShadeRequest,
+    Take,
+    TechniqueRequest,
 )
+from kerfpath.studio.options import options_message
 from kerfpath.studio.planning import Outcome, Planning
 from kerfpath.studio.pose_map import (
     map_message,
@@ -79,7 +83,7 @@ from kerfpath.studio.scene import tables_of
 # Answers to the read-only questions of pages about planned contours.
 
 
-class Looks:
+class Answers:
     """Answers the questions of pages about the current plans.
 
     Slow questions have a thread for each page and kind: a newer one stops the one before.
@@ -116,7 +120,7 @@ class Looks:
             cuts, nodes, graph, robot=prepared.job.robot, shades=shades, revision=revision
         )
 
-    def pose(self, ask: ReasonOf) -> PoseMessage:
+    def pose(self, ask: PoseRequest) -> PoseMessage:
         """Return the joints of the robot at a place of a map.
 
         Raises
@@ -136,7 +140,7 @@ class Looks:
             node=ask.node, gamma=ask.gamma, posture=ask.posture,
         )  # fmt: skip
 
-    def shade(self, page: Page, ask: ShadeOf, revision: int) -> None:
+    def shade(self, page: Page, ask: ShadeRequest, revision: int) -> None:
         """Compute a quantity over a map; `by` None stops a running computation."""
         by = ask.by
         if by is None:
@@ -151,7 +155,7 @@ class Looks:
 
         self._ask(page, ask.type, look)
 
-    def technique(self, page: Page, ask: TechniqueOf) -> None:
+    def technique(self, page: Page, ask: TechniqueRequest) -> None:
         """Compute the course of another technique; `method` None stops a running computation."""
         method = ask.method
         if method is None:
@@ -202,7 +206,7 @@ class _Cost(NamedTuple):
     before: float | None
 
 
-class Newer:
+class OutdatedFilter:
     """A filter that drops messages older than one that was sent."""
 
     def __init__(self) -> None:
@@ -264,16 +268,17 @@ class Session:
     def __init__(self, document: Document) -> None:
         self.document = document
         self.hub = Hub()
-        self.kept = Kept()
+        self.kept = KeptJobs()
         self._planning = Planning(self._from_thread, self._prepared_there, self._refused_there)
-        self._looks = Looks(self._planning, self._to_page, self._look_failed)
-        self._newer = Newer()
+        self._answers = Answers(self._planning, self._to_page, self._answer_failed)
+        self._filter = OutdatedFilter()
         self._job: Job | None = None
         self._faults: list[Fault] = []
         self._contours: list[ContourName] = []
         self._interval = 1.0
         self._first: str | None = None
-        self._ways: dict[str, NoPathMessage] = {}
+        self._options: OptionsMessage | None = None
+        self._alternatives: dict[str, NoPathMessage] = {}
         self._changed = asyncio.Event()
         self._files: tuple[JobResult, FileTexts] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -288,20 +293,20 @@ class Session:
                 self._changed.clear()
                 await self._read()
         finally:
-            self._looks.close()
+            self._answers.close()
             self._planning.close()
 
     def leave(self, page: Page) -> None:
         """Forget a page that is closed."""
         self.hub.close(page)
-        self._looks.leave(page)
+        self._answers.leave(page)
 
     @property
     def meshes(self) -> dict[str, bytes]:
         """The meshes of the scene, by their ids."""
         return self._planning.meshes
 
-    async def hear(self, ask: Ask, page: Page) -> None:
+    async def hear(self, ask: Request, page: Page) -> None:
         """Carry out the request of a page; an error is sent to it as the answer."""
         try:
             await self._do(ask, page)
@@ -355,62 +360,62 @@ class Session:
             raise InputError("the current job is not planned yet; wait until it is")
         return planned
 
-    async def _do(self, ask: Ask, page: Page) -> None:
+    async def _do(self, ask: Request, page: Page) -> None:
         match ask:
             case Edit():
                 self._change([(ask.path, ask.value)], ask.gesture)
             case Edits():
                 self._change([(one.path, one.value) for one in ask.edits])
-            case Text():
+            case ReplaceText():
                 self._replace(ask.text)
-            case Plain(type="undo"):
+            case Command(type="undo"):
                 self.document.undo()
                 self._changed.set()
-            case Plain(type="redo"):
+            case Command(type="redo"):
                 self.document.redo()
                 self._changed.set()
-            case Plain(type="cancel"):
+            case Command(type="cancel"):
                 self._planning.cancel()
-            case Plain():
+            case Command():
                 self._changed.set()
             case Save():
                 self.document.save(over=ask.over)
                 self._say_job()
-            case OfContour(type="focus"):
+            case ContourRequest(type="focus"):
                 self._first = ask.contour
-            case OfContour(type="fastest"):
+            case ContourRequest(type="fastest"):
                 self._planning.fastest(ask.contour, self.document.revision)
-            case OfContour():
+            case ContourRequest():
                 revision = self.document.revision
-                page.say(await asyncio.to_thread(self._looks.map, ask.contour, revision))
-            case ReasonOf():
-                page.say(await asyncio.to_thread(self._looks.pose, ask))
-            case ShadeOf():
-                self._looks.shade(page, ask, self.document.revision)
-            case TechniqueOf():
-                self._looks.technique(page, ask)
+                page.say(await asyncio.to_thread(self._answers.map, ask.contour, revision))
+            case PoseRequest():
+                page.say(await asyncio.to_thread(self._answers.pose, ask))
+            case ShadeRequest():
+                self._answers.shade(page, ask, self.document.revision)
+            case TechniqueRequest():
+                self._answers.technique(page, ask)
             case Relax():
                 self._relax(ask)
-            case Cut():
+            case CutLoops():
                 part = self._planning.known_part()
                 self._replace(with_loops(await self._job_now(), part, ask.loops))
-            case Leave():
+            case RemoveContour():
                 self._replace(without_contour(await self._job_now(), ask.index))
-            case Keep() | Rename() | OfKept():
+            case Keep() | Rename() | KeptCommand():
                 self._keep(ask)
-            case FrontOf():
+            case FrontRequest():
                 self._planning.front(ask, self.document.revision)
-            case PointOf():
+            case CandidateRequest():
                 page.say(await asyncio.to_thread(self._planning.candidate, ask))
-            case ReachOf():
+            case ReachRequest():
                 self._planning.layouts.reach(ask, lambda said: self._soon(page.say, said))
             case Place():
                 self._change(self._planning.layouts.placed(ask))
-            case LayoutOf():
+            case LayoutRequest():
                 self._planning.look(ask, self.document.revision)
             case Take():
                 self._change(self._planning.layouts.changes(ask.number, self.document.revision))
-            case TextOf():
+            case ProgramRequest():
                 revision = self.document.revision
                 result, texts = await self.program(ask.language)
                 page.say(await asyncio.to_thread(program_text, result, texts, revision))
@@ -437,13 +442,13 @@ class Session:
         return self._job
 
     def _relax(self, ask: Relax) -> None:
-        known = self._ways.get(ask.contour)
-        ways = [] if known is None else known.relaxations or []
-        if ask.index >= len(ways):
+        known = self._alternatives.get(ask.contour)
+        options = [] if known is None else known.relaxations or []
+        if ask.index >= len(options):
             raise InputError(f"contour {ask.contour!r:.60} has no relaxation {ask.index}")
-        self._change([(tuple(one.path), one.value) for one in ways[ask.index].edits])
+        self._change([(tuple(one.path), one.value) for one in options[ask.index].edits])
 
-    def _keep(self, ask: Keep | Rename | OfKept) -> None:
+    def _keep(self, ask: Keep | Rename | KeptCommand) -> None:
         """Keep the job, or rename, forget or restore one that is kept."""
         match ask:
             case Keep():
@@ -453,9 +458,9 @@ class Session:
                 self.kept.keep(self.document, ask.name, asked.metric, asked.objective)
             case Rename():
                 self.kept.rename(ask.id, ask.name)
-            case OfKept(type="forget"):
+            case KeptCommand(type="forget"):
                 self.kept.forget(ask.id)
-            case OfKept():
+            case KeptCommand():
                 self._replace(self.kept.text(ask.id))
         self.hub.say(self.kept.message())
 
@@ -485,11 +490,18 @@ class Session:
                 self.document, self._job, self._contours, self._faults, interval=self._interval
             )
         )
+        if self._job is None:
+            return
+        tables = job_file(self._job).robot.external
+        options = options_message(self._job.robot, [table.called or "" for table in tables])
+        if options != self._options:
+            self._options = options
+            self.hub.say(options)
 
     def _to_page(self, page: Page, message: Message) -> None:
         self._soon(page.say, message)
 
-    def _look_failed(self, page: Page, kind: str, error: BaseException) -> None:
+    def _answer_failed(self, page: Page, kind: str, error: BaseException) -> None:
         self._to_page(page, ErrorMessage(message=said_of(error), about=kind))
 
     def _from_thread(self, message: Message) -> None:
@@ -503,17 +515,17 @@ class Session:
             self._loop.call_soon_threadsafe(take, *what)
 
     def _say(self, message: Message) -> None:
-        newer = self._newer.of(message)
+        newer = self._filter.of(message)
         if newer is None:
             return
         if isinstance(newer, NoPathMessage):
-            self._ways[newer.contour] = newer
+            self._alternatives[newer.contour] = newer
         elif isinstance(newer, PlanMessage):
-            self._ways.pop(newer.contour, None)
+            self._alternatives.pop(newer.contour, None)
         elif isinstance(newer, SceneMessage):
             names = [contour.name for contour in newer.contours]
             self.hub.keep_only(names)
-            self._newer.keep_only(names)
+            self._filter.keep_only(names)
             self.kept.keep_only(names)
         self.hub.say(newer)
         if self.kept.take(newer):

@@ -76,7 +76,7 @@ def first(messages):
     names = [contour["name"] for contour in messages["scene"][0]["contours"]]
     job = messages["job"][0]
     job = job | {"contours": [each for each in job["contours"] if each["name"] in names]}
-    kinds = ("scene", "part", "plan", "program", "outcome", "progress")
+    kinds = ("options", "scene", "part", "plan", "program", "outcome", "progress")
     return [job, *(message for kind in kinds for message in messages[kind])]
 
 

@@ -4,8 +4,6 @@ import json
 
 import pytest
 
-from kerfpath.job.format.tables.job import SequenceTable
-from kerfpath.job.format.tables.part import CornersTable, LeadTable, MicroJointsTable
 from studio.browser.test_page import ready, sent, serious, until
 
 pytestmark = pytest.mark.slow
@@ -121,24 +119,6 @@ def test_every_option_has_a_control_and_is_found_by_its_name(page, studio, first
     page.get_by_text("No option matches.").wait_for()
 
 
-def test_the_keys_of_the_controls_are_keys_of_the_job(page, studio, first, messages):
-    values = messages["job"][0]["values"]
-    studio.open(*first)
-    ready(page)
-    groups = page.evaluate("async () => (await import('/client/panels/keys.js')).GROUPS")
-    tables = {"sequence": SequenceTable, "lead_in": LeadTable, "lead_out": LeadTable}
-    tables |= {"micro_joints": MicroJointsTable, "corners": CornersTable}
-    for key in (each["key"] for group in groups for each in group["keys"]):
-        *way, last = key.split(".")
-        if way and way[-1] in tables:
-            assert last in tables[way[-1]].model_fields, key
-        else:
-            table = values["contour"][0] if way == ["contour"] else values
-            for part in way if way != ["contour"] else []:
-                table = table[part]
-            assert last in table, key
-
-
 def pareto(plan, **more):
     """A set of three points, of which the last is beaten, and the second is no job's."""
     axes = [
@@ -169,8 +149,7 @@ def test_a_point_of_the_pareto_set_is_shown_and_taken(page, studio, first, messa
             studio.say({"type": "candidate", "contour": "slot", "number": number, "plan": other})
 
     studio.react = react
-    studio.open(*(m | {"choices": m["choices"] | {"pareto.criteria": ["displacement", "velocity",
-                  "range", "limits"]}} if m["type"] == "job" else m for m in first))  # fmt: skip
+    studio.open(*first)
     ready(page)
     page.locator("#contours button", has_text="slot").click()
     page.get_by_text("Criteria and runs").click()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kerfpath.robots import ExternalAxis, base_in_part, chain_of, robot
+from kerfpath.studio.options import options_message
 from studio.browser.test_page import MODULE, ready, sent, serious, until
 
 pytestmark = pytest.mark.slow
@@ -97,7 +98,16 @@ def carried(messages):
     job["values"]["robot"]["external"] = TABLES
     job["given"] += [f"robot.external.{i}.{key}" for i in (0, 1) for key in TABLES[i]]
     plans = [moved(plan) for plan in messages["plan"]]
-    return [job, scene, *messages["part"], *plans, *messages["outcome"], *messages["progress"]]
+    options = options_message(CARRIED, ["rail", "table"]).model_dump(mode="json")
+    return [
+        job,
+        options,
+        scene,
+        *messages["part"],
+        *plans,
+        *messages["outcome"],
+        *messages["progress"],
+    ]
 
 
 def test_the_frames_are_those_of_the_cell(modules, carried):
@@ -287,7 +297,7 @@ def test_the_axes_are_told_in_their_units(page, studio, carried):
         "Show or hide rail: \u2212500.0 to 500.0 mm, 1000 mm/s, 1500 mm/s\u00b2"
     )
     assert "endless" in legend.nth(7).get_attribute("title")
-    page.locator("[data-kind=angle]").click()
+    page.locator("#plot-kind").get_by_role("button", name="Angle").click()
     drawn = """() => {
         const { series, data, axes } = studio.plots.plot;
         return { scales: series.slice(1).map(({ scale }) => scale),
@@ -320,10 +330,7 @@ def test_the_keys_of_an_axis_have_controls(page, studio, carried):
     page.get_by_label("Find an option").fill("table")
     assert page.get_by_label("table, lower limit").count() == 0  # endless
     assert page.get_by_label("table, point on the axis", exact=True).input_value() == "1200, 0, 500"
-    job = copy.deepcopy(carried[0])
-    job["revision"] += 1
-    job["values"]["robot"]["external"] = []
-    studio.say(job)
+    studio.say(options_message(CARRIED).model_dump(mode="json"))
     until(page, lambda: page.get_by_label("rail, speed", exact=True).count() == 0)
 
 

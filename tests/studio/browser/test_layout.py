@@ -236,7 +236,7 @@ def test_what_the_search_has_tried_is_said_in_words(page, studio, first, message
     take.click()
     until(page, lambda: studio.sent[-1] == {"type": "take", "number": 3})
     sheet.get_by_role("button", name="Back to the job's place").click()
-    assert page.get_by_label("Part x, mm").input_value() == "1200"
+    until(page, lambda: page.get_by_label("Part x, mm").input_value() == "1200")
     sheet.get_by_role("button", name="Search again").click()
     until(page, lambda: studio.sent[-1]["type"] == "layout")
     asked = studio.sent[-1]

@@ -14,7 +14,7 @@ WHOLE = {"from": 0, "to": 1, "top": 0, "bottom": 1}
 DRAWN = """() => new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)))"""
 PIXEL = """([node, sample]) => {
     const { chart, grid } = studio.map;
-    const frame = chart.frame();
+    const frame = chart.frame;
     const { s, gamma } = grid.message;
     const [x, y] = [chart.x(s[node], frame), chart.y(gamma[sample], frame)];
     const { width, height } = chart.back;
@@ -66,7 +66,7 @@ def mapped(page, studio, first, messages):
 
 def middle(page):
     box = page.locator("#map-canvas").bounding_box()
-    frame = page.evaluate("() => studio.map.chart.frame()")
+    frame = page.evaluate("() => studio.map.chart.frame")
     return (
         box["x"] + frame["left"] + frame["width"] / 2,
         box["y"] + frame["top"] + frame["height"] / 2,
@@ -152,7 +152,7 @@ def test_the_wheel_zooms_where_the_pointer_is_and_all_is_shown_again(mapped, stu
     box = page.locator("#map-canvas").bounding_box()
     at = [x - box["x"] + 30, y - box["y"] - 20]
     page.mouse.move(x + 30, y - 20)
-    before, frame = page.evaluate(place, at), page.evaluate("() => studio.map.chart.frame()")
+    before, frame = page.evaluate(place, at), page.evaluate("() => studio.map.chart.frame")
     length = page.evaluate("() => studio.map.grid.length")
     for _ in range(3):
         page.mouse.wheel(0, -100)
@@ -231,7 +231,7 @@ def test_a_pin_is_drawn_where_the_pointer_is_on_a_zoomed_map(mapped, studio):
     until(page, lambda: any(m["type"] == "edit" for m in studio.sent))
     (edit,) = (m for m in studio.sent if m["type"] == "edit")
     ((start, end, low, high),) = edit["value"]
-    frame, s = page.evaluate("() => [studio.map.chart.frame(), studio.map.grid.message.s]")
+    frame, s = page.evaluate("() => [studio.map.chart.frame, studio.map.grid.message.s]")
     share = 1.3**-5
     # The middle of this map is at 0 deg; written to a tenth.
     assert [low, high] == pytest.approx([-30 * 360 * share / frame["height"], 0], abs=0.06)

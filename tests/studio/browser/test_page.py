@@ -325,7 +325,7 @@ def test_hovering_the_map_says_why_and_shows_a_ghost_without_the_server(
     gamma, layer = plan["gamma"][len(plan["s"]) // 2], plan["posture"][0]
     assert page.evaluate("() => studio.map.grid.layers[studio.map.layer].posture") == layer
     box = page.locator("#map-canvas").bounding_box()
-    frame = page.evaluate("() => studio.map.chart.frame()")
+    frame = page.evaluate("() => studio.map.chart.frame")
     x = box["x"] + frame["left"] + 0.5 * frame["width"]
     y = box["y"] + frame["top"] + (0.45 - gamma / math.tau) * frame["height"]
     page.mouse.move(x, y)  # this server never answers what it is asked about a pose

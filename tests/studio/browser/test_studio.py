@@ -120,7 +120,7 @@ PLACES = """() => {
     const { chart } = studio.map;
     const { x, y } = chart.canvas.getBoundingClientRect();
     const [{ left, top, width, height }, { gamma, s }] = [
-        chart.frame(), studio.store.plans.get(studio.store.selected)[0],
+        chart.frame, studio.store.plans.get(studio.store.selected)[0],
     ];
     return { x: x + left, y: y + top, width, height, gamma, s };
 }"""

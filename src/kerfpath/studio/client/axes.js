@@ -13,7 +13,7 @@ import { UNITS } from "./format.js";
 
 /**
  * Return the axes of a robot in the order of its joints.
- * @param {import("./messages.js").RobotModel | undefined} robot
+ * @param {import("./messages.js").RobotEntry | undefined} robot
  * @returns {Axis[]}
  */
 export function axesOf(robot) {

@@ -1,42 +1,4 @@
-/** Create and find elements; text enters the page only as text, never as HTML. */
-
-/**
- * Return a new element.
- * @template {keyof HTMLElementTagNameMap} K
- * @param {K} tag
- * @param {Record<string, string | number | boolean | ((event: any) => void) | null | undefined>} [attributes]
- *   `on...` names are listeners; true is an attribute without a value; false, null and undefined none
- * @param {...(Node | string | null)} children
- * @returns {HTMLElementTagNameMap[K]}
- */
-export function el(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (typeof value === "function") made.addEventListener(name.slice(2), value);
-    else if (value === true) made.setAttribute(name, "");
-    else if (value !== false && value !== null && value !== undefined)
-      made.setAttribute(name, String(value));
-  }
-  made.append(...children.filter((child) => child !== null));
-  return made;
-}
-
-const SVG = "http://www.w3.org/2000/svg";
-
-/**
- * Return an icon of the page's sheet, hidden from screen readers.
- * @param {string} name
- * @returns {SVGSVGElement}
- */
-export function icon(name) {
-  const svg = document.createElementNS(SVG, "svg");
-  svg.setAttribute("class", "icon");
-  svg.setAttribute("aria-hidden", "true");
-  const use = document.createElementNS(SVG, "use");
-  use.setAttribute("href", `#i-${name}`);
-  svg.append(use);
-  return svg;
-}
+/** The elements of the page, the colours and text size of its theme, and its frames. */
 
 /**
  * Return the element of the page with an id; throws if it is missing.
@@ -112,3 +74,16 @@ export function freshContext(canvas) {
 
 /** Return the number of pixels of a canvas per CSS px: two at most, to keep drawing fast. */
 export const pixelRatio = () => Math.min(window.devicePixelRatio || 1, 2);
+
+/**
+ * Place a floating element at a place of a canvas, inside it.
+ * @param {HTMLElement} element
+ * @param {number} x  px
+ * @param {number} y  px
+ * @param {HTMLCanvasElement} canvas
+ */
+export function floatAt(element, x, y, { clientWidth, clientHeight }) {
+  const left = Math.max(8, Math.min(x, clientWidth - element.offsetWidth - 8));
+  const top = Math.max(8, Math.min(y, clientHeight - element.offsetHeight - 8));
+  element.style.transform = `translate(${left}px, ${top}px)`;
+}

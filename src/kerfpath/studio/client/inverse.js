@@ -2,7 +2,7 @@
 
 import { baseOf, frames, multiply, rotation } from "./kinematics.js";
 
-/** @typedef {import("./messages.js").RobotModel} RobotModel */
+/** @typedef {import("./messages.js").RobotEntry} RobotModel */
 
 const STRIDE = 0.1; // rad of the beam's rotation from one solution to the next
 const FAR = 0.6; // rad that a joint may move in one stride: more means a singularity is near

@@ -1,6 +1,6 @@
 /** Forward kinematics: the frames of all joints from their values, for the robot of the server. */
 
-/** @typedef {import("./messages.js").RobotModel} RobotModel */
+/** @typedef {import("./messages.js").RobotEntry} RobotModel */
 
 /**
  * Return the product of two poses.
@@ -42,7 +42,7 @@ export const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
 /**
  * Return the pose by which an external axis has moved what it carries.
- * @param {import("./messages.js").Joint} joint
+ * @param {import("./messages.js").JointEntry} joint
  * @param {number} value  rad or m
  */
 function motion({ T, axis, unit }, value) {

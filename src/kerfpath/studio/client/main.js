@@ -7,13 +7,13 @@ import { MapView } from "./map/view.js";
 import { foot, notices, topBar } from "./panels/bar.js";
 import { comparePanel, followKept } from "./panels/compare.js";
 import { contoursPanel } from "./panels/contours.js";
+import { formPanel } from "./panels/form.js";
 import { frontPanel } from "./panels/front.js";
 import { jobSheet } from "./panels/jobtext.js";
 import { jointsPanel } from "./panels/joints.js";
 import { layoutSheet } from "./panels/layout.js";
 import { loopsSheet } from "./panels/loops.js";
-import { morePanel } from "./panels/more.js";
-import { optionsPanel } from "./panels/options.js";
+import { followFastest, optionsPanel } from "./panels/options.js";
 import { followProgram, programSheet } from "./panels/program.js";
 import { auditPanel, resultPanel } from "./panels/result.js";
 import { drawSheet, prepareSheets } from "./panels/sheet.js";
@@ -42,9 +42,8 @@ const plots = new Plots();
 const extras = recordings(view);
 new Track();
 followKept(view);
+followFastest();
 followProgram();
-optionsPanel(store, connection);
-morePanel(store, connection, player);
 prepareSheets({
   text: jobSheet,
   program: programSheet,
@@ -58,6 +57,8 @@ mount(byId("result"), () => resultPanel(view));
 mount(byId("compare"), () => comparePanel(view));
 mount(byId("front"), frontPanel);
 mount(byId("joints"), jointsPanel);
+mount(byId("options"), optionsPanel);
+mount(byId("more"), formPanel);
 mount(byId("audit"), auditPanel);
 mount(byId("status"), foot);
 mount(byId("sheet"), drawSheet);

@@ -3,7 +3,7 @@
 import { send, store } from "./app.js";
 import { counted, millimetres } from "./format.js";
 
-/** @typedef {import("./messages.js").Loop} Loop */
+/** @typedef {import("./messages.js").LoopEntry} Loop */
 
 /** Return the contours of the job by their loops. */
 export const contoursByLoop = () =>

@@ -25,12 +25,25 @@ export function ticks(low, high, most) {
   return found;
 }
 
+/**
+ * Return the least and the largest of values, with some margin.
+ * @param {number[]} values
+ * @returns {[number, number]}
+ */
+function spanOf(values) {
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const room = 0.06 * (high - low) || Math.abs(low) * 0.05 || 1;
+  return [low - room, high + room];
+}
+
 export class Scatter {
   constructor() {
     /** @type {HTMLCanvasElement | null} */
     this.canvas = null;
     /** @type {Point[]} */
     this.points = [];
+    /** @type {[number, number][]} the range of each criterion, with some margin */
+    this.spans = [];
     /** @type {[Axis, Axis]} */
     this.axes = [{ label: "" }, { label: "" }];
     /** @type {[number, number, number]} the criteria across, up, and by colour; -1: none */
@@ -56,6 +69,7 @@ export class Scatter {
       ...{ number, best },
       values: values.map((value, i) => axes[i].of(value)),
     }));
+    this.spans = axes.map((_, i) => spanOf(this.points.map((point) => point.values[i])));
     this.axes = [axes[this.shown[0]], axes[this.shown[1]]];
     this.chosen = chosen;
   }
@@ -72,25 +86,13 @@ export class Scatter {
   }
 
   /**
-   * Return the least and the largest value of a criterion, with some margin.
-   * @param {number} axis
-   * @returns {[number, number]}
-   */
-  range(axis) {
-    const values = this.points.map((point) => point.values[axis]);
-    const [low, high] = [Math.min(...values), Math.max(...values)];
-    const room = 0.06 * (high - low) || Math.abs(low) * 0.05 || 1;
-    return [low - room, high + room];
-  }
-
-  /**
    * Return where a point is on the canvas, CSS px.
    * @param {Point} point
    */
   place({ values }) {
     const { left, top, width, height } = this.frame();
     const [x, y] = this.shown;
-    const [[x0, x1], [y0, y1]] = [this.range(x), this.range(y)];
+    const [[x0, x1], [y0, y1]] = [this.spans[x], this.spans[y]];
     return {
       x: left + ((values[x] - x0) / (x1 - x0)) * width,
       y: top + (1 - (values[y] - y0) / (y1 - y0)) * height,
@@ -117,7 +119,7 @@ export class Scatter {
     if (!context || !this.points.length) return;
     this.grid(context);
     const colour = this.shown[2];
-    const [low, high] = colour < 0 ? [0, 1] : this.range(colour);
+    const [low, high] = colour < 0 ? [0, 1] : this.spans[colour];
     const { em } = this.frame();
     for (const best of [false, true])
       for (const point of this.points.filter((each) => each.best === best)) {
@@ -162,7 +164,7 @@ export class Scatter {
     context.fillStyle = themeColour("--quiet");
     context.strokeStyle = themeColour("--line");
     context.lineWidth = 1;
-    const [[x0, x1], [y0, y1]] = [this.range(this.shown[0]), this.range(this.shown[1])];
+    const [[x0, x1], [y0, y1]] = this.shown.map((axis) => this.spans[axis]);
     context.textAlign = "center";
     context.textBaseline = "top";
     for (const at of ticks(x0, x1, width / (4.5 * em))) {

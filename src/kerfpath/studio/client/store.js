@@ -3,49 +3,56 @@
 /** @typedef {import("./messages.js").ServerMessage} ServerMessage */
 /** @typedef {import("./messages.js").PlanMessage} PlanMessage */
 /** @typedef {import("./messages.js").NoPathMessage} NoPathMessage */
-/** @typedef {import("./messages.js").MapMessage} MapMessage */
-
-/**
- * @typedef {"connection" | "job" | "part" | "pointed" | "clearance" | "scene" | "plan" | "program" | "outcome" | "progress" | "map"
- *   | "pose" | "fastest" | "program_text" | "error" | "selected" | "kept" | "compare" | "front"
- *   | "candidate" | "shade" | "technique" | "reach" | "layout" | "dismissed" | "sheet" | "anything"} Topic
- */
-
 /** @typedef {import("./messages.js").KeptEntry} KeptEntry */
 /** @typedef {{entry: KeptEntry, plans: Map<string, PlanMessage[]>}} Against */
 /** @typedef {{name: string, s: number[], gamma: number[], posture: number[]}} Course */
+
+/**
+ * What may change: a type of message, or a state of the page; "anything" is any of them.
+ * @typedef {ServerMessage["type"] | "connection" | "pointed" | "selected" | "compare" | "dismissed"
+ *   | "sheet" | "anything"} Topic
+ */
+
+/**
+ * Of these types only the newest message is kept, under its type.
+ * @typedef {"job" | "options" | "part" | "scene" | "program" | "outcome" | "fastest" | "pose"
+ *   | "program_text" | "front" | "reach" | "layout"} Latest
+ */
 
 const MOST_SHADES = 12; // some 100 kB each
 const MOST_ERRORS = 3;
 const ERROR_STAYS = 12_000; // ms
 
+/** @type {new () => {[T in Latest]: Extract<ServerMessage, {type: T}> | null}} */
+const Messages = /** @type {any} */ (
+  class {
+    job = null;
+    options = null;
+    part = null;
+    scene = null;
+    program = null;
+    outcome = null;
+    fastest = null;
+    pose = null;
+    program_text = null;
+    front = null;
+    reach = null;
+    layout = null;
+  }
+);
+
 /** The state of the page. A message changes it; then the listeners to its topic are called. */
-export class Store {
+export class Store extends Messages {
   constructor() {
+    super();
     /** @type {import("./connection.js").Status} */
     this.connection = "connecting";
     /** @type {number | null} time of the next try, ms */
     this.retryAt = null;
     this.met = false; // whether the connection has ever been open
     this.broken = false; // whether it has been lost since it was last open
-    /** @type {import("./messages.js").JobMessage | null} */
-    this.job = null;
-    /** @type {import("./messages.js").PartMessage | null} */
-    this.part = null;
-    /** @type {import("./messages.js").SceneMessage | null} */
-    this.scene = null;
-    /** @type {import("./messages.js").ProgramMessage | null} */
-    this.program = null;
-    /** @type {import("./messages.js").OutcomeMessage | null} */
-    this.outcome = null;
     /** @type {import("./messages.js").ProgressMessage} */
     this.progress = { type: "progress", busy: false, label: "", done: 0, total: 0 };
-    /** @type {import("./messages.js").FastestMessage | null} */
-    this.fastest = null;
-    /** @type {import("./messages.js").PoseMessage | null} */
-    this.pose = null;
-    /** @type {import("./messages.js").ProgramTextMessage | null} */
-    this.program_text = null;
     /** @type {import("./messages.js").ErrorMessage[]} those that are shown */
     this.errors = [];
     /** @type {Map<string, PlanMessage[]>} by contour, its pieces in order */
@@ -58,7 +65,7 @@ export class Store {
     this.nopaths = new Map();
     /** @type {Map<string, import("./messages.js").ClearanceMessage>} by the names of plans */
     this.clearances = new Map();
-    /** @type {Map<string, MapMessage>} */
+    /** @type {Map<string, import("./messages.js").MapMessage>} */
     this.maps = new Map();
     /** @type {Map<string, import("./messages.js").ShadeMessage>} by contour and quantity */
     this.shades = new Map();
@@ -70,14 +77,8 @@ export class Store {
     this.kept = [];
     /** @type {Against | null} the kept job that is compared */
     this.against = null;
-    /** @type {import("./messages.js").FrontMessage | null} */
-    this.front = null;
     /** @type {{contour: string, number: number, own: PlanMessage[]} | null} shown in place of the job's plan */
     this.candidate = null;
-    /** @type {import("./messages.js").ReachMessage | null} */
-    this.reach = null;
-    /** @type {import("./messages.js").LayoutMessage | null} */
-    this.layout = null;
     /** @type {string | null} the chosen contour */
     this.selected = null;
     /** @type {Map<string, Set<(about: any) => void>>} */
@@ -183,14 +184,6 @@ export class Store {
   get table() {
     const known = [...(this.job?.contours ?? []), ...(this.scene?.contours ?? [])];
     return known.find(({ name }) => name === this.selected)?.index ?? null;
-  }
-
-  /**
-   * Return what is wrong with a key of the job, or "".
-   * @param {string} key  dotted
-   */
-  faultOf(key) {
-    return this.job?.faults.find((each) => each.key.join(".") === key)?.message ?? "";
   }
 
   /** The names of all contours, in the order of the job. */

@@ -7,7 +7,6 @@ import { AROUND, intervals, pinOver, said, stretched, widened, Pins } from "./pi
 
 /** @typedef {import("./pins.js").Pin} Pin */
 /** @typedef {import("./chart.js").Chart} Chart */
-/** @typedef {import("./chart.js").Frame} Frame */
 /** @typedef {{index: number, sides: Set<"start" | "end" | "low" | "high">}} Hit */
 /** @typedef {{x: number, y: number, s: number, gamma: number}} Place px, m, deg */
 
@@ -50,22 +49,18 @@ export class Bands {
   /**
    * Return the boxes of a pin, px.
    * @param {Pin} pin
-   * @param {Frame} frame
    */
-  boxes(pin, frame) {
-    const { grid, window } = this.chart;
+  boxes(pin) {
+    const { grid, window, frame } = this.chart;
     const first = grid?.message.s[0] ?? 0;
-    const [from, to] = [pin.start, pin.end].map((mm) => this.chart.x(first + mm / 1e3, frame));
+    const [from, to] = [pin.start, pin.end].map((mm) => this.chart.x(first + mm / 1e3));
     // As wide as the cells of its nodes, and at least wide enough to be seen.
     const shown = (window.to - window.from) * Math.max(1, (grid?.nodes ?? 2) - 1);
     const beside = Math.max(2, frame.width / shown / 2);
-    const [begin, end] = [
-      this.chart.x(first, frame),
-      this.chart.x(first + (grid?.length ?? 0), frame),
-    ];
+    const [begin, end] = [this.chart.x(first), this.chart.x(first + (grid?.length ?? 0))];
     const x = Math.max(begin, from - beside);
     const width = Math.min(end, to + beside) - x;
-    const y = (/** @type {number} */ angle) => this.chart.up(angle, frame);
+    const y = (/** @type {number} */ angle) => this.chart.up(angle);
     return intervals(pin).map(([low, high]) => ({
       ...{ x, y: y(high), width, height: Math.max(2, y(low) - y(high)) },
       ...{ low, high },
@@ -79,10 +74,9 @@ export class Bands {
    */
   hit({ x, y }) {
     const { list, chosen } = this.pins;
-    const frame = this.chart.frame();
     const order = list.map((_, i) => i).sort((a, b) => Number(b === chosen) - Number(a === chosen));
     for (const index of order)
-      for (const box of this.boxes(list[index], frame)) {
+      for (const box of this.boxes(list[index])) {
         const [right, bottom] = [box.x + box.width, box.y + box.height];
         if (x < box.x - NEAR || x > right + NEAR || y < box.y - NEAR || y > bottom + NEAR) continue;
         /** @type {Hit["sides"]} */
@@ -104,7 +98,7 @@ export class Bands {
     this.took = false;
     const { grid, canvas } = this.chart;
     if (event.button !== 0 || event.shiftKey || !grid?.layers.length || !this.pins.writable) return;
-    const frame = this.chart.frame();
+    const { frame } = this.chart;
     const [x, y] = [event.offsetX - frame.left, event.offsetY - frame.top];
     if (x < -NEAR || y < -NEAR || x > frame.width + NEAR || y > frame.height + NEAR) return;
     const from = this.place(event);
@@ -227,14 +221,13 @@ export class Bands {
   /**
    * Draw every pin: its inside outlined, its outside hatched.
    * @param {CanvasRenderingContext2D} context
-   * @param {Frame} frame
    */
-  draw(context, frame) {
+  draw(context) {
     const { list, chosen } = this.pins;
-    const scale = frame.em / 13;
+    const scale = this.chart.frame.em / 13;
     list.forEach((pin, i) => {
-      const boxes = this.boxes(pin, frame);
-      this.hatch(context, boxes, frame, scale);
+      const boxes = this.boxes(pin);
+      this.hatch(context, boxes, scale);
       context.strokeStyle = themeColour("--accent");
       context.lineWidth = (i === chosen ? 2.6 : 1.6) * scale;
       for (const { x, y, width, height } of boxes) context.strokeRect(x, y, width, height);
@@ -260,10 +253,10 @@ export class Bands {
    * Dim and hatch the outside of the boxes of a pin, over its stretch.
    * @param {CanvasRenderingContext2D} context
    * @param {{x: number, y: number, width: number, height: number}[]} boxes
-   * @param {Frame} frame
    * @param {number} scale
    */
-  hatch(context, boxes, frame, scale) {
+  hatch(context, boxes, scale) {
+    const { frame } = this.chart;
     const [{ x, width }] = boxes;
     context.save();
     context.beginPath();

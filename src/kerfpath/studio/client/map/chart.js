@@ -10,7 +10,6 @@ import { WHOLE } from "./window.js";
 /** @typedef {import("../store.js").Course} Course */
 /** @typedef {import("./grid.js").Grid} Grid */
 /** @typedef {import("./shade.js").Shade} Shade */
-/** @typedef {(context: CanvasRenderingContext2D, frame: Frame) => void} Under */
 /** @typedef {{left: number, top: number, width: number, height: number, em: number}} Frame CSS px */
 
 /**
@@ -22,7 +21,7 @@ import { WHOLE } from "./window.js";
  * @property {number | null} broken  m, where the path breaks
  * @property {{s: number, gamma: number} | null} now
  * @property {{node: number, sample: number} | null} hover
- * @property {Under} under  draws what is below the courses
+ * @property {(context: CanvasRenderingContext2D) => void} under  draws what is below the courses
  */
 
 const TURNS = [1, 2, 5, 10, 15, 30, 45, 90]; // deg
@@ -42,6 +41,10 @@ export class Chart {
     this.back = document.createElement("canvas");
     this.painted = "";
     this.font = getComputedStyle(document.body).fontFamily;
+    this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    /** @type {Frame} where the cells are on the canvas */
+    this.frame = this.measured();
+    new ResizeObserver(() => (this.frame = this.measured())).observe(canvas);
   }
 
   dark() {
@@ -53,11 +56,7 @@ export class Chart {
     return inks(message, this.dark(), themeColour("--free"), this.shade !== null);
   }
 
-  /**
-   * Return where the cells are on the canvas.
-   * @returns {Frame}
-   */
-  frame() {
+  measured() {
     const em = textSize();
     const { clientWidth, clientHeight } = this.canvas;
     const [left, top] = [3.1 * em, 0.4 * em];
@@ -70,46 +69,46 @@ export class Chart {
 
   /** @param {Drawn} drawn */
   draw({ plans, before, technique, stale, broken, now, hover, under }) {
-    const context = freshContext(this.canvas);
-    if (!context || !this.grid?.layers.length) return;
-    const frame = this.frame();
+    if (!freshContext(this.canvas) || !this.grid?.layers.length) return;
+    this.frame = this.measured();
+    const { context, frame } = this;
     const scale = frame.em / 13;
-    this.cells(pixelRatio(), frame);
+    this.cells();
     context.drawImage(this.back, frame.left, frame.top, frame.width, frame.height);
-    this.axes(context, frame);
+    this.axes();
     context.save();
     context.beginPath();
     context.rect(frame.left, frame.top, frame.width, frame.height);
     context.clip();
-    under(context, frame);
+    under(context);
     context.setLineDash([5 * scale, 4 * scale]);
-    for (const plan of before)
-      this.stroke(context, plan, frame, themeColour("--quiet"), 1.6 * scale);
+    for (const plan of before) this.stroke(plan, "--quiet", 1.6);
     if (technique) {
       context.lineCap = "round";
       context.setLineDash([0.1, 4.5 * scale]);
-      this.stroke(context, technique, frame, themeColour("--course-halo"), 4.6 * scale);
-      this.stroke(context, technique, frame, themeColour("--other"), 2.8 * scale);
+      this.stroke(technique, "--course-halo", 4.6);
+      this.stroke(technique, "--other", 2.8);
       context.lineCap = "butt";
     }
     context.setLineDash([]);
     context.globalAlpha = stale ? 0.55 : 1;
-    for (const plan of plans) this.course(context, plan, frame, "--course", 2.2 * scale);
+    for (const plan of plans) {
+      this.stroke(plan, "--course-halo", 4.84);
+      this.stroke(plan, "--course", 2.2);
+    }
     context.globalAlpha = 1;
-    if (broken !== null) this.breakAt(context, broken, frame);
-    if (now) this.cursor(context, now, frame);
-    if (hover) this.crosshair(context, hover, frame);
+    if (broken !== null) this.breakAt(broken);
+    if (now) this.cursor(now);
+    if (hover) this.crosshair(hover);
     context.restore();
   }
 
-  /**
-   * Paint the cells if they, their size or the theme have changed.
-   * @param {number} ratio
-   * @param {Frame} frame
-   */
-  cells(ratio, frame) {
+  /** Paint the cells if they, their size or the theme have changed. */
+  cells() {
     const grid = /** @type {Grid} */ (this.grid);
-    const [w, h] = [Math.round(frame.width * ratio), Math.round(frame.height * ratio)];
+    const ratio = pixelRatio();
+    const { width, height } = this.frame;
+    const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
     const { graph, contour } = grid.message;
     const shaded = this.shade ? `${this.shade.message.by} ${this.shade.number}` : "";
     const { from, to, top, bottom } = this.window;
@@ -122,14 +121,12 @@ export class Chart {
     this.back.getContext("2d")?.putImageData(image, 0, 0);
   }
 
-  /**
-   * @param {number} s  m
-   * @param {Frame} frame
-   */
-  x(s, frame) {
+  /** @param {number} s  m */
+  x(s) {
     const { message, length } = /** @type {Grid} */ (this.grid);
     const { from, to } = this.window;
-    return frame.left + (((s - message.s[0]) / length - from) / (to - from)) * frame.width;
+    const { left, width } = this.frame;
+    return left + (((s - message.s[0]) / length - from) / (to - from)) * width;
   }
 
   /**
@@ -138,7 +135,7 @@ export class Chart {
    * @returns {number} m
    */
   sAt(x) {
-    const { left, width } = this.frame();
+    const { left, width } = this.frame;
     const { from, to } = this.window;
     const share = from + Math.min(1, Math.max(0, (x - left) / width)) * (to - from);
     return (this.grid?.message.s[0] ?? 0) + share * (this.grid?.length ?? 0);
@@ -150,7 +147,7 @@ export class Chart {
    * @returns {number} deg
    */
   gammaAt(y) {
-    const { top: edge, height } = this.frame();
+    const { top: edge, height } = this.frame;
     const { top, bottom } = this.window;
     const share = top + Math.min(1, Math.max(0, (y - edge) / height)) * (bottom - top);
     return 180 - 360 * share;
@@ -159,28 +156,21 @@ export class Chart {
   /**
    * Return the height of an angle from -180 to 180 deg.
    * @param {number} angle  deg
-   * @param {Frame} frame
    */
-  up(angle, frame) {
+  up(angle) {
     const { top, bottom } = this.window;
-    return frame.top + ((0.5 - angle / 360 - top) / (bottom - top)) * frame.height;
+    return this.frame.top + ((0.5 - angle / 360 - top) / (bottom - top)) * this.frame.height;
   }
 
-  /**
-   * @param {number} gamma  rad
-   * @param {Frame} frame
-   */
-  y(gamma, frame) {
-    return this.up(deg(wrapped(gamma)), frame);
+  /** @param {number} gamma  rad */
+  y(gamma) {
+    return this.up(deg(wrapped(gamma)));
   }
 
-  /**
-   * @param {CanvasRenderingContext2D} context
-   * @param {Frame} frame
-   */
-  axes(context, frame) {
+  axes() {
     const { length, message } = /** @type {Grid} */ (this.grid);
-    const { left, top, width, height, em } = frame;
+    const { context } = this;
+    const { left, top, width, height, em } = this.frame;
     context.font = `${0.82 * em}px ${this.font}`;
     context.fillStyle = themeColour("--quiet");
     context.strokeStyle = themeColour("--rule");
@@ -191,7 +181,7 @@ export class Chart {
     const { from, to, top: high, bottom: low } = this.window;
     const turn = TURNS.find((each) => (360 * (low - high)) / each <= height / (1.5 * em)) ?? 90;
     for (let gamma = -180; gamma <= 180; gamma += turn) {
-      const y = this.up(gamma, frame);
+      const y = this.up(gamma);
       if (y < top - 0.5 || y > top + height + 0.5) continue;
       context.fillRect(left - 4, Math.round(y), 4, 1);
       const inside = Math.min(Math.max(y, top + 0.3 * em), top + height - 0.3 * em);
@@ -207,7 +197,7 @@ export class Chart {
     const mm = length * 1e3;
     const step = STEPS.find((each) => ((to - from) * mm) / each <= width / (4 * em)) ?? 2e4;
     for (let k = Math.ceil((from * mm) / step - 1e-9); k * step <= to * mm + 1e-9; k++) {
-      const x = this.x(message.s[0] + (k * step) / 1e3, frame);
+      const x = this.x(message.s[0] + (k * step) / 1e3);
       context.fillRect(Math.round(x), top + height, 1, 4);
       context.textAlign = x < left + em ? "left" : x > left + width - em ? "right" : "center";
       context.fillText(fixed(k * step, step < 1 ? 1 : 0), x, top + height + 0.4 * em);
@@ -217,30 +207,16 @@ export class Chart {
   }
 
   /**
-   * Draw a course with a halo.
-   * @param {CanvasRenderingContext2D} context
-   * @param {PlanMessage} plan
-   * @param {Frame} frame
-   * @param {string} colour
-   * @param {number} width
-   */
-  course(context, plan, frame, colour, width) {
-    this.stroke(context, plan, frame, themeColour("--course-halo"), 2.2 * width);
-    this.stroke(context, plan, frame, themeColour(colour), width);
-  }
-
-  /**
    * Draw a course; it is faint where its posture is not the shown one.
-   * @param {CanvasRenderingContext2D} context
    * @param {Course} plan
-   * @param {Frame} frame
    * @param {string} colour
-   * @param {number} width
+   * @param {number} width  of the usual text size
    */
-  stroke(context, plan, frame, colour, width) {
+  stroke(plan, colour, width) {
+    const { context } = this;
     const posture = this.grid?.layers[this.layer].posture;
-    context.strokeStyle = colour;
-    context.lineWidth = width;
+    context.strokeStyle = themeColour(colour);
+    context.lineWidth = (width * this.frame.em) / 13;
     context.lineJoin = "round";
     const alpha = context.globalAlpha;
     for (const here of [true, false]) {
@@ -250,8 +226,8 @@ export class Chart {
         if ((plan.posture[k] === posture) !== here) continue;
         const [from, to] = [wrapped(plan.gamma[k]), wrapped(plan.gamma[k + 1])];
         if (Math.abs(from - to) > Math.PI) continue; // over the edge of the map
-        context.moveTo(this.x(plan.s[k], frame), this.y(from, frame));
-        context.lineTo(this.x(plan.s[k + 1], frame), this.y(to, frame));
+        context.moveTo(this.x(plan.s[k]), this.y(from));
+        context.lineTo(this.x(plan.s[k + 1]), this.y(to));
       }
       context.stroke();
     }
@@ -260,12 +236,11 @@ export class Chart {
 
   /**
    * Draw where the path breaks.
-   * @param {CanvasRenderingContext2D} context
    * @param {number} s  m
-   * @param {Frame} frame
    */
-  breakAt(context, s, frame) {
-    const x = this.x(s, frame);
+  breakAt(s) {
+    const { context, frame } = this;
+    const x = this.x(s);
     const width = (2 * frame.em) / 13;
     context.fillStyle = themeColour("--alert");
     context.fillRect(x - width / 2, frame.top, width, frame.height);
@@ -282,13 +257,12 @@ export class Chart {
 
   /**
    * Draw the place of the player.
-   * @param {CanvasRenderingContext2D} context
    * @param {{s: number, gamma: number}} now
-   * @param {Frame} frame
    */
-  cursor(context, now, frame) {
+  cursor(now) {
+    const { context, frame } = this;
     const scale = frame.em / 13;
-    const [x, y] = [this.x(now.s, frame), this.y(now.gamma, frame)];
+    const [x, y] = [this.x(now.s), this.y(now.gamma)];
     context.fillStyle = themeColour("--kerf");
     context.fillRect(x - 0.75 * scale, frame.top, 1.5 * scale, frame.height);
     context.beginPath();
@@ -301,14 +275,13 @@ export class Chart {
 
   /**
    * Draw the place of the pointer.
-   * @param {CanvasRenderingContext2D} context
    * @param {{node: number, sample: number}} hover
-   * @param {Frame} frame
    */
-  crosshair(context, hover, frame) {
+  crosshair(hover) {
+    const { context, frame } = this;
     const { message } = /** @type {Grid} */ (this.grid);
-    const x = Math.round(this.x(message.s[hover.node], frame));
-    const y = Math.round(this.y(message.gamma[hover.sample], frame));
+    const x = Math.round(this.x(message.s[hover.node]));
+    const y = Math.round(this.y(message.gamma[hover.sample]));
     context.fillStyle = themeColour("--ink");
     context.globalAlpha = 0.5;
     context.fillRect(frame.left, y, frame.width, 1);

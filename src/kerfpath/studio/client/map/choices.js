@@ -41,19 +41,27 @@ export class Choices {
    */
   choose(kind, name) {
     this.chosen[kind] = name;
-    if (!name) this.ask(kind, "", { [kind === "shade" ? "by" : "method"]: null });
+    if (!name) this.ask(kind, "", null);
     this.changed();
   }
 
   /**
-   * Ask for something, once; an empty key stops its computation.
+   * Ask for a quantity or a technique, once; an empty key stops its computation.
    * @param {"shade" | "technique"} kind
    * @param {string} key
-   * @param {object} what
+   * @param {any} name
    */
-  ask(kind, key, what) {
-    if ((key && this.asked[kind] === key) || !store.selected) return;
-    if (!send({ type: kind, contour: store.selected, ...what })) return;
+  ask(kind, key, name) {
+    const { selected: contour } = store;
+    if ((key && this.asked[kind] === key) || !contour) return;
+    if (
+      !send(
+        kind === "shade"
+          ? { type: kind, contour, by: name }
+          : { type: kind, contour, method: name },
+      )
+    )
+      return;
     this.asked[kind] = key;
     delete this.refused[kind];
   }
@@ -78,11 +86,11 @@ export class Choices {
     const fits = shade?.graph === graph;
     if (!shade || !fits) this.shade = null;
     else if (this.shade?.message !== shade) this.shade = new Shade(shade);
-    if (by && !fits) this.ask("shade", `${contour} ${graph} ${by}`, { by });
+    if (by && !fits) this.ask("shade", `${contour} ${graph} ${by}`, by);
     this.technique = (method && store.techniques.get(`${contour} ${method}`)) || null;
     const done = (store.plans.get(contour) ?? []).every(({ passed }) => passed !== null);
     if (grid && method && done && !this.fresh(contour))
-      this.ask("technique", `${contour} ${method} ${this.revision(contour)}`, { method });
+      this.ask("technique", `${contour} ${method} ${this.revision(contour)}`, method);
   }
 
   /** @param {string} contour */

@@ -76,7 +76,7 @@ export class Gestures {
    * @param {{offsetX: number, offsetY: number}} event
    */
   share({ offsetX, offsetY }) {
-    const { left, top, width, height } = this.chart.frame();
+    const { left, top, width, height } = this.chart.frame;
     const within = (/** @type {number} */ at) => Math.min(1, Math.max(0, at));
     return { x: within((offsetX - left) / width), y: within((offsetY - top) / height) };
   }
@@ -88,7 +88,7 @@ export class Gestures {
     const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 33 : 1;
     const [across, down] = [event.deltaX * lines, event.deltaY * lines];
     if (event.shiftKey || Math.abs(across) > Math.abs(down)) {
-      const { width } = this.chart.frame();
+      const { width } = this.chart.frame;
       this.see(moved(this.chart.window, (across || down) / width, 0));
       return;
     }
@@ -108,7 +108,7 @@ export class Gestures {
   /** @param {PointerEvent} event */
   move(event) {
     if (!this.drag) return;
-    const { width, height } = this.chart.frame();
+    const { width, height } = this.chart.frame;
     const { x, y, seen } = this.drag;
     this.see(moved(seen, (x - event.offsetX) / width, (y - event.offsetY) / height));
   }

@@ -47,7 +47,7 @@ export class Hover {
   at(x, y) {
     const { chart, grid } = this;
     if (!chart.grid?.layers.length) return null;
-    const { left, top, width, height } = chart.frame();
+    const { left, top, width, height } = chart.frame;
     if (x < left || x > left + width || y < top || y > top + height) return null;
     const gamma = (chart.gammaAt(y) / 180) * Math.PI;
     return { node: grid.nodeAt(chart.sAt(x)), sample: grid.sampleAt(gamma) };
@@ -132,7 +132,6 @@ export class Hover {
   say(head, numbers) {
     const { cell, chart, tip, grid } = this;
     if (!cell || !chart.grid) return;
-    const frame = chart.frame();
     const s = grid.message.s[cell.node];
     const gamma = grid.message.gamma[cell.sample];
     const place = cell.node * grid.samples + cell.sample;
@@ -150,7 +149,7 @@ export class Hover {
     );
     tip.hidden = false;
     const { clientWidth, clientHeight } = chart.canvas;
-    const [x, y] = [chart.x(s, frame), chart.y(gamma, frame)];
+    const [x, y] = [chart.x(s), chart.y(gamma)];
     const left = x + 16 + tip.offsetWidth > clientWidth ? x - 16 - tip.offsetWidth : x + 16;
     const top = Math.min(
       Math.max(4, y - tip.offsetHeight / 2),

@@ -159,7 +159,7 @@ export class MapView {
       broken: store.nopaths.get(name)?.s ?? null,
       now: plan ? { s: plan.s[k], gamma: plan.gamma[k] } : null,
       hover: this.hover.cell,
-      under: (context, frame) => this.bands.draw(context, frame),
+      under: (context) => this.bands.draw(context),
     });
   }
 
@@ -213,11 +213,8 @@ export class MapView {
     const { cell } = this.hover;
     const { message } = /** @type {Grid} */ (this.grid);
     if (!cell) return { x: 0.5, y: 0.5 };
-    const frame = this.chart.frame();
-    const [offsetX, offsetY] = [
-      this.chart.x(message.s[cell.node], frame),
-      this.chart.y(message.gamma[cell.sample], frame),
-    ];
+    const offsetX = this.chart.x(message.s[cell.node]);
+    const offsetY = this.chart.y(message.gamma[cell.sample]);
     return this.gestures.share({ offsetX, offsetY });
   }
 

@@ -5,7 +5,7 @@ import { change, counted, digits, fixed } from "../format.js";
 import { NUMBER, dot, html, options, redraw } from "../ui.js";
 import { bar } from "./bar.js";
 
-/** @typedef {import("../messages.js").Try} Try */
+/** @typedef {import("../messages.js").TryEntry} Try */
 
 /** The variables: label, unit, and default range on either side. */
 const VARIABLES = /** @type {Record<string, [string, string, number]>} */ ({
@@ -22,7 +22,6 @@ const VARIABLES = /** @type {Record<string, [string, string, number]>} */ ({
   mount_deg: ["Head about flange", "deg", 90],
 });
 const USUAL = ["x_mm", "y_mm", "yaw_deg"];
-/** @type {Record<string, {words: string, value: string}>} */
 const GOALS = {
   speed: { words: "Fastest speed of the slowest contour", value: "m/min" },
   margin: { words: "Least ratio of fastest to requested speed", value: "times requested speed" },
@@ -45,7 +44,9 @@ export function candidates(placing, moved) {
   let filled = false;
   /** What is searched for, as it is in the fields; a variable without a range is not varied. */
   const wanted = {
-    ...{ goal: "speed", judged: "grid", evaluations: "64" },
+    goal: /** @type {import("../messages.js").LayoutRequest["goal"]} */ ("speed"),
+    judged: "grid",
+    evaluations: "64",
     varied: new Set(USUAL),
     ranges: /** @type {Record<string, [string, string]>} */ (
       Object.fromEntries(
@@ -65,7 +66,8 @@ export function candidates(placing, moved) {
     const bad = spans.some(([low, high]) => !low || !high || !(Number(low) < Number(high)));
     if (!spans.length || bad) return null;
     const names = Object.keys(VARIABLES).filter((name) => wanted.varied.has(name));
-    return Object.fromEntries(names.map((name) => [name, wanted.ranges[name].map(Number)]));
+    const numbers = names.map((name) => [name, wanted.ranges[name].map(Number)]);
+    return /** @type {Record<string, [number, number]>} */ (Object.fromEntries(numbers));
   }
 
   function look() {
@@ -74,10 +76,8 @@ export function candidates(placing, moved) {
     if (!spans) return;
     back();
     const count = Math.min(100000, Math.max(8, Math.round(Number(wanted.evaluations)) || 64));
-    send({
-      ...{ type: "layout", goal: wanted.goal, ranges: spans, evaluations: count },
-      grid: wanted.judged === "grid",
-    });
+    const [goal, grid] = [wanted.goal, wanted.judged === "grid"];
+    send({ type: "layout", goal, ranges: spans, evaluations: count, grid });
   }
 
   /** Take the settings of [layout] from the job, once. */
@@ -206,7 +206,7 @@ export function candidates(placing, moved) {
     const { number, offsets, value, status, reason } = tried;
     const mark = status !== "feasible" ? "none" : value !== null ? "done" : "";
     return html`
-      <button key=${number} aria-current=${String(number === shown)} disabled=${disabled}
+      <button key=${number} data-number=${number} aria-current=${String(number === shown)} disabled=${disabled}
         title=${reason} onClick=${() => show(tried)}>
         ${dot(mark)}
         <span class="name">${worth(tried)}</span>

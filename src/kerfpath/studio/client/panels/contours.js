@@ -5,7 +5,7 @@ import { clock, fixed, millimetres, secondsOf } from "../format.js";
 import { dot, html, icon } from "../ui.js";
 import { openSheet } from "./sheet.js";
 
-/** @typedef {import("../messages.js").ContourShape} ContourShape */
+/** @typedef {import("../messages.js").ContourEntry} ContourShape */
 /** The state of a contour: its mark, and words. */
 /** @typedef {{mark: "done" | "none" | "warn" | "busy" | "open", words: string}} Standing */
 

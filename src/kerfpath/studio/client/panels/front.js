@@ -28,8 +28,9 @@ const running = () => store.front?.state === "running" && !store.stale(store.fro
 
 function search() {
   if (running()) return send({ type: "cancel" });
+  const { selected: contour } = store;
   store.withdraw();
-  return send({ type: "front", contour: store.selected, criteria: [...wanted], runs });
+  return contour && send({ type: "front", contour, criteria: [...wanted], runs });
 }
 
 /** @param {number} number  of the point whose motion is shown */
@@ -50,8 +51,7 @@ function shownAxis({ name, words, unit, better }) {
 
 /** The Pareto set, and the search for it. */
 export function frontPanel() {
-  const { job } = store;
-  if (!job) return null;
+  if (!store.job) return null;
   const front = mine();
   const off = !store.live || !store.chosen.length || wanted.size < 2;
   const words = running() ? "Stop" : front ? "Search again" : "Search";
@@ -74,7 +74,7 @@ export function frontPanel() {
       <details class="group-of-keys">
         <summary>Criteria and runs</summary>
         <div class="criteria" role="group" aria-label="Criteria">
-          ${(job.choices["pareto.criteria"] ?? []).map(criterion)}
+          ${(store.options?.criteria ?? []).map(criterion)}
         </div>
         <p class="field head"><label>Runs of the planner </label><input ...${count} /></p>
       </details>`,
@@ -111,7 +111,7 @@ function set(front) {
     store.candidate?.contour === front.contour ? store.candidate.number : null,
   );
   const by = scatter.shown[2];
-  const [low, high] = by < 0 ? [] : scatter.range(by).map((value) => digits(value, 3));
+  const [low, high] = by < 0 ? [] : scatter.spans[by].map((value) => digits(value, 3));
   const names = axes.map(({ name }, i) => ({ value: String(i), label: name }));
   const pickers = ["across", "up", "by colour"].map(
     (name, i) => html`
@@ -202,7 +202,7 @@ function taking(front) {
   const point = front.points.find(({ number }) => number === candidate?.number);
   if (!point || candidate?.contour !== front.contour) return null;
   const { edits } = point;
-  const take = () => send({ type: "edits", edits });
+  const take = () => edits && send({ type: "edits", edits });
   return html`
     ${edits && html`<button class="primary" disabled=${!store.live} onClick=${take}>Take it</button>`}
     <button class="plain" onClick=${() => store.withdraw()}>Back to the job's plan</button>

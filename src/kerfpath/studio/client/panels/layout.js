@@ -74,8 +74,8 @@ export function layoutSheet(placing) {
   /** Write the move to the job, as one step of undo. */
   function commit() {
     const offsets = placing.offsets();
-    if (Object.keys(offsets).length)
-      placing.sent(send({ type: "place", scene: store.scene?.revision, offsets }));
+    if (store.scene && Object.keys(offsets).length)
+      placing.sent(send({ type: "place", scene: store.scene.revision, offsets }));
     moved();
   }
 
@@ -265,7 +265,7 @@ function fastestHere(placing) {
 
   function find() {
     looked = known().key;
-    looking = send({ type: "fastest", contour: store.selected });
+    looking = send({ type: "fastest", contour: store.selected ?? "" });
     redraw();
   }
 

@@ -6,7 +6,7 @@ import { counted } from "../format.js";
 import { barred, contoursByLoop, cutLoops, described, leaving } from "../part.js";
 import { html, redraw } from "../ui.js";
 
-/** @typedef {import("../messages.js").Loop} Loop */
+/** @typedef {import("../messages.js").LoopEntry} Loop */
 
 const filter = { words: "", uncut: false, inner: false };
 

@@ -1,11 +1,24 @@
 /** The main options: speed of the contour, objective, metric, posture, shares of the limits. */
 
-import { byId, el, icon } from "../dom.js";
-import { fixed } from "../format.js";
-import { amount, choice, gesture } from "./fields.js";
+import { useRef } from "preact/hooks";
 
-/** @typedef {import("../store.js").Store} Store */
-/** @typedef {import("../messages.js").Path} Path */
+import { send, store } from "../app.js";
+import { fixed } from "../format.js";
+import { faultOf, setKey, valueOf } from "../job.js";
+import {
+  Input,
+  NUMBER,
+  Slider,
+  card,
+  dot,
+  gesture,
+  html,
+  icon,
+  options,
+  redraw,
+  segments,
+  useHeld,
+} from "../ui.js";
 
 /** @type {Record<string, string>} */
 const WORDS = {
@@ -15,186 +28,160 @@ const WORDS = {
   manhattan: "Manhattan",
   chebychev: "Chebychev",
 };
+const SPEED = "contour.speed_m_min";
+
+/** What is known of the fastest speed of the chosen contour. */
+const fastest = {
+  looking: false,
+  /** @type {import("../messages.js").FastestMessage | null} */
+  answer: null,
+};
+
+/** Follow the search for the fastest speed; its answer is for one contour and one job. */
+export function followFastest() {
+  store.on(["fastest"], (answer) => Object.assign(fastest, { looking: false, answer }));
+  store.on(["error"], () => (fastest.looking = false));
+  store.on(["selected", "job"], () => (fastest.answer = null));
+}
+
+/** Speed, objective and limits. */
+export function optionsPanel() {
+  const { job, selected, table } = store;
+  if (!job) return null;
+  const disabled = !store.live || !selected;
+  const shape = store.scene?.contours.find(({ name }) => name === selected);
+  const alike = job.contours.filter(({ index }) => index === table).length;
+  const speed = {
+    ...{ id: "speed", label: "Cutting speed", unit: "m/min", least: 0.1, step: 0.05, places: 2 },
+    ...{ value: valueOf(SPEED) ?? shape?.speed_m_min ?? 1, disabled, fault: faultOf(SPEED) },
+    onSet: (/** @type {number} */ value, /** @type {string} */ drag) => setKey(SPEED, value, drag),
+  };
+  const find = () => {
+    fastest.looking = send({ type: "fastest", contour: selected ?? "" });
+    redraw();
+  };
+  const start = html`
+    <button class="plain" disabled=${disabled || fastest.looking} onClick=${find}>
+      ${icon("speed")}Find the fastest
+    </button>`;
+  const shared = `Applies to all ${alike} contours that this table of the job picks.`;
+  return [
+    card(
+      "Speed",
+      start,
+      html`
+        <${Amount} key=${selected} ...${speed} />
+        ${alike > 1 && html`<p class="quiet small">${shared}</p>`}
+        <div class="answer" aria-live="polite">${answer()}</div>`,
+    ),
+    html`
+      <section class="card">
+        <h2>Objective and limits</h2>
+        ${words("objective", "Objective", disabled)}
+        ${words("metric", "Metric", disabled)}
+        ${posture(disabled)}
+        ${share("eta_velocity", "Speed limits used", disabled)}
+        ${share("eta_acceleration", "Acceleration limits used", disabled)}
+      </section>`,
+  ];
+}
+
+/** What was found of the fastest speed. */
+function answer() {
+  if (fastest.looking)
+    return html`<p class="waiting">${dot("busy")}Searching for the fastest constant speed.</p>`;
+  if (fastest.answer?.contour !== store.selected || !fastest.answer) return null;
+  const { speed_m_min: best, binds, edits } = fastest.answer;
+  const take = () =>
+    edits.forEach(({ path, value }) => send({ type: "edit", path, value, gesture: "fastest" }));
+  const found =
+    best === null ? "No feasible speed was found. " : `Fastest: ${fixed(best, 2)} m/min. `;
+  return html`
+    <p>${found}<span class="quiet">${binds && `Binding limit: ${binds}`}</span></p>
+    ${
+      edits.length > 0 &&
+      html`<button class="plain" onClick=${take}>Cut at ${fixed(best ?? 0, 2)} m/min</button>`
+    }`;
+}
+
+/** @param {string} key */
+const choicesOf = (key) =>
+  store.options?.groups.flatMap(({ fields }) => fields).find((each) => each.key === key)?.choices ??
+  [];
+
+/** @type {(name: string, label: string, disabled: boolean) => unknown} */
+function words(name, label, disabled) {
+  const key = `plan.${name}`;
+  const now = valueOf(key) ?? "";
+  const choices = choicesOf(key).map((value) => ({ value, label: WORDS[value] ?? value }));
+  const choose = (/** @type {string} */ value) => value !== now && setKey(key, value, gesture());
+  return html`
+    <div class="field row">
+      <span class="label">${label}</span>
+      ${segments(label, choices, now, choose, disabled)}
+    </div>`;
+}
+
+/** @param {boolean} disabled */
+function posture(disabled) {
+  const now = valueOf("plan.posture") ?? "";
+  const known = choicesOf("plan.posture");
+  const all = now && !known.includes(now) ? [now, ...known] : known;
+  const choose = (/** @type {any} */ { target }) =>
+    setKey("plan.posture", target.value || null, gesture());
+  const choices = all.map((word) => ({ value: word, label: word }));
+  return html`
+    <div class="field row">
+      <label for="posture">Posture</label>
+      <select id="posture" value=${now} disabled=${disabled} onChange=${choose}>
+        ${options([{ value: "", label: "any" }, ...choices])}
+      </select>
+    </div>`;
+}
+
+/** @type {(name: string, label: string, disabled: boolean) => unknown} */
+function share(name, label, disabled) {
+  const key = `plan.${name}`;
+  const set = (/** @type {number} */ value, /** @type {string} */ drag) =>
+    setKey(key, Number((value / 100).toFixed(4)), drag);
+  const field = {
+    ...{ id: name, label, unit: "%", least: 30, most: 100, step: 1, places: 0 },
+    ...{ value: 100 * (valueOf(key) ?? 1), disabled, fault: faultOf(key), onSet: set },
+  };
+  return html`<${Amount} ...${field} />`;
+}
 
 /**
- * @param {Store} store
- * @param {{send: (message: any) => boolean}} connection
+ * A slider with its number; without `most` the range of the slider follows the value.
+ * @param {{id: string, label: string, unit: string, least: number, most?: number, step: number,
+ *   places: number, value: number, disabled: boolean, fault: string,
+ *   onSet: (value: number, gesture: string) => void}} props
  */
-export function optionsPanel(store, connection) {
-  const host = byId("options");
-  const send = (
-    /** @type {Path} */ path,
-    /** @type {unknown} */ value,
-    /** @type {string} */ drag,
-  ) => void connection.send({ type: "edit", path, value, gesture: drag });
-
-  const speed = amount({
-    ...{
-      id: "speed",
-      label: "Cutting speed",
-      unit: "m/min",
-      min: 0.1,
-      max: 10,
-      step: 0.05,
-      places: 2,
-    },
-    send: (value, drag) => send(["contour", table(), "speed_m_min"], value, drag),
-  });
-  const fastest = el(
-    "button",
-    { class: "plain", onclick: find },
-    icon("speed"),
-    "Find the fastest",
-  );
-  const answer = el("div", { class: "answer", "aria-live": "polite" });
-  const posture = el("select", {
-    id: "posture",
-    onchange: () => send(["plan", "posture"], posture.value || null, gesture()),
-  });
-  const shared = el("p", { class: "quiet small" });
-  const etas = /** @type {const} */ ([
-    ["eta_velocity", "Speed limits used"],
-    ["eta_acceleration", "Acceleration limits used"],
-  ]).map(([key, label]) => ({
-    key,
-    field: amount({
-      ...{ id: key, label, unit: "%", min: 30, max: 100, step: 1, places: 0 },
-      send: (value, drag) => send(["plan", key], Number((value / 100).toFixed(4)), drag),
-    }),
-  }));
-  const choices = /** @type {const} */ ([
-    ["objective", "Objective"],
-    ["metric", "Metric"],
-  ]).map(([key, label]) => ({
-    key,
-    field: choice(label, (value) => send(["plan", key], value, gesture())),
-  }));
-  /** @type {Map<string, number>} end of the speed slider, by contour */
-  const reach = new Map();
-  let looking = false;
-
-  host.replaceChildren(
-    el(
-      "section",
-      { class: "card" },
-      el("header", {}, el("h2", {}, "Speed"), el("span", { class: "grow" }), fastest),
-      speed.element,
-      shared,
-      answer,
-    ),
-    el(
-      "section",
-      { class: "card" },
-      el("h2", {}, "Objective and limits"),
-      ...choices.map(({ field }) => field.element),
-      el("div", { class: "field row" }, el("label", { for: "posture" }, "Posture"), posture),
-      ...etas.map(({ field }) => field.element),
-    ),
-  );
-  store.on(["job", "scene", "selected", "plan", "connection"], draw);
-  store.on(["fastest", "error"], (about) => {
-    looking = false;
-    if (about.type === "fastest") found();
-    draw();
-  });
-  store.on(["selected", "job"], () => answer.replaceChildren());
-  draw();
-
-  /** The place of the chosen contour's table in the job. */
-  function table() {
-    const known = store.job?.contours.find(({ name }) => name === store.selected);
-    return (
-      known?.index ?? store.scene?.contours.find(({ name }) => name === store.selected)?.index ?? 0
-    );
-  }
-
-  /** @param {string} key */
-  function faultOf(key) {
-    return store.job?.faults.find((each) => each.key.join(".") === key)?.message ?? "";
-  }
-
-  function draw() {
-    const { job, scene, selected } = store;
-    const values = job?.values;
-    host.hidden = !job;
-    const disabled = store.connection !== "open" || !values || !selected;
-    const shape = scene?.contours.find(({ name }) => name === selected);
-    const now = values?.contour?.[table()]?.speed_m_min ?? shape?.speed_m_min ?? 1;
-    const held = reach.get(selected ?? "") ?? 0;
-    const most = now > held || now < held / 5 ? nice(2 * now) : held;
-    reach.set(selected ?? "", most);
-    speed.show(now, { max: most, disabled, fault: faultOf(`contour.${table()}.speed_m_min`) });
-    const alike = (job?.contours ?? []).filter(({ index }) => index === table()).length;
-    shared.textContent =
-      alike > 1 ? `Applies to all ${alike} contours that this table of the job picks.` : "";
-    shared.hidden = alike < 2;
-    fastest.disabled = disabled || looking;
-    for (const { key, field } of etas)
-      field.show(100 * (values?.plan?.[key] ?? 1), { disabled, fault: faultOf(`plan.${key}`) });
-    drawPosture(disabled);
-    for (const { key, field } of choices) {
-      const words = job?.choices[`plan.${key}`] ?? [];
-      field.show(
-        values?.plan?.[key] ?? "",
-        words.map((value) => ({ value, label: WORDS[value] ?? value })),
-        disabled,
-      );
-    }
-  }
-
-  /** @param {boolean} disabled */
-  function drawPosture(disabled) {
-    const { job } = store;
-    const held = job?.values?.plan?.posture ?? "";
-    const words = job?.choices["plan.posture"] ?? (held ? [held] : []);
-    const key = [held, ...words].join(" ");
-    posture.disabled = disabled;
-    if (posture.dataset.key === key) return;
-    posture.dataset.key = key;
-    const one = (/** @type {string} */ value, /** @type {string} */ text) =>
-      el("option", { value, selected: value === held }, text);
-    posture.replaceChildren(one("", "any"), ...words.map((word) => one(word, word)));
-  }
-
-  function find() {
-    if (!store.selected || !connection.send({ type: "fastest", contour: store.selected })) return;
-    looking = true;
-    answer.replaceChildren(
-      el(
-        "p",
-        { class: "waiting" },
-        el("i", { class: "dot busy" }),
-        "Searching for the fastest constant speed.",
-      ),
-    );
-    fastest.disabled = true;
-  }
-
-  function found() {
-    const { fastest: result } = store;
-    if (!result || result.contour !== store.selected) return;
-    const { speed_m_min: best, binds, edits } = result;
-    answer.replaceChildren(
-      el(
-        "p",
-        {},
-        best === null ? "No feasible speed was found. " : `Fastest: ${fixed(best, 2)} m/min. `,
-        el("span", { class: "quiet" }, binds && `Binding limit: ${binds}`),
-      ),
-      ...(edits.length
-        ? [
-            el(
-              "button",
-              {
-                class: "plain",
-                onclick: () => edits.forEach(({ path, value }) => send(path, value, "fastest")),
-              },
-              `Cut at ${fixed(best ?? 0, 2)} m/min`,
-            ),
-          ]
-        : []),
-    );
-  }
+function Amount({ id, label, unit, least, most, step, places, value, disabled, fault, onSet }) {
+  const [now, hold] = useHeld(value);
+  const reach = useRef(0);
+  if (now === value && (value > reach.current || value < reach.current / 5))
+    reach.current = nice(2 * value);
+  const take = (/** @type {string} */ text) => {
+    if (text !== "" && Number.isFinite(Number(text))) onSet(Number(text), gesture());
+  };
+  const range = { min: least, max: most ?? reach.current, step };
+  const text =
+    now === value ? String(Number(value.toFixed(Math.max(places, 3)))) : now.toFixed(places);
+  return html`
+    <div class="field">
+      <div class="head">
+        <label for=${id}>${label}</label>
+        <span class="value">
+          <${Input} ...${NUMBER} id=${`${id}-number`} min=${least} value=${text} disabled=${disabled}
+            aria-label=${`${label}, ${unit}`} aria-invalid=${String(Boolean(fault))} onSet=${take} />
+          <span class="unit">${unit}</span>
+        </span>
+      </div>
+      <${Slider} id=${id} ...${range} value=${now} disabled=${disabled}
+        aria-describedby=${`${id}-fault`} onHold=${hold} onSet=${onSet} />
+      <p class="fault" id=${`${id}-fault`} hidden=${!fault}>${fault}</p>
+    </div>`;
 }
 
 /**

@@ -73,7 +73,7 @@ function ask(language) {
 }
 
 function languages() {
-  const words = store.job?.choices["program.language"] ?? [];
+  const words = store.options?.languages ?? [];
   if (!words.length) return null;
   const choices = words.map((word) => ({ value: word, label: word }));
   return html`

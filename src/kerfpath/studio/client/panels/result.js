@@ -76,7 +76,7 @@ function proof(plans) {
     : "The best motion found; no bound on the best cost is proved.";
 }
 
-/** @param {import("../messages.js").Check} check */
+/** @param {import("../messages.js").CheckEntry} check */
 function failure({ title, value, limit, unit, ok }) {
   const is = value === null ? "" : `: ${inUnits(value, unit)}`;
   const most = limit === null ? "" : `, the limit is ${inUnits(limit, unit)}`;

@@ -4,7 +4,7 @@ import { Group, Raycaster, Vector2, Vector3 } from "three";
 
 import { fill, line, paintLines } from "./paths.js";
 
-/** @typedef {import("../messages.js").Loop} Loop */
+/** @typedef {import("../messages.js").LoopEntry} Loop */
 /** @typedef {import("../messages.js").PartMessage} PartMessage */
 /** @typedef {import("./stage.js").Stage} Stage */
 

@@ -19,7 +19,7 @@ import { baseOf, frames, groundOf } from "../kinematics.js";
 import { creased, merged, mesh } from "./meshes.js";
 
 /** @typedef {import("../messages.js").SceneMessage} SceneMessage */
-/** @typedef {import("../messages.js").Body} Body */
+/** @typedef {import("../messages.js").BodyEntry} Body */
 /** @typedef {Body["kind"]} Kind */
 
 /** @type {Record<Kind, string>} */

@@ -3,7 +3,7 @@
 import { Color, Mesh, MeshBasicMaterial, Vector3 } from "three";
 
 import { store } from "../app.js";
-import { byId, themeColour } from "../dom.js";
+import { byId, floatAt, themeColour } from "../dom.js";
 import { millimetres } from "../format.js";
 import { draw, html } from "../ui.js";
 import { creased, mesh } from "./meshes.js";
@@ -74,9 +74,7 @@ export class Near {
     const { stage, canvas } = this.view;
     stage.camera.updateMatrixWorld();
     const { x, y } = stage.project(this.at);
-    const right = Math.min(Math.max(x + 18, 8), canvas.clientWidth - this.label.offsetWidth - 8);
-    const top = Math.min(Math.max(y - 44, 8), canvas.clientHeight - this.label.offsetHeight - 8);
-    this.label.style.transform = `translate(${right}px, ${top}px)`;
+    floatAt(this.label, x + 18, y - 44, canvas);
   }
 
   /**

@@ -1,13 +1,13 @@
 /** Loops and faces of the part, pointed at and clicked: they become contours of the job. */
 
 import { send, store } from "../app.js";
-import { byId } from "../dom.js";
+import { byId, floatAt } from "../dom.js";
 import { counted, millimetres } from "../format.js";
 import { barred, cutLoops, described, leaving, uncut } from "../part.js";
 import { draw, html, icon } from "../ui.js";
 import { Loops, faceOf } from "./loops.js";
 
-/** @typedef {import("../messages.js").Loop} Loop */
+/** @typedef {import("../messages.js").LoopEntry} Loop */
 /** @typedef {import("./view.js").SceneView} SceneView */
 
 export class Picking {
@@ -150,10 +150,7 @@ export class Picking {
     draw(menu, content);
     menu.hidden = false;
     view.label.hidden = true;
-    const room = view.canvas;
-    const left = Math.min(x + 12, room.clientWidth - menu.offsetWidth - 8);
-    const top = Math.min(y + 12, room.clientHeight - menu.offsetHeight - 8);
-    menu.style.transform = `translate(${Math.max(8, left)}px, ${Math.max(8, top)}px)`;
+    floatAt(menu, x + 12, y + 12, view.canvas);
     /** @type {HTMLElement | null} */ (menu.querySelector("button:not(:disabled)"))?.focus();
   }
 

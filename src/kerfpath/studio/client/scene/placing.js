@@ -208,7 +208,7 @@ export class Placing {
 
   /**
    * Show a placement that was tried.
-   * @param {import("../messages.js").Try} tried
+   * @param {import("../messages.js").TryEntry} tried
    */
   preview({ part, rest, offsets }) {
     this.base.copy(matrix(rest)).invert();

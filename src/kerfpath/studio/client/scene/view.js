@@ -3,7 +3,7 @@
 import { Box3, Vector3 } from "three";
 
 import { player, store } from "../app.js";
-import { byId } from "../dom.js";
+import { byId, floatAt } from "../dom.js";
 import { fixed, millimetres, percent } from "../format.js";
 import { draw, html, mount, redraw } from "../ui.js";
 import { Machine } from "./machine.js";
@@ -300,8 +300,7 @@ export class SceneView {
     this.label.hidden = !(found || loop) || !this.picking.menu.hidden;
     if (this.label.hidden) return;
     draw(this.label, found ? this.described(found) : loop && this.picking.words(loop.loop));
-    const right = Math.min(x + 14, this.canvas.clientWidth - this.label.offsetWidth - 8);
-    this.label.style.transform = `translate(${right}px, ${Math.max(4, y - 40)}px)`;
+    floatAt(this.label, x + 14, y - 40, this.canvas);
   }
 
   /**

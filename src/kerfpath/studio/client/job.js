@@ -1,0 +1,58 @@
+/** The keys of the job: their values, what is wrong with them, and edits. */
+
+import { send, store } from "./app.js";
+
+/** @typedef {import("./messages.js").Edit["path"]} Path */
+
+/**
+ * Return the path of a dotted key; "contour.x" is x of the chosen contour's table.
+ * @param {string} key
+ * @returns {Path}
+ */
+export function pathOf(key) {
+  const [first, ...rest] = key.split(".");
+  const inner = rest.map((part) => (/^\d+$/.test(part) ? Number(part) : part));
+  return first === "contour" ? [first, store.table ?? 0, ...inner] : [first, ...inner];
+}
+
+/**
+ * Return the value of a key, or null.
+ * @param {string} key
+ */
+export function valueOf(key) {
+  /** @type {any} */
+  let found = store.job?.values;
+  for (const part of pathOf(key)) found = found?.[part];
+  return found ?? null;
+}
+
+/**
+ * Whether a key is in the text of the job.
+ * @param {string} key
+ */
+export const isGiven = (key) => store.job?.given.includes(pathOf(key).join(".")) ?? false;
+
+/**
+ * Return what is wrong with a key, or "".
+ * @param {string} key
+ */
+export function faultOf(key) {
+  const path = pathOf(key).join(".");
+  return store.job?.faults.find((each) => each.key.join(".") === path)?.message ?? "";
+}
+
+/**
+ * Set a key; null removes it. Edits with the same gesture are one step of undo.
+ * @param {string} key
+ * @param {unknown} value
+ * @param {string} gesture
+ */
+export const setKey = (key, value, gesture) =>
+  send({ type: "edit", path: pathOf(key), value, gesture });
+
+/**
+ * Set several keys in one step of undo.
+ * @param {...[string, unknown]} changes
+ */
+export const setKeys = (...changes) =>
+  send({ type: "edits", edits: changes.map(([key, value]) => ({ path: pathOf(key), value })) });
