@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kerfpath.job import read_job
-from kerfpath.studio.planning import part_message
+from kerfpath.studio.entries import part_message
 from studio.talk import QUICK, serving, talking, write_job
 
 

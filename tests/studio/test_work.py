@@ -7,8 +7,8 @@ import pytest
 
 from kerfpath import plan, refine
 from kerfpath.progress import may_stop, stopped_by
-from kerfpath.studio.hub import Newest, Seldom, Stop, Superseded
-from kerfpath.studio.planning import Cache
+from kerfpath.studio.cache import Cache
+from kerfpath.studio.work import Newest, Seldom, Stop, Superseded
 
 
 @pytest.fixture

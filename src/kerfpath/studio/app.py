@@ -33,7 +33,6 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kerfpath.errors import KerfpathError
 from kerfpath.studio.document import Document
-from kerfpath.studio.entries import File
 from kerfpath.studio.hub import Page
 from kerfpath.studio.messages import (
     CandidateRequest,
@@ -43,6 +42,7 @@ from kerfpath.studio.messages import (
     ProgramRequest,
     parse,
 )
+from kerfpath.studio.program import File
 
 # -----------------------------------------------------------------------------
 # Access to the server: allowed hosts, allowed origins, and the token.
@@ -327,7 +327,7 @@ async def _export(request: Request) -> Response:
         return PlainTextResponse("there is no export of this name\n", status_code=404)
     try:
         if name == "program":
-            from kerfpath.studio.entries import zipped
+            from kerfpath.studio.program import zipped
 
             result, texts = await session.program(language)
             return _download(zipped(result.job.program.name, texts))

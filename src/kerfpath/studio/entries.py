@@ -1,184 +1,45 @@
-"""Entries of messages: plans, contours without one, files, the text of a program, the job."""
+"""Messages about the job, its plans, contours without one, distances in the cell, and the part."""
 
 from __future__ import annotations
 
-import io
 import re
-import zipfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import ValidationError
 
 from kerfpath.arrays import Array
 from kerfpath.auditor import Check
+from kerfpath.cad import Loop, Part
+from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES
 from kerfpath.errors import InputError
 from kerfpath.job import (
     CutResult,
-    FileTexts,
     Job,
     JobFile,
-    JobResult,
-    ProgramTable,
-    program_options,
-    program_places,
-    script_refusal,
 )
 from kerfpath.plans import Plan
-from kerfpath.post import Line, ProgramIssue, TimedLine, languages
 from kerfpath.studio.document import Document
 from kerfpath.studio.messages import (
     CheckEntry,
+    ClearanceMessage,
     ContourName,
     CriteriaEntry,
     EditEntry,
-    Export,
+    FaceEntry,
     Fault,
-    FileEntry,
-    FindingEntry,
     JobMessage,
+    LoopEntry,
     LossEntry,
     NearestEntry,
     NoPathMessage,
+    PartMessage,
     PlanMessage,
-    ProgramTextMessage,
     Relaxation,
     flat,
+    flat_or_none,
 )
-
-# -----------------------------------------------------------------------------
-# Files for download.
-
-
-class File(NamedTuple):
-    """A file for download: its name, media type and content."""
-
-    name: str
-    kind: str
-    content: bytes
-
-
-# -----------------------------------------------------------------------------
-# Exports: the job, the program in a language, plan, trajectory and report.
-
-WAIT = "the bounds of the plans are still being computed"
-
-
-def exports_of(result: JobResult, *, settled: bool) -> list[Export]:
-    """Return the exports of a result, with the reason why one is not available.
-
-    Parameters
-    ----------
-    result : JobResult
-    settled : bool
-        False while bounds of its plans are still to be computed.
-    """
-    program = ""
-    if not result.passed:
-        program = "a contour has no plan that passes its audit, or a transfer move is missing"
-    elif result.job.program.language == "none":
-        program = 'the job has language = "none" in [program]; set a language there'
-    files = "" if settled else WAIT
-    script = script_refusal(result.job, [cut.request for cut in result.cuts])
-    return [
-        Export(name="job", href="/export/job", ready=True),
-        Export(name="program", href="/export/program", ready=not program, why=program),
-        Export(name="plan.json", href="/export/plan.json", ready=settled, why=files),
-        Export(name="trajectory.csv", href="/export/trajectory.csv", ready=settled, why=files),
-        Export(name="script", href="/export/script", ready=not script, why=script),
-        Export(name="report", href="/report", ready=settled, why=files),
-    ]
-
-
-def in_language(result: JobResult, language: str | None) -> JobResult:
-    """Return the result with another language for its program; None keeps the job's own.
-
-    Raises
-    ------
-    InputError
-        The language is unknown, or the settings of [program] do not fit it.
-    """
-    if language is None:
-        return result
-    if language not in languages():
-        raise InputError(
-            f"language {language!r:.40} is not known; expected {', '.join(sorted(languages()))}"
-        )
-    table: Mapping[str, Any] = {**result.job.source.get("program", {}), "language": language}
-    try:
-        asked = ProgramTable.model_validate(table)
-    except ValidationError as error:
-        said = error.errors(include_url=False)[0]["msg"]
-        raise InputError(f"program in {language}: {said}; correct [program]") from None
-    # Keep the name of the job: the file that was read may be a copy with another name.
-    job = result.job
-    options = program_options(asked, job.program.name, job.tolerances)
-    options = replace(options, language=language)
-    return replace(result, job=replace(result.job, program=options))
-
-
-def program_text(result: JobResult, texts: FileTexts, revision: int) -> ProgramTextMessage:
-    """Return the program files of a result, with the time of each line."""
-    faults = list(texts.faults)
-    if not texts.program and not faults:
-        faults = ["no program: a contour has no plan that passes its audit"]
-    places = program_places(result, {name: texts.files[name] for name in texts.program})
-    said = {str(issue) for issue, _ in places.findings}
-    return ProgramTextMessage(
-        language=result.job.program.language,
-        revision=revision,
-        files=[_file(name, texts.files[name], places.lines) for name in texts.program],
-        findings=[_finding(*found) for found in places.findings],
-        notes=[note for note in texts.notes if note not in said],
-        faults=faults,
-    )
-
-
-def _file(name: str, text: str, lines: Sequence[TimedLine]) -> FileEntry:
-    mine = [each for each in lines if each.line.file == name]
-    return FileEntry(
-        name=name,
-        text=text,
-        lines=[each.line.number for each in mine],
-        begin=flat([each.begin for each in mine], 6),
-        end=flat([each.end for each in mine], 6),
-    )
-
-
-def _finding(issue: ProgramIssue, line: Line | None) -> FindingEntry:
-    return FindingEntry(
-        level=issue.level,
-        message=issue.message,
-        place=issue.place,
-        file=None if line is None else line.file,
-        line=None if line is None else line.number,
-    )
-
-
-def zipped(name: str, texts: FileTexts) -> File:
-    """Return the program as one file, or as an archive if it has several files.
-
-    Raises
-    ------
-    InputError
-        There is no program.
-    """
-    if not texts.program:
-        why = "; ".join(texts.faults) or "a contour has no plan that passes its audit"
-        raise InputError(f"no program: {why}")
-    if len(texts.program) == 1:
-        (only,) = texts.program
-        return File(only.rsplit("/", 1)[-1], "text/plain", texts.files[only].encode())
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for each in texts.program:
-            # ZipInfo has a fixed time, so that the same program gives the same archive.
-            archive.writestr(zipfile.ZipInfo(each), texts.files[each])
-    return File(f"{name}.zip", "application/zip", packed.getvalue())
-
+from kerfpath.studio.work import Stop
 
 # -----------------------------------------------------------------------------
 # The messages about a plan, and about the reason why there is none.
@@ -480,3 +341,94 @@ def _given(value: object, way: str = "") -> Iterator[str]:
         entries = list(enumerate(value))
     for name, inner in entries:
         yield from _given(inner, f"{way}.{name}" if way else str(name))
+
+
+# -----------------------------------------------------------------------------
+# The distances of bodies in the cell along each plan, computed once it is found.
+
+AT_ONCE = 32
+"""Number of nodes that are measured between two checks for a stop."""
+
+
+def clearance_message(
+    cell: Cell, cut: CutResult, revision: int, stop: Stop
+) -> ClearanceMessage | None:
+    """Return the nearest pair of bodies at each node of a planned cut, and its distance.
+
+    Only pairs with the near-miss distance of the cell count. Pairs with a distance of their own,
+    such as the nozzle and the part or neighbours in the arm, are left out: they are always near,
+    and the plan keeps their distance. Return None if there is no other pair.
+
+    Raises
+    ------
+    Superseded
+        Something else has been requested meanwhile.
+    """
+    assert cut.plan is not None
+    q, general = cut.plan.unwrapped, ~cell.own
+    if not general.any():
+        return None
+    distance, pair = np.empty(len(q)), np.empty(len(q), dtype=np.int64)
+    for begin in range(0, len(q), AT_ONCE):
+        stop.check()
+        part = slice(begin, begin + AT_ONCE)
+        wanted = np.broadcast_to(general, (len(q[part]), len(general)))
+        found = cell.distances(q[part], wanted=wanted)
+        pair[part] = np.nanargmin(found, axis=1)
+        distance[part] = np.nanmin(found, axis=1)
+    used, index = np.unique(pair, return_inverse=True)
+    return ClearanceMessage(
+        revision=revision,
+        contour=cut.contour,
+        name=cut.plan.name,
+        distance=flat_or_none(distance),
+        over=flat_or_none(distance - cell.required[pair]),
+        pair=index.tolist(),
+        pairs=[list(cell.pair_names[k]) for k in used.tolist()],
+    )
+
+
+# -----------------------------------------------------------------------------
+# The message about the part: its loops, cut or not, and the face of each of its triangles.
+
+MOST_LOOPS = 3000
+"""Number of loops that a page gets, the longest ones: more could not be distinguished."""
+FINEST = 2e-5
+"""Least chord error of a drawn loop, m: smaller errors are not visible."""
+SHARE = 2e-3
+"""Chord error as a share of the length of the loop, so that small holes look round."""
+COARSEST = 2e-4
+"""Largest chord error of a drawn loop, m."""
+
+
+def part_message(job: Job, part: Part, revision: int) -> PartMessage:
+    """Return the pickable loops of a part, in the robot base, and the faces of its mesh.
+
+    As in `Part.pick`, loops of the pieces of a skin and loops around the thickness of a sheet are
+    left out.
+    """
+    asked = [loop for loop in part.loops if not loop.skin and loop.side != "edge"]
+    told = sorted(asked, key=lambda loop: -loop.length)[:MOST_LOOPS]
+    kept = {loop.name for loop in told}
+    return PartMessage(
+        revision=revision,
+        loops=[_entry(loop, job) for loop in asked if loop.name in kept],
+        faces=[FaceEntry(name=name, triangles=count) for name, count in part.mesh_faces()],
+        left_out=len(part.loops) - len(told),
+    )
+
+
+def _entry(loop: Loop, job: Job) -> LoopEntry:
+    off = float(np.clip(SHARE * loop.length, FINEST, COARSEST))
+    points = loop.line(off) @ job.placement[:3, :3].T + job.placement[:3, 3]
+    return LoopEntry(
+        name=loop.name,
+        face=loop.face,
+        kind=loop.kind,
+        side=loop.side,
+        closed=loop.closed,
+        length=loop.length,
+        diameter=loop.diameter,
+        gap=loop.largest_gap,
+        points=flat(points, 6),
+    )

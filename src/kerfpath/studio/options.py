@@ -17,13 +17,7 @@ from kerfpath.front import CRITERIA
 from kerfpath.job import JobFile
 from kerfpath.post import languages
 from kerfpath.robots import Robot
-from kerfpath.studio.messages import (
-    Companion,
-    OptionField,
-    OptionGroup,
-    OptionsMessage,
-    Sampling,
-)
+from kerfpath.studio.messages import Companion, OptionField, OptionGroup, OptionsMessage, Sampling
 
 UNITS = {
     "_mm_s2": "mm/s2", "_deg_s2": "deg/s2", "_mm_s": "mm/s", "_deg_s": "deg/s", "_m_min": "m/min",

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from threading import Event, Lock
+from threading import Event
 from time import perf_counter
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
-import numpy as np
-
-from kerfpath.arrays import Array
-from kerfpath.cad import Loop, Part
+from kerfpath.cad import Part
 from kerfpath.compiling import FOR_BOUNDS
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, KerfpathError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import (
     Candidate,
-    ContourTable,
     CutRequest,
     CutResult,
     Job,
@@ -29,193 +24,51 @@ from kerfpath.job import (
     advised,
     all_of,
     certified,
-    course_of_plans,
     cut_candidate,
     fastest_along,
     foresee,
     is_compiled,
     measured,
     order_cuts,
-    prepare,
     warm_up,
 )
 from kerfpath.planner import at_most, draft
 from kerfpath.plans import Plan
-from kerfpath.studio.document import PROVING, cut_key, graph_key, motion_key, part_key, setup_key
-from kerfpath.studio.entries import alternatives, exports_of, no_path_message, plan_message
-from kerfpath.studio.front import Fronts, Layouts, clearance_message
-from kerfpath.studio.hub import Newest, Seldom, Stop, cycle_of, program_message, said_of
+from kerfpath.studio.cache import (
+    PROVING,
+    ResultCache,
+    cut_key,
+    motion_key,
+    part_key,
+    setup_key,
+)
+from kerfpath.studio.entries import (
+    alternatives,
+    clearance_message,
+    no_path_message,
+    part_message,
+    plan_message,
+)
 from kerfpath.studio.messages import (
     CandidateMessage,
     CandidateRequest,
     ClearanceMessage,
     EditEntry,
     ErrorMessage,
-    FaceEntry,
     FastestMessage,
     FrontRequest,
     LayoutRequest,
-    LoopEntry,
     Message,
     OutcomeMessage,
-    PartMessage,
     PlanMessage,
     ProgressMessage,
     SceneMessage,
-    flat,
 )
 from kerfpath.studio.pose_map import map_id
+from kerfpath.studio.program import cycle_of, exports_of, program_message
 from kerfpath.studio.scene import Meshes, scene_of, scene_of_robot, tables_of
-
-# -----------------------------------------------------------------------------
-# Results that are kept from one plan to the next: drawing, cell, nodes, graphs and cuts.
-
-MOST_VERTICES = 1_000_000
-"""Vertices of the graphs that each store keeps beyond those of the last two runs (about 70 MB)."""
-_T = TypeVar("_T")
-
-
-class _Used(Generic[_T]):
-    """A kept object, and the round in which it was last used."""
-
-    def __init__(self, thing: _T, last: int) -> None:
-        self.thing, self.last = thing, last
-
-
-class Cache(Generic[_T]):
-    """A cache that drops the oldest objects once they are too large together.
-
-    Objects used in the current or the previous round are never dropped: a run uses the same
-    objects in the same order, and would find none of them if the oldest were dropped.
-
-    Parameters
-    ----------
-    size : callable
-        Returns the size of an object.
-    most : int
-        Total size beyond which the oldest objects are dropped.
-    """
-
-    def __init__(self, size: Callable[[_T], int], most: int) -> None:
-        self._size, self._most, self._lock, self._round = size, most, Lock(), 0
-        self._things: OrderedDict[str, _Used[_T]] = OrderedDict()
-
-    def __len__(self) -> int:
-        return len(self._things)
-
-    def begin(self) -> None:
-        """Begin a round."""
-        with self._lock:
-            self._round += 1
-
-    def get(self, key: str) -> _T | None:
-        """Return a kept object; None if there is none."""
-        with self._lock:
-            found = self._things.get(key)
-            if found is None:
-                return None
-            found.last = self._round
-            self._things.move_to_end(key)
-            return found.thing
-
-    def put(self, key: str, thing: _T) -> None:
-        """Keep an object."""
-        with self._lock:
-            self._things[key] = _Used(thing, self._round)
-            self._things.move_to_end(key)
-            total = sum(self._size(used.thing) for used in self._things.values())
-            while total > self._most:
-                eldest = next(iter(self._things))
-                if self._things[eldest].last >= self._round - 1:
-                    break
-                total -= self._size(self._things.pop(eldest).thing)
-
-
-class ResultCache:
-    """The intermediate results that successive plans of a job share."""
-
-    def __init__(self) -> None:
-        self._part: tuple[str, Part] | None = None
-        self._prepared: tuple[str, PreparedJob] | None = None
-        self._graphs: Cache[LayeredGraph] = Cache(lambda graph: len(graph.q), MOST_VERTICES)
-        self.cuts: Cache[tuple[CutResult, ...]] = Cache(_vertices, MOST_VERTICES)
-        """Results of contours, by `cut_key` and candidate."""
-        self.proved: Cache[CutResult] = Cache(lambda cut: len(cut.graph.q), MOST_VERTICES)
-        """Results with their bounds."""
-
-    def begin(self) -> None:
-        """Begin a run: objects that only runs before the last one used may be dropped."""
-        for kept in (self._graphs, self.cuts, self.proved):
-            kept.begin()
-
-    def prepared(self, job: Job) -> PreparedJob:
-        """Return a job with its drawing and cell read; unchanged parts are used again.
-
-        Raises
-        ------
-        InputError
-            As for `kerfpath.job.prepare`.
-        """
-        setup = setup_key(job)
-        if self._prepared is not None and self._prepared[0] == setup:
-            before = replace(self._prepared[1], job=job)
-            tables = [job.contours[i].table for i in tables_of(before)]
-            contours = zip(before.contours, tables, strict=True)
-            return replace(before, contours=tuple(_pinned(each, job, t) for each, t in contours))
-        made = prepare(job, self.part(job))
-        self._prepared = setup, made
-        return made
-
-    def part(self, job: Job) -> Part:
-        """Return the content of a job's drawing.
-
-        Raises
-        ------
-        InputError
-            The drawing cannot be read.
-        """
-        key = part_key(job)
-        if self._part is None or self._part[0] != key:
-            self._part = key, job.read_part()
-        return self._part[1]
-
-    def graph(
-        self,
-        job: Job,
-        nodes: Contour,
-        solved: Callable[[int], None] | None = None,
-        external: Array | None = None,
-    ) -> LayeredGraph:
-        """Return the layered graph of a job's nodes; `external` is as in `Job.graph`."""
-        key = graph_key(job, nodes, external)
-        found = self._graphs.get(key)
-        if found is None:
-            found = job.graph(nodes, external=external, progress=solved)
-            self._graphs.put(key, found)
-        return found
-
-    def whole(self, job: Job, cuts: Sequence[CutResult]) -> tuple[Contour, LayeredGraph]:
-        """Return the nodes and the graph of a contour from its cut, or the cuts of its pieces."""
-        one = cuts[0]
-        if len(cuts) == 1:
-            return one.candidate.nodes, one.graph
-        nodes = one.request.candidates[0].nodes
-        plans = [cut.plan for cut in cuts if cut.plan is not None]
-        along = job.robot.externals and job.options.method == "continuous"
-        x = course_of_plans(job, nodes, plans) if along else None
-        return nodes, self.graph(job, nodes, external=x)
-
-
-def _pinned(request: CutRequest, job: Job, table: ContourTable) -> CutRequest:
-    """Return the request of a contour with the options and windows of gamma of another job."""
-    own = request.task.table.model_copy(update={"gamma_windows": table.gamma_windows})
-    task = replace(request.task, table=own)
-    return replace(request, task=task, options=task.asked(job.options))
-
-
-def _vertices(cuts: tuple[CutResult, ...]) -> int:
-    return sum(len(cut.graph.q) for cut in cuts)
-
+from kerfpath.studio.studies import Fronts, Layouts
+from kerfpath.studio.work import Newest, Seldom, Stop, said_of
 
 # -----------------------------------------------------------------------------
 # The fastest constant speed of a contour, as an edit of the job.
@@ -260,52 +113,6 @@ def fastest_message(
         binds=f"the {found.limit} of {job.robot.joint_names[found.joint]} at node {found.node}, "
         f"{place} mm",
         edits=[EditEntry(path=["contour", index, "speed_m_min"], value=speed)],
-    )
-
-
-# -----------------------------------------------------------------------------
-# The message about the part: its loops, cut or not, and the face of each of its triangles.
-
-MOST_LOOPS = 3000
-"""Number of loops that a page gets, the longest ones: more could not be distinguished."""
-FINEST = 2e-5
-"""Least chord error of a drawn loop, m: smaller errors are not visible."""
-SHARE = 2e-3
-"""Chord error as a share of the length of the loop, so that small holes look round."""
-COARSEST = 2e-4
-"""Largest chord error of a drawn loop, m."""
-
-
-def part_message(job: Job, part: Part, revision: int) -> PartMessage:
-    """Return the pickable loops of a part, in the robot base, and the faces of its mesh.
-
-    As in `Part.pick`, loops of the pieces of a skin and loops around the thickness of a sheet are
-    left out.
-    """
-    asked = [loop for loop in part.loops if not loop.skin and loop.side != "edge"]
-    told = sorted(asked, key=lambda loop: -loop.length)[:MOST_LOOPS]
-    kept = {loop.name for loop in told}
-    return PartMessage(
-        revision=revision,
-        loops=[_entry(loop, job) for loop in asked if loop.name in kept],
-        faces=[FaceEntry(name=name, triangles=count) for name, count in part.mesh_faces()],
-        left_out=len(part.loops) - len(told),
-    )
-
-
-def _entry(loop: Loop, job: Job) -> LoopEntry:
-    off = float(np.clip(SHARE * loop.length, FINEST, COARSEST))
-    points = loop.line(off) @ job.placement[:3, :3].T + job.placement[:3, 3]
-    return LoopEntry(
-        name=loop.name,
-        face=loop.face,
-        kind=loop.kind,
-        side=loop.side,
-        closed=loop.closed,
-        length=loop.length,
-        diameter=loop.diameter,
-        gap=loop.largest_gap,
-        points=flat(points, 6),
     )
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +15,13 @@ from kerfpath.arrays import Array, Ints
 from kerfpath.cell import Cell
 from kerfpath.comfort import MEASURES, measure
 from kerfpath.contour import Contour
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.job import CutResult, Job
+from kerfpath.job import CutResult, Job, PreparedJob
 from kerfpath.losses import Loss, Reason
-from kerfpath.planner import clearance_map
+from kerfpath.options import PlanOptions
+from kerfpath.planner import clearance_map, plan
 from kerfpath.robots import Robot, posture_name
-from kerfpath.studio.hub import Stop
 from kerfpath.studio.messages import (
     CodeLayer,
     CourseEntry,
@@ -29,8 +30,11 @@ from kerfpath.studio.messages import (
     ShadeLayer,
     ShadeMessage,
     ShadeName,
+    TechniqueMessage,
     flat,
+    flat_or_none,
 )
+from kerfpath.studio.work import Stop
 
 KINDS = {
     Loss.ADMITTED: "admitted",
@@ -406,3 +410,69 @@ def _on_the_map(graph: LayeredGraph, found: _Values) -> tuple[NDArray[np.uint8],
 
 def _text(codes: NDArray[np.uint8]) -> str:
     return base64.b64encode(codes.tobytes()).decode()
+
+
+# -----------------------------------------------------------------------------
+# Courses of other techniques on a contour: the paper's procedure, and the known technique.
+
+
+def technique_message(
+    prepared: PreparedJob,
+    cut: CutResult,
+    nodes: Contour,
+    graph: LayeredGraph,
+    method: Literal["paper", "known"],
+    *,
+    revision: int,
+) -> TechniqueMessage:
+    """Return the course of a technique along a contour, on the layered graph of its plan."""
+    asked, notes = _without(cut.request.options, prepared, method)
+    job, first = prepared.job, float(nodes.s[0])
+    robot = replace(job.robot, load=None, jerk=None)
+    base = TechniqueMessage(
+        revision=revision, contour=cut.contour, method=method, s=[], gamma=[], posture=[],
+        cost=None, peak_velocity=[], peak_acceleration=[], statement="", notes=notes,
+    )  # fmt: skip
+    try:
+        made = plan(
+            nodes, robot, tool=job.tool, placement=job.placement, speed=cut.candidate.speed,
+            options=asked, graph=graph,
+        )  # fmt: skip
+    except NoFeasiblePath as broken:
+        return base.model_copy(update={"statement": str(broken)})
+    criteria = made.criteria
+    found = {
+        "s": flat(made.contour.s - first),
+        "gamma": flat(made.gamma),
+        "posture": made.posture.tolist(),
+        "cost": made.cost,
+        "peak_velocity": flat_or_none(criteria.peak_velocity),
+        "peak_acceleration": flat_or_none(criteria.peak_acceleration),
+        "statement": made.proof.statement,
+    }
+    return base.model_copy(update=found)
+
+
+def _without(
+    options: PlanOptions, prepared: PreparedJob, method: Literal["paper", "known"]
+) -> tuple[PlanOptions, list[str]]:
+    """Return the options that the technique can use, and a note on those that it ignores."""
+    comfort = options.comfort
+    asked = replace(
+        options, method=method, refine=False, refine_parts=1, certify=None,
+        closure="free", rotation=None, feed="constant", interruptions="none", least_piece=None,
+        between_nodes="reported",
+        comfort=None if comfort is None else replace(comfort, clearance=None),
+    )  # fmt: skip
+    kept = {
+        "the closure of the motion": options.closure == "free",
+        "limits on the rotation of endless joints": options.rotation is None,
+        "feed reductions": options.feed == "constant",
+        "interruptions": options.interruptions == "none",
+        "limits between the nodes": options.between_nodes != "guaranteed",
+        "limits on torque": prepared.job.robot.load is None,
+        "limits on jerk": prepared.job.robot.jerk is None,
+        "collisions in the cell": prepared.cell is None,
+    }
+    left = [words for words, none in kept.items() if not none]
+    return asked, [f"It ignores {', '.join(left)}."] if left else []

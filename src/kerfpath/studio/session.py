@@ -22,17 +22,9 @@ from kerfpath.job import (
     with_loops,
     without_contour,
 )
-from kerfpath.studio.document import Change, Document, KeptJobs, technique_message
-from kerfpath.studio.entries import (
-    WAIT,
-    File,
-    faults_of,
-    in_language,
-    job_file,
-    job_message,
-    program_text,
-)
-from kerfpath.studio.hub import Hub, Newest, Page, Stop, said_of
+from kerfpath.studio.document import Change, Document, KeptJobs
+from kerfpath.studio.entries import faults_of, job_file, job_message
+from kerfpath.studio.hub import Hub, Page
 from kerfpath.studio.messages import (
     CandidateRequest,
     Command,
@@ -75,9 +67,12 @@ from kerfpath.studio.pose_map import (
     pose_message,
     shade_message,
     shades_of,
+    technique_message,
     with_collisions,
 )
+from kerfpath.studio.program import WAIT, File, in_language, program_text
 from kerfpath.studio.scene import tables_of
+from kerfpath.studio.work import Newest, Stop, said_of
 
 # -----------------------------------------------------------------------------
 # Answers to the read-only questions of pages about planned contours.

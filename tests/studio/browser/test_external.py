@@ -101,8 +101,8 @@ def carried(messages):
     options = options_message(CARRIED, ["rail", "table"]).model_dump(mode="json")
     return [
         job,
-        options,
         scene,
+        options,
         *messages["part"],
         *plans,
         *messages["outcome"],

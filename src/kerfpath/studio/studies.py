@@ -1,4 +1,4 @@
-"""Other placements of the part: the test of reach, and the search for the best one."""
+"""Searches over many plans: the Pareto set of a contour, and other placements of the part."""
 
 from __future__ import annotations
 
@@ -16,18 +16,15 @@ import moocore
 import numpy as np
 
 from kerfpath.arrays import Array
-from kerfpath.cell import Cell
 from kerfpath.errors import InputError
 from kerfpath.front import AHEAD, Criterion, Evaluation, FrontSearch, Subproblem
 from kerfpath.job import CutResult, Job, PreparedJob
 from kerfpath.plans import Plan
 from kerfpath.studio.document import Change, with_values
 from kerfpath.studio.entries import plan_message
-from kerfpath.studio.hub import Newest, Seldom, Stop
 from kerfpath.studio.messages import (
     AxisEntry,
     CandidateMessage,
-    ClearanceMessage,
     EditEntry,
     FrontMessage,
     LayoutMessage,
@@ -40,8 +37,8 @@ from kerfpath.studio.messages import (
     ReachRequest,
     TryEntry,
     flat,
-    flat_or_none,
 )
+from kerfpath.studio.work import Newest, Seldom, Stop
 from kerfpath.study import digest, problem_of_job
 from kerfpath.study.placing import (
     UNITS,
@@ -56,51 +53,6 @@ from kerfpath.study.placing import (
     placed_text,
     placement_of,
 )
-
-# -----------------------------------------------------------------------------
-# The distances of bodies in the cell along each plan, computed once it is found.
-
-AT_ONCE = 32
-"""Number of nodes that are measured between two checks for a stop."""
-
-
-def clearance_message(
-    cell: Cell, cut: CutResult, revision: int, stop: Stop
-) -> ClearanceMessage | None:
-    """Return the nearest pair of bodies at each node of a planned cut, and its distance.
-
-    Only pairs with the near-miss distance of the cell count. Pairs with a distance of their own,
-    such as the nozzle and the part or neighbours in the arm, are left out: they are always near,
-    and the plan keeps their distance. Return None if there is no other pair.
-
-    Raises
-    ------
-    Superseded
-        Something else has been requested meanwhile.
-    """
-    assert cut.plan is not None
-    q, general = cut.plan.unwrapped, ~cell.own
-    if not general.any():
-        return None
-    distance, pair = np.empty(len(q)), np.empty(len(q), dtype=np.int64)
-    for begin in range(0, len(q), AT_ONCE):
-        stop.check()
-        part = slice(begin, begin + AT_ONCE)
-        wanted = np.broadcast_to(general, (len(q[part]), len(general)))
-        found = cell.distances(q[part], wanted=wanted)
-        pair[part] = np.nanargmin(found, axis=1)
-        distance[part] = np.nanmin(found, axis=1)
-    used, index = np.unique(pair, return_inverse=True)
-    return ClearanceMessage(
-        revision=revision,
-        contour=cut.contour,
-        name=cut.plan.name,
-        distance=flat_or_none(distance),
-        over=flat_or_none(distance - cell.required[pair]),
-        pair=index.tolist(),
-        pairs=[list(cell.pair_names[k]) for k in used.tolist()],
-    )
-
 
 # -----------------------------------------------------------------------------
 # The Pareto set of a contour: its runs, and the edits that make the plan of one the job's.
