@@ -2,11 +2,14 @@
 
 import re
 
+import pytest
+
 from conftest import ROOT
 
 README = (ROOT / "README.md").read_text()
 
 
+@pytest.mark.usefixtures("certified_by_default")
 def test_the_python_example_runs_and_its_audit_is_clean(capsys):
     (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     exec(compile(code, "README.md", "exec"), {})
