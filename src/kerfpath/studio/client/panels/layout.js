@@ -129,7 +129,14 @@ export function layoutSheet(placing) {
 
   /** The numbers of the placement. */
   function fields() {
-    const { xyz, rpy } = placing.place ?? { xyz: [0, 0, 0], rpy: [0, 0, 0] };
+    const place = () => placing.place ?? { xyz: [0, 0, 0], rpy: [0, 0, 0] };
+    const { xyz, rpy } = place();
+    /** @type {(which: "xyz" | "rpy", i: number) => (to: number) => void} */
+    const putPart = (which, i) => (to) => {
+      const now = place(); // not what was drawn last
+      now[which][i] = to;
+      placing.put(now.xyz, now.rpy);
+    };
     const offsets = placing.offsets();
     const base = ["x", "y", "z"].map((axis) => offsets[`base_${axis}_mm`] ?? 0);
     const [yaw, mount] = [offsets.base_yaw_deg ?? 0, offsets.mount_deg ?? 0];
@@ -146,10 +153,10 @@ export function layoutSheet(placing) {
     return html`
       <div class="place">
         ${["x", "y", "z"].map((axis, i) =>
-          field(`Part ${axis}`, axis, "mm", 10, xyz[i], (to) => placing.put(xyz.with(i, to), rpy)),
+          field(`Part ${axis}`, axis, "mm", 10, xyz[i], putPart("xyz", i)),
         )}
         ${["roll", "pitch", "yaw"].map((turn, i) =>
-          field(`Part ${turn}`, turn, "deg", 1, rpy[i], (to) => placing.put(xyz, rpy.with(i, to))),
+          field(`Part ${turn}`, turn, "deg", 1, rpy[i], putPart("rpy", i)),
         )}
       </div>
       <details class="group-of-keys">
