@@ -38,10 +38,14 @@ ROOT = Path(__file__).parents[1]
 JOBS = ROOT / "tests" / "outputs"
 INPUTS = (ROOT / "src" / "kerfpath" / "demo", ROOT / "examples" / "parts", JOBS)
 """Folders of jobs and drawings; every case begins with a copy of their files."""
-MASKS: tuple[tuple[re.Pattern[str], str], ...] = ()
+MASKS = {
+    r'(?m)(?<="seconds": )[\d.e-]+(?=}$)': "SECONDS",  # of a plan, in the messages of the studio
+    r"(\.toml +\d+/\d+ +\w+ +[\d.]+) +[\d.]+": r"\1 SECONDS",  # of a job, in the table of a batch
+}
 """What two runs of one commit write differently, and what stands for it.
 
-The folder of a case is masked, too. Progress is neither shown (`--quiet`) nor recorded.
+The folder of a case is masked, too, and what a stopped study goes on from (.sqlite) is left out.
+Progress is neither shown (`--quiet`) nor recorded.
 """
 
 
@@ -92,10 +96,10 @@ class Workshop:
     def collect(self, folder: Path) -> None:
         """Copy all outputs to a folder, masked."""
         for file in sorted(self.folder.rglob("*")):
-            if file.is_file() and file not in self._inputs:
+            if file.is_file() and file not in self._inputs and file.suffix != ".sqlite":
                 text = file.read_bytes().decode("latin-1").replace(str(self.folder), "FOLDER")
-                for pattern, instead in MASKS:
-                    text = pattern.sub(instead, text)
+                for pattern, instead in MASKS.items():
+                    text = re.sub(pattern, instead, text)
                 target = folder / file.relative_to(self.folder)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 target.write_bytes(text.encode("latin-1"))
@@ -168,6 +172,7 @@ xyz_mm = [750, -100, 350]
 [program]
 language = "LANGUAGE"
 pierce_time_s = 0.3
+lead_time_s = 0.01
 """
 
 
@@ -182,7 +187,7 @@ def planned(shop: Workshop, text: str, *languages: str) -> None:
         for program in sorted((shop.folder / "out").glob("job.*")):
             shop.run(f"audit out/{program.name} --job job.toml")
         for language in languages:
-            shop.run(f"post out/plan.json --job job.toml --language {language}")
+            shop.run(f"post out/plan.json --language {language}")
 
 
 def shipped(name: str) -> Callable[[Workshop], None]:
@@ -231,8 +236,10 @@ def commands(shop: Workshop) -> None:
     moved = re.sub(r"(MoveL \[\[-?\d+)\.", r"\g<1>9.", shop.text("slits/slits.mod"), count=1)
     shop.input("moved.mod", moved)
     shop.input("points.csv", MEASURED)
-    shop.input("grid.toml", with_keys(shop.text("slits.toml"), ON_GRID))
-    shop.both("speed grid.toml")
+    one_slit = re.sub(r'\[\[contour\]\]\npick = "b"[^[]*', "", shop.text("slits.toml"))
+    shop.input("slit.toml", with_keys(one_slit, ON_GRID))
+    shop.both("speed slit.toml")
+    shop.run("check b_pillar_cell.toml")
     for command in COMMANDS.split("\n\n")[1].splitlines():
         shop.both(command)
     for language in LANGUAGES:
@@ -245,7 +252,6 @@ def commands(shop: Workshop) -> None:
 COMMANDS = """\
 plan slits.toml --out slits
 check slits.toml
-check b_pillar_cell.toml
 robots
 robots abb_irb4600_60_205
 robots fanuc_m20id_25
@@ -265,10 +271,13 @@ touch-up moved.mod --job slits.toml --plan slits/plan.json --out touched
 """
 """Commands before and after a target of their program is moved."""
 ON_GRID = """\
+[[contour]]
+count = 3
 [plan]
 method = "exact"
 refine = false
 between_nodes = "reported"
+posture = "front/up"
 """
 HELP = """\
 plan check speed contours robots post audit compare touch-up script pareto batch layout studio demo
@@ -283,13 +292,14 @@ nominal_x_mm,nominal_y_mm,nominal_z_mm,measured_x_mm,measured_y_mm,measured_z_mm
 
 def studies(shop: Workshop) -> None:
     """Run the studies, small."""
+    shop.input("grid.toml", with_keys(shop.text("slits.toml"), ON_GRID))
     for command in STUDIES.splitlines():
         shop.run(f"{command} --processes 1")
 
 
 STUDIES = """\
-pareto slits.toml --runs 10 --out pareto
-layout slits.toml --evaluations 8 --map-points 3 --out layout
+pareto grid.toml --runs 10 --out pareto
+layout grid.toml --evaluations 8 --map-points 3 --out layout
 batch slits.toml plate.toml --out batch
 """
 
