@@ -69,7 +69,7 @@ def _about(path: Path) -> Iterator[None]:
         raise OSError(error.errno, error.strerror, str(path)) from None
 
 
-def no_more_writing(timeout: float) -> None:
+def finish_writes(timeout: float) -> None:
     """Wait, for `timeout` s at most, until a file in progress is written; begin no other.
 
     Call it just before the process ends: every later `write_whole` waits forever.

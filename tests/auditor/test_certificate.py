@@ -11,7 +11,7 @@ from kerfpath import Contour, InputError, plan, robot
 from kerfpath.auditor import certificate as certificate_module
 from kerfpath.auditor import certified_bound, checks
 from kerfpath.auditor import steps as steps_module
-from kerfpath.auditor.certificate import _asked, _rates
+from kerfpath.auditor.certificate import _rates, certificate_inputs
 from kerfpath.auditor.cover import covered
 from kerfpath.auditor.steps import candidates, reduced_costs
 from kerfpath.certificate import Certificate
@@ -67,7 +67,7 @@ def row(of):
 def potential(of, level=0, multipliers=None):
     """A certificate from the value function over the cells' middles."""
     node, posture, index, q, _, reach = every_cell(of, level)
-    value = grid_values(of, node, q, reach, _asked(of)[1].velocity[0])
+    value = grid_values(of, node, q, reach, certificate_inputs(of)[1].velocity[0])
     stage = stage_of(node, posture, level, index, q, np.c_[value, value], None, multipliers)
     return Certificate(bound=0.0, stages=(stage,))
 
@@ -86,7 +86,7 @@ def test_no_step_costs_less_than_is_claimed(which, metric, request):
     of, rng = request.getfixturevalue(which), np.random.default_rng(3)
     settings = replace(of.settings, metric=metric)
     of = replace(of, settings=settings)
-    where, rates, _ = _asked(of)
+    where, rates, _ = certificate_inputs(of)
     K, n = of.q.shape
     rates = replace(
         rates, velocity=rates.velocity * 20, tilt=rng.normal(size=(K - 1, n)) * rates.weights
@@ -143,7 +143,7 @@ def test_no_step_costs_less_than_is_claimed(which, metric, request):
 @pytest.mark.parametrize("which", ["made", "turning"])
 def test_the_pairs_are_those_that_a_step_may_join(which, request):
     of = request.getfixturevalue(which)
-    where, rates, _ = _asked(of)
+    where, rates, _ = certificate_inputs(of)
     rates = replace(rates, velocity=rates.velocity * 5)
     node, posture, index, q, *_ = every_cell(of)
     at = covered(where, stage_of(node, posture, 0, index, q), None, None)
@@ -165,7 +165,7 @@ def test_a_step_costs_at_least_the_distance_of_its_cells(which, metric, request)
     # Without a potential: of every two boxes of joints, as far apart as they are.
     of = request.getfixturevalue(which)
     of = replace(of, settings=replace(of.settings, metric=metric))
-    where, rates, _ = _asked(of)
+    where, rates, _ = certificate_inputs(of)
     # No joint goes so far that it could come round the other way.
     rates = replace(rates, velocity=np.minimum(rates.velocity * 20, 2.0))
     node, posture, index, q, *_ = every_cell(of)
@@ -215,7 +215,7 @@ def test_one_step_is_bounded_by_the_nearest_pair_of_poses(arm, tool, placement):
         ends.append(q[reach[:, 0] & inside.all(1), 0])
     u = increments(of, *ends)
     cost = np.abs(u) @ of.settings.weights
-    least = cost[(np.abs(u) <= _asked(of)[1].velocity[0]).all(-1)].min()
+    least = cost[(np.abs(u) <= certificate_inputs(of)[1].velocity[0]).all(-1)].min()
     stages, bounds = [], []
     for level in range(6):
         stages += flat(of, level).stages
@@ -244,7 +244,7 @@ def test_no_potential_proves_more_than_a_motion_costs(made, scale):
 
 def test_multipliers_cost_no_motion_that_keeps_the_acceleration(made):
     rng = np.random.default_rng(5)
-    _, rates, change = _asked(made)
+    _, rates, change = certificate_inputs(made)
     K, n = made.q.shape
     nu = np.zeros((K, n))
     nu[1:-1] = rng.normal(size=(K - 2, n))

@@ -94,7 +94,7 @@ def certified_bound(certificate: Certificate, plan: Plan) -> float:
         The certificate does not fit the plan or does not cover all motions, or certificates do not
         apply to such a plan.
     """
-    where, every, change = _asked(plan)
+    where, every, change = certificate_inputs(plan)
     if not certificate.stages:
         raise CertificateRefused("it has no stage")
     K, n = plan.q.shape
@@ -112,7 +112,7 @@ def certified_bound(certificate: Certificate, plan: Plan) -> float:
     return proved
 
 
-def _asked(plan: Plan) -> tuple[Reachable, Rates, Array]:
+def certificate_inputs(plan: Plan) -> tuple[Reachable, Rates, Array]:
     """Return where the motions of a plan's task may be, the bounds of their steps, and A of (6)."""
     settings, robot = plan.settings, plan.robot
     tau = np.diff(plan.time)

@@ -200,11 +200,11 @@ def _covered(
     left: Places | None = None
     finest = max(int(stage.level.max(initial=0)), deepest) + BEYOND
     for level in range(min(finest, DEEPEST_CELL) + 1):
-        wanted = [] if left is None else [_halves(left)]
+        wanted = [] if left is None else [_bisected(left)]
         if before is not None:
-            wanted.append(_again(before.take(before.level == level)))
+            wanted.append(_same_intervals(before.take(before.level == level)))
         elif level == 0:
-            wanted.append(_everything(where, nodes))
+            wanted.append(_full_circle(where, nodes))
         places = _places(where, level, _all(wanted))
         cells = rows[stage.level[rows] == level]
         known, listed = _matched(where, stage, cells, places)
@@ -225,7 +225,7 @@ def _middle(level: int, index: Ints) -> Array:
     return np.asarray(TURN / (BASE << level) * (index + 0.5) - np.pi)
 
 
-def _everything(where: Reachable, nodes: Ints) -> _Wanted:
+def _full_circle(where: Reachable, nodes: Ints) -> _Wanted:
     """Return the full circle of gamma of some nodes in every allowed posture."""
     node, index, posture = (
         grid.ravel() for grid in np.meshgrid(nodes, np.arange(BASE), where.postures, indexing="ij")
@@ -236,13 +236,13 @@ def _everything(where: Reachable, nodes: Ints) -> _Wanted:
     return _Wanted(node, index, posture, near, room, np.full(len(node), EVERYWHERE))
 
 
-def _again(places: Places) -> _Wanted:
+def _same_intervals(places: Places) -> _Wanted:
     """Return places of another stage, only on their own turns."""
     room, known = np.full(places.q.shape, SAME_PLACE), np.full(len(places), SAME)
     return _Wanted(places.node, places.index, places.posture, places.q, room, known)
 
 
-def _halves(places: Places) -> _Wanted:
+def _bisected(places: Places) -> _Wanted:
     """Return both halves of places.
 
     Where the joints are one smooth function of gamma, its value in the middle gives the turn.

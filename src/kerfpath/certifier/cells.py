@@ -165,12 +165,12 @@ class CellMaker:
     def halves(self, cells: CellSet) -> CellSet:
         """Return both halves of the cells, on the same turns."""
         sets = [
-            self._halves(cells.take(slice(first, first + AT_ONCE // 2)))
+            self._bisected(cells.take(slice(first, first + AT_ONCE // 2)))
             for first in range(0, len(cells), AT_ONCE // 2)
         ]
         return CellSet.join(sets) if sets else cells
 
-    def _halves(self, cells: CellSet) -> CellSet:
+    def _bisected(self, cells: CellSet) -> CellSet:
         parent = np.repeat(np.arange(len(cells)), 2)
         right = np.tile([0, 1], len(cells))
         node, level = cells.node[parent], (cells.level[parent] + 1).astype(np.int8)

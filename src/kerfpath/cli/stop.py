@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Thread, current_thread, main_thread
 
-from kerfpath.files import no_more_writing
+from kerfpath.files import finish_writes
 
 STOPPED = 130
 """Exit code of a command that Ctrl-C has stopped."""
@@ -88,7 +88,7 @@ def _watch(receiver: socket.socket) -> None:
     while signals := receiver.recv(16):
         count += signals.count(signal.SIGINT)
         if count > (1 if _in_order else 0):
-            no_more_writing(FILE_SECONDS)
+            finish_writes(FILE_SECONDS)
             _print("kerfpath: stopped")
             os._exit(STOPPED)
 
