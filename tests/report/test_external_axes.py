@@ -15,7 +15,8 @@ from kerfpath.job.output.writing import trajectory_text
 from kerfpath.options import PlanOptions
 from kerfpath.planner import layered_graph
 from kerfpath.report import ContourSection, render
-from kerfpath.report.motion import add_cell, joint_positions, limit_shares, poses_shown
+from kerfpath.report.motion import joint_positions, limit_shares
+from kerfpath.report.scene import add_cell, poses_shown
 from kerfpath.robots import carried
 from kerfpath.transfer import transfer_move
 
