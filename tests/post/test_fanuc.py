@@ -368,7 +368,7 @@ def test_the_reader_refuses_what_it_does_not_know(file, old, new, message):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("L P[10] 600cm/min FINE", "L P[10] 600cm/min CNT100", "does not stop, expected a stop"),
+        ("L P[10] 600cm/min FINE", "L P[10] 600cm/min CNT100", "a rounded corner, expected a stop"),
         ("720cm/min", "7200cm/min", "the speed is 1200 mm/s, expected 120"),
         ("DO[1]=OFF", "DO[1]=ON", "switches laser on 0.02 s ahead, expected laser off"),
         ("'N U T, 0, 0, 1'", "'F U T, 0, 0, 1'", "the posture is F U T 0 0 1, expected N U T"),

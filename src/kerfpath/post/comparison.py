@@ -1,11 +1,11 @@
-"""List the differences between two programs that were read."""
+"""Compare programs: two that were read, or one with what was read back of its text."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -27,13 +27,15 @@ from kerfpath.post.program import (
     Program,
     ProgramIssue,
     Request,
+    Switch,
     Wait,
+    switches_of,
 )
 from kerfpath.post.read_program import ReadHandshake, ReadMove, ReadProgram, ReadStep, ReadWait
 from kerfpath.robots import ExternalAxis, Robot
 
 # -----------------------------------------------------------------------------
-# Compare a program that was read back with the one that was written.
+# Tolerances.
 
 POINT = 1e-6
 """Largest distance (m) of a target that is read back from the one written, beyond its digits."""
@@ -52,250 +54,6 @@ REACH = 4.0
 """Distance (m) that no tip has from an axis: the lever arm of rounding errors of joints."""
 SHARE = 6e-3
 """Largest difference of shares of the full speed: controllers count per cent."""
-
-
-def deviations(
-    program: Program, read: ReadProgram, language: Language, settings: LanguageSettings
-) -> list[ProgramIssue]:
-    """Return every difference between a program and what was read back; empty if there is none.
-
-    Only what the language can express is compared.
-
-    Parameters
-    ----------
-    program : Program
-    read : ReadProgram
-        The program that the reader of the language returned for the text.
-    language : Language
-    settings : LanguageSettings
-        Settings with which it was written.
-    """
-    if language.sayable is not None:
-        program = language.sayable(program, settings)
-    issues = list(_check_frames(program, read))
-    ours = [step for step in program.steps if not isinstance(step, Comment)]
-    theirs = list(read.steps)
-    if len(ours) != len(theirs):
-        message = f"{len(theirs)} moves and waits were read back, expected {len(ours)}"
-        return [*issues, ProgramIssue("error", "read-back", message, "program")]
-    pairs: list[tuple[Move, ReadMove]] = []
-    for step, back in zip(ours, theirs, strict=True):
-        if isinstance(step, Wait) and isinstance(back, ReadWait):
-            if abs(step.time - back.time) > LEAD:
-                issues.append(_issue(back, f"waits {back.time:g} s, expected {step.time:g} s"))
-        elif isinstance(step, Request | Await) and isinstance(back, ReadHandshake):
-            if step != back.what:
-                message = f"{handshake_in_words(back.what)}, expected {handshake_in_words(step)}"
-                issues.append(_issue(back, message))
-        elif not isinstance(back, ReadMove) or _kind(step) != back.kind:
-            issues.append(_issue(back, f"is a {_kind_read(back)}, expected a {_kind(step)}"))
-        else:
-            assert isinstance(step, JointMove | LinearMove)
-            pairs.append((step, back))
-    rules = language.rules(settings)
-    issues += _compare_places(program, pairs, rules)
-    issues += _compare_motion(pairs, rules, _Air(program, read))
-    issues += _compare_postures(program, pairs, language, settings)
-    return issues
-
-
-def _issue(back: ReadStep, message: str) -> ProgramIssue:
-    return ProgramIssue("error", "read-back", f"not as planned: {message}", back.place)
-
-
-def _kind(step: object) -> str:
-    kinds = (
-        ("joint", JointMove),
-        ("circular", CircularMove),
-        ("linear", LinearMove),
-        ("wait", Wait),
-    )
-    return next((word for word, kind in kinds if isinstance(step, kind)), "handshake")
-
-
-def _kind_read(back: ReadStep) -> str:
-    if isinstance(back, ReadMove):
-        return back.kind
-    return "wait" if isinstance(back, ReadWait) else "handshake"
-
-
-def handshake_in_words(what: Handshake) -> str:
-    """Return a handshake in words."""
-    if isinstance(what, Await):
-        return f"awaits {what.partner} for {what.timeout:g} s"
-    return f"{what.partner} request {'on' if what.on else 'off'}"
-
-
-def _check_frames(program: Program, read: ReadProgram) -> Iterator[ProgramIssue]:
-    for what in ("T_flange_tip", "T_base_part"):
-        back = getattr(read, what)
-        if back is not None and np.abs(back - getattr(program, what)).max() > FRAME:
-            name = "tool" if what == "T_flange_tip" else "part frame"
-            message = f"the {name} differs from the planned one"
-            yield ProgramIssue("error", "read-back", message, "program")
-
-
-def _compare_places(
-    program: Program, pairs: list[tuple[Move, ReadMove]], rules: Rules
-) -> Iterator[ProgramIssue]:
-    """Compare the tips of all targets, by joints where the text gives them."""
-    point, angle = POINT + rules.point_step, ANGLE + rules.angle_step
-    tips = program.tips([m for m, _ in pairs])
-    posed = [
-        (b, T, b.T_part_tip)
-        for (_, b), T in zip(pairs, tips, strict=True)
-        if b.T_part_tip is not None
-    ]
-    posed += [
-        (b, m.T_part_via, b.T_part_via)
-        for m, b in pairs
-        if isinstance(m, CircularMove) and b.T_part_via is not None
-    ]
-    if posed:
-        yield from _compare_poses(
-            [b for b, _, _ in posed],
-            np.array([ours for _, ours, _ in posed]),
-            np.array([theirs for _, _, theirs in posed]),
-            point,
-            angle,
-        )
-    jointed = [(m, b) for m, b in pairs if b.q is not None and not _joints_follow(b)]
-    if jointed:
-        q, q_back = np.array([m.q for m, _ in jointed]), np.array([b.q for _, b in jointed])
-        forward = program.robot.forward
-        backs = [b for _, b in jointed]
-        tool = program.T_flange_tip
-        left = q.shape[1] * rules.angle_step
-        tips, tips_back = forward(q) @ tool, forward(q_back) @ tool
-        yield from _compare_poses(backs, tips, tips_back, point + REACH * left, angle + left)
-        arm = program.robot.family.joints
-        apart = np.abs(q - q_back)[:, :arm]
-        off = apart.max(axis=1)
-        for k in np.flatnonzero(off > angle).tolist():
-            joint = int(apart[k].argmax()) + 1
-            yield _issue(backs[k], f"joint {joint} is {np.degrees(off[k]):.4f} deg off")
-    yield from _check_external(program.robot, pairs, point, angle)
-    for move, back in pairs:
-        if back.q is not None and _joints_follow(back):
-            off_by = float(np.abs(move.q - back.q)[: program.robot.family.joints].max())
-            if off_by > DERIVED:
-                message = f"the configuration leads to joints {np.degrees(off_by):.1f} deg off"
-                yield _issue(back, message)
-        if back.q is None and back.T_part_tip is None:
-            yield _issue(back, "the target is missing")
-
-
-def _check_external(
-    robot: Robot, pairs: list[tuple[Move, ReadMove]], point: float, angle: float
-) -> Iterator[ProgramIssue]:
-    """Compare the values of external axes at all targets, where a text must give them."""
-    arm = robot.family.joints
-    for move, back in pairs if robot.externals else ():
-        values = back.external_of(robot.externals)
-        if values is None:
-            yield _issue(back, f"the value of {robot.externals[0].name} is missing")
-            continue
-        for axis, ours, theirs in zip(robot.externals, move.q[arm:], values, strict=True):
-            off = abs(float(ours - theirs))
-            if off > (point if axis.kind == "linear" else angle):
-                by = (
-                    f"{off * 1e3:.4f} mm" if axis.kind == "linear" else f"{np.degrees(off):.4f} deg"
-                )
-                yield _issue(back, f"{axis.name} is {by} off")
-
-
-def _joints_follow(back: ReadMove) -> bool:
-    """Return whether the joints of a move follow from a pose and its configuration."""
-    return back.T_part_tip is not None and back.posture != ()
-
-
-def _compare_poses(
-    backs: list[ReadMove], ours: Array, theirs: Array, point: float, angle: float
-) -> Iterator[ProgramIssue]:
-    off, turned = distances(ours, theirs)
-    for k in np.flatnonzero((off > point) | (turned > angle)).tolist():
-        message = f"the tip is {off[k] * 1e3:.4f} mm and {np.degrees(turned[k]):.4f} deg off"
-        yield _issue(backs[k], message)
-
-
-def _compare_motion(
-    pairs: list[tuple[Move, ReadMove]], rules: Rules, air: _Air
-) -> Iterator[ProgramIssue]:
-    for move, back in pairs:
-        joint, timed = isinstance(move, JointMove), False
-        if isinstance(move, JointMove):
-            timed = back.duration is not None
-            if message := air.apart(move, back):
-                yield _issue(back, message)
-        off = SHARE if joint else 0.51 * rules.speed_step + 1e-9
-        if back.speed is not None and not timed and abs(move.speed - back.speed) > off:
-            unit, scale = ("of the full speed", 1.0) if joint else ("mm/s", 1e3)
-            message = f"the speed is {back.speed * scale:g} {unit}, expected {move.speed * scale:g}"
-            yield _issue(back, message)
-        if (
-            isinstance(move, LinearMove)
-            and (took := back.duration) is not None
-            and abs(move.duration - took) > DURATION
-        ):
-            yield _issue(back, f"takes {took:g} s, expected {move.duration:g} s")
-        if back.zone is None and move.zone == 0:
-            yield _issue(back, "the move does not stop, expected a stop")
-        if back.zone is not None and abs(move.zone - back.zone) > POINT:
-            message = f"the zone is {back.zone * 1e3:g} mm, expected {move.zone * 1e3:g} mm"
-            yield _issue(back, message)
-        ours: Any = getattr(move, "switches", ())
-        same = [(s.signal, s.on) for s in ours] == [(s.signal, s.on) for s in back.switches]
-        if not same or any(
-            abs(s.lead_time - b.lead_time) > LEAD for s, b in zip(ours, back.switches, strict=True)
-        ):
-            message = (
-                f"switches {switches_in_words(back.switches)}, expected {switches_in_words(ours)}"
-            )
-            yield _issue(back, message)
-
-
-class _Air:
-    """Times (s) of the joint moves of a program, in all and at constant speed."""
-
-    def __init__(self, program: Program, read: ReadProgram) -> None:
-        self._took = dict(zip(read.moves, air_times(program), strict=False))
-        self._cruise = cruises(program)
-
-    def apart(self, move: JointMove, back: ReadMove) -> str:
-        """Return how the time of a move that was read back differs; empty if it does not."""
-        for took, planned in (
-            (back.duration, self._took.get(back)),
-            (back.cruise, self._cruise.get(move)),
-        ):
-            if took is not None and planned is not None and abs(took - planned) > LEAD:
-                return f"takes {took:g} s, expected {planned:g} s"
-        return ""
-
-
-def switches_in_words(switches: Any) -> str:
-    """Return switches in words."""
-    words = [f"{s.signal} {'on' if s.on else 'off'} {s.lead_time:g} s ahead" for s in switches]
-    return " and ".join(words) or "nothing"
-
-
-def _compare_postures(
-    program: Program,
-    pairs: list[tuple[Move, ReadMove]],
-    language: Language,
-    settings: LanguageSettings,
-) -> Iterator[ProgramIssue]:
-    worded = [(move, back) for move, back in pairs if back.posture]
-    if not worded or language.posture is None:
-        return
-    expected = language.posture(program.robot, np.array([m.q for m, _ in worded]), settings)
-    for (_, back), ours in zip(worded, expected, strict=True):
-        if back.posture != ours:
-            yield _issue(back, f"the posture is {_words(back.posture)}, expected {_words(ours)}")
-
-
-def _words(posture: tuple[int | str, ...]) -> str:
-    return " ".join(str(code) for code in posture)
-
 
 # -----------------------------------------------------------------------------
 # Match the contours and moves of two programs.
@@ -431,9 +189,19 @@ def _number_places(a: Sequence[ReadMove], b: Sequence[ReadMove], near: float) ->
 
 Both = Sequence[tuple[Stop, Stop]]
 """Moves that both programs have."""
-SAID = {"speeds": "speed", "zones": "zone", "switches": "switches", "postures": "target"}
+Posed = tuple[Stop, Stop, Array, Array]
+"""Such a pair of moves, with the poses (4, 4) that both have there."""
+ELSEWHERE = {
+    "targets": "target",
+    "joints": "target",
+    "external": "target",
+    "postures": "target",
+    "speeds": "speed",
+    "zones": "zone",
+    "switches": "switches",
+}
 """The key of `ReadMove.elsewhere` for the code of a difference."""
-UNSAID = (("speed", "speeds"), ("duration", "times"), ("cruise", "times"), ("zone", "zones"))
+OPTIONAL = (("speed", "speeds"), ("duration", "times"), ("cruise", "times"), ("zone", "zones"))
 """Attributes that a move may lack, and the code of a difference in them."""
 JOINTS = 9
 """Largest number of joints of a robot."""
@@ -483,7 +251,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Digits:
-    """Largest differences (m, rad, sine, m/s, s) of two texts that come from their digits.
+    """Largest differences (m, rad, sine, m/s, s, s) of two texts that come from their digits.
 
     Tips may differ by `by_joints` (m) more if both give joints: those are compared, too.
     """
@@ -494,6 +262,26 @@ class _Digits:
     frame: float
     speed: float
     lead: float
+    duration: float
+
+    @classmethod
+    def of(cls, rules: Sequence[Rules], joints: int) -> _Digits:
+        """Return those of texts with the digits of `rules`; without any, of equal languages."""
+        steps = [(r.point_step, r.angle_step, r.speed_step) for r in rules] or [(0.0, 0.0, 0.0)]
+        point, angle, speed = np.sum(steps, axis=0).tolist()
+        return cls(
+            point=POINT + point,
+            by_joints=REACH * joints * angle,
+            angle=ANGLE + angle,
+            frame=FRAME + point + angle,
+            speed=1e-9 + 0.51 * speed,
+            lead=LEAD * len(steps),
+            duration=LEAD * len(steps),
+        )
+
+
+_Unequal = tuple[Difference, list[ProgramIssue]]
+"""Moves that differ in one property: the difference, and an issue of each of them."""
 
 
 def differences(
@@ -527,16 +315,7 @@ def differences(
     InputError
         A path is given in joints alone.
     """
-    steps = [(r.point_step, r.angle_step, r.speed_step) for r in rules] or [(0.0, 0.0, 0.0)]
-    point, angle, speed = np.sum(steps, axis=0).tolist()
-    digits = _Digits(
-        point=POINT + point,
-        by_joints=REACH * JOINTS * angle,
-        angle=ANGLE + angle,
-        frame=FRAME + point + angle,
-        speed=1e-9 + 0.51 * speed,
-        lead=LEAD * len(steps),
-    )
+    digits = _Digits.of(rules, JOINTS)
     found = list(_compare_frames(a, b, digits))
     one, two = groups_of(a), groups_of(b)
     same = match_groups(one, two)
@@ -546,10 +325,8 @@ def differences(
     pairs = [pair for i, j in same for pair in pair_moves(one[i], two[j], digits.point)]
     both = [(pair.a, pair.b) for pair in pairs if pair.a is not None and pair.b is not None]
     found += _name_moves(pairs, names)
-    found += _compare_targets(both, digits)
-    found += _compare_joints(both, digits, len(b.externals))
-    found += _compare_external(both, digits, b.externals)
-    found += _compare_values(both, digits, names)
+    found += [each for each, _ in _compare_targets(both, digits)]
+    found += [each for each, _ in _compare_values(both, digits, b.externals, names)]
     if strict:
         found += _find_unsaid(both, names)
     found += _compare_handshakes([(one[i], two[j]) for i, j in same], names)
@@ -570,7 +347,9 @@ def not_compared(a: ReadProgram, b: ReadProgram) -> list[str]:
     return said
 
 
-def _compare_frames(a: ReadProgram, b: ReadProgram, digits: _Digits) -> Iterator[Difference]:
+def _compare_frames(
+    a: Program | ReadProgram, b: ReadProgram, digits: _Digits
+) -> Iterator[Difference]:
     for attribute, words in (("T_flange_tip", "tool"), ("T_base_part", "part frame")):
         one, two = getattr(a, attribute), getattr(b, attribute)
         if one is None or two is None or np.abs(one - two).max() <= digits.frame:
@@ -621,117 +400,145 @@ def _name_moves(pairs: Sequence[MovePair], names: Names) -> Iterator[Difference]
         )
 
 
-def _compare_targets(both: Both, digits: _Digits) -> Iterator[Difference]:
-    """Compare the tip poses of targets and of points on the way to them."""
-    posed = [
+def _posed(both: Both) -> list[Posed]:
+    """Return the targets, and the points on the way to them, whose pose both programs give."""
+    return [
         (a, b, getattr(a.move, which), getattr(b.move, which))
         for a, b in both
         for which in ("T_part_tip", "T_part_via")
         if getattr(a.move, which) is not None and getattr(b.move, which) is not None
     ]
+
+
+def _compare_targets(both: Both, digits: _Digits) -> Iterator[_Unequal]:
+    """Compare the tip poses of targets and of points on the way to them."""
+    posed = _posed(both)
+    jointed = np.array([a.move.q is not None and b.move.q is not None for a, b, _, _ in posed])
+    by_joints = jointed * digits.by_joints
+    yield from _compare_poses(posed, digits.point + by_joints, digits.angle + by_joints / REACH)
+
+
+def _compare_poses(
+    posed: Sequence[Posed], point: float | Array, angle: float | Array
+) -> Iterator[_Unequal]:
     if not posed:
         return
     off, turned = distances(
         np.array([one[2] for one in posed]), np.array([one[3] for one in posed])
     )
-    jointed = np.array([a.move.q is not None and b.move.q is not None for a, b, _, _ in posed])
-    point = digits.point + jointed * digits.by_joints
-    angle = digits.angle + jointed * digits.by_joints / REACH
-    moved = np.flatnonzero((off > point) | (turned > angle))
-    if moved.size:
-        a, b, _, _ = posed[moved[np.lexsort((turned[moved], off[moved]))[-1]]]
-        message = (
-            f"{len(moved)} moved, by up to {off[moved].max() * 1e3:.4f} mm "
-            f"and {np.degrees(turned[moved].max()):.4f} deg"
-        )
-        yield _difference("targets", len(moved), message, a, b)
+    moved = np.flatnonzero((off > point) | (turned > angle)).tolist()
+    if moved:
+        off, turned = off[moved] * 1e3, np.degrees(turned[moved])
+        message = f"{len(moved)} moved, by up to {off.max():.4f} mm and {turned.max():.4f} deg"
+        words = [
+            f"the tip is {by:.4f} mm and {angle:.4f} deg off"
+            for by, angle in zip(off, turned, strict=True)
+        ]
+        worst = int(np.lexsort((turned, off))[-1])
+        yield _unequal("targets", [posed[k][:2] for k in moved], worst, message, words)
 
 
-def _compare_joints(both: Both, digits: _Digits, external: int) -> Iterator[Difference]:
-    """Compare the joints of the arm, if both programs give them; the last are external axes."""
-    said = [(a, b) for a, b in both if a.move.q is not None and b.move.q is not None]
-    if not said:
-        return
-    q = np.abs(np.array([a.move.q for a, _ in said]) - [b.move.q for _, b in said])
-    off = q[:, : q.shape[1] - external].max(axis=1)
-    moved = np.flatnonzero(off > digits.angle)
-    if moved.size:
-        worst = int(moved[np.argmax(off[moved])])
-        message = f"{len(moved)} moved, by up to {np.degrees(off[worst]):.4f} deg"
-        yield _difference("joints", len(moved), message, *said[worst])
-
-
-def _compare_external(
-    both: Both, digits: _Digits, axes: Sequence[ExternalAxis]
-) -> Iterator[Difference]:
-    """Compare the values of external axes, if both programs give them."""
-    values = ((a.move.external_of(axes), b.move.external_of(axes), a, b) for a, b in both)
-    said = [(np.abs(x - y), a, b) for x, y, a, b in values if x is not None and y is not None]
-    for i, axis in enumerate(axes):
-        least = digits.point if axis.kind == "linear" else digits.angle
-        moved = [(float(off[i]), a, b) for off, a, b in said if off[i] > least]
-        if moved:
-            off, a, b = max(moved, key=lambda each: each[0])
-            by = f"{off * 1e3:.4f} mm" if axis.kind == "linear" else f"{np.degrees(off):.4f} deg"
-            message = f"{axis.name} moved at {counted(len(moved), 'target')}, by up to {by}"
-            yield _difference("external", len(moved), message, a, b)
-
-
-def _difference(code: str, count: int, message: str, a: Stop, b: Stop) -> Difference:
-    said_at = b.move.elsewhere.get("target", "")
-    places = (a.move.place, b.move.place)
-    return Difference(code=code, count=count, message=message, places=places, said_at=said_at)
-
-
-def _compare_values(both: Both, digits: _Digits, names: Names) -> Iterator[Difference]:
-    """Compare the other attributes of moves, one after the other."""
-    rows: tuple[tuple[str, Callable[[Stop, Stop], float], Callable[[Stop], str]], ...] = (
-        ("kinds", lambda a, b: a.move.kind != b.move.kind, lambda a: a.move.kind),
-        ("speeds", lambda a, b: _speeds(a.move, b.move, digits), lambda a: _speed(a.move)),
+def _compare_values(
+    both: Both, digits: _Digits, axes: Sequence[ExternalAxis], names: Names
+) -> Iterator[_Unequal]:
+    """Compare joints and external axes, and the other properties of moves one after the other."""
+    yield from _compare_joints(both, digits, len(axes))
+    yield from _compare_external(both, digits, axes)
+    rows: tuple[tuple[str, str, Callable[[Stop, Stop], float], Callable[[Stop], str]], ...] = (
+        ("kinds", "is", lambda a, b: a.move.kind != b.move.kind, lambda a: a.move.kind),
+        (
+            "speeds",
+            "the speed is",
+            lambda a, b: _speeds(a.move, b.move, digits),
+            lambda a: _speed(a.move),
+        ),
         (
             "times",
-            lambda a, b: max(
-                _excess(a.move.duration, b.move.duration, digits.lead),
-                _excess(a.move.cruise, b.move.cruise, digits.lead),
-            ),
+            "takes",
+            lambda a, b: _times(a.move, b.move, digits),
             lambda a: f"{a.move.cruise if a.move.duration is None else a.move.duration:g} s",
         ),
+        ("zones", "the zone is", lambda a, b: _zones(a.move, b.move, digits), _zone),
         (
-            "zones",
-            lambda a, b: _zones(a.move, b.move, digits),
-            _zone,
-        ),
-        (
+            "switches",
             "switches",
             lambda a, b: _switches(a.move, b.move, digits),
             lambda a: switches_in_words(a.move.switches),
         ),
-        ("waits", lambda a, b: _excess(a.wait, b.wait, digits.lead), lambda a: f"{a.wait:g} s"),
+        (
+            "waits",
+            "waits",
+            lambda a, b: _excess(a.wait, b.wait, digits.lead),
+            lambda a: f"{a.wait:g} s",
+        ),
         (
             "postures",
+            "the posture is",
             lambda a, b: (
                 bool(a.move.posture and b.move.posture) and a.move.posture != b.move.posture
             ),
             lambda a: " ".join(str(word) for word in a.move.posture),
         ),
     )
-    for code, excess, words in rows:
+    for code, verb, excess, shown in rows:
         off = np.array([float(excess(a, b)) for a, b in both])
-        moved = np.flatnonzero(off > 0)
-        if moved.size:
-            a, b = both[int(moved[np.argmax(off[moved])])]
-            said = f"{words(a)} in {names[0]} and {words(b)} in {names[1]}"
-            message = f"{counted(len(moved), 'move')}, {said}"
-            places = tuple((code == "waits" and s.waits_at) or s.move.place for s in (a, b))
-            said_at = b.move.elsewhere.get(SAID[code], "") if code in SAID else ""
-            yield Difference(
-                code=code, count=len(moved), message=message, places=places, said_at=said_at
-            )
+        if moved := np.flatnonzero(off > 0).tolist():
+            values = [(shown(a), shown(b)) for a, b in (both[k] for k in moved)]
+            worst = int(np.argmax(off[moved]))
+            one, two = values[worst]
+            message = f"{counted(len(moved), 'move')}, {one} in {names[0]} and {two} in {names[1]}"
+            words = [f"{verb} {found}, expected {expected}" for expected, found in values]
+            yield _unequal(code, [both[k] for k in moved], worst, message, words)
+
+
+def _compare_joints(both: Both, digits: _Digits, external: int) -> Iterator[_Unequal]:
+    """Compare the joints of the arm, if both programs give them; the last are external axes."""
+    given = [(a, b) for a, b in both if a.move.q is not None and b.move.q is not None]
+    if not given:
+        return
+    q = np.abs(np.array([a.move.q for a, _ in given]) - [b.move.q for _, b in given])
+    q = np.degrees(q[:, : q.shape[1] - external])
+    off = q.max(axis=1)
+    if moved := np.flatnonzero(off > np.degrees(digits.angle)).tolist():
+        words = [f"joint {q[k].argmax() + 1} is {off[k]:.4f} deg off" for k in moved]
+        message = f"{len(moved)} moved, by up to {off.max():.4f} deg"
+        worst = int(np.argmax(off[moved]))
+        yield _unequal("joints", [given[k] for k in moved], worst, message, words)
+
+
+def _compare_external(
+    both: Both, digits: _Digits, axes: Sequence[ExternalAxis]
+) -> Iterator[_Unequal]:
+    """Compare the values of external axes, if both programs give them."""
+    values = ((a.move.external_of(axes), b.move.external_of(axes), a, b) for a, b in both)
+    given = [(np.abs(x - y), a, b) for x, y, a, b in values if x is not None and y is not None]
+    for i, axis in enumerate(axes):
+        linear = axis.kind == "linear"
+        least = digits.point if linear else digits.angle
+        moved = [(a, b) for off, a, b in given if off[i] > least]
+        offs = [float(off[i]) for off, _, _ in given if off[i] > least]
+        if moved:
+            by = [f"{x * 1e3:.4f} mm" if linear else f"{np.degrees(x):.4f} deg" for x in offs]
+            worst = int(np.argmax(offs))
+            message = f"{axis.name} moved at {counted(len(moved), 'target')}, by up to {by[worst]}"
+            words = [f"{axis.name} is {each} off" for each in by]
+            yield _unequal("external", moved, worst, message, words)
+
+
+def _unequal(code: str, moves: Both, worst: int, message: str, words: Sequence[str]) -> _Unequal:
+    """Return the difference at the worst of moves, and an issue of each in `words`."""
+    pair = moves[worst]
+    places = tuple((code == "waits" and stop.waits_at) or stop.move.place for stop in pair)
+    said_at = pair[1].move.elsewhere.get(ELSEWHERE.get(code, ""), "")
+    return (
+        Difference(code=code, count=len(moves), message=message, places=places, said_at=said_at),
+        [_issue(b.move, each) for (_, b), each in zip(moves, words, strict=True)],
+    )
 
 
 def _find_unsaid(both: Both, names: Names) -> Iterator[Difference]:
     """Find moves that have a speed, a time or a zone in only one of the programs."""
-    for attribute, code in UNSAID:
+    for attribute, code in OPTIONAL:
         said = [[getattr(stop.move, attribute) is not None for stop in pair] for pair in both]
         if alone := [k for k, (one, two) in enumerate(said) if one != two]:
             a, b = both[alone[0]]
@@ -763,6 +570,11 @@ def _compare_handshakes(
 def _excess(one: float | None, two: float | None, allowed: float) -> float:
     """Return by how much two numbers differ beyond `allowed`; 0 if one is missing."""
     return 0.0 if one is None or two is None else max(abs(one - two) - allowed, 0.0)
+
+
+def _times(a: ReadMove, b: ReadMove, digits: _Digits) -> float:
+    allowed = digits.lead if a.kind == "joint" else digits.duration
+    return max(_excess(a.duration, b.duration, allowed), _excess(a.cruise, b.cruise, digits.lead))
 
 
 def _zones(a: ReadMove, b: ReadMove, digits: _Digits) -> float:
@@ -797,3 +609,159 @@ def _switches(a: ReadMove, b: ReadMove, digits: _Digits) -> bool:
         abs(one.lead_time - two.lead_time) > digits.lead
         for one, two in zip(a.switches, b.switches, strict=True)
     )
+
+
+# -----------------------------------------------------------------------------
+# Compare a program that was read back with the one that was written.
+
+
+def deviations(
+    program: Program, read: ReadProgram, language: Language, settings: LanguageSettings
+) -> list[ProgramIssue]:
+    """Return every kind of difference between a program and what was read back of its text.
+
+    Steps are compared in order, and only what the language can express.
+
+    Parameters
+    ----------
+    program : Program
+    read : ReadProgram
+        The program that the reader of the language returned for the text.
+    language : Language
+    settings : LanguageSettings
+        Settings with which it was written.
+    """
+    if language.sayable is not None:
+        program = language.sayable(program, settings)
+    ours = [step for step in program.steps if not isinstance(step, Comment)]
+    theirs = list(read.steps)
+    if len(ours) != len(theirs):
+        message = f"{len(theirs)} moves and waits were read back, expected {len(ours)}"
+        return [ProgramIssue("error", "read-back", message, "program")]
+    issues: list[ProgramIssue] = []
+    pairs: list[tuple[Move, ReadMove]] = []
+    for step, back in zip(ours, theirs, strict=True):
+        if isinstance(step, Wait) and isinstance(back, ReadWait):
+            if abs(step.time - back.time) > LEAD:
+                issues.append(_issue(back, f"waits {back.time:g} s, expected {step.time:g} s"))
+        elif isinstance(step, Request | Await) and isinstance(back, ReadHandshake):
+            if step != back.what:
+                message = f"{handshake_in_words(back.what)}, expected {handshake_in_words(step)}"
+                issues.append(_issue(back, message))
+        elif not isinstance(back, ReadMove) or _kind(step) != back.kind:
+            issues.append(_issue(back, f"is a {_kind_read(back)}, expected a {_kind(step)}"))
+        else:
+            assert isinstance(step, JointMove | LinearMove)
+            pairs.append((step, back))
+    digits = _Digits.of([language.rules(settings)], program.robot.joints)
+    digits = replace(digits, frame=FRAME, duration=DURATION)
+    for frame in _compare_frames(program, read, digits):
+        message = f"not as planned: {frame.message}"
+        issues.append(ProgramIssue("error", "read-back", message, "program"))
+    planned = _planned_moves(program, read, pairs, language, settings)
+    both = [(Stop(move), Stop(back)) for move, (_, back) in zip(planned, pairs, strict=True)]
+    for _, unequal in (
+        *_compare_given_poses(program, both, digits),
+        *_compare_values(both, digits, program.robot.externals, ("the program", "the text")),
+    ):
+        issues += unequal
+    return [*issues, *_check_targets(program.robot, pairs)]
+
+
+def _issue(back: ReadStep, message: str) -> ProgramIssue:
+    return ProgramIssue("error", "read-back", f"not as planned: {message}", back.place)
+
+
+def _kind(step: object) -> str:
+    kinds = (
+        ("joint", JointMove),
+        ("circular", CircularMove),
+        ("linear", LinearMove),
+        ("wait", Wait),
+    )
+    return next((word for word, kind in kinds if isinstance(step, kind)), "handshake")
+
+
+def _kind_read(back: ReadStep) -> str:
+    if isinstance(back, ReadMove):
+        return back.kind
+    return "wait" if isinstance(back, ReadWait) else "handshake"
+
+
+def handshake_in_words(what: Handshake) -> str:
+    """Return a handshake in words."""
+    if isinstance(what, Await):
+        return f"awaits {what.partner} for {what.timeout:g} s"
+    return f"{what.partner} request {'on' if what.on else 'off'}"
+
+
+def switches_in_words(switches: Iterable[Switch]) -> str:
+    """Return switches in words."""
+    words = [f"{s.signal} {'on' if s.on else 'off'} {s.lead_time:g} s ahead" for s in switches]
+    return " and ".join(words) or "nothing"
+
+
+def _joints_follow(back: ReadMove) -> bool:
+    """Return whether the joints of a move follow from a pose and its configuration."""
+    return back.T_part_tip is not None and back.posture != ()
+
+
+def _planned_moves(
+    program: Program,
+    read: ReadProgram,
+    pairs: Sequence[tuple[Move, ReadMove]],
+    language: Language,
+    settings: LanguageSettings,
+) -> Iterator[ReadMove]:
+    """Yield each planned move with the values of all that its text states."""
+    arm = program.robot.family.joints
+    tips = program.tips([move for move, _ in pairs])
+    air, cruise = dict(zip(read.moves, air_times(program), strict=False)), cruises(program)
+    postures: Iterator[tuple[int | str, ...]] = iter(())
+    worded = [move.q for move, back in pairs if back.posture]
+    if worded and language.posture is not None:
+        postures = iter(language.posture(program.robot, np.array(worded), settings))
+    for (move, back), tip in zip(pairs, tips, strict=True):
+        duration = air.get(back) if isinstance(move, JointMove) else move.duration
+        timed_joint = isinstance(move, JointMove) and back.duration is not None
+        yield replace(
+            back,
+            speed=None if timed_joint else move.speed,
+            duration=None if back.duration is None else duration,
+            cruise=cruise.get(move),
+            zone=move.zone,
+            q=None if back.q is None or _joints_follow(back) else move.q,
+            T_part_tip=tip,
+            T_part_via=move.T_part_via if isinstance(move, CircularMove) else None,
+            external=move.q[arm:],
+            posture=next(postures, ()) if back.posture else (),
+            switches=switches_of(move),
+        )
+
+
+def _compare_given_poses(program: Program, both: Both, digits: _Digits) -> Iterator[_Unequal]:
+    """Compare the poses in a text, and those to which its joints lead, with the planned ones."""
+    yield from _compare_poses(_posed(both), digits.point, digits.angle)
+    jointed = [(a, b, a.move.q, b.move.q) for a, b in both if a.move.q is not None]
+    if jointed:
+        ours, theirs = (
+            program.robot.forward(np.array([one[side] for one in jointed])) @ program.T_flange_tip
+            for side in (2, 3)
+        )
+        rows = [(a, b, T, T_b) for (a, b, *_), T, T_b in zip(jointed, ours, theirs, strict=True)]
+        by_joints = digits.by_joints
+        yield from _compare_poses(rows, digits.point + by_joints, digits.angle + by_joints / REACH)
+
+
+def _check_targets(robot: Robot, pairs: Sequence[tuple[Move, ReadMove]]) -> Iterator[ProgramIssue]:
+    """Find targets without a position, and configurations that lead to other joints."""
+    for move, back in pairs:
+        if back.q is None and back.T_part_tip is None:
+            yield _issue(back, "the target is missing")
+        if robot.externals and back.external_of(robot.externals) is None:
+            yield _issue(back, f"the value of {robot.externals[0].name} is missing")
+        if back.q is not None and _joints_follow(back):
+            off = float(np.abs(move.q - back.q)[: robot.family.joints].max())
+            if off > DERIVED:
+                message = f"the configuration leads to joints {np.degrees(off):.1f} deg off"
+                yield _issue(back, message)
