@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,8 @@ import pytest
 from hypothesis import settings
 
 from kerfpath import compiling, isolated
-from kerfpath.certificate import USUAL
-from kerfpath.certifier import bound, infeasibility
 from kerfpath.contour import Contour
-from kerfpath.options import PlanOptions
-from kerfpath.planner import on_grid, quickest
+from kerfpath.effort import Effort, changed_effort, set_effort
 from kerfpath.robots import robot
 
 # The same examples in every run, without a deadline that a busy machine could miss.
@@ -37,18 +35,20 @@ def pose(xyz, rotation=None):
 
 
 # A plan states a bound by default, which takes seconds. Tests ask for it where they are about it,
-# and jobs get a little of it; the processes that tests start state it as a user sees it.
-PlanOptions.__init__.__kwdefaults__["certify"] = None
-USUAL_WORK = bound.MOST_PAIRS, bound.MOST_PER_NODE
-bound.MOST_PAIRS, bound.MOST_PER_NODE = 1_500_000, 0
-
-
-# So does the search for the quickest motion, which takes seconds a contour, and its ceiling.
-USUAL_RUNGS, quickest.RUNGS = quickest.RUNGS, ()
-on_grid.MOST_BINDING = 2
-infeasibility.FAILED = 2
-USUAL_CEILING = infeasibility.MOST_STEPS, infeasibility.MOST_PAIRS
-infeasibility.MOST_STEPS, infeasibility.MOST_PAIRS = 200_000, 3_000_000
+# and jobs get a little of it; the commands that tests start state it as a user sees it. The search
+# for the quickest motion and its ceiling take seconds a contour, too.
+USUAL = Effort()
+set_effort(
+    Effort(
+        certified=False,
+        certificate_pairs=1_500_000,
+        certificate_pairs_per_node=0,
+        minimax_undecided=2,
+        infeasibility_steps=200_000,
+        binding_nodes=2,
+        speed_factors=(),
+    )
+)
 
 
 def pytest_sessionstart(session):
@@ -79,29 +79,41 @@ def pytest_collection_modifyitems(items):
 
 
 @pytest.fixture
-def quickest_at_work(monkeypatch):
+def change_effort():
+    """Give the function that changes limits of the effort until the test ends."""
+    with ExitStack() as changes:
+        yield lambda **limits: changes.enter_context(changed_effort(**limits))
+
+
+@pytest.fixture
+def quickest_at_work():
     """Look for the quickest motion as far as outside the tests."""
-    monkeypatch.setattr(quickest, "RUNGS", USUAL_RUNGS)
+    with changed_effort(speed_factors=USUAL.speed_factors):
+        yield
 
 
 @pytest.fixture
-def ceiling_at_work(monkeypatch):
+def ceiling_at_work():
     """Let the search for what is impossible work as much as outside the tests."""
-    monkeypatch.setattr(infeasibility, "MOST_STEPS", USUAL_CEILING[0])
-    monkeypatch.setattr(infeasibility, "MOST_PAIRS", USUAL_CEILING[1])
+    with changed_effort(infeasibility_steps=USUAL.infeasibility_steps):
+        yield
 
 
 @pytest.fixture
-def certified_by_default(monkeypatch):
+def certified_by_default():
     """Let plans be certified unless they are not to be, as outside the tests."""
-    monkeypatch.setitem(PlanOptions.__init__.__kwdefaults__, "certify", USUAL)
+    with changed_effort(certified=True):
+        yield
 
 
 @pytest.fixture
-def certifier_at_work(monkeypatch):
+def certifier_at_work():
     """Let the certifier work as much as outside the tests."""
-    monkeypatch.setattr(bound, "MOST_PAIRS", USUAL_WORK[0])
-    monkeypatch.setattr(bound, "MOST_PER_NODE", USUAL_WORK[1])
+    with changed_effort(
+        certificate_pairs=USUAL.certificate_pairs,
+        certificate_pairs_per_node=USUAL.certificate_pairs_per_node,
+    ):
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -6,6 +6,7 @@ import sys
 import time
 from pathlib import Path
 
+from kerfpath.effort import current_effort
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.sweep import UnfitWorker
 
@@ -15,6 +16,10 @@ class Stubborn(Exception):
 
     def __init__(self, *, needed):
         super().__init__(f"needs {needed}")
+
+
+def binding_nodes():
+    return current_effort().binding_nodes
 
 
 def square(x):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal, TypedDict, cast, get_args
 
 import numpy as np
@@ -13,6 +13,7 @@ from kerfpath.arrays import Array, floats, require_one_of, scalar, short_repr
 from kerfpath.certificate import USUAL, Certify, CertifyData
 from kerfpath.comfort import Band, BandData, Comfort
 from kerfpath.contour import FrameKind
+from kerfpath.effort import current_effort
 from kerfpath.errors import InputError, OptionConflict
 from kerfpath.limits import Limits
 from kerfpath.robots import Robot
@@ -93,6 +94,10 @@ class OptionData(TypedDict):
     floor_m: float | None
     gamma_windows: list[WindowData]
     certify: CertifyData | None
+
+
+def _usual_certify() -> Certify | None:
+    return USUAL if current_effort().certified else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -179,7 +184,7 @@ class PlanOptions:
     retract: float | None = None
     floor: float | None = None
     gamma_windows: tuple[GammaWindow, ...] = ()
-    certify: Certify | None = USUAL
+    certify: Certify | None = field(default_factory=_usual_certify)
 
     __repr__ = short_repr
 

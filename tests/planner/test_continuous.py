@@ -19,6 +19,7 @@ from kerfpath import (
 )
 from kerfpath.cell import box_between, cell_of
 from kerfpath.contour import Contour
+from kerfpath.effort import changed_effort
 from kerfpath.options import PlanOptions
 from kerfpath.planner import layered_graph, on_grid, statements
 from kerfpath.planner.task import task_of
@@ -82,7 +83,7 @@ def test_the_step_of_gamma_hardly_matters(task):
 
 @pytest.mark.parametrize("name", ["plain", "max", "periodic", "rotation", "tangent", "wrist"])
 def test_very_many_nodes_are_planned_from_every_few_of_them(
-    circle, arm, tool, placement, name, monkeypatch
+    circle, arm, tool, placement, name, monkeypatch, change_effort
 ):
     """As 121 nodes are here, and 25 of them; the cost may differ by what refinements leave."""
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "postures": (0, 1)}
@@ -92,15 +93,15 @@ def test_very_many_nodes_are_planned_from_every_few_of_them(
     monkeypatch.setattr(
         on_grid.ThinTask, "lifted", lambda *of: lifted.append(lift(*of)) or lifted[-1]
     )
-    monkeypatch.setattr(on_grid, "MANY", 100)
+    change_effort(subsampled_from=100)
     made = plan(circle, arm, **options)
     assert len(lifted) == 1
     assert made.cost <= plain.cost * (1 + SAME)
     assert audit(made) == []
 
 
-def test_every_few_nodes_are_those_of_the_whole(circle, arm, tool, placement, monkeypatch):
-    monkeypatch.setattr(on_grid, "MANY", 100)
+def test_every_few_nodes_are_those_of_the_whole(circle, arm, tool, placement, change_effort):
+    change_effort(subsampled_from=100)
     asked = PlanOptions(gamma_step=STEP, frames="rotation-minimising")
     whole = task_of(circle, arm, asked, tool=tool, placement=placement, speed=0.1)
     thin = on_grid.thinned(whole)
@@ -130,12 +131,12 @@ def solved(circle, arm, tool, placement, **options):
 
 
 def test_poses_of_very_many_nodes_are_solved_only_where_those_of_a_few_do_not_do(
-    circle, arm, tool, placement, monkeypatch
+    circle, arm, tool, placement, monkeypatch, change_effort
 ):
     space = circle, arm, tool, placement
     whole, nodes = solved(*space)
     assert nodes == len(circle) == 121
-    monkeypatch.setattr(on_grid, "MANY", 100)
+    change_effort(subsampled_from=100)
     made, nodes = solved(*space)
     assert nodes == 25
     assert sum(made.counts.values()) * 121 == sum(whole.counts.values()) * 25
@@ -146,7 +147,7 @@ def test_poses_of_very_many_nodes_are_solved_only_where_those_of_a_few_do_not_do
     assert again.counts == whole.counts
 
 
-def test_a_node_without_a_pose_is_named_among_very_many(circle, arm, tool, placement, monkeypatch):
+def test_a_node_without_a_pose_is_named_among_very_many(circle, arm, tool, placement):
     """Node 60 is one of the few that are looked at first, node 62 is not."""
     space, broken = (arm, tool, placement), []
     for node in (60, 62):
@@ -154,9 +155,8 @@ def test_a_node_without_a_pose_is_named_among_very_many(circle, arm, tool, place
         points[node] += (0, 0, 30)
         far = replace(circle, points=points)
         broken.append(solved(far, *space)[0])
-        monkeypatch.setattr(on_grid, "MANY", 100)
-        broken.append(solved(far, *space)[0])
-        monkeypatch.undo()
+        with changed_effort(subsampled_from=100):
+            broken.append(solved(far, *space)[0])
     for plain, thinned in (broken[:2], broken[2:]):
         assert isinstance(plain, NoFeasiblePath)
         assert str(thinned) == str(plain)
@@ -165,9 +165,9 @@ def test_a_node_without_a_pose_is_named_among_very_many(circle, arm, tool, place
 
 @pytest.mark.parametrize(("intervals", "every"), [(104, 4), (105, 5), (111, 3), (103, 5)])
 def test_a_motion_along_some_nodes_is_one_along_all(
-    circle, arm, tool, placement, monkeypatch, intervals, every
+    circle, arm, tool, placement, change_effort, intervals, every
 ):
-    monkeypatch.setattr(on_grid, "MANY", 100)
+    change_effort(subsampled_from=100)
     asked, nodes = PlanOptions(gamma_step=STEP), circle.resample(count=intervals + 1)
     whole = task_of(nodes, arm, asked, tool=tool, placement=placement, speed=0.1)
     thin = on_grid.thinned(whole)
@@ -183,7 +183,7 @@ def test_a_motion_along_some_nodes_is_one_along_all(
 
 
 def test_with_fewer_nodes_a_tilt_or_another_axis_no_node_is_left_out(
-    circle, arm, tool, placement, monkeypatch
+    circle, arm, tool, placement, change_effort
 ):
     def thin(robot=arm, **options):
         asked = PlanOptions(gamma_step=np.radians(30), **options)
@@ -192,7 +192,7 @@ def test_with_fewer_nodes_a_tilt_or_another_axis_no_node_is_left_out(
         )
 
     assert thin() is None
-    monkeypatch.setattr(on_grid, "MANY", 100)
+    change_effort(subsampled_from=100)
     assert thin() is not None
     assert thin(tilt=Tilt(cone=0.1, steps=1)) is None
     rail = {"lower": 0.0, "upper": 0.1, "velocity": 1.0, "acceleration": 1.0, "step": 0.1}
@@ -248,8 +248,10 @@ def test_a_motion_that_is_just_missed_is_looked_for_on_half_the_step():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("closure", "many"), [("free", 800), ("periodic", 800), ("free", 50)])
-def test_it_goes_around_what_is_in_the_way(task, arm, tool, placement, closure, many, monkeypatch):
-    monkeypatch.setattr(on_grid, "MANY", many)  # intervals: there are 60
+def test_it_goes_around_what_is_in_the_way(
+    task, arm, tool, placement, closure, many, change_effort
+):
+    change_effort(subsampled_from=many)  # intervals: there are 60
     there = posts(arm, tool, placement, 6)
     options = task[1] | {"closure": closure}
     blind = plan(*task[0], **options)

@@ -130,7 +130,7 @@ def test_a_refusal_says_with_what_a_motion_was_found(seed, share, arm, space):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_of_a_hopeless_speed_a_motion_is_found_without_the_exact_search(
-    seed, arm, space, monkeypatch
+    seed, arm, space, monkeypatch, change_effort
 ):
     nodes = drawn(seed)
     fastest = fastest_speed(nodes, arm, refine=True, **space)
@@ -139,7 +139,7 @@ def test_of_a_hopeless_speed_a_motion_is_found_without_the_exact_search(
         raise AssertionError("the exact search may take minutes here")
 
     monkeypatch.setattr(quickest_module, "find_least_interval", no_search)
-    monkeypatch.setattr(quickest_module, "MOST_EDGES", 0)
+    change_effort(exact_edges=0)
     with pytest.raises(NoFeasiblePath) as caught:
         plan(nodes, arm, speed=20 * fastest.speed, **space)
     needed = caught.value.relaxation.speed * 20

@@ -10,12 +10,12 @@ from kerfpath import InputError
 from kerfpath.kernels import continuous as kernel
 from kerfpath.kernels.continuous import Steps, Targets
 from kerfpath.limits import Limits
-from kerfpath.search import METRIC_CODES, ContinuousSearch, Effort, GammaSamples, SearchProblem
+from kerfpath.search import METRIC_CODES, BeamWidth, ContinuousSearch, GammaSamples, SearchProblem
 from kerfpath.search.continuous import _targets
 
 METRICS = ["manhattan", "chebychev", "euclid"]
 M = 9  # samples on the circle
-EFFORT = Effort(50, (0.1, 0.25))
+BEAM = BeamWidth(50, (0.1, 0.25))
 
 
 def circles(rng, K=5, posts=2, gone=0.15):
@@ -155,7 +155,7 @@ def test_paths_keep_the_limits_between_their_points(metric, objective):
     q, start, samples = smooth()
     task = problem(q, start, metric=metric, objective=objective)
     search = ContinuousSearch(task, samples)
-    (path,) = search.paths(EFFORT)
+    (path,) = search.paths(BEAM)
     layer = np.searchsorted(start, np.stack([path.one, path.other]), side="right") - 1
     np.testing.assert_array_equal(layer, np.tile(np.arange(len(start) - 1), (2, 1)))
     assert ((path.share >= 0) & (path.share <= 1)).all()
@@ -181,7 +181,7 @@ def test_a_path_never_costs_more_than_the_best_on_its_samples():
         endless=ENDLESS, posture=None, vertex_cost=np.zeros(len(q)), weights=task.weights,
         metric="manhattan", objective="sum", method="exact", eta_v=1.0, eta_a=1.0,
     )  # fmt: skip
-    (path,) = ContinuousSearch(task, samples).paths(EFFORT)
+    (path,) = ContinuousSearch(task, samples).paths(BEAM)
     dq = naive.difference(path.q[:-1], path.q[1:], ENDLESS)
     assert (np.abs(dq) * task.weights).sum() < cost
 
@@ -191,7 +191,7 @@ def test_a_periodic_path_ends_beside_where_it_begins():
     first = q[start[0] : start[1]]
     q[start[-2] :] = first  # the last layer repeats the first
     search = ContinuousSearch(problem(q, start, closure="periodic"), samples)
-    paths = list(search.paths(EFFORT._replace(ways=3)))
+    paths = list(search.paths(BEAM._replace(ways=3)))
     assert paths
     for path in paths:
         began, ended = samples.sample[path.one[0]], samples.sample[path.one[-1]]
@@ -203,11 +203,11 @@ def test_a_periodic_path_ends_beside_where_it_begins():
 def test_a_joint_turns_no_further_than_it_may():
     q, start, samples = smooth(K=16)
     free = ContinuousSearch(problem(q, start), samples)
-    (path,) = free.paths(EFFORT)
+    (path,) = free.paths(BEAM)
     dq = naive.difference(path.q[:-1], path.q[1:], ENDLESS)
     turned = np.abs(np.cumsum(dq[:, 0])).max()
     held = ContinuousSearch(problem(q, start, rotation=[0.5 * turned, np.inf, np.inf]), samples)
-    for path in held.paths(EFFORT._replace(ways=3)):
+    for path in held.paths(BEAM._replace(ways=3)):
         assert np.abs(path.q[:, 0] - path.q[0, 0]).max() <= 0.5 * turned + 1e-6
     assert held.value >= free.value * (1 - 1e-12)
 
@@ -218,10 +218,10 @@ def test_where_nothing_leads_on_there_is_no_path():
     q[start[5] : start[6], 1] += 10.0  # out of reach of all before and after
     search = ContinuousSearch(problem(q, start), samples)
     assert search.value == np.inf
-    assert list(search.paths(EFFORT)) == []
+    assert list(search.paths(BEAM)) == []
     closed = np.where(np.arange(len(q)) < start[1], np.inf, 0.0)
     assert (
-        list(ContinuousSearch(problem(*smooth()[:2], vertex_cost=closed), samples).paths(EFFORT))
+        list(ContinuousSearch(problem(*smooth()[:2], vertex_cost=closed), samples).paths(BEAM))
         == []
     )
 

@@ -77,8 +77,8 @@ def test_the_optimum_agrees_with_trying_every_pair_of_edges(closure):
 
 @pytest.mark.parametrize("below", [0.3, 20.0])
 @pytest.mark.parametrize("closure", ["free", "periodic"])
-def test_costs_below_zero_change_nothing_but_the_optimum(monkeypatch, closure, below):
-    monkeypatch.setattr("kerfpath.search.exact.ROOM", 30)
+def test_costs_below_zero_change_nothing_but_the_optimum(change_effort, closure, below):
+    change_effort(recorded_states=30)
     rng = np.random.default_rng(26)
     # From one layer back to it all steps are 0 but for rounding, which is no tie to break.
     assert sum(agree(rng, closure, below=below, layers=(2, 9)) for _ in range(300)) > 60
@@ -244,9 +244,9 @@ def test_ends_that_do_not_repeat_are_refused():
         shortest_path([[0.0], [0.1], [0.2]], [0, 1, 3], closure="periodic", **ONE)
 
 
-def test_the_bound_cannot_hide_a_dear_optimum(monkeypatch):
+def test_the_bound_cannot_hide_a_dear_optimum(change_effort):
     # Forgetting what it recorded must not change the answer.
-    monkeypatch.setattr("kerfpath.search.exact.ROOM", 3)
+    change_effort(recorded_states=3)
     rng = np.random.default_rng(24)
     assert sum(agree(rng, "free") for _ in range(200)) > 50
 

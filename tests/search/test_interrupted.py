@@ -183,8 +183,8 @@ def plans(q, start, o, least_piece=0):
                 yield len(breaks), (max if o["objective"] == "max" else sum)(parts), sum(parts)
 
 
-def test_without_a_record_the_answer_is_the_same(monkeypatch):
-    monkeypatch.setattr("kerfpath.search.exact.ROOM", 3)
+def test_without_a_record_the_answer_is_the_same(change_effort):
+    change_effort(recorded_states=3)
     rng = np.random.default_rng(33)
     assert sum(bool(agree(rng, layers=(4, 12))) for _ in range(200)) > 50
 

@@ -54,18 +54,20 @@ def test_the_optimum_agrees_with_trying_every_pair_of_edges():
 
 
 @pytest.mark.parametrize(("stretch", "corner", "around"), [(1.01, 1e-3, 1), (1.5, 1e-9, 2)])
-def test_where_the_search_begins_does_not_change_the_answer(monkeypatch, stretch, corner, around):
+def test_where_the_search_begins_does_not_change_the_answer(
+    monkeypatch, change_effort, stretch, corner, around
+):
     monkeypatch.setattr(slowed_module, "FIRST_STRETCH", stretch)
     monkeypatch.setattr(slowed_module, "CORNER", corner)
     monkeypatch.setattr(slowed_module, "AROUND", around)
-    monkeypatch.setattr(slowed_module, "ROOM", 30)
+    change_effort(recorded_states=30)
     rng = np.random.default_rng(52)
     for _ in range(400):
         agree(rng, layers=(1, 14), size=(1, 10))
 
 
-def test_costs_below_zero_change_nothing_but_the_optimum(monkeypatch):
-    monkeypatch.setattr(slowed_module, "ROOM", 30)
+def test_costs_below_zero_change_nothing_but_the_optimum(change_effort):
+    change_effort(recorded_states=30)
     rng = np.random.default_rng(56)
     for _ in range(300):
         agree(rng, below=rng.choice([0.3, 20.0]), layers=(1, 9), size=(1, 10))

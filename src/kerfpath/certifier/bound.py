@@ -24,6 +24,7 @@ from kerfpath.certifier.infeasibility import (
     turning_nodes,
 )
 from kerfpath.certifier.stages import StageResult, Steps, distinct_groups, linked, solve_stage
+from kerfpath.effort import current_effort
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, rho
 from kerfpath.kernels.reduced import tangents
@@ -183,8 +184,6 @@ NEAR = 0.9
 """Share of the target from which (6) may be what is missing."""
 DEEPEST = 12
 """Largest level: cells of 0.001 deg."""
-MOST_PAIRS, MOST_PER_NODE = 10_000_000, 60_000
-"""Most steps from cell to cell, in all and in addition for each node, unless a time is given."""
 MOST_CELLS = 2_000_000
 """Most cells of a stage, some 2 GB; the certifier stops before it exceeds them."""
 CLEARLY, USUAL_LEVEL, WIDER = 0.02, 3, 2.0
@@ -344,6 +343,8 @@ class _Course:
         self.cost, self.until, self.progress = plan.cost, until, progress
         self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
         self.last = len(plan.q) - 1
+        effort = current_effort()
+        self.most_pairs = effort.certificate_pairs + effort.certificate_pairs_per_node * self.last
         longest = max(1, int(LONGEST / self.steps.velocity.max()))
         self.nodes = turning_nodes(plan, TURNED, longest)
         self.best, self.pairs, self.count = 0.0, 0, 0
@@ -470,7 +471,7 @@ class _Course:
     def _late(self, slow: bool) -> bool:
         """Return whether to use multipliers of (6) from here on."""
         close = slow and self.best > NEAR * self.target
-        return close or self.pairs > EARLY * (MOST_PAIRS + MOST_PER_NODE * self.last)
+        return close or self.pairs > EARLY * self.most_pairs
 
     def _enough(self, result: StageResult, left: float) -> bool:
         """Return whether the next stage, with a share `left` of the cells, is too much work."""
@@ -486,7 +487,7 @@ class _Course:
         """Return whether the time is over, or this number of steps exceeds the limit on work."""
         if self.until < np.inf:
             return monotonic() > self.until
-        return pairs > MOST_PAIRS + MOST_PER_NODE * self.last
+        return pairs > self.most_pairs
 
     def _with_nodes(self, cells: CellSet, most: int = DEEPEST) -> CellSet:
         """Return the cells plus those of further nodes, similarly fine where motions may pass."""

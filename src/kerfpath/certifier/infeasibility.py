@@ -14,6 +14,7 @@ from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
 from kerfpath.certificate import cell_bounds
 from kerfpath.certifier.cells import CellMaker, CellSet
 from kerfpath.certifier.stages import StageResult, Steps, arranged, distinct_groups, solve_stage
+from kerfpath.effort import current_effort
 from kerfpath.errors import Closed
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN, rho
@@ -323,9 +324,6 @@ class Parts:
 
 DEEPEST_RULED_OUT = 12
 """Largest level: cells of 0.001 deg."""
-MOST_STEPS, MOST_PAIRS = 2_000_000, 30_000_000
-"""Most steps between cells in one round, and most pairs of steps in all, before the test ends
-undecided."""
 NODES_AROUND = 12
 """Nodes on either side of a node in a part of the contour that is tested."""
 MOST_CELLS = 2_000
@@ -411,11 +409,9 @@ class MotionTest:
             metric=MANHATTAN,
             endless=self._endless,
         )
-        return self.closed_to(steps, around)
+        return self.closed_to(steps, current_effort().infeasibility_pairs, around)
 
-    def closed_to(
-        self, steps: Steps, around: int | None = None, most_pairs: int = MOST_PAIRS
-    ) -> Closed | None:
+    def closed_to(self, steps: Steps, most_pairs: int, around: int | None = None) -> Closed | None:
         """Return the same for motions with given bounds (5) and (6) and largest cost of steps.
 
         It ends undecided after `most_pairs` pairs of steps.
@@ -507,7 +503,7 @@ class _Round:
         count_steps(self._packed, self._step, self._lead_v, k, live, count)
         begin = np.concatenate([[0], np.cumsum(count)])
         self._steps += int(begin[-1])
-        if self._steps > MOST_STEPS:
+        if self._steps > current_effort().infeasibility_steps:
             self.left = True
             return None
         to = np.empty(begin[-1], np.int64)
@@ -547,9 +543,6 @@ CLOSE = 0.5
 SHARES = (0.5, 0.75, 0.9, 0.95)
 """Shares of the cost that are tried in this order if that of the gap stays undecided: costs that
 are far too low are quickly proved to be impossible."""
-FAILED, MOST_PAIRS = 3, 3_000_000
-"""Costs that may stay undecided before the search stops; and pairs of steps after which a cost
-counts as undecided."""
 ROUNDED = 1e-15
 """Relative rounding error of a quotient."""
 
@@ -574,13 +567,15 @@ def largest_step_bound(
     middle = int(np.argmax([rho(u, steps.weight, steps.metric) for u in plan.increments]))
     part = slice(max(middle - NODES_AROUND_STEP, 0), middle + NODES_AROUND_STEP + 2)
     test = MotionTest(plan.robot, plan.frames[part], plan.T_flange_tip, plan.settings.postures)
+    effort = current_effort()
     low, high, cost = 0.0, plan.cost, (1 - gap) * plan.cost
     ladder = iter(share * plan.cost for share in SHARES if share < 1 - gap)
     tests = failed = 0
-    while not spent() and failed < FAILED and high - low > CLOSE * gap * plan.cost:
+    close = CLOSE * gap * plan.cost
+    while not spent() and failed < effort.minimax_undecided and high - low > close:
         progress("certificate", int(1000 * low / plan.cost), 1000)
         tests += 1
-        if test.closed_to(_capped(steps, cost), most_pairs=MOST_PAIRS) is not None:
+        if test.closed_to(_capped(steps, cost), effort.minimax_pairs) is not None:
             low = cost
             if tests == 1:
                 break

@@ -16,16 +16,16 @@ from kerfpath.planner.statements import plan_off_grid
 from kerfpath.planner.task import PlanningTask
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
-from kerfpath.search import ContinuousPath, Effort, find_shortest
+from kerfpath.search import BeamWidth, ContinuousPath, find_shortest
 
 FIRST_STEP = 5e-3
 """rad: first change of gamma when a path between the samples is refined."""
 FINE, COARSE = (0.1, 0.25), (1.1, 1.0)
-"""`Effort.alike` of beams for paths that hardly accelerate, and for paths that must."""
-QUICK = (Effort(60, FINE, 2), Effort(200, COARSE, 2))
-"""Efforts of the first paths; a wide search follows if the value function promises more."""
+"""`BeamWidth.alike` for paths that hardly accelerate, and for paths that must."""
+QUICK = (BeamWidth(60, FINE, 2), BeamWidth(200, COARSE, 2))
+"""Beams of the first paths; a wide search follows if the value function promises more."""
 OTHERWISE = (0.5, 0.5)
-"""`Effort.alike` of a wide search that is to reach other local optima than the first."""
+"""`BeamWidth.alike` of a wide search that is to reach other local optima than the first."""
 ENOUGH, POOR = 5e-3, 1e-2
 """Relative gap to the value function: below the first a motion is good; beyond the second (6) binds
 so much that the promised costs say little, and all paths are refined."""
@@ -148,7 +148,7 @@ def clear_motion(
         return starts.best
     search, paths = searched
     if starts.best is not None and starts.above(search.value, ENOUGH):
-        paths = [path for effort in QUICK for path in search.paths(effort)]
+        paths = [path for beam in QUICK for path in search.paths(beam)]
     begin("refinement")
     starts.refine(paths)
     if not thorough:
@@ -162,7 +162,7 @@ def clear_motion(
         if fine is not None:
             starts.refine_from_grid(fine)
         width, _, ways = wide(task)
-        paths += search.paths(Effort(width, OTHERWISE, ways))
+        paths += search.paths(BeamWidth(width, OTHERWISE, ways))
         starts.refine(paths, unpromising=True)
         made = shaken(starts.best.plan, finder)
         return replace(starts.best, plan=made, cost_after=made.cost)

@@ -15,6 +15,7 @@ from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.certifier import MotionTest
 from kerfpath.compiling import finish_compiling
 from kerfpath.contour import Contour
+from kerfpath.effort import current_effort
 from kerfpath.errors import InputError, NoFeasiblePath, Relaxation
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.courses import CoarseLayer, Nearby, best_steps
@@ -44,9 +45,9 @@ from kerfpath.search import SearchProblem, find_shortest, velocity_allows
 
 MOST_NODES = 5_000
 """Most nodes whose cells are all held in memory at once: some 200 MB."""
-BINDS, APART, MOST_BINDING = 0.9, 3, 12
-"""Share of the limits, in speed, from which they bind at a node; distance in nodes that further
-binding nodes keep; and most binding nodes."""
+BINDS, APART = 0.9, 3
+"""Share of the limits, in speed, from which they bind at a node; and distance in nodes that further
+binding nodes keep."""
 SLACK = 1e-6
 """Share of a limit that is left free, for rounding."""
 FAR, CLOSE = 300.0, 1.02
@@ -143,7 +144,7 @@ def binding_nodes(motions: Sequence[QuickMotion]) -> list[int]:
     """Return nodes where limits bind successively quicker motions, that of the quickest first.
 
     They are the binding node of each motion, and nodes where limits nearly bind the quickest one,
-    at most `MOST_BINDING`, not close to each other.
+    at most `Effort.binding_nodes`, not close to each other.
     """
     plan = motions[-1].plan
     velocity = np.abs(plan.velocity_share).max(axis=1) / plan.settings.eta_v
@@ -157,7 +158,7 @@ def binding_nodes(motions: Sequence[QuickMotion]) -> list[int]:
     for node in [*(motion.at.node for motion in reversed(motions)), *near.tolist()]:
         if all(abs(node - other) > APART for other in nodes):
             nodes.append(node)
-    return nodes[:MOST_BINDING]
+    return nodes[: current_effort().binding_nodes]
 
 
 # -----------------------------------------------------------------------------
@@ -576,12 +577,6 @@ def _smooth(rng: np.random.Generator, nodes: int, size: float) -> Array:
 # -----------------------------------------------------------------------------
 # Very many nodes: a motion along every few of them is the start for all of them.
 
-MANY = 800
-"""Number of intervals from which on a task is thinned, divided by the number of free variables at a
-node (gamma and the joints that a pose leaves free).
-
-The closer the nodes, the less an increment may change by (6), compared with the samples of gamma:
-paths through these become poor, and their refinement takes long and may end in another optimum."""
 EVERY = 5, 4, 6, 3, 7
 """One of this many nodes is kept: the first number that divides the intervals, else the first."""
 
@@ -646,7 +641,7 @@ def thinned(task: PlanningTask) -> ThinTask | None:
     built for it.
     """
     last, axes = len(task.contour) - 1, len(task.robot.free)
-    if last < MANY / (1 + axes) or task.settings.tilt is not None:
+    if last < current_effort().subsampled_from / (1 + axes) or task.settings.tilt is not None:
         return None
     if axes and task.external is None:
         return None

@@ -8,32 +8,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfpath.arrays import short_repr
+from kerfpath.effort import current_effort
 from kerfpath.kernels.metric import wrap
 from kerfpath.planner.collision_free import ClearSearch
 from kerfpath.planner.task import PlanningTask
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Binding, quicken
 from kerfpath.search import (
+    BeamWidth,
     ContinuousPath,
     ContinuousSearch,
-    Effort,
     LeastInterval,
     edges_allowed,
     find_least_interval,
     find_slow_path,
 )
 
-RUNGS = (1.06, 1.0, 1.1)
-"""Multiples of the speed reached at which beam searches look for a quicker motion. If no motion is
-as quick, they keep (6) as far as they can, and end in another local optimum."""
 GAIN = 2e-3
-"""Relative gain of speed below which a rung counts as without gain."""
+"""Relative gain of speed below which a search counts as without gain."""
 WIDE, MOST_STATES = 1600, 5_000_000
 """Most states kept in a wide search, in each layer and in all layers."""
 ALIKE = (1.1, 0.5)
-"""`Effort.alike` of a wide search."""
-MOST_EDGES = 2e7
-"""Most edges with which the exact search for the fastest path takes at most some ten seconds."""
+"""`BeamWidth.alike` of a wide search."""
 SLACK = 1e-6
 """Share of the interval that is left free, so that the motion keeps the limits after rounding."""
 SAME_VALLEY = 0.05
@@ -93,9 +89,10 @@ def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMoti
         return
     best = quicker(task, finder, path, best)
     yield best
-    rung, tried = 0, [path]
-    while rung < len(RUNGS):
-        before, ahead = best.dt, _at(task, best.dt / RUNGS[rung])
+    factors = current_effort().speed_factors
+    without_gain, tried = 0, [path]
+    while without_gain < len(factors):
+        before, ahead = best.dt, _at(task, best.dt / factors[without_gain])
         found = clear_paths(ahead, finder, (wide(task),))
         for between in () if found is None else found[1]:
             made = ahead.plan_between(between, _claim())
@@ -105,7 +102,7 @@ def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMoti
                 if faster is not best:
                     best = faster
                     yield best
-        rung = 0 if best.dt < (1 - GAIN) * before else rung + 1
+        without_gain = 0 if best.dt < (1 - GAIN) * before else without_gain + 1
 
 
 def slow_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotion]:
@@ -117,7 +114,7 @@ def slow_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotio
     """
     slow = _without_aim(task)
     path = finder.find(find_slow_path, slow.problem)
-    if edges_allowed(slow.problem, path.dt) <= MOST_EDGES:
+    if edges_allowed(slow.problem, path.dt) <= current_effort().exact_edges:
         yield from quick_motions(task, finder)
         return
     task, best = slow, _along(slow, path)
@@ -173,13 +170,13 @@ def quicker(task: PlanningTask, finder: ClearSearch, start: Plan, best: QuickMot
     return replace(best, plan=made, at=at) if finder.is_clear(made) else best
 
 
-def wide(task: PlanningTask) -> Effort:
-    """Return the effort of a wide search, less wide over very many nodes."""
-    return Effort(min(WIDE, MOST_STATES // len(task.contour) + 1), ALIKE, 1)
+def wide(task: PlanningTask) -> BeamWidth:
+    """Return the beam of a wide search, less wide over very many nodes."""
+    return BeamWidth(min(WIDE, MOST_STATES // len(task.contour) + 1), ALIKE, 1)
 
 
 def clear_paths(
-    task: PlanningTask, finder: ClearSearch, efforts: tuple[Effort, ...]
+    task: PlanningTask, finder: ClearSearch, beams: tuple[BeamWidth, ...]
 ) -> tuple[ContinuousSearch, list[ContinuousPath]] | None:
     """Return a search over continuous gamma and its paths, clear at the samples that they use.
 
@@ -188,7 +185,7 @@ def clear_paths(
     """
     for _ in range(MOST_SEARCHES):
         search = ContinuousSearch(finder.open_problem(task.problem), task.samples)
-        paths = [path for effort in efforts for path in search.paths(effort)]
+        paths = [path for beam in beams for path in search.paths(beam)]
         if not finder.learn([ends for path in paths for ends in (path.one, path.other)]):
             return search, paths
     return None

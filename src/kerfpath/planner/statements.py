@@ -21,7 +21,7 @@ from kerfpath.planner.task import PlanningTask
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner import Refinement
 from kerfpath.retime import feed, retime
-from kerfpath.search import ContinuousSearch, Effort, SearchProblem, find_shortest, find_slowed
+from kerfpath.search import BeamWidth, ContinuousSearch, SearchProblem, find_shortest, find_slowed
 
 # -----------------------------------------------------------------------------
 # Plans off the grid: the best refinement of the paths worth starting from.
@@ -120,8 +120,8 @@ def plan_first_order(task: PlanningTask, finder: ClearSearch) -> Plan | None:
 # -----------------------------------------------------------------------------
 # feed="dip": paths to slow down, their least times, and where the speed is reduced.
 
-EFFORT = Effort(60, (1.1, 1.0))
-"""Effort of the search for a path over continuous gamma."""
+BEAM = BeamWidth(60, (1.1, 1.0))
+"""BeamWidth of the search for a path over continuous gamma."""
 SLOWER = (1.0, 1.15, 1.4, 2.0)
 """Node intervals at which (6) must hold everywhere, as multiples of the one asked for."""
 MOST_LOOKS = 20
@@ -186,7 +186,7 @@ def _between(task: PlanningTask, finder: ClearSearch, problem: SearchProblem) ->
     claim = "no motion was found at constant speed; slowed down from a path over continuous gamma"
     for _ in range(MOST_LOOKS):
         search = ContinuousSearch(finder.open_problem(problem), task.samples)
-        paths = list(search.paths(EFFORT))
+        paths = list(search.paths(BEAM))
         if not finder.learn([ends for path in paths for ends in (path.one, path.other)]):
             proof = Proof(optimal=False, statement=finder.claimed(claim))
             return task.plan_between(paths[0], proof) if paths else None

@@ -3,9 +3,9 @@
 from kerfpath.search.clear import CheckedEdges as CheckedEdges
 from kerfpath.search.clear import FoundPath as FoundPath
 from kerfpath.search.clear import find_clear as find_clear
+from kerfpath.search.continuous import BeamWidth as BeamWidth
 from kerfpath.search.continuous import ContinuousPath as ContinuousPath
 from kerfpath.search.continuous import ContinuousSearch as ContinuousSearch
-from kerfpath.search.continuous import Effort as Effort
 from kerfpath.search.continuous import GammaSamples as GammaSamples
 from kerfpath.search.continuous import compile_search as compile_search
 from kerfpath.search.problem import METRIC_CODES as METRIC_CODES

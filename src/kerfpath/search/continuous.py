@@ -84,7 +84,7 @@ class ContinuousPath:
     __repr__ = short_repr
 
 
-class Effort(NamedTuple):
+class BeamWidth(NamedTuple):
     """Width of a beam search."""
 
     width: int
@@ -160,10 +160,10 @@ class ContinuousSearch:
         """
         return min((way.value for way in self._ways), default=np.inf)
 
-    def paths(self, effort: Effort) -> Iterator[ContinuousPath]:
-        """Yield the best paths found with an effort; there may be none."""
-        for way in self._ways[: effort.ways]:
-            path = self._beam(way, effort)
+    def paths(self, beam: BeamWidth) -> Iterator[ContinuousPath]:
+        """Yield the best paths found with a beam; there may be none."""
+        for way in self._ways[: beam.ways]:
+            path = self._beam(way, beam)
             if path is not None:
                 yield path
 
@@ -239,18 +239,18 @@ class ContinuousSearch:
         place = self._origin[targets.start[-2] :] - self._problem.start[-2]
         return np.isin(place, self._origin[beside])
 
-    def _beam(self, way: _Way, effort: Effort) -> ContinuousPath | None:
+    def _beam(self, way: _Way, wide: BeamWidth) -> ContinuousPath | None:
         """Return the best path of a beam search along a way; None if it does not reach the end."""
         targets = self._targets
-        first = way.first[: effort.width]
+        first = way.first[: wide.width]
         K = len(targets.start) - 1
-        size = K, effort.width
+        size = K, wide.width
         beam = Beam(
             np.empty(size, np.int64), np.empty(size), np.empty(size, np.int64), np.empty(size),
             np.zeros(K, np.int64),
         )  # fmt: skip
         acceleration = self._problem.aim.acceleration
-        alike = Alike(*effort.alike)
+        alike = Alike(*wide.alike)
         if advance(targets, way.steps, way.cost, way.V, acceleration, first, alike, beam) < K:
             return None
         cost = beam.cost[-1, : beam.size[-1]]
@@ -332,5 +332,5 @@ def compile_search() -> None:
         posture=np.zeros_like(sample),
         samples=samples,
     )
-    for _ in ContinuousSearch(problem, on_grid).paths(Effort(4, (0.1, 0.1))):
+    for _ in ContinuousSearch(problem, on_grid).paths(BeamWidth(4, (0.1, 0.1))):
         pass

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
+from kerfpath.effort import current_effort
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels.search import Aim, SortedLayers
 from kerfpath.kernels.states import EVERY
@@ -19,8 +20,6 @@ NARROW = 2
 """States kept for each vertex in the search for a good path, whose cost is then a ceiling."""
 WORTH_A_CEILING = 0.1
 """States per vertex from which on that search saves more time than it takes."""
-ROOM = 10_000_000
-"""Most states that a search under a loose bound may remember: 80 MB."""
 UNLIMITED = 2**62
 NO_SEAM = np.empty(0)
 """Seam of an open path: (6) need not hold between its last increment and a first one."""
@@ -145,9 +144,9 @@ def _grow(
     if least == np.inf:
         return None
     bound, good, sought = max(least, floor + K * rise) * (1 + ROUNDING), np.inf, False
-    first_gap = FIRST_GAP * abs(least - K * rise)
+    first_gap, room = FIRST_GAP * abs(least - K * rise), current_effort().recorded_states
     while True:
-        reached = exact.recursion(layers, aim, h, bound, seam, ROOM, EVERY)
+        reached = exact.recursion(layers, aim, h, bound, seam, room, EVERY)
         if reached.best[-1] >= 0:
             break
         if reached.lowest == np.inf or reached.lowest > ceiling:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.arrays import Array, Bools, Ints, floats, freeze, scalar, short_repr
+from kerfpath.effort import current_effort
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels import exact, to_go
 from kerfpath.kernels.metric import CHEBYCHEV, increments, increments_between
@@ -18,7 +19,6 @@ from kerfpath.kernels.states import EVERY
 from kerfpath.search.exact import (
     FIRST_GAP,
     NO_SEAM,
-    ROOM,
     ROUNDING,
     UNLIMITED,
     BestPath,
@@ -534,7 +534,8 @@ def _best(layers: SortedLayers, aim: Aim) -> tuple[Ints, float]:
     _add_corners(layers, aim, h)
     least = float((layers.cost + h)[: layers.start[1]].min())
     bound = least * (1 + ROUNDING)
-    while (reached := exact.recursion(layers, aim, h, bound, NO_SEAM, ROOM, EVERY)).best[-1] < 0:
+    room = current_effort().recorded_states
+    while (reached := exact.recursion(layers, aim, h, bound, NO_SEAM, room, EVERY)).best[-1] < 0:
         gap = max(2 * (bound - least), FIRST_GAP * least)
         bound = max(least + gap, reached.lowest * (1 + ROUNDING))
     if not reached.recorded:

@@ -17,6 +17,7 @@ from threading import Thread
 from typing import Any
 
 from kerfpath import __version__
+from kerfpath.effort import Effort, current_effort, set_effort
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
 from kerfpath.progress import may_stop
@@ -71,7 +72,10 @@ def _run_pool(
     ours, theirs = context.Pipe()
     with _starting():  # a process that looks after semaphores
         pool = ProcessPoolExecutor(
-            processes, mp_context=context, initializer=_set_up, initargs=(theirs, call)
+            processes,
+            mp_context=context,
+            initializer=_set_up,
+            initargs=(theirs, call, current_effort()),
         )
     flying: dict[Future[TaskOutcome], Task] = {}
     broken = False
@@ -146,13 +150,14 @@ def _interrupt_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _set_up(link: Connection, call: bytes) -> None:
+def _set_up(link: Connection, call: bytes, effort: Effort) -> None:
     """Set up a process: use one thread, ignore Ctrl-C, and end as soon as the sweep ends.
 
     The function is imported here instead of in the first task.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ.update(ONE_THREAD)
+    set_effort(effort)
     Thread(target=_leave_with, args=(link,), daemon=True).start()
     with suppress(OSError):  # the sweep may have been killed meanwhile
         link.send(None)

@@ -33,9 +33,9 @@ from kerfpath.limits import Limits, rates_of
 from kerfpath.losses import Loss, Reason
 from kerfpath.planner import plan, samples_of
 from kerfpath.search import (
+    BeamWidth,
     ContinuousPath,
     ContinuousSearch,
-    Effort,
     SearchProblem,
     shortest_path,
 )
@@ -45,7 +45,7 @@ from kerfpath.study.placing.place import Numbers, middle_of, motions_of, move_jo
 # -----------------------------------------------------------------------------
 # Estimate how fast nodes can be cut over continuous gamma, by beams without refinement.
 
-EFFORT = Effort(200, (0.5, 0.5))
+BEAM = BeamWidth(200, (0.5, 0.5))
 """States kept in each layer. On nine placements of two contours of the demo, paths were 0 to 6 %
 slower than the fastest motion found, and eight times as many states did not improve that."""
 LONGER, CLOSE = 1.3, 1.01
@@ -126,7 +126,7 @@ class Beams:
         samples = samples_of(self.graph)
         for _ in range(MOST_SEARCHES):
             search = ContinuousSearch(replace(problem, vertex_cost=self.cost.copy()), samples)
-            path = next(search.paths(EFFORT), None)
+            path = next(search.paths(BEAM), None)
             if path is None or self.checker is None:
                 return path
             ends = np.unique(np.concatenate([path.one, path.other]))
