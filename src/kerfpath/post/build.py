@@ -37,13 +37,13 @@ from kerfpath.transfer import End, TransferMove, back_off, least_time, speed_sha
 # The targets of a program are poses of the tip in the part, wherever external axes carry robot
 # and part. Some controllers couple the work object to the axes that carry the part, and have the
 # same poses (RAPID, KRL); others have poses of the tip in the fixed frame (FANUC), see
-# `standing`. In both cases the controller itself takes account of axes that carry the robot.
+# `part_motion`. In both cases the controller itself takes account of axes that carry the robot.
 
 SAME_DIRECTION = 0.1
 """Sine below which x of the base does not define how a frame about an axis is turned."""
 
 
-def said_unit(axis: ExternalAxis) -> str:
+def controller_unit(axis: ExternalAxis) -> str:
     """Return the unit of the values of an axis in programs: mm or deg."""
     return "mm" if axis.kind == "linear" else "deg"
 
@@ -53,13 +53,13 @@ def arm_joints(robot: Robot, q: ArrayLike) -> Array:
     return floats(q, "q", (None, robot.joints))[:, : robot.family.joints]
 
 
-def said(robot: Robot, q: ArrayLike) -> Array:
+def to_controller_units(robot: Robot, q: ArrayLike) -> Array:
     """Return the values (K, E) of the external axes, mm and deg, from joint vectors q (K, n)."""
     values = floats(q, "q", (None, robot.joints))[:, robot.family.joints :]
     return np.asarray(values * _scales(robot))
 
 
-def from_said(robot: Robot, values: ArrayLike) -> Array:
+def from_controller_units(robot: Robot, values: ArrayLike) -> Array:
     """Return values (..., E) of the external axes in m and rad, given in mm and deg."""
     return freeze(np.asarray(values, dtype=np.float64) / _scales(robot))
 
@@ -101,7 +101,7 @@ def carrier_frame(robot: Robot, values: Sequence[float] | None = None) -> Array:
     return freeze(T)
 
 
-def standing(robot: Robot, T_base_part: Array, external: Array) -> Array:
+def part_motion(robot: Robot, T_base_part: Array, external: Array) -> Array:
     """Return the poses (K, 4, 4) m of the part in the part frame with all axes at zero.
 
     `external` has the values (K, E) m and rad of the external axes.
@@ -133,7 +133,7 @@ def setup_remarks(robot: Robot, *, si: bool = False) -> Iterator[str]:
     The units are those of the program: mm and deg, or m and rad with `si`.
     """
     for axis in robot.externals:
-        unit = axis.unit if si else said_unit(axis)
+        unit = axis.unit if si else controller_unit(axis)
         way = "along" if axis.kind == "linear" else "about"
         yield f"External axis {axis.name} ({unit}): carries the {axis.carries}"
         yield f"{way} {words_of(axis.axis, 6)} of the base"

@@ -171,7 +171,7 @@ class LineReader:
 
     # Steps.
 
-    def require_standing(self, what: str) -> None:
+    def require_stopped(self, what: str) -> None:
         """Refuse a wait or handshake while the robot moves; each language overrides this."""
 
     def add_move(self, kind: MoveKind, speed: float | None, **said: Any) -> None:
@@ -180,7 +180,7 @@ class LineReader:
 
     def wait(self, time: str | float) -> None:
         """Add a wait (s)."""
-        self.require_standing("a wait")
+        self.require_stopped("a wait")
         self.steps.append(ReadWait(time=float(time), file=self.file, line=self.line))
 
     def ask(self, port: object, *, on: bool) -> None:
@@ -193,7 +193,7 @@ class LineReader:
 
     def add_handshake(self, what: Handshake) -> None:
         """Add a handshake."""
-        self.require_standing("a handshake")
+        self.require_stopped("a handshake")
         self.steps.append(ReadHandshake(what=what, file=self.file, line=self.line))
 
     def partner(self, port: object, way: Literal["input", "output"]) -> Partner:

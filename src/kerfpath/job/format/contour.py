@@ -276,7 +276,7 @@ class ContourSpec:
         update = {key: value * share ** power[key] for key, value in given.items()}
         count = None if self.count is None else int(np.ceil((self.count - 1) / share)) + 1
         table = self.table.model_copy(update={**update, "count": count})
-        return replace(task_of(table), pick=self.pick, name=self.name)
+        return replace(contour_request(table), pick=self.pick, name=self.name)
 
     def asked(self, options: PlanOptions) -> PlanOptions:
         """Return the options of the job with the windows of gamma of this contour."""
@@ -308,7 +308,7 @@ class ContourSpec:
             )
 
 
-def task_of(table: ContourTable) -> ContourSpec:
+def contour_request(table: ContourTable) -> ContourSpec:
     """Return what a [[contour]] table asks for, in SI."""
     angle, step = table.axis_tolerance_deg, table.time_step_ms
     return ContourSpec(

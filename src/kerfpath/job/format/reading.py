@@ -23,7 +23,7 @@ from kerfpath.contour import Contour
 from kerfpath.dynamics import STANDARD_GRAVITY
 from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
-from kerfpath.job.format.contour import ContourSpec, keys_of_closed_loops, task_of
+from kerfpath.job.format.contour import ContourSpec, contour_request, keys_of_closed_loops
 from kerfpath.job.format.drawing import Drawing
 from kerfpath.job.format.program import ProgramOptions, Tolerances, program_options, tolerances_of
 from kerfpath.job.format.tables import (
@@ -500,7 +500,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         tool=file.tool.resolve(),
         placement=file.part.resolve(drawing),
         drawing=drawing,
-        contours=tuple(task_of(table) for table in file.contour),
+        contours=tuple(contour_request(table) for table in file.contour),
         options=options,
         cell=file.cell,
         home=home_of(file.sequence, file.robot.external, robot),

@@ -304,8 +304,8 @@ def _expected(
     if job.options.feed == "dip" and made.feed is not None and not picked:
         plan = _dipping(plan, whole.dt, made.time)
     plan = recompute(plan)
-    asked = job.options.retract
-    room = retract_checks(plan, None if asked == made.settings.retract else asked)
+    requested = job.options.retract
+    room = retract_checks(plan, None if requested == made.settings.retract else requested)
     rows = (place, *_postures(job, plan), *room)
     drawing = prepared.contours[number].drawing_checks(own, plan.contour, job.tolerances.path)
     return ExpectedPlan(
@@ -361,8 +361,8 @@ def _postures(job: Job, made: Plan) -> list[Check]:
     return [count("posture", "nodes in a posture that the job does not allow", len(other), node)]
 
 
-def _node_count(made: Plan, asked: str) -> Check:
-    said = f"wrong number of nodes: expected {asked}, found {len(made.contour)}"
+def _node_count(made: Plan, expected: str) -> Check:
+    said = f"wrong number of nodes: expected {expected}, found {len(made.contour)}"
     return count("nodes", said, 1)
 
 

@@ -59,7 +59,7 @@ from kerfpath.windows import GammaWindow
 # -----------------------------------------------------------------------------
 # Check the joint limits of a program as a controller runs its text, with rounded corners.
 
-UNSAID = 1.0
+SOME_ZONE = 1.0
 """Zone, m, for a text that gives no length; any value except zero."""
 SHORTEST = 1e-9
 """Least duration of a move, s."""
@@ -115,7 +115,7 @@ def _moves(cut: ReadCut, controller: Controller) -> list[LinearMove]:
         took = max(float(cut.took[before:node].sum()), SHORTEST)
         way = np.diff(cut.T_part_tip[before : node + 1, :3, 3], axis=0)
         speed = move.speed or float(np.linalg.norm(way, axis=1).sum()) / took
-        zone = controller.zone(UNSAID, speed) if move.zone is None else move.zone
+        zone = controller.zone(SOME_ZONE, speed) if move.zone is None else move.zone
         if move.T_part_via is None:
             made = LinearMove(T_part_tip=T, q=q, speed=speed, duration=took, zone=zone)
         else:
@@ -788,13 +788,13 @@ def _compared(
     if not followed:
         return []
     try:
-        asked = expect_program(job, followed, home, chosen, settings)
+        expected = expect_program(job, followed, home, chosen, settings)
     except InputError as error:
         said = f"the program of the job cannot be made along these paths ({error})"
         return [count("asked", said, 1)]
     rules = chosen.rules(settings)
-    asked = add_tips(asked, job)
-    found = differences(asked, read, rules=(rules,), names=("the job", "the text"), strict=True)
+    expected = add_tips(expected, job)
+    found = differences(expected, read, rules=(rules,), names=("the job", "the text"), strict=True)
     places = [step.place for step in read.steps]
     rows = [
         count(

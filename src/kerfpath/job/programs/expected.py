@@ -114,12 +114,12 @@ def expect_program(
         There is no such program: joints leave the path, or the tool cannot back off.
     """
     rules, options = language.rules(settings), job.program
-    plans = [whole_cut(job, cut, asked, plan) for cut, asked, plan in cuts]
+    plans = [whole_cut(job, cut, requested, plan) for cut, requested, plan in cuts]
     moves = _moves(job, [cut for cut, _, _ in cuts], plans, home)
     # Arcs are added below, where they were read.
     program = replace(options, arc_tolerance=None).program(plans, moves)
     sections = []
-    for section, (cut, asked, _) in zip(program.sections, cuts, strict=True):
+    for section, (cut, requested, _) in zip(program.sections, cuts, strict=True):
         steps = [
             replace(step, q=_same_pose(program, step.q, cut.approach[-1], rules))
             if isinstance(step, JointMove)
@@ -127,17 +127,17 @@ def expect_program(
             for step in section.steps
         ]
         if options.zone == "auto":
-            steps = _with_zones(steps, cut, asked)
+            steps = _with_zones(steps, cut, requested)
         if options.arc_tolerance is not None:
-            steps = _with_arcs(steps, cut, asked)
+            steps = _with_arcs(steps, cut, requested)
         sections.append(replace(section, steps=tuple(steps)))
     return read_as_written(replace(program, sections=tuple(sections)), language, settings)
 
 
-def whole_cut(job: Job, cut: ReadCut, asked: TargetNodes, plan: Plan) -> Plan:
+def whole_cut(job: Job, cut: ReadCut, requested: TargetNodes, plan: Plan) -> Plan:
     """Return the plan of a cut with every node that the job asks for, along arcs, too."""
-    targets, at = cut.ends, asked.at
-    K = len(asked.nodes)
+    targets, at = cut.ends, requested.at
+    K = len(requested.nodes)
     T, q = np.empty((K, 4, 4)), np.empty((K, cut.q.shape[1]))
     T[at], q[at] = cut.T_part_tip[targets], cut.q[targets]
     flange = np.linalg.inv(plan.T_flange_tip)
@@ -145,17 +145,17 @@ def whole_cut(job: Job, cut: ReadCut, asked: TargetNodes, plan: Plan) -> Plan:
         first, last = at[max(j - 1, 0)], at[j]
         if move.T_part_via is not None and last - first > 1:
             inner = slice(first + 1, last)
-            s = asked.nodes.s[first : last + 1]
+            s = requested.nodes.s[first : last + 1]
             parts = ((s - s[0]) / (s[-1] - s[0]))[1:-1]
             T[inner] = ToolCourse.through(T[[first, last]], [move.T_part_via]).poses(parts)
             q[inner] = follow_poses(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
-    time = asked.time
+    time = requested.time
     if job.options.feed != "constant":  # it may be slower, which is checked separately
-        time = np.interp(np.arange(K), at, _as_fast(cut, asked.nodes.s[at]))
+        time = np.interp(np.arange(K), at, _as_fast(cut, requested.nodes.s[at]))
     return replace(
         plan,
         contour=Contour(
-            T[:, :3, 3], T[:, :3, 2], s=asked.nodes.s, kind=asked.nodes.kind, name=plan.name
+            T[:, :3, 3], T[:, :3, 2], s=requested.nodes.s, kind=requested.nodes.kind, name=plan.name
         ),
         q=q,
         gamma=np.zeros(K),
@@ -198,28 +198,28 @@ def _moves(
     ]
 
 
-def _same_pose(program: Program, asked: Array, read: Array, rules: Rules) -> Array:
+def _same_pose(program: Program, requested: Array, read: Array, rules: Rules) -> Array:
     """Return the joints that were read if they bring the tool to the requested pose.
 
     Near a singularity, the digits of a pose leave a larger error in the joints than in the pose.
     """
-    T = program.robot.forward(np.array([asked, read])) @ program.T_flange_tip
-    left = len(asked) * rules.angle_step
+    T = program.robot.forward(np.array([requested, read])) @ program.T_flange_tip
+    left = len(requested) * rules.angle_step
     off = np.linalg.norm(T[0, :3, 3] - T[1, :3, 3])
     turned = np.linalg.norm(T[0, :3, :3] - T[1, :3, :3]) / np.sqrt(2)
     near = off <= POINT + rules.point_step + REACH * left and turned <= ANGLE + left
-    near = near and np.abs(asked - read)[program.robot.free].max(initial=0) <= POINT
-    return read if near and np.abs(asked - read).max() <= SAME_BRANCH else asked
+    near = near and np.abs(requested - read)[program.robot.free].max(initial=0) <= POINT
+    return read if near and np.abs(requested - read).max() <= SAME_BRANCH else requested
 
 
-def _with_zones(steps: Sequence[Step], cut: ReadCut, asked: TargetNodes) -> list[Step]:
+def _with_zones(steps: Sequence[Step], cut: ReadCut, requested: TargetNodes) -> list[Step]:
     """Return the steps of a cut with the zones that were read, if they are one step away.
 
     Zones are rounded to steps, and digits of targets may lead to the next step.
     """
     path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
     found = list(steps)
-    for k, move in zip((path[node] for node in asked.at), cut.targets, strict=True):
+    for k, move in zip((path[node] for node in requested.at), cut.targets, strict=True):
         step = found[k]
         assert isinstance(step, LinearMove)
         if move.zone and abs(move.zone - step.zone) <= ZONE_STEP * step.zone + POINT:
@@ -227,12 +227,12 @@ def _with_zones(steps: Sequence[Step], cut: ReadCut, asked: TargetNodes) -> list
     return found
 
 
-def _with_arcs(steps: Sequence[Step], cut: ReadCut, asked: TargetNodes) -> list[Step]:
+def _with_arcs(steps: Sequence[Step], cut: ReadCut, requested: TargetNodes) -> list[Step]:
     """Return the steps of a cut with the arcs that were read, if there may be an arc."""
     path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
     found, done = list(steps[: path[0] + 1]), path[0] + 1
     for j, move in enumerate(cut.targets[1:], 1):
-        first, last = path[asked.at[j - 1] + 1], path[asked.at[j]]
+        first, last = path[requested.at[j - 1] + 1], path[requested.at[j]]
         run = [step for step in steps[first : last + 1] if isinstance(step, LinearMove)]
         found += steps[done:first]
         done = last + 1
@@ -273,7 +273,7 @@ OUTSIDE = 1e-5
 def check_pins(
     job: Job,
     cut: ReadCut,
-    asked: TargetNodes,
+    requested: TargetNodes,
     plan: Plan,
     windows: Sequence[GammaWindow],
     rules: Rules,
@@ -284,9 +284,9 @@ def check_pins(
     """
     if not windows or job.options.tilt is not None:
         return []
-    whole = whole_cut(job, cut, asked, plan)
+    whole = whole_cut(job, cut, requested, plan)
     settings = replace(whole.settings, gamma_windows=tuple(windows))
-    pinned = replace(whole, contour=asked.nodes, settings=settings)
+    pinned = replace(whole, contour=requested.nodes, settings=settings)
     tool = job.robot.forward(pinned.q) @ job.tool
     # Digits of three angles, or of the four numbers of a quaternion.
     return window_checks(pinned, tool, slack=OUTSIDE + 4 * rules.angle_step)

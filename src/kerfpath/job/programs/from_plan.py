@@ -573,13 +573,13 @@ def touch_up(
     if job.sequence is not None:
         job = replace(job, sequence=job.sequence.model_copy(update={"order": "given"}))
     prepared = prepare(job, part)
-    asked = dict(zip(prepared.names, prepared.contours, strict=True))
-    if set(asked) != set(file.contours.values()):
+    requests = dict(zip(prepared.names, prepared.contours, strict=True))
+    if set(requests) != set(file.contours.values()):
         raise InputError(
             f"{job.path}: the job has other contours than {file.path}; give the job of that plan"
         )
     contours = [
-        _touched_up(asked[p.name], p, moved, group.path, ease)
+        _touched_up(requests[p.name], p, moved, group.path, ease)
         for p, moved, group in zip(file.plans, targets, groups, strict=True)
     ]
     outcome = run_prepared(prepared.with_contours(contours), progress=progress)
@@ -668,37 +668,41 @@ def _require_few(
 
 
 def _touched_up(
-    asked: CutRequest, p: Plan, moved: Sequence[MovedTarget], moves: Sequence[ReadMove], ease: float
+    request: CutRequest,
+    p: Plan,
+    moved: Sequence[MovedTarget],
+    moves: Sequence[ReadMove],
+    ease: float,
 ) -> CutRequest:
     """Return the request for a contour around its moved targets, in the postures of its plan."""
-    planned = _path_and_nodes(p, asked)
+    planned = _path_and_nodes(p, request)
     if moved:
         k = np.array([target.node for target in moved])
         T = np.array([moves[node].T_part_tip for node in k])
         path, keep = touched_up(planned.path, planned.nodes, k, T[:, :3, 3], T[:, :3, 2], ease=ease)
-        nodes = _sample_touched(path, planned.nodes, keep, asked.task.speed)
-        planned = Candidate.at(asked.task.speed, path, nodes)
+        nodes = _sample_touched(path, planned.nodes, keep, request.task.speed)
+        planned = Candidate.at(request.task.speed, path, nodes)
     postures = tuple(np.unique(p.posture).tolist())
     return replace(
-        asked,
+        request,
         candidates=(planned,),
-        options=replace(asked.options, postures=postures),
+        options=replace(request.options, postures=postures),
         touched_up=bool(moved),
     )
 
 
-def _path_and_nodes(p: Plan, asked: CutRequest) -> Candidate:
+def _path_and_nodes(p: Plan, request: CutRequest) -> Candidate:
     """Return the candidate of a plan.
 
     For a plan that was touched up before, its path is straight lines between the plan's nodes.
     """
-    for candidate in asked.candidates:
+    for candidate in request.candidates:
         fits = len(candidate.nodes) == len(p.contour)
         if fits and _distances(p.contour, candidate.path) < SAME_PATH:
             return candidate
     slowed = bool((p.contour.speed_share < 1).any())
     nodes = replace(p.contour, time=p.time if slowed else None)
-    return Candidate.at(asked.task.speed, p.contour, nodes)
+    return Candidate.at(request.task.speed, p.contour, nodes)
 
 
 def _sample_touched(path: Contour, nodes: Contour, keep: Ints, speed: float) -> Contour:

@@ -10,7 +10,7 @@ import numpy as np
 from kerfpath.arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import pose_of
-from kerfpath.post.build import from_said
+from kerfpath.post.build import from_controller_units
 from kerfpath.post.csv.writer import POSE, CsvSettings, columns
 from kerfpath.post.line_reader import LineReader, program_lines
 from kerfpath.post.program import SIGNALS, Switch
@@ -113,7 +113,7 @@ class _Reader(LineReader):
         T = pose_of(point * 1e-3, wxyz)
         if T is None:
             raise self.fault("the quaternion must have length 1")
-        return freeze(np.append(np.radians(q), from_said(self.robot, x))), T
+        return freeze(np.append(np.radians(q), from_controller_units(self.robot, x))), T
 
     def switches(self, text: str) -> tuple[Switch, ...]:
         found = []

@@ -13,7 +13,7 @@ import numpy as np
 
 from kerfpath.names import identifier
 from kerfpath.post.arcs import quaternions, timetable
-from kerfpath.post.build import arm_joints, said, said_unit
+from kerfpath.post.build import arm_joints, controller_unit, to_controller_units
 from kerfpath.post.languages import (
     Formatter,
     LanguageSettings,
@@ -56,7 +56,7 @@ def columns(robot: Robot) -> list[str]:
     """Return the names of the columns of a robot."""
     axes = [f"q{i}_deg" for i in range(1, robot.family.joints + 1)]
     for i, axis in enumerate(robot.externals, 1):
-        axes.append(f"e{i}_{identifier(axis.name)}_{said_unit(axis)}")
+        axes.append(f"e{i}_{identifier(axis.name)}_{controller_unit(axis)}")
     rest = ["speed_mm_s", "speed_percent", "zone_mm", "events"]
     return ["section", "kind", "t_s", *axes, *POSE, *rest]
 
@@ -121,7 +121,9 @@ class Csv(Formatter):
         program, moves = self.program, list(dict.fromkeys(self.program.moves))
         points, tips = targets_of(moves), dict(zip(moves, program.tips(moves), strict=True))
         robot, q = program.robot, np.array([q for _, q, _ in points])
-        q_deg = np.hstack([np.degrees(arm_joints(robot, q)), said(robot, q)]).round(9)
+        q_deg = np.hstack([np.degrees(arm_joints(robot, q)), to_controller_units(robot, q)]).round(
+            9
+        )
         T = np.array([tips[move] if T is None else T for move, _, T in points])
         point_mm, wxyz = (T[:, :3, 3] * 1e3).round(7), quaternions(T).round(11)
         text = ",".join(["%.9f"] * q_deg.shape[1] + ["%.7f"] * 3 + ["%.11f"] * 4)

@@ -21,9 +21,9 @@ from kerfpath.errors import InputError
 from kerfpath.post.build import (
     AxisCount,
     axes_that_carry,
-    from_said,
-    said,
+    from_controller_units,
     setup_remarks,
+    to_controller_units,
     wrist_in_plane,
 )
 from kerfpath.post.languages import (
@@ -238,7 +238,7 @@ def _words(robot: Robot) -> dict[int, str]:
 def _rows(robot: Robot, q: Array, letter: str) -> str:
     """Return the values of the axes whose names begin with a letter, at joints q (n,)."""
     words, texts = _words(robot), []
-    for i, value in enumerate(said(robot, q[None])[0]):
+    for i, value in enumerate(to_controller_units(robot, q[None])[0]):
         if words[i][0] == letter:
             measure = " mm" if robot.externals[i].kind == "linear" else "deg"
             texts.append(f"{words[i]}={number(value, DECIMALS):>13} {measure}")
@@ -278,7 +278,7 @@ def read_values(robot: Robot, extended: str, leading: str) -> Array:
         if values[word][1] != unit:
             raise InputError(f"{word}: expected {unit}, got {values[word][1]}")
         rows.append(values[word][0])
-    return from_said(robot, rows) if rows else np.zeros(0)
+    return from_controller_units(robot, rows) if rows else np.zeros(0)
 
 
 def remarks(robot: Robot) -> Iterator[str]:

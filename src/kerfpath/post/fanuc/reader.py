@@ -11,7 +11,7 @@ import numpy as np
 from kerfpath.arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import faceplate, from_euler, world
-from kerfpath.post.build import standing
+from kerfpath.post.build import part_motion
 from kerfpath.post.fanuc.controller import (
     EXTENDED,
     GROUP_2,
@@ -325,7 +325,7 @@ class _Section(Listing):
         external = np.array(list(self.externals.values())).reshape(len(arm), -1)
         T = from_euler(values, ANGLES)
         if leads(self.robot):
-            T = np.linalg.inv(standing(self.robot, T_base_part, external)) @ T
+            T = np.linalg.inv(part_motion(self.robot, T_base_part, external)) @ T
         q = dict(zip(self.targets, freeze(np.hstack([arm, external])), strict=True))
         poses = dict(zip(self.targets, freeze(T), strict=True))
         steps = [

@@ -11,7 +11,7 @@ import numpy as np
 
 from kerfpath.arrays import Ints
 from kerfpath.post.arcs import TICK, euler, not_whole
-from kerfpath.post.build import standing
+from kerfpath.post.build import part_motion
 from kerfpath.post.fanuc.controller import (
     FanucSettings,
     axes_from_joints,
@@ -305,7 +305,7 @@ class Fanuc(CalledFormatter):
         tips = np.array([np.eye(4) if T is None else T for _, _, T in targets])
         if leads(robot):
             external = q[:, robot.family.joints :]
-            tips = standing(robot, self.program.T_base_part, external) @ tips
+            tips = part_motion(robot, self.program.T_base_part, external) @ tips
         poses = euler(tips, ANGLES).tolist()
         configurations = posture(robot, q, settings)
         frames = f"\tUF : {settings.user_frame}, UT : {settings.tool_frame},\t"

@@ -17,9 +17,9 @@ from kerfpath.post.arcs import TICK, not_whole
 from kerfpath.post.build import (
     AxisCount,
     axes_that_carry,
-    from_said,
-    said,
+    from_controller_units,
     setup_remarks,
+    to_controller_units,
     wrist_in_plane,
 )
 from kerfpath.post.languages import (
@@ -280,7 +280,7 @@ class ExternalPulses:
 
     def rows(self, q: Array) -> list[str]:
         """Return the positions of base axes and station, at joints q (K, n)."""
-        pulses = np.round(said(self.robot, q) * self.scales).astype(np.int64)
+        pulses = np.round(to_controller_units(self.robot, q) * self.scales).astype(np.int64)
         return [
             f"{word}{k:05d}={','.join(map(str, row[self.numbers[word]].tolist()))}"
             for word in self.kinds()
@@ -306,7 +306,7 @@ class ExternalPulses:
 
     def values(self, pulses: Array) -> Array:
         """Return values (K, E) m and rad of pulses."""
-        return from_said(self.robot, pulses / self.scales)
+        return from_controller_units(self.robot, pulses / self.scales)
 
     def moved(self, line: str) -> str:
         """Return the line of a move with the positions of base axes and station."""

@@ -314,7 +314,7 @@ class _Job(_Text):
         self.required = wait_lines(int(label), port, timeout, self.settings)[1:]
         self.expect_answer(port, timeout)
 
-    def require_standing(self, what: str) -> None:
+    def require_stopped(self, what: str) -> None:
         if not self.stands:
             raise self.fault(f"{what} must follow a move with PL=0")
 

@@ -17,9 +17,9 @@ from kerfpath.post.build import (
     axes_that_carry,
     axis_numbers,
     calibration_remarks,
-    from_said,
-    said,
+    from_controller_units,
     setup_remarks,
+    to_controller_units,
     wrist_in_plane,
 )
 from kerfpath.post.languages import (
@@ -198,7 +198,7 @@ def external_fields(robot: Robot, q: Array, settings: KrlSettings) -> list[str]:
     numbers = axis_numbers(settings.external_numbers, len(robot.externals))
     return [
         "".join(f",E{n} {number(x, DECIMALS)}" for n, x in zip(numbers, row, strict=False))
-        for row in said(robot, q).tolist()
+        for row in to_controller_units(robot, q).tolist()
     ]
 
 
@@ -221,7 +221,7 @@ def read_fields(robot: Robot, text: str, settings: KrlSettings) -> Array:
             raise InputError(f"E{n} = {values[n]:g}: the robot has no such external axis")
     if len(_FIELD.findall(text)) > len(values):
         raise InputError("the target gives an external axis twice")
-    return from_said(robot, [values[n] for n in numbers]) if names else np.zeros(0)
+    return from_controller_units(robot, [values[n] for n in numbers]) if names else np.zeros(0)
 
 
 def missing(robot: Robot, settings: KrlSettings) -> Iterator[str]:
@@ -279,7 +279,7 @@ def check(program: Program, settings: KrlSettings) -> Iterator[ProgramIssue]:
     q = np.array([move.q for move in moves])
     axes_deg = np.degrees(axes_from_joints(program.robot, q))
     beyond = (np.abs(axes_deg) > TURN_DEG) & ~program.robot.endless[:6]
-    axes_deg = np.hstack([axes_deg, said(program.robot, q)])
+    axes_deg = np.hstack([axes_deg, to_controller_units(program.robot, q)])
     for k, i in np.argwhere(beyond).tolist():
         message = f"A{i + 1} = {axes_deg[k, i]:.1f} deg cannot be expressed by Status and Turn"
         fix = "only an endless axis may pass 360 deg; set endless, or limit the axis"

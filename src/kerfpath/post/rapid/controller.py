@@ -23,9 +23,9 @@ from kerfpath.post.build import (
     AxisCount,
     axes_that_carry,
     calibration_remarks,
-    from_said,
-    said,
+    from_controller_units,
     setup_remarks,
+    to_controller_units,
     wrist_in_plane,
 )
 from kerfpath.post.languages import (
@@ -260,7 +260,7 @@ class ExternalUnits:
     def values(self, q: Array) -> list[str]:
         """Return the text of the external axes in targets at joint vectors q (K, n)."""
         texts = []
-        for row in said(self.robot, q).tolist():
+        for row in to_controller_units(self.robot, q).tolist():
             values = dict(zip(self.letters, row, strict=True))
             words = [number(values[c], 6) if c in values else NONE for c in LETTERS]
             texts.append(f"[{','.join(words)}]")
@@ -276,7 +276,7 @@ class ExternalUnits:
             if letter not in names and value != ABSENT:
                 return f"eax_{letter} = {value:g}: the robot has no such axis, expected {NONE}"
         said_values = [values[LETTERS.index(letter)] for letter in self.letters]
-        return from_said(self.robot, said_values) if axes else freeze(np.zeros(0))
+        return from_controller_units(self.robot, said_values) if axes else freeze(np.zeros(0))
 
     def activated(self) -> list[str]:
         """Return the lines that activate every unit; the robot is stopped."""

@@ -125,12 +125,12 @@ class _Reader(LineReader):
         while self.text != "end":
             self.read(self.text, _STEPS)
             self.advance()
-        self.require_standing("a move")
+        self.require_stopped("a move")
         self.advance()
         return tuple(self.steps)
 
     def joint(self, *said: str | None) -> None:
-        self.require_standing("a move")
+        self.require_stopped("a move")
         *angles, a, v, _, r = (float(word or "nan") for word in said)
         self.require_acceleration(a, np.radians(self.settings.joint_acceleration_deg_s2))
         timed, robot = said[-2], self.robot
@@ -157,7 +157,7 @@ class _Reader(LineReader):
         self, target: tuple[str, ...], motion: tuple[str, ...], via: Array | None = None
     ) -> None:
         armed, self.ahead = self.ahead, {}
-        self.require_standing("a move")
+        self.require_stopped("a move")
         a, v, r = (float(word) for word in motion)
         if min(a, v) <= 0:
             raise self.fault("speed and acceleration must be above 0")
@@ -197,7 +197,7 @@ class _Reader(LineReader):
             raise self.fault("the program does not define how it waits for an input")
         self.expect_answer(int(port), float(timeout))
 
-    def require_standing(self, what: str) -> None:
+    def require_stopped(self, what: str) -> None:
         """Require that a signal switched ahead of the end of a move is also switched at its end."""
         if ahead := [*self.ahead, *self.leads]:
             raise self.fault(f"the {ahead[0]} is switched ahead of a move, but not at its end")

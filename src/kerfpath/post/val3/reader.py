@@ -415,7 +415,7 @@ class _Routine(LineReader):
                     return PARTNERS[partner]
         raise self.fault(f"{port} is not declared")
 
-    def require_standing(self, what: str) -> None:
+    def require_stopped(self, what: str) -> None:
         if not self.stands:
             raise self.fault(f"{what} must follow waitEndMove()")
 
