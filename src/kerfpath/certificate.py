@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from kerfpath.arrays import Array, scalar, short_repr
 from kerfpath.errors import InputError
+from kerfpath.setting import documented, setting
 
 __all__ = [
     "ALLOWANCE",
@@ -61,20 +62,10 @@ class CertifyData(TypedDict):
     keep: bool
 
 
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certify:
     """How plans are certified: the gap to reach, and the time for it.
-
-    Parameters
-    ----------
-    gap : float
-        Gap at which the certifier stops: the share of the plan's cost between bound and cost,
-        above 0 and at most 1.
-    seconds : float s, optional
-        Time to spend on each plan; None: only the certifier's own limit on its work, so that the
-        same task has the same bound on every machine.
-    keep : bool
-        Whether plan.json contains the certificate, for others to check; it always has the bound.
 
     Raises
     ------
@@ -82,9 +73,33 @@ class Certify:
         A gap or a time that is not positive, or a gap over 1.
     """
 
-    gap: float = 0.005
-    seconds: float | None = None
-    keep: bool = False
+    gap: float = setting(
+        0.5,
+        "gap at which the certifier stops: the share of the plan's cost between bound and cost",
+        unit="%",
+        above=0,
+        most=100,
+        example="0.5",
+        key="certify_gap_percent",
+        concerns="proof",
+    )
+    seconds: float | None = setting(
+        None,
+        "time to spend on each plan; none: only the certifier's own limit on its work, so that "
+        "the same task has the same bound on every machine",
+        unit="s",
+        above=0,
+        example="10",
+        key="certify_seconds",
+        concerns="proof",
+    )
+    keep: bool = setting(
+        False,
+        "whether plan.json contains the certificate, for others to check; it always has the bound",
+        example="false",
+        key="certificate",
+        concerns="proof",
+    )
 
     def __post_init__(self) -> None:
         gap = scalar(self.gap, "certify gap", above=0.0)
@@ -98,8 +113,13 @@ class Certify:
             raise InputError(f"certify keep: expected True or False, got {self.keep!r}")
 
     def to_data(self) -> CertifyData:
-        """Return it as JSON data; `Certify(**data)` is equal to it."""
+        """Return it as JSON data, which `from_data` reads."""
         return cast(CertifyData, asdict(self))
+
+    @classmethod
+    def from_data(cls, data: CertifyData) -> Certify:
+        """Return what `to_data` wrote."""
+        return cls(**data)
 
 
 USUAL = Certify()

@@ -25,7 +25,7 @@ which its manipulability includes. A seven-axis arm has those of its other joint
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from functools import partial
 from typing import TypedDict
 
@@ -162,6 +162,15 @@ class Comfort:
                 "comfort clearance: its margin is the near-miss distance of the cell; set the "
                 "margin there, and only width and cost here"
             )
+
+    def to_data(self) -> dict[str, BandData]:
+        """Return the bands as JSON data, which `from_data` reads."""
+        return {name: band for name, band in asdict(self).items() if band is not None}
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, BandData]) -> Comfort:
+        """Return the bands that `to_data` wrote."""
+        return cls(**{name: Band(**band) for name, band in data.items()})
 
     @property
     def bands(self) -> dict[str, Band]:

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, Literal, TypedDict, cast, get_args
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath.arrays import Array, floats, require_one_of, scalar, short_repr
-from kerfpath.certificate import USUAL, Certify, CertifyData
-from kerfpath.comfort import Band, BandData, Comfort
+from kerfpath.arrays import Array, floats, short_repr
+from kerfpath.certificate import USUAL, Certify
+from kerfpath.comfort import Comfort
 from kerfpath.contour import FrameKind
 from kerfpath.effort import current_effort
 from kerfpath.errors import InputError, OptionConflict
 from kerfpath.limits import Limits
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
-from kerfpath.tilt import Tilt, TiltData
-from kerfpath.windows import GammaWindow, WindowData
+from kerfpath.setting import documented, from_json, setting, settings, to_json
+from kerfpath.tilt import Tilt
+from kerfpath.windows import GammaWindow
 
 __all__ = [
     "EXACT_OR_BETTER",
@@ -28,7 +29,6 @@ __all__ = [
     "GraphKeywords",
     "Interruptions",
     "OptionConflict",
-    "OptionData",
     "PlanKeywords",
     "PlanMethod",
     "PlanOptions",
@@ -68,93 +68,14 @@ class PlanKeywords(GraphKeywords, total=False):
     certify: Certify | None
 
 
-class OptionData(TypedDict):
-    """Options as JSON data: SI units, unit in the key, null for infinity."""
-
-    method: PlanMethod
-    objective: ObjectiveKind
-    metric: Metric
-    weights_per_rad: list[float] | None
-    eta_v: float
-    eta_a: float
-    closure: Closure
-    rotation_rad: list[float | None] | None
-    comfort: dict[str, BandData] | None
-    gamma_step_rad: float
-    tilt: TiltData | None
-    frames: FrameKind
-    postures: list[int] | None
-    feed_kind: FeedKind
-    refine: bool
-    refine_parts: int
-    between_nodes: BetweenNodes
-    interruptions: Interruptions
-    least_piece_m: float | None
-    retract_m: float | None
-    floor_m: float | None
-    gamma_windows: list[WindowData]
-    certify: CertifyData | None
-
-
 def _usual_certify() -> Certify | None:
     return USUAL if current_effort().certified else None
 
 
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlanOptions:
     """Options of a plan: the search space, the objective, and the limits to keep.
-
-    Parameters
-    ----------
-    gamma_step : float rad
-        Step of the free rotation about the beam.
-    frames : {"rotation-minimising", "tangent"}
-        Task frames that gamma is measured in.
-    tilt : Tilt, optional
-        Tolerance of the tool axis, which is then searched too; None: only the nominal axis.
-    postures : tuple of int, optional
-        The postures that may be used; None: all. See `kerfpath.robots.postures_named`.
-    method : {"continuous", "exact", "paper", "known"}
-        "continuous": the best motion found over continuous gamma; the others search the grid, as
-        `kerfpath.shortest_path` does.
-    objective, metric, closure
-        As in `kerfpath.shortest_path`.
-    weights : (n,) 1/rad, optional
-        Weights of the joint-space distance (1/m for a rail); None: 1 / (velocity limit * dt).
-    eta_v, eta_a : float
-        Share of the velocity and acceleration limits that may be used.
-    rotation : (n,) rad, optional
-        Largest angle that an endless joint may turn away from where it begins, in either
-        direction; infinite for no limit.
-    feed : {"constant", "dip"}
-        If the limits do not allow the speed everywhere: "constant" refuses, "dip" reduces the feed
-        there and keeps the speed elsewhere, in the least time.
-    refine : bool
-        Whether gamma moves off its grid after a search of the grid, see `kerfpath.refine`; with
-        the method "continuous" it always does.
-    refine_parts : int
-        Parts into which the refinement divides every interval between nodes. Jobs do so; `plan`
-        keeps the nodes of its contour.
-    between_nodes : {"reported", "kept", "guaranteed"}
-        The limits hold at the nodes, and the audit reports what the program needs between them.
-        "kept": if that is more, the nodes keep lower limits if this keeps the limits at every
-        instant. "guaranteed": the audit fails unless that is proved. Jobs do so; `plan` holds the
-        limits at the nodes, and `kerfpath.keep_limits` those between them.
-    interruptions : {"none", "fewest"}
-        Whether a contour that cannot be cut in one go is cut in pieces, see `plan_in_pieces`.
-    least_piece : float m, optional
-        Least length of such a piece.
-    comfort : Comfort, optional
-        Margins that the nodes keep from singularities and limits, and penalties beyond them.
-    retract : float m, optional
-        Distance by which the tool can back off along its axis at both ends, within the joint limits
-        and their margin, if some sample of gamma allows it; else the audit reports it.
-    floor : float m, optional
-        Least height of elbow, wrist and flange in the robot base, at every node; None: no floor.
-    gamma_windows : tuple of GammaWindow
-        Stretches of the contour on which gamma is kept inside an interval.
-    certify : Certify, optional
-        The gap to the best motion to prove, and the time for it; None: no bound is proved.
 
     Raises
     ------
@@ -162,39 +83,174 @@ class PlanOptions:
         A value out of range or of the wrong type; `OptionConflict` if two do not go together.
     """
 
-    gamma_step: float = np.pi / 90
-    frames: FrameKind = "rotation-minimising"
-    tilt: Tilt | None = None
-    postures: tuple[int, ...] | None = None
-    method: PlanMethod = "continuous"
-    objective: ObjectiveKind = "sum"
-    metric: Metric = "manhattan"
-    weights: Array = None  # type: ignore[assignment]  # `resolve` fills in the default
-    eta_v: float = 1.0
-    eta_a: float = 1.0
-    closure: Closure = "free"
-    rotation: Array | None = None
-    feed: FeedKind = "constant"
-    refine: bool = False
-    refine_parts: int = 1
-    between_nodes: BetweenNodes = "reported"
-    interruptions: Interruptions = "none"
-    least_piece: float | None = None
-    comfort: Comfort | None = None
-    retract: float | None = None
-    floor: float | None = None
-    gamma_windows: tuple[GammaWindow, ...] = ()
-    certify: Certify | None = field(default_factory=_usual_certify)
+    method: PlanMethod = setting(
+        "continuous",
+        "continuous: the best motion found over continuous gamma; exact: the best path of the "
+        "grid, proved; paper and known, for comparison, see `kerfpath.shortest_path`",
+        concerns="search",
+    )
+    objective: ObjectiveKind = setting(
+        "sum", "sum (14) or maximum (15) of the distances that is minimised", concerns="search"
+    )
+    metric: Metric = setting("manhattan", "distance in joint space (13)", concerns="search")
+    weights: Array = setting(
+        None,
+        "weight of each joint in the distance (1/m for a rail); "
+        "none: 1 / (velocity limit * time between nodes)",
+        takes=tuple[float, ...],
+        what="a number not below 0 for every joint",
+        unit="1/rad",
+        least=0,
+        example="[1, 1, 1, 1, 1, 1]",
+        key="weights",
+        concerns="search",
+    )
+    eta_v: float = setting(
+        1.0,
+        "share of the velocity limits (5) that may be used",
+        above=0,
+        most=1,
+        example="0.95",
+        key="eta_velocity",
+        concerns="search",
+    )
+    eta_a: float = setting(
+        1.0,
+        "share of the acceleration limits (6) that may be used",
+        above=0,
+        most=1,
+        example="0.9",
+        key="eta_acceleration",
+        concerns="search",
+    )
+    closure: Closure = setting(
+        "free", "periodic: the motion ends in the pose and at the speed it began with"
+    )
+    rotation: Array | None = setting(
+        None,
+        "largest angle that an endless joint may turn away from where it begins, in either "
+        "direction; infinite for no limit",
+        takes=float,
+        unit="deg",
+        least=0,
+        example="360",
+    )
+    comfort: Comfort | None = setting(
+        None,
+        "margins that the nodes keep from singularities, limits and bodies, and penalties beyond "
+        "them; in a job the table [comfort]",
+        takes=None,
+    )
+    gamma_step: float = setting(
+        2.0,
+        "step of the free rotation gamma about the beam; with the method continuous it affects "
+        "the time, but hardly the result",
+        unit="deg",
+        above=0,
+        most=360,
+        example="1",
+        concerns="graph",
+    )
+    tilt: Tilt | None = setting(
+        None,
+        "tolerance of the tool axis, which is then searched, too; none: only the nominal axis",
+        takes=None,
+    )
+    frames: FrameKind = setting(
+        "rotation-minimising", "task frames in which gamma is measured", concerns="graph"
+    )
+    postures: tuple[int, ...] | None = setting(
+        None,
+        "postures (configurations) that may be used, see `kerfpath.robots.postures_named`; "
+        "none: all; in a job words, where a part that is left out is free",
+        takes=str,
+        what="a posture in words",
+        example='"front/up"',
+        key="posture",
+        concerns="graph",
+    )
+    feed: FeedKind = setting(
+        "constant",
+        "if the limits do not allow the speed everywhere: constant refuses, dip reduces the feed "
+        "there and keeps the speed elsewhere, in the least time",
+        data="feed_kind",
+        concerns="search",
+    )
+    refine: bool = setting(
+        False,
+        "whether gamma moves off its grid after a search of the grid, see `kerfpath.refine`; with "
+        "the method continuous it always does. In jobs true for the methods continuous and exact",
+        example="true",
+        in_jobs=None,
+        concerns="search",
+    )
+    refine_parts: int = setting(
+        1,
+        "parts into which the refinement divides every interval between nodes; jobs only: `plan` "
+        "keeps the nodes of its contour",
+        least=1,
+        most=100,
+        example="4",
+    )
+    between_nodes: BetweenNodes = setting(
+        "reported",
+        "reported: the limits hold at the nodes, and the audit reports what the program needs "
+        "between them. kept: if that is more, the plan is made again with lower limits at the "
+        "nodes if this keeps them at every instant. guaranteed: the audit fails unless that is "
+        "proved. Jobs only; for a plan use `kerfpath.keep_limits`",
+        in_jobs="kept",
+    )
+    interruptions: Interruptions = setting(
+        "none",
+        "fewest: a contour that cannot be cut in one go is cut in pieces; jobs and "
+        "`plan_in_pieces`",
+        concerns="search",
+    )
+    least_piece: float | None = setting(
+        None,
+        "least length of every such piece, along its nodes",
+        unit="mm",
+        above=0,
+        example="20",
+        concerns="search",
+    )
+    retract: float | None = setting(
+        None,
+        "distance by which the tool can back off along its axis at both ends, within the joint "
+        "limits and their margin, if some sample of gamma allows it; else the audit reports it. "
+        "In jobs with a program or [sequence] the retract of [program]",
+        takes=None,
+        unit="mm",
+        above=0,
+    )
+    floor: float | None = setting(
+        None,
+        "height in the robot base below which no node has the elbow, the wrist or the flange; "
+        "none: no floor. In jobs from the keys of [robot]",
+        takes=None,
+        unit="mm",
+    )
+    gamma_windows: tuple[GammaWindow, ...] = setting(
+        (),
+        "stretches of the contour on which gamma is kept inside an interval; in a job of a "
+        "[[contour]]",
+        takes=None,
+    )
+    certify: Certify | None = setting(
+        _usual_certify,
+        "lower bound on the cost of every motion: the gap to reach, and the time for it; none, in "
+        "a job false: no bound is proved",
+        takes=bool,
+        example="true",
+        in_jobs=True,
+        concerns="proof",
+    )
 
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        for name, known in _KNOWN.items():
-            require_one_of(getattr(self, name), name, known)
-        cast: dict[str, object] = {
-            "gamma_step": scalar(self.gamma_step, "gamma_step", unit="rad", above=0.0),
-            "eta_v": scalar(self.eta_v, "eta_v", above=0.0),
-            "eta_a": scalar(self.eta_a, "eta_a", above=0.0),
+        cast = {
+            name: each.checked(getattr(self, name)) for name, each in settings(PlanOptions).items()
         }
         if self.postures is not None:
             cast["postures"] = tuple(int(posture) for posture in self.postures)
@@ -202,17 +258,6 @@ class PlanOptions:
             cast["weights"] = floats(self.weights, "weights", (None,))
         if self.rotation is not None:
             cast["rotation"] = floats(self.rotation, "rotation", (None,), infinite=True)
-        for name in ("least_piece", "retract"):
-            if (length := getattr(self, name)) is not None:
-                cast[name] = scalar(length, name, unit="m", above=0.0)
-        if self.floor is not None:
-            cast["floor"] = scalar(self.floor, "floor", unit="m")
-        if not (isinstance(self.refine_parts, int) and self.refine_parts >= 1):
-            raise InputError(
-                f"refine_parts: expected a whole number >= 1, got {self.refine_parts!r}"
-            )
-        if not isinstance(self.certify, Certify | None):
-            raise InputError(f"certify: expected kerfpath.Certify or None, got {self.certify!r}")
         cast["gamma_windows"] = tuple(self.gamma_windows)
         for window in self.gamma_windows:
             if not isinstance(window, GammaWindow):
@@ -257,13 +302,13 @@ class PlanOptions:
             comfort=None if self.comfort is None else self.comfort.hard,
         )
 
-    def to_data(self) -> OptionData:
+    def to_data(self) -> dict[str, Any]:
         """Return the options as JSON data, which `from_data` reads."""
-        names = {key: _NAMES.get(key, key) for key in OptionData.__annotations__}
-        return cast(OptionData, {key: _to_json(getattr(self, name)) for key, name in names.items()})
+        known = settings(PlanOptions).items()
+        return {each.data: to_json(getattr(self, name)) for name, each in known}
 
     @classmethod
-    def from_data(cls, data: OptionData) -> PlanOptions:
+    def from_data(cls, data: Mapping[str, Any]) -> PlanOptions:
         """Return the options that `to_data` wrote; other keys of `data` are ignored.
 
         Raises
@@ -273,41 +318,8 @@ class PlanOptions:
         KeyError
             A key is missing.
         """
-        every: Mapping[str, Any] = data
-        values = {_NAMES.get(key, key): every[key] for key in OptionData.__annotations__}
-        if (tilt := data["tilt"]) is not None:
-            values["tilt"] = Tilt.from_data(tilt)
-        if (certify := data["certify"]) is not None:
-            values["certify"] = Certify(**certify)
-        values["gamma_windows"] = [GammaWindow.from_data(each) for each in data["gamma_windows"]]
-        if (comfort := data["comfort"]) is not None:
-            values["comfort"] = Comfort(**{name: Band(**band) for name, band in comfort.items()})
-        if (rotation := data["rotation_rad"]) is not None:
-            values["rotation"] = [np.inf if angle is None else angle for angle in rotation]
-        return cls(**values)
-
-
-_NAMES = {
-    "weights_per_rad": "weights",
-    "rotation_rad": "rotation",
-    "gamma_step_rad": "gamma_step",
-    "feed_kind": "feed",
-    "least_piece_m": "least_piece",
-    "retract_m": "retract",
-    "floor_m": "floor",
-}
-"""Names of options whose JSON key differs, by that key."""
-
-
-def _to_json(value: object) -> object:
-    """Return the value of an option as JSON data, null for infinity."""
-    if isinstance(value, Tilt | Certify | GammaWindow):
-        return value.to_data()
-    if isinstance(value, Comfort):
-        return {name: band for name, band in asdict(value).items() if band is not None}
-    if isinstance(value, np.ndarray):
-        return [number if np.isfinite(number) else None for number in value.tolist()]
-    return [_to_json(each) for each in value] if isinstance(value, tuple) else value
+        known = settings(PlanOptions).items()
+        return cls(**{name: from_json(data[each.data], each.kind) for name, each in known})
 
 
 def with_keywords(
@@ -340,17 +352,6 @@ def with_keywords(
             raise TypeError(f"unexpected keyword argument {name!r}; {said}")
     return replace(options or PlanOptions(), **keywords, **more)
 
-
-_KNOWN: dict[str, tuple[str, ...]] = {
-    "frames": get_args(FrameKind),
-    "method": get_args(PlanMethod),
-    "objective": get_args(ObjectiveKind),
-    "metric": get_args(Metric),
-    "closure": get_args(Closure),
-    "feed": get_args(FeedKind),
-    "between_nodes": get_args(BetweenNodes),
-    "interruptions": get_args(Interruptions),
-}
 
 KEEPS = "kerfpath.keep_limits(plan) makes a plan keep its limits between the nodes, too"
 EXACT_OR_BETTER = ("continuous", "exact")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass
 from typing import TypedDict
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, freeze, not_negative
 from kerfpath.errors import InputError
+from kerfpath.setting import documented, setting
 
 __all__ = ["Tilt", "TiltData", "tilt_frames"]
 
@@ -22,6 +23,7 @@ class TiltData(TypedDict):
     cost_per_rad: float
 
 
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tilt:
     """Tilt allowed away from the nominal tool axis: largest angle, steps and cost.
@@ -31,24 +33,40 @@ class Tilt:
     about the axis lean x + lead y. A positive lead, which turns about y, points the beam ahead;
     a positive lean, which turns about x, points it away from y.
 
-    Parameters
-    ----------
-    cone : float rad
-        Largest angle between tool axis and nominal axis, from 0 to less than pi/2.
-    steps : int
-        Steps of lead and of lean from the nominal axis to the rim of the cone; 0: no tilt.
-    cost : float 1/rad
-        Cost of each node per angle of tilt, on top of the distances of (14) or (15).
-
     Raises
     ------
     InputError
         A value out of these ranges.
     """
 
-    cone: float
-    steps: int = 1
-    cost: float = 0.0
+    cone: float = setting(
+        MISSING,
+        "largest angle between tool axis and nominal axis, to any side, less than a right angle",
+        unit="deg",
+        above=0,
+        below=90,
+        example="3",
+        key="tilt_deg",
+        in_jobs=None,
+        concerns="graph",
+    )
+    steps: int = setting(
+        1,
+        "steps of lead and of lean from the nominal axis to the rim of the cone; 0: no tilt",
+        least=1,
+        most=10,
+        example="2",
+        key="tilt_steps",
+        concerns="graph",
+    )
+    cost: float = setting(
+        0.0,
+        "cost of each node per angle of tilt, on top of the distances of (14) or (15)",
+        unit="1/deg",
+        least=0,
+        example="0.01",
+        key="tilt_cost_per_deg",
+    )
 
     def __post_init__(self) -> None:
         for name, unit in (("cone", "rad"), ("cost", "1/rad")):

@@ -24,22 +24,26 @@ from kerfpath.job import (
     course_of_plans,
     prepare,
 )
+from kerfpath.options import PlanOptions
+from kerfpath.setting import keys
 from kerfpath.studio.scene import tables_of
 
 # -----------------------------------------------------------------------------
 # Hash keys of the inputs of each step of planning: equal keys allow results to be used again.
 
-PROVING = frozenset(("certify", "certify_gap_percent", "certify_seconds", "certificate"))
+
+def _concerning(*what: str) -> frozenset[str]:
+    return frozenset(key for key, each in keys(PlanOptions).items() if each.concerns in what)
+
+
+PROVING = _concerning("proof")
 """Keys of [plan] that only concern the proof for a motion that has been found."""
-LIGHT = PROVING | {
-    "weights", "eta_velocity", "eta_acceleration", "metric", "objective", "method", "feed",
-    "refine", "interruptions", "least_piece_mm",
-}  # fmt: skip
+LIGHT = _concerning("proof", "search")
 """Keys of [plan] that change neither the nodes nor the layered graph."""
+GRAPH = _concerning("graph")
+"""Keys of [plan] that the layered graph depends on."""
 PINS = "gamma_windows"
 """Key of [[contour]] that changes neither the nodes nor their speed."""
-GRAPH = frozenset(["gamma_step_deg", "frames", "tilt_deg", "tilt_steps", "posture"])
-"""Keys of [plan] that the layered graph depends on."""
 
 
 def part_key(job: Job) -> str:

@@ -598,7 +598,7 @@ def test_a_posture_that_does_not_exist_is_refused_at_its_line(read, words):
             'closure = "periodic"\nmethod = "known"',
             '"continuous" or "exact" with closure = "periodic"',
         ),
-        ("refine_parts = 0", "refine_parts: expected a whole number of parts from 1 to 100, got 0"),
+        ("refine_parts = 0", "refine_parts: expected a whole number from 1 to 100, got 0"),
         ("rotation_deg = -1", "rotation_deg: expected a number not below 0, in deg, got -1"),
         ("certify = 1", "plan.certify: expected true or false, got 1"),
         ("certify_gap_percent = 0", "expected a number above 0, at most 100, in per cent, got 0"),

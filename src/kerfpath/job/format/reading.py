@@ -487,7 +487,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         moves = file.program.language != "none" or file.sequence is not None
         options = file.plan.resolve(
             robot,
-            _comfort(file, robot),
+            comfort=_comfort(file, robot),
             retract=file.program.retract_mm / 1000 if moves else None,
             floor=file.robot.height_of_floor(),
         )

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any, Literal, NotRequired, TypedDict
 
 from kerfpath.auditor import Level, Unit
-from kerfpath.options import OptionData
 
 Row = list[float]
 Rows = list[Row]
@@ -191,8 +190,8 @@ class CertificateData(TypedDict):
     stages: list[StageData]
 
 
-class PlanData(OptionData):
-    """A contour, or a piece of one, that has a plan: its options and its results."""
+class PlanData(TypedDict):
+    """A contour, or a piece of one, that has a plan: its results, and beside them its options."""
 
     name: str
     contour: str

@@ -25,7 +25,7 @@ from kerfpath.job.plan_file.schema import (
     read_moves,
     with_dynamics,
 )
-from kerfpath.options import OptionData, PlanOptions
+from kerfpath.options import PlanOptions
 from kerfpath.plans import Feed, Plan, Proof
 from kerfpath.robots import Coupling, Robot
 from kerfpath.sequence import Order, PartPlan
@@ -416,7 +416,7 @@ def _read_plan(entry: PlanData, robot: Robot, tool: Any, placement: Any) -> Plan
         posture=nodes["posture"],
         turn=nodes["turn"],
         time=nodes["time_s"],
-        settings=PlanOptions.from_data(cast(OptionData, entry | weights)),
+        settings=PlanOptions.from_data(entry | weights),
         cost=entry["cost"],
         proof=Proof(
             optimal=entry["optimal"],

@@ -46,8 +46,10 @@ from kerfpath.job.plan_file.layout import (
     SequenceData,
     StageData,
 )
+from kerfpath.options import PlanOptions
 from kerfpath.robots import ExternalAxis, Robot
 from kerfpath.sequence import PartPlan
+from kerfpath.setting import settings
 from kerfpath.transfer import TransferMove
 from kerfpath.urdf import ChainInertia
 
@@ -76,7 +78,9 @@ def _strict(kind: Any) -> Any:
     if kind in (float, int):
         return Real if kind is float else Whole
     if kind == ContourData:
-        planned = _model(PlanData, weights_per_rad=list[Real])  # a plan's own are always there
+        options = {each.data: _strict(each.json) for each in settings(PlanOptions).values()}
+        options["weights_per_rad"] = list[Real]  # a plan's own are always there
+        planned = _model(PlanData, **options)
         return Annotated[
             Annotated[planned, Tag("planned")] | Annotated[_model(BrokenData), Tag("broken")],
             Discriminator(_is_planned),
@@ -89,13 +93,13 @@ def _strict(kind: Any) -> Any:
     return get_origin(kind)[inner] if get_origin(kind) in (list, dict) else kind
 
 
-def _model(kind: Any, **instead: Any) -> type[_Entry]:
-    """Return the model of a TypedDict, with other types `instead` of those of some keys."""
-    keys: dict[str, Any] = {}
+def _model(kind: Any, **more: Any) -> type[_Entry]:
+    """Return the model of a TypedDict with `more` keys, whose types are strict already."""
+    # A field called "schema" would hide a method of the model.
+    keys: dict[str, Any] = {f"{name}_": (hint, Field(alias=name)) for name, hint in more.items()}
     for name, hint in get_type_hints(kind, include_extras=True).items():
         optional = get_origin(hint) is NotRequired
-        value = instead.get(name) or _strict(get_args(hint)[0] if optional else hint)
-        # A field called "schema" would hide a method of the model.
+        value = _strict(get_args(hint)[0] if optional else hint)
         keys[f"{name}_"] = (value, Field(None if optional else ..., alias=name))
     return create_model(kind.__name__, __base__=_Entry, **keys)
 
