@@ -1,4 +1,4 @@
-"""Replace linear moves by circular ones where a path runs along arcs."""
+"""Paths of programs: zones, times, frames of controllers, and arcs in place of straight moves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Build the neutral program from plans."""
+"""Build the neutral program from plans, with external axes, and its dry run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Check texts of programs, for all languages: no control characters, no absurdly large numbers."""
+"""The base of all readers, which read programs line by line, and what no text may contain."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Check the names, numbers and outputs of a program before there is a plan for it."""
+"""Places in programs: called routines, contours that were read, and lines of the text."""
 
 from __future__ import annotations
 

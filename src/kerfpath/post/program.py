@@ -1,4 +1,4 @@
-"""Differences of controllers from the plan: switches only at stops, other postures."""
+"""The neutral program: the steps of the robot in order, before a language formats them."""
 
 from __future__ import annotations
 

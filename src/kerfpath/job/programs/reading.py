@@ -1,9 +1,9 @@
-"""Read a program on disk, and the motions that its text means."""
+"""Read programs on disk: the motions that a text means, and the differences between two."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +11,19 @@ import numpy as np
 from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.errors import InputError
 from kerfpath.execution import ToolCourse
-from kerfpath.job.format import Job, ProgramTable
+from kerfpath.job.format import Job, ProgramTable, read_job
 from kerfpath.post import (
+    Difference,
     Language,
     LanguageSettings,
     ReadGroup,
     ReadMove,
     ReadProgram,
+    Rules,
+    differences,
     groups_of,
     languages,
+    not_compared,
     read_program,
     with_tips,
 )
@@ -325,3 +329,70 @@ def follow_poses(robot: Robot, T: Array, q0: Array, free: Array | None = None) -
         q[k] = robot.follow(pose[None], before[None], branch)[0]
         before = before if np.isnan(q[k]).any() else q[k]
     return q
+
+
+# -----------------------------------------------------------------------------
+# Compare two programs on disk.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramComparison:
+    """What differs between two programs, and what could not be compared.
+
+    Parameters
+    ----------
+    differences : tuple of Difference
+        Empty if the programs are the same.
+    not_compared : tuple of str
+        What only one of them states.
+    """
+
+    differences: tuple[Difference, ...]
+    not_compared: tuple[str, ...]
+
+    __repr__ = short_repr
+
+
+def compare_programs(a: Path, b: Path, job_file: Path) -> ProgramComparison:
+    """Return what differs between two programs of a job, in the same language or in two.
+
+    Parameters
+    ----------
+    a, b : Path
+        The main files of the programs.
+    job_file : Path
+        The job that they were made for, with robot, frames and settings of languages.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, or a line was not written by kerfpath.
+    """
+    job = read_job(job_file)
+    (one, settings), (two, other) = language_of(a, job), language_of(b, job)
+    reads = [
+        add_tips(program_on_disk(path, chosen, of, job.robot), job)
+        for path, chosen, of in ((a, one, settings), (b, two, other))
+    ]
+    rules: tuple[Rules, ...] = ()
+    said = any(move.posture for read in reads for move in read.moves)
+    if one.name != two.name:  # words for postures have another meaning in another language
+        rules = (one.rules(settings), two.rules(other))
+        reads = [_without_postures(read) for read in reads]
+    found, left = differences(*reads, rules=rules), not_compared(*reads)
+    left += ["postures"] if said and rules else []
+    return ProgramComparison(differences=tuple(found), not_compared=tuple(left))
+
+
+def _without_postures(read: ReadProgram) -> ReadProgram:
+    sections = [
+        replace(
+            section,
+            steps=tuple(
+                replace(step, posture=()) if isinstance(step, ReadMove) else step
+                for step in section.steps
+            ),
+        )
+        for section in read.sections
+    ]
+    return replace(read, sections=tuple(sections))

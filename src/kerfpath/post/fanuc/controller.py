@@ -1,9 +1,4 @@
-"""Switches before a motion, on the way to its end, and after the tip has stopped there.
-
-The line of a motion has one TB; controllers accept no second one. Other switches ahead of its end
-come before the motion, while the robot is stopped: for example gas, when the tool leaves for the
-start of a contour.
-"""
+"""A FANUC controller: its settings, axes, frames and external axes, and when it switches."""
 
 from __future__ import annotations
 
@@ -291,6 +286,10 @@ def remarks(robot: Robot) -> Iterator[str]:
 
 # -----------------------------------------------------------------------------
 # Switches before a motion, on the way to its end, and after the tip has stopped there.
+#
+# The line of a motion has one TB; controllers accept no second one. Other switches ahead of its end
+# come before the motion, while the robot is stopped: for example gas, when the tool leaves for the
+# start of a contour.
 
 
 class Switching(NamedTuple):

@@ -1,4 +1,4 @@
-"""Issues that only FANUC controllers have."""
+"""TP, the language of FANUC controllers, as listings: this module only formats."""
 
 from __future__ import annotations
 

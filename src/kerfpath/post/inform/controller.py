@@ -1,4 +1,4 @@
-"""Issues that only INFORM has."""
+"""A Yaskawa controller: its settings, axes and external axes, and the issues of INFORM."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Issues that only KRL has: the controller's frames, turns beyond Turn, the short way."""
+"""A KUKA controller: its settings, axes and external axes, and the issues of KRL."""
 
 from __future__ import annotations
 

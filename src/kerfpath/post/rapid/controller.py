@@ -1,11 +1,4 @@
-"""External axes in RAPID: their letters, mechanical units and speeds.
-
-A target gives each external axis under a letter, eax_a to eax_f, in mm or deg; 9E9 means no axis. A
-unit that carries the part moves the user frame of the work object that names it (wobjdata: ufprog
-FALSE, ufmec). The calibration of the unit defines that frame, and the object frame is the part in
-it. A track moves the base of the robot, which the controller knows from its own configuration; a
-fixed work object is in the world.
-"""
+"""An ABB controller: its settings, axes and external axes."""
 
 from __future__ import annotations
 
@@ -183,6 +176,12 @@ def is_reserved(name: str) -> bool:
 
 # -----------------------------------------------------------------------------
 # External axes in RAPID: their letters, mechanical units and speeds.
+#
+# A target gives each external axis under a letter, eax_a to eax_f, in mm or deg; 9E9 means no axis.
+# A unit that carries the part moves the user frame of the work object that names it (wobjdata:
+# ufprog FALSE, ufmec). The calibration of the unit defines that frame, and the object frame is the
+# part in it. A track moves the base of the robot, which the controller knows from its own
+# configuration; a fixed work object is in the world.
 
 LETTERS = "abcdef"
 NONE = "9E9"

@@ -1,4 +1,4 @@
-"""Issues that only VAL 3 has."""
+"""A Staubli controller: its settings and axes, and the issues of VAL 3."""
 
 from __future__ import annotations
 
