@@ -81,6 +81,8 @@ class Certify:
         most=100,
         example="0.5",
         key="certify_gap_percent",
+        group="Bound",
+        label="Required gap",
         concerns="proof",
     )
     seconds: float | None = setting(
@@ -91,6 +93,8 @@ class Certify:
         above=0,
         example="10",
         key="certify_seconds",
+        group="Bound",
+        label="Time limit",
         concerns="proof",
     )
     keep: bool = setting(

@@ -87,12 +87,24 @@ class PlanOptions:
         "continuous",
         "continuous: the best motion found over continuous gamma; exact: the best path of the "
         "grid, proved; paper and known, for comparison, see `kerfpath.shortest_path`",
+        group="Search",
+        label="Method",
         concerns="search",
     )
     objective: ObjectiveKind = setting(
-        "sum", "sum (14) or maximum (15) of the distances that is minimised", concerns="search"
+        "sum",
+        "sum (14) or maximum (15) of the distances that is minimised",
+        group="Objective and limits",
+        label="Objective",
+        concerns="search",
     )
-    metric: Metric = setting("manhattan", "distance in joint space (13)", concerns="search")
+    metric: Metric = setting(
+        "manhattan",
+        "distance in joint space (13)",
+        group="Objective and limits",
+        label="Metric",
+        concerns="search",
+    )
     weights: Array = setting(
         None,
         "weight of each joint in the distance (1/m for a rail); "
@@ -112,6 +124,8 @@ class PlanOptions:
         most=1,
         example="0.95",
         key="eta_velocity",
+        group="Objective and limits",
+        label="Share of the speed limits",
         concerns="search",
     )
     eta_a: float = setting(
@@ -121,10 +135,15 @@ class PlanOptions:
         most=1,
         example="0.9",
         key="eta_acceleration",
+        group="Objective and limits",
+        label="Share of the acceleration limits",
         concerns="search",
     )
     closure: Closure = setting(
-        "free", "periodic: the motion ends in the pose and at the speed it began with"
+        "free",
+        "periodic: the motion ends in the pose and at the speed it began with",
+        group="Search",
+        label="Closed contours",
     )
     rotation: Array | None = setting(
         None,
@@ -134,6 +153,8 @@ class PlanOptions:
         unit="deg",
         least=0,
         example="360",
+        group="Search",
+        label="Rotation of endless joints, at most",
     )
     comfort: Comfort | None = setting(
         None,
@@ -149,6 +170,8 @@ class PlanOptions:
         above=0,
         most=360,
         example="1",
+        group="Search",
+        label="Step of gamma",
         concerns="graph",
     )
     tilt: Tilt | None = setting(
@@ -157,7 +180,11 @@ class PlanOptions:
         takes=None,
     )
     frames: FrameKind = setting(
-        "rotation-minimising", "task frames in which gamma is measured", concerns="graph"
+        "rotation-minimising",
+        "task frames in which gamma is measured",
+        group="Search",
+        label="Frames",
+        concerns="graph",
     )
     postures: tuple[int, ...] | None = setting(
         None,
@@ -167,6 +194,8 @@ class PlanOptions:
         what="a posture in words",
         example='"front/up"',
         key="posture",
+        group="Objective and limits",
+        label="Posture",
         concerns="graph",
     )
     feed: FeedKind = setting(
@@ -174,6 +203,8 @@ class PlanOptions:
         "if the limits do not allow the speed everywhere: constant refuses, dip reduces the feed "
         "there and keeps the speed elsewhere, in the least time",
         data="feed_kind",
+        group="Feed reductions and pieces",
+        label="Feed",
         concerns="search",
     )
     refine: bool = setting(
@@ -182,6 +213,8 @@ class PlanOptions:
         "the method continuous it always does. In jobs true for the methods continuous and exact",
         example="true",
         in_jobs=None,
+        group="Search",
+        label="Refined off the grid",
         concerns="search",
     )
     refine_parts: int = setting(
@@ -191,6 +224,8 @@ class PlanOptions:
         least=1,
         most=100,
         example="4",
+        group="Search",
+        label="Parts of the refinement",
     )
     between_nodes: BetweenNodes = setting(
         "reported",
@@ -199,11 +234,15 @@ class PlanOptions:
         "nodes if this keeps them at every instant. guaranteed: the audit fails unless that is "
         "proved. Jobs only; for a plan use `kerfpath.keep_limits`",
         in_jobs="kept",
+        group="Search",
+        label="Limits between the nodes",
     )
     interruptions: Interruptions = setting(
         "none",
         "fewest: a contour that cannot be cut in one go is cut in pieces; jobs and "
         "`plan_in_pieces`",
+        group="Feed reductions and pieces",
+        label="Interruptions",
         concerns="search",
     )
     least_piece: float | None = setting(
@@ -212,6 +251,8 @@ class PlanOptions:
         unit="mm",
         above=0,
         example="20",
+        group="Feed reductions and pieces",
+        label="Shortest piece",
         concerns="search",
     )
     retract: float | None = setting(
@@ -243,6 +284,8 @@ class PlanOptions:
         takes=bool,
         example="true",
         in_jobs=True,
+        group="Bound",
+        label="Bound of the cost",
         concerns="proof",
     )
 

@@ -57,6 +57,8 @@ class Setting:
         Key in a job and in plan.json, where it is not the name with the unit.
     in_jobs : object
         The default in a job, where it is another one.
+    group, label : str
+        Title of its group in the studio, and its words there; without them it has no control.
     concerns : {"graph", "search", "proof", "all"}
         What a change affects: the layered graph, only the search in it, only the proof, or more.
     name, kind, optional
@@ -76,6 +78,8 @@ class Setting:
     key: str = ""
     data: str = ""
     in_jobs: Any = ...
+    group: str = ""
+    label: str = ""
     concerns: Literal["graph", "search", "proof", "all"] = "all"
     name: str = ""
     kind: Any = None
@@ -91,6 +95,11 @@ class Setting:
         if self.unit not in UNITS or not isinstance(value, int | float):
             return value
         return float(UNITS[self.unit][1](value))
+
+    @property
+    def keys(self) -> dict[str, Setting]:
+        """What a job gives for it, by key: itself, and the settings inside its value."""
+        return ({} if self.takes is None else {self.key: self}) | keys(self.kind)
 
     @property
     def json(self) -> Any:
@@ -168,11 +177,8 @@ def settings(kind: Any) -> dict[str, Setting]:
 
 @cache
 def keys(kind: Any) -> dict[str, Setting]:
-    """Return the settings that a job has keys for by these, with those inside the values."""
-    found: dict[str, Setting] = {}
-    for each in settings(kind).values():
-        found |= ({} if each.takes is None else {each.key: each}) | keys(each.kind)
-    return found
+    """Return what a job gives for the settings of a dataclass, by key."""
+    return {key: one for each in settings(kind).values() for key, one in each.keys.items()}
 
 
 def _suffix(unit: str) -> str:

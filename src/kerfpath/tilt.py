@@ -48,6 +48,8 @@ class Tilt:
         example="3",
         key="tilt_deg",
         in_jobs=None,
+        group="Tolerance of the tool axis",
+        label="Tilt, at most",
         concerns="graph",
     )
     steps: int = setting(
@@ -57,6 +59,8 @@ class Tilt:
         most=10,
         example="2",
         key="tilt_steps",
+        group="Tolerance of the tool axis",
+        label="Steps of the tilt",
         concerns="graph",
     )
     cost: float = setting(
@@ -66,6 +70,8 @@ class Tilt:
         least=0,
         example="0.01",
         key="tilt_cost_per_deg",
+        group="Tolerance of the tool axis",
+        label="Cost of the tilt",
     )
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
 """The form of options: the keys of a job that have a control, and what a control must know of them.
 
 Unit, kind, choices, bounds, default and help of a key follow from its declaration in the tables of
-a job. Its group and its label are given here.
+a job; of a planning option its group and its label, too. Those of other keys are given here.
 """
 
 from __future__ import annotations
@@ -15,8 +15,10 @@ from pydantic.fields import FieldInfo
 
 from kerfpath.front import CRITERIA
 from kerfpath.job import JobFile
+from kerfpath.options import PlanOptions
 from kerfpath.post import languages
 from kerfpath.robots import Robot
+from kerfpath.setting import settings
 from kerfpath.studio.messages import Companion, OptionField, OptionGroup, OptionsMessage, Sampling
 
 UNITS = {
@@ -27,6 +29,8 @@ UNITS = {
 """Unit of a key by the end of its name."""
 
 
+SEARCH = ("Search", "Feed reductions and pieces", "Tolerance of the tool axis")
+"""Titles of groups of planning options that are shown one below the other."""
 EXTERNAL = "External axes"
 """Title of the group of external axes; each axis has its own fields."""
 POSTURE = "plan.posture"
@@ -44,40 +48,13 @@ SAMPLINGS = {
 def _groups() -> dict[str, tuple[OptionField, ...]]:
     """Return the fields that every job has, by the titles of their groups."""
     return {
-        "Objective and limits": (
-            _field("plan.objective", "Objective"),
-            _field("plan.metric", "Metric"),
-            _field(POSTURE, "Posture"),
-            _field("plan.eta_velocity", "Share of the speed limits"),
-            _field("plan.eta_acceleration", "Share of the acceleration limits"),
-        ),
+        "Objective and limits": tuple(_planning("Objective and limits")),
         EXTERNAL: (),
         "Place of the part": (
             _field("part.xyz_mm", "x, y, z"),
             _field("part.rpy_deg", "Roll, pitch, yaw"),
         ),
-        "Search": (
-            _field("plan.method", "Method", help="continuous: gamma is not restricted to a grid"),
-            _field("plan.gamma_step_deg", "Step of gamma"),
-            _field(
-                "plan.closure", "Closed contours", help="periodic: the motion ends as it begins"
-            ),
-            _field("plan.rotation_deg", "Rotation of endless joints, at most"),
-            _field("plan.frames", "Frames"),
-            _field("plan.refine", "Refined off the grid"),
-            _field("plan.refine_parts", "Parts of the refinement"),
-            _field("plan.between_nodes", "Limits between the nodes"),
-        ),
-        "Feed reductions and pieces": (
-            _field("plan.feed", "Feed", help="dip: slow down where needed"),
-            _field("plan.interruptions", "Interruptions", help="fewest: cut in pieces"),
-            _field("plan.least_piece_mm", "Shortest piece"),
-        ),
-        "Tolerance of the tool axis": (
-            _field("plan.tilt_deg", "Tilt, at most"),
-            _field("plan.tilt_steps", "Steps of the tilt", needs="plan.tilt_deg"),
-            _field("plan.tilt_cost_per_deg", "Cost of the tilt", needs="plan.tilt_deg"),
-        ),
+        **{title: tuple(_planning(title)) for title in SEARCH},
         "Margins": (
             *_band("limits", "Joint limits", "deg"),
             *_band("wrist", "Wrist singularity", "deg"),
@@ -86,11 +63,7 @@ def _groups() -> dict[str, tuple[OptionField, ...]]:
             *_band("manipulability", "Manipulability", "m3"),
             *_band("clearance", "Clearance", "mm"),
         ),
-        "Bound": (
-            _field("plan.certify", "Bound of the cost"),
-            _field("plan.certify_gap_percent", "Required gap", needs="plan.certify"),
-            _field("plan.certify_seconds", "Time limit", needs="plan.certify"),
-        ),
+        "Bound": tuple(_planning("Bound")),
         "Order and transfer moves": (
             _field("sequence", "Plan transfer moves"),
             _field("sequence.order", "Order", needs="sequence"),
@@ -128,6 +101,16 @@ def _groups() -> dict[str, tuple[OptionField, ...]]:
             _field("contour.corners.slow_share", "Share of the speed at corners"),
         ),
     }
+
+
+def _planning(group: str) -> Iterator[OptionField]:
+    """Yield the fields of the planning options that are declared to be of a group."""
+    for option in settings(PlanOptions).values():
+        for key, each in option.keys.items():
+            first = next(iter(option.keys))
+            if each.group == group:
+                needs = None if key == first else f"plan.{first}"
+                yield _field(f"plan.{key}", each.label, help=each.help, needs=needs)
 
 
 def _band(name: str, label: str, unit: str) -> Iterator[OptionField]:

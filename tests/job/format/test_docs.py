@@ -1,4 +1,7 @@
-"""docs/job-file.md has every table and every key of a job, and no other."""
+"""docs/job-file.md has every table and every key of a job, and no other.
+
+The keys of [plan] are in a table that is written from their declarations.
+"""
 
 import re
 
@@ -25,7 +28,7 @@ def test_every_table_has_a_section():
     assert set(SECTIONS) == {name for name in TABLES if "." not in name}
 
 
-@pytest.mark.parametrize("table", TABLES)
+@pytest.mark.parametrize("table", sorted(TABLES.keys() - {"plan"}))
 def test_every_key_of_a_table_is_told(table):
     section = SECTIONS[table.split(".")[0]]
     known = words_of(section)

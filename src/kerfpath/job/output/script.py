@@ -19,6 +19,8 @@ from kerfpath.job.format.tables import CellTable
 from kerfpath.operations import Side
 from kerfpath.options import PlanOptions
 from kerfpath.robots import robot as robot_of
+from kerfpath.setting import settings
+from kerfpath.tilt import Tilt
 
 # -----------------------------------------------------------------------------
 # Write the cell of a job as lines of a Python script.
@@ -95,7 +97,12 @@ def _head(table: CellTable) -> str:
 # -----------------------------------------------------------------------------
 # Write a job as a Python script that calls the public functions, to be read and extended.
 
-ANGLES = frozenset(("gamma_step", "cone", "angle", "lower", "upper", "velocity", "acceleration"))
+ANGLES = {"angle", "lower", "upper", "velocity", "acceleration"} | {
+    name
+    for kind in (PlanOptions, Tilt)
+    for name, each in settings(kind).items()
+    if each.kind is float and each.unit == "deg"
+}
 """Arguments in rad, rad/s and rad/s^2, which are written in degrees if that loses no digit."""
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 CLASSES = ("Band", "Certify", "Comfort", "PlanOptions", "Tilt")

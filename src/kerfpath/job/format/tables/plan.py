@@ -89,7 +89,7 @@ def said_in_keys(conflict: OptionConflict, table: PlanTable) -> tuple[tuple[str,
     """Return the key of two options in conflict, and the message in the words of a job."""
     names = {CLEARANCE: "clearance_band_mm", PENALTIES: "costs in [comfort]"}
     for name, each in settings(PlanOptions).items():
-        names[name] = each.key if each.takes is not None else next(iter(keys(each.kind)), name)
+        names[name] = next(iter(each.keys), name)
     key = names[conflict.option]
     expected = f"no {key}" if conflict.expected is None else f"{key} = {_toml(conflict.expected)}"
     beside = " and ".join(
