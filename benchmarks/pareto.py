@@ -20,6 +20,7 @@ from kerfpath.front import ParetoProblem, SearchKind, criteria_named, hypervolum
 from kerfpath.job import read_job
 from kerfpath.options import PlanOptions
 from kerfpath.planner import layered_graph
+from kerfpath.setup import Setup
 from kerfpath.study import pareto_of_job
 
 __all__ = ["run"]
@@ -200,7 +201,7 @@ def _nsga(
     robot = options["robot"]
     asked = PlanOptions(gamma_step=options["gamma_step"], frames=options["frames"])
     problem = ParetoProblem(
-        contour=nodes, robot=robot, tool=options["tool"], placement=options["placement"],
+        contour=nodes, setup=Setup.of(robot, options["tool"], options["placement"]),
         speed=options["speed"], options=asked, graph=options["graph"],
         criteria=criteria_named(criteria, robot, options=asked, cell=None, home=None),
     )  # fmt: skip

@@ -33,6 +33,7 @@ from kerfpath.front import (
 )
 from kerfpath.front.problem import Solution, grid
 from kerfpath.planner import layered_graph
+from kerfpath.setup import Setup
 from kerfpath.transfer import least_time
 
 STEP = np.radians(8)
@@ -402,10 +403,13 @@ def test_plans_over_continuous_gamma_keep_what_their_runs_were_asked_for(off_gri
     assert windows > 0
 
 
+def setup_of(task):
+    return Setup.of(task["robot"], task["tool"], task["placement"])
+
+
 def test_a_plan_of_the_grid_is_held_to_in_what_can_be_held(task, found):
     problem = ParetoProblem(
-        contour=task["contour"], robot=task["robot"], tool=task["tool"],
-        placement=task["placement"], speed=task["speed"], options=PlanOptions(),
+        contour=task["contour"], setup=setup_of(task), speed=task["speed"], options=PlanOptions(),
         graph=task["graph"], criteria=criteria_named(
             ("displacement", "velocity", "range_6"), task["robot"], options=PlanOptions(),
             cell=None, home=None,
@@ -431,9 +435,9 @@ def test_windows_beside_a_limit_on_the_same_rotation_stay_on_the_grid(task, foun
     window[5] = -0.5, 0.5
     run = replace(found.runs[0], window=window, continuous=True)
     options = PlanOptions(rotation=[np.inf] * 5 + [1.0], gamma_step=STEP)
-    where = {key: task[key] for key in ("tool", "placement", "speed", "graph")}
+    where = {key: task[key] for key in ("speed", "graph")}
     with pytest.raises(NoFeasiblePath, match="on the grid only: the rotation"):
-        plan_run(run, task["contour"], task["robot"], options=options, cell=None, **where)
+        plan_run(run, task["contour"], setup_of(task), options, **where)
 
 
 def test_the_same_run_comes_back_from_its_data(found, off_grid):

@@ -8,6 +8,7 @@ import pytest
 from conftest import pose
 from kerfpath import Contour, NoFeasiblePath, PlanOptions, audit, pareto, plan
 from kerfpath.front import ParetoProblem, criteria_named, graph_of_runs, plan_run
+from kerfpath.setup import Setup
 
 TRAVEL = {"lower": -0.6, "upper": 0.6, "velocity": 1.0, "acceleration": 2.0}
 CENTRE = pose([1.3, 0.0, 0.5])
@@ -35,10 +36,12 @@ def options(tool):
 def problem(line, railed, options):
     """The problem as `pareto` poses it."""
     asked = PlanOptions(gamma_step=STEP, postures=(0,))
-    where = {"tool": options["tool"], "placement": CENTRE, "speed": 0.2, "options": asked}
+    setup = Setup.of(railed, options["tool"], CENTRE)
     named = criteria_named(("displacement", "range"), railed, options=asked, cell=None, home=None)
-    graph = graph_of_runs(line, railed, cell=None, **where)
-    return ParetoProblem(contour=line, robot=railed, criteria=named, graph=graph, **where)
+    graph = graph_of_runs(line, setup, asked, speed=0.2)
+    return ParetoProblem(
+        contour=line, setup=setup, speed=0.2, options=asked, criteria=named, graph=graph
+    )
 
 
 def test_no_plan_of_a_set_is_beaten_and_each_passes_the_audit(line, railed, options):
@@ -78,14 +81,14 @@ def test_a_run_whose_window_leaves_the_courses_looks_for_one_within_it(problem, 
     assert not ((course > low) & (course < low + 0.2)).any()
     window[6] = low, low + 0.2
     run = replace(problem.unbounded, window=window, continuous=True)
-    where = {"tool": problem.tool, "placement": CENTRE, "speed": 0.2, "options": problem.options}
-    made = plan_run(run, line, problem.robot, graph=problem.graph, cell=None, **where)
+    asked = line, problem.setup, problem.options
+    made = plan_run(run, *asked, speed=0.2, graph=problem.graph)
     assert low <= made.external.min() <= made.external.max() <= low + 0.2
     assert made.robot is problem.robot
     assert audit(made, path_tolerance=1e-3) == []
     on_grid = replace(run, continuous=False)
     with pytest.raises(NoFeasiblePath):
-        plan_run(on_grid, line, problem.robot, graph=problem.graph, cell=None, **where)
+        plan_run(on_grid, *asked, speed=0.2, graph=problem.graph)
     assert problem.solve(on_grid) == "no pose in the window of joint 7"
 
 

@@ -22,8 +22,9 @@ from kerfpath.contour import Contour
 from kerfpath.effort import changed_effort
 from kerfpath.options import PlanOptions
 from kerfpath.planner import layered_graph, on_grid, statements
-from kerfpath.planner.task import task_of
+from kerfpath.planner.task import planning_task
 from kerfpath.plans import Proof
+from kerfpath.setup import Setup
 
 STEP = np.radians(4)
 SAME = 1e-3
@@ -103,7 +104,7 @@ def test_very_many_nodes_are_planned_from_every_few_of_them(
 def test_every_few_nodes_are_those_of_the_whole(circle, arm, tool, placement, change_effort):
     change_effort(subsampled_from=100)
     asked = PlanOptions(gamma_step=STEP, frames="rotation-minimising")
-    whole = task_of(circle, arm, asked, tool=tool, placement=placement, speed=0.1)
+    whole = planning_task(circle, Setup.of(arm, tool, placement), asked, speed=0.1)
     thin = on_grid.thinned(whole)
     graph, nodes = thin.task.graph, [*range(0, 120, 5), 120]
     assert thin.nodes.tolist() == nodes
@@ -169,7 +170,7 @@ def test_a_motion_along_some_nodes_is_one_along_all(
 ):
     change_effort(subsampled_from=100)
     asked, nodes = PlanOptions(gamma_step=STEP), circle.resample(count=intervals + 1)
-    whole = task_of(nodes, arm, asked, tool=tool, placement=placement, speed=0.1)
+    whole = planning_task(nodes, Setup.of(arm, tool, placement), asked, speed=0.1)
     thin = on_grid.thinned(whole)
     assert (np.diff(thin.nodes) == every).all()
     assert intervals - every < thin.nodes[-1] <= intervals
@@ -188,7 +189,7 @@ def test_with_fewer_nodes_a_tilt_or_another_axis_no_node_is_left_out(
     def thin(robot=arm, **options):
         asked = PlanOptions(gamma_step=np.radians(30), **options)
         return on_grid.thinned(
-            task_of(circle, robot, asked, tool=tool, placement=placement, speed=0.1)
+            planning_task(circle, Setup.of(robot, tool, placement), asked, speed=0.1)
         )
 
     assert thin() is None

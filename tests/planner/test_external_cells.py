@@ -54,11 +54,13 @@ def test_courses_keep_clear_where_they_can(along_a_wall):
     """The gentlest course leads into the post; with the cell it leads past it."""
     from kerfpath.options import PlanOptions
     from kerfpath.planner.external_motion import GENTLE, courses
-    from kerfpath.planner.task import task_of
+    from kerfpath.planner.task import planning_task
+    from kerfpath.setup import Setup
 
     contour, robot, cell, options = along_a_wall
-    there = {name: options[name] for name in ("tool", "placement", "speed")}
-    task = task_of(contour, robot, PlanOptions(gamma_step=np.radians(6)), **there)
+    setup = Setup.of(robot, options["tool"], options["placement"])
+    asked = PlanOptions(gamma_step=np.radians(6))
+    task = planning_task(contour, setup, asked, speed=options["speed"])
     (free,), (kept,) = (list(courses(task, (GENTLE,), clear=c)) for c in (_all, cell.clear))
     assert np.abs(free - kept).max() > 0.05
 

@@ -12,8 +12,9 @@ from kerfpath.options import PlanOptions
 from kerfpath.planner import quickest as quickest_module
 from kerfpath.planner.collision_free import ClearSearch
 from kerfpath.planner.quickest import quick_motions
-from kerfpath.planner.task import task_of
+from kerfpath.planner.task import planning_task
 from kerfpath.plans import path_cost
+from kerfpath.setup import Setup
 
 STEP = np.radians(6)
 pytestmark = pytest.mark.usefixtures("quickest_at_work")
@@ -45,7 +46,7 @@ def space(tool, placement):
 
 def task(nodes, arm, tool, placement, speed=0.5, **options):
     asked = PlanOptions(gamma_step=STEP, **options)
-    return task_of(nodes, arm, asked, tool=tool, placement=placement, speed=speed)
+    return planning_task(nodes, Setup.of(arm, tool, placement), asked, speed=speed)
 
 
 @pytest.mark.slow
@@ -69,7 +70,7 @@ def test_at_the_fastest_speed_and_below_there_is_a_plan(seed, method, arm, space
 @pytest.mark.parametrize("seed", range(3))
 def test_motions_grow_quicker_and_keep_every_limit_at_their_own_speed(seed, arm, tool, placement):
     posed = task(drawn(seed), arm, tool, placement)
-    found = list(quick_motions(posed, ClearSearch(posed, None)))
+    found = list(quick_motions(posed, ClearSearch(posed)))
     assert len(found) >= 2
     steps = [motion.dt for motion in found]
     assert steps == sorted(steps, reverse=True)
@@ -90,7 +91,7 @@ def test_what_a_plan_aims_at_plays_no_part(arm, tool, placement):
         {"objective": "max", "speed": 0.1},
     ):
         posed = task(nodes, arm, tool, placement, **aim)
-        finder = ClearSearch(posed, None)
+        finder = ClearSearch(posed)
         steps.append([motion.dt for motion in islice(quick_motions(posed, finder), 3)])
     assert steps[0] == steps[1] == steps[2]
 
@@ -98,7 +99,7 @@ def test_what_a_plan_aims_at_plays_no_part(arm, tool, placement):
 def test_the_fastest_speed_is_that_of_the_quickest_motion(arm, tool, placement, space):
     nodes = drawn(1)
     posed = task(nodes, arm, tool, placement)
-    *_, best = quick_motions(posed, ClearSearch(posed, None))
+    *_, best = quick_motions(posed, ClearSearch(posed))
     told = fastest_speed(nodes, arm, refine=True, **space)
     # dt is a mean of differences of times.
     assert told.speed == pytest.approx(np.diff(nodes.s).max() / best.dt, rel=1e-12)
@@ -156,7 +157,7 @@ def test_with_an_external_axis_motions_grow_quicker_too(kind, arm, tool, placeme
     else:
         robot = arm.with_positioner([0, 0, 1], [1.2, 0, 0], **limits)
     posed = task(drawn(0, nodes=11), robot, tool, placement)
-    found = list(quick_motions(posed, ClearSearch(posed, None)))
+    found = list(quick_motions(posed, ClearSearch(posed)))
     # What the fastest path on the grid is quickened to, its axis with it, may be the last.
     assert found[-1].dt <= found[1].dt < found[0].dt
     for motion in found[1:]:

@@ -247,7 +247,7 @@ class Clearance(Criterion):
             )
 
     def value(self, plan: Plan, problem: ParetoProblem) -> float:
-        cell = problem.cell
+        cell = problem.setup.cell
         assert cell is not None
         wanted = counts_as_clearance(cell)
         apart = cell.distances(plan.q, wanted=np.broadcast_to(wanted, (len(plan.q), len(wanted))))

@@ -32,6 +32,7 @@ from kerfpath.planner import (
 from kerfpath.plans import Plan, on_turns
 from kerfpath.robots import Robot
 from kerfpath.search import Metric, ObjectiveKind, Relaxations
+from kerfpath.setup import Setup
 
 # -----------------------------------------------------------------------------
 # Subproblems: the settings of one run of the planner, and a plain grid of such settings.
@@ -224,13 +225,10 @@ def follows_courses(robot: Robot, options: PlanOptions) -> bool:
 
 def graph_of_runs(
     contour: Contour,
-    robot: Robot,
-    *,
-    tool: Array,
-    placement: Array,
-    speed: float | None,
+    setup: Setup,
     options: PlanOptions,
-    cell: Cell | None,
+    *,
+    speed: float | None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
     """Return the layered graph that all runs of a front share.
@@ -244,28 +242,27 @@ def graph_of_runs(
     InputError
         As `kerfpath.plan`.
     """
-    if not follows_courses(robot, options):
+    if not follows_courses(setup.robot, options):
         return layered_graph(
-            contour, robot, tool=tool, placement=placement, options=options, progress=progress
+            contour,
+            setup.robot,
+            tool=setup.tool,
+            placement=setup.placement,
+            options=options,
+            progress=progress,
         )
     asked = replace(options, feed="constant", certify=None)
-    return graph_over_courses(
-        contour, robot, tool=tool, placement=placement, speed=speed, options=asked, cell=cell,
-        progress=progress,
-    )  # fmt: skip
+    return graph_over_courses(contour, setup, asked, speed=speed, progress=progress)
 
 
 def plan_run(
     run: Subproblem,
     contour: Contour,
-    robot: Robot,
-    *,
-    tool: Array,
-    placement: Array,
-    speed: float | None,
+    setup: Setup,
     options: PlanOptions,
+    *,
+    speed: float | None,
     graph: LayeredGraph,
-    cell: Cell | None,
     phase: Callable[[str], None] | None = None,
 ) -> Plan:
     """Return the plan of a run.
@@ -279,8 +276,9 @@ def plan_run(
     Parameters
     ----------
     run : Subproblem
-    contour, robot, tool, placement, speed, cell, phase
+    contour, speed, phase
         As in `kerfpath.plan`.
+    setup : Setup
     options : PlanOptions
         Options of the front; the run replaces some of them.
     graph : LayeredGraph
@@ -294,20 +292,34 @@ def plan_run(
     InputError
         As `kerfpath.plan`.
     """
+    robot, cell = setup.robot, run.cell(setup.cell)
     asked, graph = run.applied_to(options), run.graph(graph, robot.endless)
-    cell, arm = run.cell(cell), robot
-    windowed = run.windowed(robot.endless) if run.continuous else []
+    if not run.continuous:
+        return plan(
+            contour,
+            robot,
+            tool=setup.tool,
+            placement=setup.placement,
+            speed=speed,
+            options=asked,
+            cell=cell,
+            graph=graph,
+            phase=phase,
+        )
+    arm, windowed = robot, run.windowed(robot.endless)
     if windowed:
         _require_ranges(asked, windowed)
         arm, graph = _narrowed(robot, graph, run.window, windowed, asked)
         cell = cell and replace(cell, endless=arm.endless)
-    empty = run.continuous and robot.externals and not np.diff(graph.start).all()
-    made = (best_motion if run.continuous else plan)(
-        contour, arm, tool=tool, placement=placement, speed=speed, options=asked, cell=cell,
-        graph=None if empty else graph, phase=phase,
-    )  # fmt: skip
-    if not run.continuous:
-        return made
+    empty = robot.externals and not np.diff(graph.start).all()
+    made = best_motion(
+        contour,
+        replace(setup, robot=arm, cell=cell),
+        asked,
+        speed=speed,
+        graph=None if empty else graph,
+        phase=phase,
+    )
     limits = replace(made.settings, eta_v=options.eta_v, eta_a=options.eta_a)
     return replace(_widened(made, robot) if windowed else made, settings=limits)
 
@@ -471,8 +483,9 @@ class ParetoProblem:
 
     Parameters
     ----------
-    contour, robot, tool, placement, speed, options, graph, cell
+    contour, speed, options, graph
         As in `kerfpath.plan`; the runs change some of the options.
+    setup : Setup
     criteria : tuple of Criterion
     home : (n,) rad, optional
         Where the arm comes from and goes back to.
@@ -481,14 +494,11 @@ class ParetoProblem:
     """
 
     contour: Contour
-    robot: Robot
-    tool: Array
-    placement: Array
+    setup: Setup
     speed: float | None
     options: PlanOptions
     graph: LayeredGraph
     criteria: tuple[Criterion, ...]
-    cell: Cell | None = None
     home: Array | None = None
     audit: Callable[[Plan], Sequence[object]] | None = None
 
@@ -496,6 +506,11 @@ class ParetoProblem:
 
     def __post_init__(self) -> None:
         require_rates_alone(self.robot, "the Pareto set")
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of the setup."""
+        return self.setup.robot
 
     @cached_property
     def dt(self) -> float:
@@ -568,13 +583,10 @@ class ParetoProblem:
             made = plan_run(
                 run,
                 self.contour,
-                self.robot,
-                tool=self.tool,
-                placement=self.placement,
+                self.setup,
+                self.options,
                 speed=self.speed,
-                options=self.options,
                 graph=self.graph,
-                cell=self.cell,
             )
         except NoFeasiblePath as broken:
             if first:
@@ -590,7 +602,7 @@ class ParetoProblem:
             if windows := broken.lost_by(Loss.WINDOW):
                 return f"no pose in the {windows[0]}"
             return f"no edge within {max(counts, key=counts.__getitem__, default='the seam')}"
-        wrong = full_audit(made, cell=self.cell) if self.audit is None else self.audit(made)
+        wrong = full_audit(made, cell=self.setup.cell) if self.audit is None else self.audit(made)
         return f"audit: {getattr(wrong[0], 'code', wrong[0])}" if wrong else made
 
     def evaluate(self, made: Plan) -> Evaluation:

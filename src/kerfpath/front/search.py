@@ -13,7 +13,7 @@ import moocore
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath.arrays import Array, Bools, as_pose, floats, freeze, require_one_of, short_repr
+from kerfpath.arrays import Array, Bools, floats, freeze, require_one_of, short_repr
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -33,6 +33,7 @@ from kerfpath.options import GraphKeywords, PlanMethod, PlanOptions, with_keywor
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Metric, ObjectiveKind
+from kerfpath.setup import Setup
 
 # -----------------------------------------------------------------------------
 # The Pareto front, measures of its quality, and its plans.
@@ -602,22 +603,16 @@ def pareto(
     )
     found = criteria_named(criteria, robot, options=asked, cell=cell, home=home)
     workers = whole_number((os.cpu_count() or 1) if workers is None else workers, "workers")
-    T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
+    setup = Setup.of(robot, tool, placement, cell)
     if graph is None:
-        graph = graph_of_runs(
-            contour, robot, tool=T_flange_tip, placement=T_base_part, speed=speed, options=asked,
-            cell=cell,
-        )  # fmt: skip
+        graph = graph_of_runs(contour, setup, asked, speed=speed)
     problem = ParetoProblem(
         contour=contour,
-        robot=robot,
-        tool=T_flange_tip,
-        placement=T_base_part,
+        setup=setup,
         speed=speed,
         options=asked,
         graph=graph,
         criteria=found,
-        cell=cell,
         home=None if home is None else floats(home, "home", (robot.joints,)),
         audit=audit,
     )

@@ -15,7 +15,7 @@ from kerfpath.comfort import Band
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss, Reason
-from kerfpath.planner.task import PlanningTask
+from kerfpath.planner.task import Task
 from kerfpath.plans import Plan
 from kerfpath.robots import require_axes
 from kerfpath.search import CheckedEdges, FoundPath, SearchProblem, find_clear
@@ -37,8 +37,9 @@ SAME_PLACE = 1e-9
 class ClearSearch:
     """Runs the searches of a task: as they are or, in a cell, for clear paths."""
 
-    def __init__(self, task: PlanningTask, cell: Cell | None) -> None:
-        self._task, self._cell = task, cell
+    def __init__(self, task: Task) -> None:
+        self._task, self._cell = task, task.setup.cell
+        cell = self._cell
         self._but = f" ({UNPROVED})" if cell is not None and cell.unproved else ""
         if cell is not None:
             _require_same_cell(task, cell)
@@ -76,9 +77,9 @@ class ClearSearch:
         """Return which joint vectors q (B, n) rad are clear, (B,), in the graph or not."""
         return np.ones(len(q), np.bool_) if self._cell is None else self._cell.clear(q)
 
-    def of(self, task: PlanningTask) -> ClearSearch:
+    def of(self, task: Task) -> ClearSearch:
         """Return a `ClearSearch` of another task in the same cell."""
-        return ClearSearch(task, self._cell)
+        return ClearSearch(task)
 
     def find(self, search: Callable[[SearchProblem], _P], problem: SearchProblem) -> _P:
         """Return the path that a search finds for a problem on the graph of the task."""
@@ -210,12 +211,12 @@ class ClearSearch:
         return np.asarray(at)
 
 
-def _require_same_cell(task: PlanningTask, cell: Cell) -> None:
+def _require_same_cell(task: Task, cell: Cell) -> None:
     """Raise InputError if the cell was built for another tool, placement or robot."""
     require_axes(cell.chain, task.robot)
     for name, here, there in (
-        ("tool", task.T_flange_tip, cell.T_flange_tip),
-        ("placement", task.T_base_part, cell.T_base_part),
+        ("tool", task.setup.tool, cell.T_flange_tip),
+        ("placement", task.setup.placement, cell.T_base_part),
     ):
         if there is not None and not _same(here, there):
             raise InputError(

@@ -13,7 +13,7 @@ from kerfpath.planner.collision_free import ClearSearch
 from kerfpath.planner.on_grid import plan_on_grid, shaken, thinned
 from kerfpath.planner.quickest import alike, clear_paths, wide
 from kerfpath.planner.statements import plan_off_grid
-from kerfpath.planner.task import PlanningTask
+from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
 from kerfpath.search import BeamWidth, ContinuousPath, find_shortest
@@ -41,7 +41,7 @@ FREE = 1.0
 """rad or m: how far external axes may at first leave their course in a cell."""
 
 
-def plan_continuous(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]) -> Plan:
+def plan_continuous(task: Task, finder: ClearSearch, begin: Callable[[str], None]) -> Plan:
     """Return the best motion found over continuous gamma, or on the grid if that is not possible.
 
     Raises
@@ -72,9 +72,7 @@ def claimed(found: Refinement, finder: ClearSearch) -> Plan:
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
 
 
-def _from_grid(
-    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None], why: str
-) -> Plan:
+def _from_grid(task: Task, finder: ClearSearch, begin: Callable[[str], None], why: str) -> Plan:
     """Return the best plan of the grid, refined if possible; its proof begins with `why`.
 
     Raises
@@ -91,7 +89,7 @@ def _from_grid(
 
 
 def _from_more_samples(
-    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None], none: NoFeasiblePath
+    task: Task, finder: ClearSearch, begin: Callable[[str], None], none: NoFeasiblePath
 ) -> Plan | None:
     """Return a plan found with twice as many samples of gamma; None if there is none.
 
@@ -110,7 +108,7 @@ def _from_more_samples(
     return replace(made, settings=task.settings)
 
 
-def _finer(task: PlanningTask) -> PlanningTask | None:
+def _finer(task: Task) -> Task | None:
     """Return the task with twice as many samples of gamma; None if they are close already.
 
     Its graph is built when it is needed.
@@ -120,7 +118,7 @@ def _finer(task: PlanningTask) -> PlanningTask | None:
 
 
 def clear_motion(
-    task: PlanningTask,
+    task: Task,
     finder: ClearSearch,
     begin: Callable[[str], None] = lambda what: None,
     *,
@@ -169,7 +167,7 @@ def clear_motion(
     return starts.best
 
 
-def _from_fewer_nodes(task: PlanningTask, finder: ClearSearch) -> tuple[Plan | None, float]:
+def _from_fewer_nodes(task: Task, finder: ClearSearch) -> tuple[Plan | None, float]:
     """Return the motion along some of very many nodes, extended to all, and a cost to compare with.
 
     None if there is none. No motion along all nodes costs less than the best one along some: its
@@ -188,7 +186,7 @@ def _from_fewer_nodes(task: PlanningTask, finder: ClearSearch) -> tuple[Plan | N
 class _Starts:
     """Starts of refinements, and the best motion that was reached from them."""
 
-    def __init__(self, task: PlanningTask, finder: ClearSearch) -> None:
+    def __init__(self, task: Task, finder: ClearSearch) -> None:
         self._task, self._finder = task, finder
         self._tried: list[Plan] = []
         self.best: Refinement | None = None
@@ -223,7 +221,7 @@ class _Starts:
                 found = _refine_path(self._task, self._finder, paths[i], made)
                 self.best = _better(best, found)
 
-    def refine_from_grid(self, task: PlanningTask) -> None:
+    def refine_from_grid(self, task: Task) -> None:
         """Refine the best path on the grid of a task, if there is already a motion to improve on.
 
         It leads to other local optima than paths between the samples do.
@@ -244,7 +242,7 @@ class _Starts:
 
 
 def _refine_path(
-    task: PlanningTask, finder: ClearSearch, path: ContinuousPath, made: Plan
+    task: Task, finder: ClearSearch, path: ContinuousPath, made: Plan
 ) -> Refinement | None:
     """Return the refinement of a path; None if it does not keep the limits or is not clear.
 
@@ -284,7 +282,7 @@ def _better(one: Refinement | None, other: Refinement | None) -> Refinement | No
     return min(one, other, key=lambda found: found.cost_after)
 
 
-def grid_reason(task: PlanningTask) -> str:
+def grid_reason(task: Task) -> str:
     """Return why a task must be planned on the grid; "" if it need not be."""
     comfort = task.settings.comfort
     if not task.robot.family.free_rotation:

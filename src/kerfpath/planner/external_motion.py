@@ -33,9 +33,10 @@ from kerfpath.planner.on_grid import (
     steps_of,
 )
 from kerfpath.planner.quickest import QuickMotion, quicker
-from kerfpath.planner.task import PlanningTask, task_of
+from kerfpath.planner.task import Task, planning_task
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
+from kerfpath.setup import Setup
 
 # -----------------------------------------------------------------------------
 # Smooth courses of external axes and elbows, from a search over coarse samples of these joints.
@@ -77,15 +78,18 @@ def external_course(
     """
     free = speed is None and contour.time is None
     asked = options or PlanOptions()
-    task = task_of(
-        contour, robot, asked, tool=tool, placement=placement, speed=SLOW if free else speed
+    task = planning_task(
+        contour,
+        Setup.of(robot, tool, placement, cell),
+        asked,
+        speed=SLOW if free else speed,
     )
-    return next(courses(task, (GENTLE,) if free else STYLES, ClearSearch(task, cell).clear))
+    return next(courses(task, (GENTLE,) if free else STYLES, ClearSearch(task).clear))
 
 
 def along_a_course(
-    task: PlanningTask, clear: Callable[[Array], Bools], *, at_any_speed: bool = False
-) -> PlanningTask:
+    task: Task, clear: Callable[[Array], Bools], *, at_any_speed: bool = False
+) -> Task:
     """Return the task along the most promising course, if its robot has one to choose.
 
     A task that already has a course or a graph is returned unchanged, and so is one that searches a
@@ -104,7 +108,7 @@ def along_a_course(
 
 
 def courses(
-    task: PlanningTask,
+    task: Task,
     styles: tuple[Style, ...] = STYLES,
     clear: Callable[[Array], Bools] = lambda q: np.ones(len(q), np.bool_),
 ) -> Iterator[Array]:
@@ -200,9 +204,7 @@ RUNGS = (1.25, 1.06)
 """Multiples of the speed reached at which quicker courses are looked for."""
 
 
-def plan_over_courses(
-    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]
-) -> Plan:
+def plan_over_courses(task: Task, finder: ClearSearch, begin: Callable[[str], None]) -> Plan:
     """Return the best motion found of all joints together, if poses leave some joints free.
 
     A tolerance of the tool axis is searched along the course of the best motion with the nominal
@@ -219,13 +221,10 @@ def plan_over_courses(
 
 def graph_over_courses(
     contour: Contour,
-    robot: Robot,
-    *,
-    tool: ArrayLike,
-    placement: ArrayLike,
-    speed: float | None,
+    setup: Setup,
     options: PlanOptions,
-    cell: Cell | None,
+    *,
+    speed: float | None,
     progress: Callable[[int], None] | None = None,
 ) -> LayeredGraph:
     """Return the layered graph along the courses of the plans found.
@@ -238,24 +237,24 @@ def graph_over_courses(
     NoFeasiblePath
         No plan is found, see `plan_over_courses`.
     """
-    task = task_of(contour, robot, options, tool=tool, placement=placement, speed=speed)
-    plans = _plans(task, ClearSearch(task, cell), lambda what: None)
+    task = planning_task(contour, setup, options, speed=speed)
+    plans = _plans(task, ClearSearch(task), lambda what: None)
     ways: list[Array] = []
     for made in sorted(plans, key=lambda plan: plan.cost):
         if not any(np.allclose(made.course, other, atol=ALIKE) for other in ways):
             ways.append(made.course)
     return layered_graph(
         contour,
-        robot,
-        tool=tool,
-        placement=placement,
+        setup.robot,
+        tool=setup.tool,
+        placement=setup.placement,
         options=options,
         external=np.stack(ways, axis=1),
         progress=progress,
     )
 
 
-def _plans(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]) -> list[Plan]:
+def _plans(task: Task, finder: ClearSearch, begin: Callable[[str], None]) -> list[Plan]:
     """Return the plans found along the courses, at least one.
 
     Raises
@@ -287,9 +286,7 @@ def _plans(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]
     raise _unproved(task, max(failed, key=lambda broken: broken.node))
 
 
-def faster_motions(
-    task: PlanningTask, finder: ClearSearch, best: QuickMotion
-) -> Iterator[QuickMotion]:
+def faster_motions(task: Task, finder: ClearSearch, best: QuickMotion) -> Iterator[QuickMotion]:
     """Yield successively quicker motions along the most promising courses at higher speeds."""
     rung = 0
     while rung < len(RUNGS):
@@ -320,7 +317,7 @@ class _Tried(NamedTuple):
 
 def _along(
     ways: Iterator[Array],
-    task: PlanningTask,
+    task: Task,
     finder: ClearSearch,
     begin: Callable[[str], None],
     known: Plan | None = None,
@@ -350,7 +347,7 @@ def _along(
     return tried
 
 
-def _nominal(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None]) -> Plan | None:
+def _nominal(task: Task, finder: ClearSearch, begin: Callable[[str], None]) -> Plan | None:
     """Return the best motion with the nominal tool axis; None without a tilt or a motion."""
     if task.settings.tilt is None:
         return None
@@ -363,7 +360,7 @@ def _nominal(task: PlanningTask, finder: ClearSearch, begin: Callable[[str], Non
     return None if made is None else replace(made, settings=task.settings)
 
 
-def _unproved(task: PlanningTask, broken: NoFeasiblePath) -> NoFeasiblePath:
+def _unproved(task: Task, broken: NoFeasiblePath) -> NoFeasiblePath:
     names = task.robot.free_names
     said = (
         f"{broken}; only the most promising courses of {names} were tried, which proves nothing "

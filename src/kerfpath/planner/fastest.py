@@ -22,7 +22,7 @@ from kerfpath.planner.external_motion import along_a_course, faster_motions
 from kerfpath.planner.layers import longest_step, node_interval, require_even
 from kerfpath.planner.on_grid import binding_nodes, impossible_share
 from kerfpath.planner.quickest import QuickMotion, quick_motions
-from kerfpath.planner.task import PlanningTask, task_of
+from kerfpath.planner.task import Task, planning_task
 from kerfpath.robots import Robot
 from kerfpath.search import (
     LeastInterval,
@@ -31,6 +31,7 @@ from kerfpath.search import (
     find_least_interval,
     find_relaxations,
 )
+from kerfpath.setup import Setup
 
 
 class SpeedKeywords(GraphKeywords, total=False):
@@ -128,18 +129,16 @@ def fastest_speed(
     comfort = asked.comfort
     if comfort is not None and comfort.costs:
         raise InputError("comfort: the fastest speed takes no costs; give margins only")
-    task = task_of(
+    task = planning_task(
         contour if contour.time is None else replace(contour, time=None),
-        robot,
+        Setup.of(robot, tool, placement, cell),
         PlanOptions(**{name: getattr(asked, name) for name in SpeedKeywords.__annotations__}),
-        tool=tool,
-        placement=placement,
         speed=1.0,
         graph=graph,
         external=external,
         progress=progress,
     )
-    finder = ClearSearch(task, cell)
+    finder = ClearSearch(task)
     along = along_a_course(task, finder.clear, at_any_speed=True)
     found, nodes = _fastest(task, along.whole(), finder, enough)
     if not ceiling:
@@ -160,7 +159,7 @@ def require_rates_alone(robot: Robot, what: str) -> None:
 
 
 def _fastest(
-    task: PlanningTask, along: PlanningTask, finder: ClearSearch, enough: float | None
+    task: Task, along: Task, finder: ClearSearch, enough: float | None
 ) -> tuple[FastestSpeed, list[int]]:
     """Return the largest speed, on the grid or with `refine` off it, and the nodes where it binds.
 
@@ -190,7 +189,7 @@ def _fastest(
 
 
 def _over_courses(
-    task: PlanningTask, finder: ClearSearch, ways: Iterator[QuickMotion]
+    task: Task, finder: ClearSearch, ways: Iterator[QuickMotion]
 ) -> Iterator[QuickMotion]:
     """Yield ever quicker motions: the first two along one course, then those along others."""
     for best in islice(ways, 2):

@@ -34,7 +34,7 @@ from kerfpath.planner.statements import (
     plan_slowly,
     refine_plan,
 )
-from kerfpath.planner.task import PlanningTask
+from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof, on_turns
 from kerfpath.refiner import refine
 from kerfpath.robots import Robot, posture_name
@@ -55,7 +55,7 @@ FAR, CLOSE = 300.0, 1.02
 the impossible speed is then narrowed down."""
 
 
-def motion_test(task: PlanningTask) -> MotionTest | None:
+def motion_test(task: Task) -> MotionTest | None:
     """Return the test of a task for motions at any gamma; None if nothing can be proved.
 
     Other constraints of a plan (cell, comfort, closure, rotation limits) only leave fewer motions.
@@ -64,11 +64,11 @@ def motion_test(task: PlanningTask) -> MotionTest | None:
     if not task.robot.encloses or asked.tilt is not None or len(task.contour) > MOST_NODES:
         return None
     finish_compiling()
-    frames = task.T_base_part @ task.contour.frames(asked.frames)
-    return MotionTest(task.robot, frames, task.T_flange_tip, asked.postures)
+    frames = task.setup.placement @ task.contour.frames(asked.frames)
+    return MotionTest(task.robot, frames, task.setup.tool, asked.postures)
 
 
-def at_any_gamma(broken: NoFeasiblePath, task: PlanningTask) -> NoFeasiblePath:
+def at_any_gamma(broken: NoFeasiblePath, task: Task) -> NoFeasiblePath:
     """Return the answer of a search without a path, with whether it is proved at every gamma."""
     test = motion_test(task)
     if test is None or task.settings.feed == "dip":
@@ -80,9 +80,7 @@ def at_any_gamma(broken: NoFeasiblePath, task: PlanningTask) -> NoFeasiblePath:
     return broken.with_message(f"{broken}; proved for every rotation: {closed}", closed=closed)
 
 
-def with_relaxation(
-    broken: NoFeasiblePath, task: PlanningTask, quick: QuickMotion
-) -> NoFeasiblePath:
+def with_relaxation(broken: NoFeasiblePath, task: Task, quick: QuickMotion) -> NoFeasiblePath:
     """Return an answer without a path, with the lower speed or higher limits that would suffice.
 
     They are those of the quickest motion found, which is slower than asked for; the figures are
@@ -105,7 +103,7 @@ def with_relaxation(
     return broken.with_message(f"{broken}; {said}{limits_said}", relaxation=needed)
 
 
-def impossible_share(task: PlanningTask, reached: float, nodes: Sequence[int]) -> float | None:
+def impossible_share(task: Task, reached: float, nodes: Sequence[int]) -> float | None:
     """Return an interval, as a share of `reached` s, that is too short for any motion at any gamma.
 
     This is proved, and holds for every shorter interval, too; None if nothing is proved. `nodes`
@@ -258,7 +256,7 @@ def coarse_places(robot: Robot) -> Array:
     return _grid(robot)[0]
 
 
-def sampled(task: PlanningTask) -> Coarse:
+def sampled(task: Task) -> Coarse:
     """Return the coarse samples of the joints that the poses of a task leave free."""
     robot, options, K = task.robot, task.settings, len(task.contour)
     places, counts = _grid(robot)
@@ -270,8 +268,8 @@ def sampled(task: PlanningTask) -> Coarse:
     graph = layered_graph(
         task.contour,
         robot,
-        tool=task.T_flange_tip,
-        placement=task.T_base_part,
+        tool=task.setup.tool,
+        placement=task.setup.placement,
         options=replace(
             options, gamma_step=GAMMA_STEP[len(counts)], tilt=None, comfort=hard, retract=None
         ),
@@ -313,7 +311,7 @@ def _grid(robot: Robot) -> tuple[Array, tuple[int, ...]]:
 
 def clear_way(
     coarse: Coarse,
-    task: PlanningTask,
+    task: Task,
     style: Style,
     clear: Callable[[Array], Bools],
     known: Reached,
@@ -373,7 +371,7 @@ def _way_to(known: Reached, end: End) -> Ints:
     return np.stack(np.unravel_index(path[::-1], value.shape), axis=1).astype(np.int64)
 
 
-def reached(coarse: Coarse, task: PlanningTask, style: Style) -> Reached:
+def reached(coarse: Coarse, task: Task, style: Style) -> Reached:
     """Return the cost of reaching each sample (X, m, P) of the last node, and the predecessors.
 
     Raises
@@ -433,7 +431,7 @@ def _layer(coarse: Coarse, robot: Robot, k: int) -> CoarseLayer:
     return CoarseLayer(q=q, ok=ok)
 
 
-def _nearby(coarse: Coarse, task: PlanningTask, parts: int, style: Style) -> Nearby:
+def _nearby(coarse: Coarse, task: Task, parts: int, style: Style) -> Nearby:
     """Return the places from which steps to each place may come within `parts` intervals."""
     robot, options = task.robot, task.settings
     free, solved, counts = robot.free, robot.solved, coarse.counts
@@ -587,16 +585,16 @@ class ThinTask:
 
     Parameters
     ----------
-    task : PlanningTask
+    task : Task
         The thinned task; it lacks the last few nodes if the intervals do not divide evenly.
-    whole : PlanningTask
+    whole : Task
         The other task, with all nodes.
     nodes : (M,) int
         The nodes of `whole` that are kept.
     """
 
-    task: PlanningTask
-    whole: PlanningTask
+    task: Task
+    whole: Task
     nodes: Ints
 
     __repr__ = short_repr
@@ -619,8 +617,8 @@ class ThinTask:
         return Plan(
             contour=task.contour,
             robot=task.robot,
-            T_flange_tip=task.T_flange_tip,
-            T_base_part=task.T_base_part,
+            T_flange_tip=task.setup.tool,
+            T_base_part=task.setup.placement,
             q=q,
             gamma=gamma,
             posture=np.repeat(made.posture[:1], len(at)),
@@ -633,7 +631,7 @@ class ThinTask:
         )
 
 
-def thinned(task: PlanningTask) -> ThinTask | None:
+def thinned(task: Task) -> ThinTask | None:
     """Return a task with very many nodes thinned to every few of them; None if it has fewer.
 
     It is also None with a tilt or a grid of external axes, with a periodic closure whose intervals
@@ -679,7 +677,7 @@ next search: for the fastest path on the grid, and for quicker motions."""
 
 
 def plan_on_grid(
-    task: PlanningTask, finder: ClearSearch, begin: Callable[[str], None], *, refine: bool
+    task: Task, finder: ClearSearch, begin: Callable[[str], None], *, refine: bool
 ) -> Plan:
     """Return the plan of the best path on the graph of a task, refined if `refine`.
 
@@ -704,7 +702,7 @@ def plan_on_grid(
 
 
 def _otherwise(
-    task: PlanningTask,
+    task: Task,
     finder: ClearSearch,
     broken: NoFeasiblePath,
     begin: Callable[[str], None],
@@ -740,7 +738,7 @@ def _otherwise(
 
 
 def _from_quickest(
-    task: PlanningTask, finder: ClearSearch, broken: NoFeasiblePath, begin: Callable[[str], None]
+    task: Task, finder: ClearSearch, broken: NoFeasiblePath, begin: Callable[[str], None]
 ) -> Plan:
     """Return the refinement of a motion that is at least as quick as asked for.
 
@@ -785,15 +783,13 @@ def _from_quickest(
     raise with_relaxation(judged, task, best)
 
 
-def _judged(
-    broken: NoFeasiblePath, task: PlanningTask, begin: Callable[[str], None]
-) -> NoFeasiblePath:
+def _judged(broken: NoFeasiblePath, task: Task, begin: Callable[[str], None]) -> NoFeasiblePath:
     """Return the answer without a path, with whether it is proved at every gamma."""
     begin("search for a proof that no motion exists")
     return at_any_gamma(broken, task)
 
 
-def _bracket(broken: NoFeasiblePath, task: PlanningTask) -> str:
+def _bracket(broken: NoFeasiblePath, task: Task) -> str:
     """Return text on the node from which paths reach the end, and the posture change needed."""
     if broken.back is None:
         return ""

@@ -9,7 +9,6 @@ from typing import Unpack
 
 from numpy.typing import ArrayLike
 
-from kerfpath.arrays import Array
 from kerfpath.cell import Cell
 from kerfpath.certificate import Certify
 from kerfpath.certifier import certify
@@ -23,11 +22,12 @@ from kerfpath.planner.continuous import clear_motion, grid_reason, plan_continuo
 from kerfpath.planner.external_motion import along_a_course, plan_over_courses
 from kerfpath.planner.on_grid import plan_on_grid
 from kerfpath.planner.statements import limits_named, refine_plan, with_windows_said
-from kerfpath.planner.task import PlanningTask, task_of
+from kerfpath.planner.task import Task, planning_task
 from kerfpath.plans import Plan, Proof
 from kerfpath.progress import Progress, no_progress
 from kerfpath.robots import Robot
 from kerfpath.search import Piece, find_interrupted
+from kerfpath.setup import Setup
 
 # -----------------------------------------------------------------------------
 # The best motion over continuous gamma, without falling back to the grid and without proofs.
@@ -35,14 +35,11 @@ from kerfpath.search import Piece, find_interrupted
 
 def best_motion(
     contour: Contour,
-    robot: Robot,
-    *,
-    tool: Array,
-    placement: Array,
-    speed: float | None,
+    setup: Setup,
     options: PlanOptions,
+    *,
+    speed: float | None,
     graph: LayeredGraph | None = None,
-    cell: Cell | None = None,
     phase: Callable[[str], None] | None = None,
 ) -> Plan:
     """Return the plan of the best motion found over continuous gamma.
@@ -52,8 +49,9 @@ def best_motion(
 
     Parameters
     ----------
-    contour, robot, tool, placement, speed, options, graph, cell, phase
+    contour, speed, options, graph, phase
         As in `kerfpath.plan`, method "continuous".
+    setup : Setup
 
     Raises
     ------
@@ -63,11 +61,9 @@ def best_motion(
         As `kerfpath.plan`.
     """
     options = replace(options, certify=None)
-    task = task_of(
-        contour, robot, options, tool=tool, placement=placement, speed=speed, graph=graph
-    )
-    task = along_a_course(task, ClearSearch(task, cell).clear)
-    finder, begin = ClearSearch(task, cell), phase or (lambda what: None)
+    task = planning_task(contour, setup, options, speed=speed, graph=graph)
+    task = along_a_course(task, ClearSearch(task).clear)
+    finder, begin = ClearSearch(task), phase or (lambda what: None)
     why = grid_reason(task)
     begin("search")
     found = None if why else clear_motion(task, finder, begin)
@@ -224,18 +220,16 @@ def plan(
     require_nodes_alone(asked, "plan")
     if cell is None and asked.comfort is not None and asked.comfort.clearance is not None:
         raise InputError("comfort clearance: is measured in a cell; give cell=")
-    task = task_of(
+    task = planning_task(
         contour,
-        robot,
+        Setup.of(robot, tool, placement, cell),
         asked,
-        tool=tool,
-        placement=placement,
         speed=speed,
         graph=graph,
         external=external,
         progress=progress,
     )
-    finder = ClearSearch(task, cell)
+    finder = ClearSearch(task)
     begin = phase or (lambda what: None)
     try:
         if asked.method == "continuous" and robot.free.size and not task.placed:
@@ -321,18 +315,16 @@ def plan_in_pieces(
     """
     asked = with_keywords(options, keywords, PieceKeywords, interruptions="fewest")
     require_nodes_alone(asked, "plan_in_pieces")
-    task = task_of(
+    task = planning_task(
         contour,
-        robot,
+        Setup.of(robot, tool, placement, cell),
         asked,
-        tool=tool,
-        placement=placement,
         speed=speed,
         graph=graph,
         progress=progress,
     )
-    task = along_a_course(task, ClearSearch(task, cell).clear).whole()
-    finder = ClearSearch(task, cell)
+    task = along_a_course(task, ClearSearch(task).clear).whole()
+    finder = ClearSearch(task)
     begin = phase or (lambda what: None)
     begin("search for pieces")
     try:
@@ -347,12 +339,12 @@ def plan_in_pieces(
         part, made = _plan_piece(task, finder, piece, number, len(found.pieces))
         if asked.refine or asked.method == "continuous":
             begin(f"refinement of piece {number} of {len(found.pieces)}")
-            made = _off_grid(part, ClearSearch(part, cell), made)
+            made = _off_grid(part, ClearSearch(part), made)
         plans.append(with_bound(made, asked.certify, phase=begin))
     return tuple(plans)
 
 
-def _off_grid(part: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
+def _off_grid(part: Task, finder: ClearSearch, made: Plan) -> Plan:
     """Return the plan of a piece moved off its grid: the best motion found there."""
     refined = refine_plan(part, finder, made)
     found = None
@@ -365,8 +357,8 @@ def _off_grid(part: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
 
 
 def _plan_piece(
-    task: PlanningTask, finder: ClearSearch, piece: Piece, number: int, count: int
-) -> tuple[PlanningTask, Plan]:
+    task: Task, finder: ClearSearch, piece: Piece, number: int, count: int
+) -> tuple[Task, Plan]:
     """Return the task of one piece, and its plan on the grid."""
     claim = f"the best path on this graph under {limits_named(task.problem)}"
     if count > 1:

@@ -11,7 +11,7 @@ from kerfpath.arrays import short_repr
 from kerfpath.effort import current_effort
 from kerfpath.kernels.metric import wrap
 from kerfpath.planner.collision_free import ClearSearch
-from kerfpath.planner.task import PlanningTask
+from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Binding, quicken
 from kerfpath.search import (
@@ -67,7 +67,7 @@ class QuickMotion:
         return self.dt * (1 - SLACK / 2) <= dt
 
 
-def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotion]:
+def quick_motions(task: Task, finder: ClearSearch) -> Iterator[QuickMotion]:
     """Yield successively quicker motions along the contour of a task, clear and within its margins.
 
     The first is the fastest path on the grid. The second, if the robot leaves a rotation free, is
@@ -105,7 +105,7 @@ def quick_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMoti
         without_gain = 0 if best.dt < (1 - GAIN) * before else without_gain + 1
 
 
-def slow_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotion]:
+def slow_motions(task: Task, finder: ClearSearch) -> Iterator[QuickMotion]:
     """Yield motions of a task whose speed is much too high: the quickest if these take little time.
 
     If the velocities leave very many edges in the time that a path takes, they are the shortest
@@ -123,14 +123,14 @@ def slow_motions(task: PlanningTask, finder: ClearSearch) -> Iterator[QuickMotio
         yield quicker(task, finder, best.plan, best)
 
 
-def _along(task: PlanningTask, least: LeastInterval) -> QuickMotion:
+def _along(task: Task, least: LeastInterval) -> QuickMotion:
     """Return the motion along a path on the grid."""
     path = _at(task, least.dt).plan(least.index, 0.0, _claim())
     at = Binding(least.joint, least.node, least.limit)
     return QuickMotion(plan=path, at=at, on_grid=least.dt)
 
 
-def _without_aim(task: PlanningTask) -> PlanningTask:
+def _without_aim(task: Task) -> Task:
     """Return the task of the fastest speed: no costs, no closure, default distances."""
     velocity, _ = task.robot.speed_limits()
     settings = replace(
@@ -147,7 +147,7 @@ def _without_aim(task: PlanningTask) -> PlanningTask:
     return replace(task.with_problem(problem), settings=settings)
 
 
-def _at(task: PlanningTask, dt: float) -> PlanningTask:
+def _at(task: Task, dt: float) -> Task:
     return task.with_problem(replace(task.problem, dt=dt))
 
 
@@ -155,7 +155,7 @@ def _claim() -> Proof:
     return Proof(optimal=False, statement="the quickest motion found")
 
 
-def quicker(task: PlanningTask, finder: ClearSearch, start: Plan, best: QuickMotion) -> QuickMotion:
+def quicker(task: Task, finder: ClearSearch, start: Plan, best: QuickMotion) -> QuickMotion:
     """Return the better of the best motion so far and a start with its interval minimised."""
     quickened = quicken(start)
     if quickened is None:
@@ -165,18 +165,18 @@ def quicker(task: PlanningTask, finder: ClearSearch, start: Plan, best: QuickMot
     comfort = task.settings.comfort
     if made.dt >= best.dt:
         return best
-    if comfort is not None and comfort.broken(task.robot, made.q, task.T_flange_tip):
+    if comfort is not None and comfort.broken(task.robot, made.q, task.setup.tool):
         return best
     return replace(best, plan=made, at=at) if finder.is_clear(made) else best
 
 
-def wide(task: PlanningTask) -> BeamWidth:
+def wide(task: Task) -> BeamWidth:
     """Return the beam of a wide search, less wide over very many nodes."""
     return BeamWidth(min(WIDE, MOST_STATES // len(task.contour) + 1), ALIKE, 1)
 
 
 def clear_paths(
-    task: PlanningTask, finder: ClearSearch, beams: tuple[BeamWidth, ...]
+    task: Task, finder: ClearSearch, beams: tuple[BeamWidth, ...]
 ) -> tuple[ContinuousSearch, list[ContinuousPath]] | None:
     """Return a search over continuous gamma and its paths, clear at the samples that they use.
 

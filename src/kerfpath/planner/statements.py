@@ -17,7 +17,7 @@ from kerfpath.losses import Loss
 from kerfpath.options import PlanOptions
 from kerfpath.planner.collision_free import ClearSearch
 from kerfpath.planner.quickest import QuickMotion
-from kerfpath.planner.task import PlanningTask
+from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.refiner import Refinement
 from kerfpath.retime import feed, retime
@@ -27,7 +27,7 @@ from kerfpath.search import BeamWidth, ContinuousSearch, SearchProblem, find_sho
 # Plans off the grid: the best refinement of the paths worth starting from.
 
 
-def refine_plan(task: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
+def refine_plan(task: Task, finder: ClearSearch, made: Plan) -> Plan:
     """Return the plan moved off its grid, clear and at least as good; unchanged if that fails.
 
     A refinement ends in the nearest optimum. The grid quantises the acceleration, so its best
@@ -70,7 +70,7 @@ def refine_plan(task: PlanningTask, finder: ClearSearch, made: Plan) -> Plan:
     return replace(best.plan, proof=proof)
 
 
-def plan_off_grid(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
+def plan_off_grid(task: Task, finder: ClearSearch) -> Refinement | None:
     """Look for a motion close to the best path without (6), for graphs without a path.
 
     If a path breaks (6) only because gamma changes in steps, a motion close to it may keep (6). The
@@ -80,7 +80,7 @@ def plan_off_grid(task: PlanningTask, finder: ClearSearch) -> Refinement | None:
     return None if first is None else _keep_if_clear(refiner.refine(first), finder)
 
 
-def plan_slowly(task: PlanningTask, quick: QuickMotion, finder: ClearSearch) -> Plan | None:
+def plan_slowly(task: Task, quick: QuickMotion, finder: ClearSearch) -> Plan | None:
     """Return the plan at the speed asked for, refined from a motion that is at least as quick.
 
     Slowed down, that motion uses less of every limit, so it keeps them, too. None if a limit on the
@@ -106,7 +106,7 @@ def _keep_if_clear(found: Refinement, finder: ClearSearch) -> Refinement:
     return replace(found, done=False, statement="the motion within the limits would not be clear")
 
 
-def plan_first_order(task: PlanningTask, finder: ClearSearch) -> Plan | None:
+def plan_first_order(task: Task, finder: ClearSearch) -> Plan | None:
     """Return the best path without (6); None if (5) alone leaves no path."""
     limits = task.problem.limits.without_acceleration()
     try:
@@ -128,7 +128,7 @@ MOST_LOOKS = 20
 """Most searches for a path whose samples are clear in the cell."""
 
 
-def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Plan:
+def plan_slowed(task: Task, finder: ClearSearch, *, refine: bool) -> Plan:
     """Return a plan at the speed asked for where its path allows it, and slower elsewhere.
 
     Two paths of the grid get the least times under all limits: the one that loses the least time
@@ -160,13 +160,13 @@ def plan_slowed(task: PlanningTask, finder: ClearSearch, *, refine: bool) -> Pla
     return replace(on_grid, proof=replace(on_grid.proof, statement=claim))
 
 
-def _off_grid(task: PlanningTask, start: Plan) -> Plan:
+def _off_grid(task: Task, start: Plan) -> Plan:
     """Return the quicker of an eased path and its refinement, with the least times."""
     eased = _ease(task, start)
     return min(eased, _with_least_times(task, refiner.refine(eased).plan), key=_time_and_cost)
 
 
-def _between_the_samples(task: PlanningTask, finder: ClearSearch) -> list[Plan]:
+def _between_the_samples(task: Task, finder: ClearSearch) -> list[Plan]:
     """Return the paths over continuous gamma that are worth slowing down; there may be none.
 
     Each has a constant interval: the one asked for, without (6), and the least of `SLOWER` with it.
@@ -181,7 +181,7 @@ def _between_the_samples(task: PlanningTask, finder: ClearSearch) -> list[Plan]:
     return [path for path in found if path is not None]
 
 
-def _between(task: PlanningTask, finder: ClearSearch, problem: SearchProblem) -> Plan | None:
+def _between(task: Task, finder: ClearSearch, problem: SearchProblem) -> Plan | None:
     """Return the best path over continuous gamma of a problem; None if none is found."""
     claim = "no motion was found at constant speed; slowed down from a path over continuous gamma"
     for _ in range(MOST_LOOKS):
@@ -193,7 +193,7 @@ def _between(task: PlanningTask, finder: ClearSearch, problem: SearchProblem) ->
     return None
 
 
-def _ease(task: PlanningTask, start: Plan) -> Plan:
+def _ease(task: Task, start: Plan) -> Plan:
     """Return the plan moved off the grid so that it exceeds the limits little, with least times."""
     claim = f"{start.proof.statement}; gamma moved off the grid to lose little time"
     eased = replace(refiner.ease(start), proof=Proof(optimal=False, statement=claim))
@@ -205,15 +205,15 @@ def _time_and_cost(made: Plan) -> tuple[float, float]:
     return round(float(made.time[-1]), 9), made.cost
 
 
-def _broken(task: PlanningTask, finder: ClearSearch, made: Plan) -> str:
+def _broken(task: Task, finder: ClearSearch, made: Plan) -> str:
     """Return what a plan off the grid would break, as text; "" if nothing."""
     comfort = task.settings.comfort
-    if comfort is not None and comfort.broken(task.robot, made.q, task.T_flange_tip):
+    if comfort is not None and comfort.broken(task.robot, made.q, task.setup.tool):
         return "break a margin of comfort"
     return "" if finder.is_clear(made) else "not be clear"
 
 
-def _least_lost(task: PlanningTask, finder: ClearSearch) -> Plan:
+def _least_lost(task: Task, finder: ClearSearch) -> Plan:
     found = finder.find(find_slowed, task.problem)
     claim = finder.claimed(
         "at constant speed the graph has no path; of all its paths this one loses the least time "
@@ -222,7 +222,7 @@ def _least_lost(task: PlanningTask, finder: ClearSearch) -> Plan:
     return task.plan(found.index, task.cost(found.index), Proof(optimal=False, statement=claim))
 
 
-def _with_least_times(task: PlanningTask, made: Plan) -> Plan:
+def _with_least_times(task: Task, made: Plan) -> Plan:
     """Return the plan with the least times and its feed reduction."""
     limits = task.problem.limits
     tau = retime(made.increments, task.dt, limits)

@@ -9,7 +9,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath.arrays import Array, Bools, Ints, as_pose, freeze, short_repr
+from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
 from kerfpath.certifier import closed_node
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -30,6 +30,7 @@ from kerfpath.planner.layers import (
 from kerfpath.plans import Plan, Proof, path_cost
 from kerfpath.robots import Robot
 from kerfpath.search import ContinuousPath, GammaSamples, SearchProblem
+from kerfpath.setup import Setup
 from kerfpath.windows import with_window_ends
 
 MOST_EMPTY = 8
@@ -69,14 +70,13 @@ class Layered:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # no slots: the cached property needs a dict
-class PlanningTask:
-    """One contour for one robot, with settings and a layered graph that is built when needed.
+class Task:
+    """One contour in one setup, with settings and a layered graph that is built when needed.
 
     Parameters
     ----------
     contour : Contour
-    robot : Robot
-    T_flange_tip, T_base_part : (4, 4) m
+    setup : Setup
     settings : PlanOptions
         Options with the weights that are used.
     dt : float s
@@ -91,16 +91,19 @@ class PlanningTask:
     """
 
     contour: Contour
-    robot: Robot
-    T_flange_tip: Array
-    T_base_part: Array
+    setup: Setup
     settings: PlanOptions
     dt: float
-    layers: Callable[[PlanningTask, Ints | None], Layered]
+    layers: Callable[[Task, Ints | None], Layered]
     external: Array | None = None
     placed: bool = False
 
     __repr__ = short_repr
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of the setup."""
+        return self.setup.robot
 
     @cached_property
     def built(self) -> Layered:
@@ -117,7 +120,7 @@ class PlanningTask:
         """The search problem on the graph, at the speed asked for."""
         return self.built.problem
 
-    def whole(self) -> PlanningTask:
+    def whole(self) -> Task:
         """Return the task with the layers of all nodes built.
 
         Raises
@@ -127,27 +130,27 @@ class PlanningTask:
         """
         return self.on(self.built)
 
-    def with_problem(self, problem: SearchProblem) -> PlanningTask:
+    def with_problem(self, problem: SearchProblem) -> Task:
         """Return the task with another search problem on the same graph."""
         return self.on(Layered(graph=self.graph, problem=problem))
 
-    def on(self, layered: Layered) -> PlanningTask:
+    def on(self, layered: Layered) -> Task:
         """Return the task with a graph that is already built."""
 
-        def layers(task: PlanningTask, nodes: Ints | None) -> Layered:
+        def layers(task: Task, nodes: Ints | None) -> Layered:
             return layered if nodes is None else layered.at_nodes(nodes)
 
         return replace(self, dt=layered.problem.dt, layers=layers)
 
-    def sampled(self, step: float) -> PlanningTask:
+    def sampled(self, step: float) -> Task:
         """Return the task with another step of gamma, rad; its graph is not built yet."""
         return self.with_settings(replace(self.settings, gamma_step=step))
 
-    def with_settings(self, settings: PlanOptions) -> PlanningTask:
+    def with_settings(self, settings: PlanOptions) -> Task:
         """Return the task with other settings; its graph is not built yet."""
         return replace(self, settings=settings, layers=_layers)
 
-    def along(self, external: Array) -> PlanningTask:
+    def along(self, external: Array) -> Task:
         """Return the task along another course (K, E) rad or m; its graph is not built yet."""
         return replace(self, external=external, placed=True, layers=_layers)
 
@@ -178,8 +181,8 @@ class PlanningTask:
         return Plan(
             contour=self.contour,
             robot=self.robot,
-            T_flange_tip=self.T_flange_tip,
-            T_base_part=self.T_base_part,
+            T_flange_tip=self.setup.tool,
+            T_base_part=self.setup.placement,
             q=graph.q[vertex],
             gamma=graph.gamma[graph.sample[vertex]],
             tilt=graph.tilt[graph.variant[vertex]],
@@ -211,8 +214,8 @@ class PlanningTask:
         made = Plan(
             contour=self.contour,
             robot=self.robot,
-            T_flange_tip=self.T_flange_tip,
-            T_base_part=self.T_base_part,
+            T_flange_tip=self.setup.tool,
+            T_base_part=self.setup.placement,
             q=path.q,
             gamma=gamma,
             tilt=graph.tilt[graph.variant[near]],
@@ -227,7 +230,7 @@ class PlanningTask:
         dq = made.increments
         return replace(made, cost=path_cost(dq, s.weights, s.metric, s.objective, made.node_cost))
 
-    def part(self, first: int, last: int, name: str) -> PlanningTask:
+    def part(self, first: int, last: int, name: str) -> Task:
         """Return the task of nodes `first` to `last`, as a contour with another name."""
         part = self.contour.part(first, last, self.settings.frames)
         x = None if self.external is None else self.external[first : last + 1]
@@ -235,23 +238,21 @@ class PlanningTask:
         return replace(self.on(self.built.part(first, last)), contour=part, external=x)
 
 
-def task_of(
+def planning_task(
     contour: Contour,
-    robot: Robot,
+    setup: Setup,
     options: PlanOptions,
     *,
-    tool: ArrayLike,
-    placement: ArrayLike,
     speed: float | None = None,
     graph: LayeredGraph | None = None,
     external: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
-) -> PlanningTask:
-    """Return the task for the arguments of `kerfpath.plan`, with the errors listed there.
+) -> Task:
+    """Return the task of a contour in a setup; other arguments and errors as in `kerfpath.plan`.
 
     Nodes without a pose are found only when its graph is built.
     """
-    T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
+    robot = setup.robot
     dt = node_interval(contour, speed)
     if options.closure == "periodic" and not contour.closed:
         raise InputError(f"closure: contour {contour.name!r} is open and cannot be periodic")
@@ -262,11 +263,9 @@ def task_of(
     if graph is not None:
         _require_fitting(graph, contour, robot, options)
         x = _course_in(graph)
-    return PlanningTask(
+    return Task(
         contour=contour,
-        robot=robot,
-        T_flange_tip=T_flange_tip,
-        T_base_part=T_base_part,
+        setup=setup,
         settings=options,
         dt=dt,
         layers=partial(_layers, graph=graph, progress=progress),
@@ -282,19 +281,19 @@ def _course_in(graph: LayeredGraph) -> Array | None:
 
 
 def _layers(
-    task: PlanningTask,
+    task: Task,
     nodes: Ints | None,
     graph: LayeredGraph | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Layered:
     """Build the layers of some nodes (M,) of a task, or of all, from a graph if one is given."""
-    contour, robot, options, tool = task.contour, task.robot, task.settings, task.T_flange_tip
+    contour, robot, options, tool = task.contour, task.robot, task.settings, task.setup.tool
     if graph is None:
         graph = layered_graph(
             contour,
             robot,
             tool=tool,
-            placement=task.T_base_part,
+            placement=task.setup.placement,
             options=replace(options, comfort=None, retract=None, floor=None),
             nodes=nodes,
             external=task.external,
@@ -312,7 +311,7 @@ def _layers(
         if nodes is None:
             require_no_empty_layer(contour, graph)
     except NoFeasiblePath as empty:
-        frames = task.T_base_part @ contour.frames(options.frames)
+        frames = task.setup.placement @ contour.frames(options.frames)
         raise _at_any_gamma(empty, graph, robot, frames, tool, options) from None
     problem = SearchProblem(
         q=graph.q,

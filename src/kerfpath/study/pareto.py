@@ -222,24 +222,14 @@ def problem_of_job(
     if asked.method == "continuous":
         job.robot.require_no_free_joint("a Pareto set off the grid")
     options = replace(asked, feed="constant", refine=False, certify=None)
+    setup = job.setup_in(cell)
     return ParetoProblem(
         contour=nodes,
-        robot=job.robot,
-        tool=job.tool,
-        placement=job.placement,
+        setup=setup,
         speed=speed,
         options=options,
         criteria=criteria_named(criteria, job.robot, options=options, cell=cell, home=job.home),
-        graph=graph_of_runs(
-            nodes,
-            job.robot,
-            tool=job.tool,
-            placement=job.placement,
-            speed=speed,
-            options=asked,
-            cell=cell,
-        ),
-        cell=cell,
+        graph=graph_of_runs(nodes, setup, asked, speed=speed),
         home=job.home,
         audit=lambda made: _faults(job, drawn, made, cell),
     )

@@ -18,6 +18,7 @@ from tree_sitter import Language, Node, Parser
 
 from kerfpath.arrays import Array, Ints, freeze, short_repr
 from kerfpath.cad import Part
+from kerfpath.cell import Cell
 from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour
 from kerfpath.dynamics import STANDARD_GRAVITY
@@ -41,6 +42,7 @@ from kerfpath.job.format.values import FAULT, LARGEST, SMALLEST, nearest
 from kerfpath.options import OptionConflict, PlanOptions
 from kerfpath.planner import coarse_places, external_course, layered_graph
 from kerfpath.robots import Robot
+from kerfpath.setup import Setup
 
 # -----------------------------------------------------------------------------
 # Locate keys and values in a TOML text, so that messages can name their line.
@@ -385,6 +387,10 @@ class Job:
             )
             raise refusal_at(self.path, ("part", "file"), said)
         return part
+
+    def setup_in(self, cell: Cell | None) -> Setup:
+        """Return the setup of the job's contours in its cell, or without one."""
+        return Setup(robot=self.robot, tool=self.tool, placement=self.placement, cell=cell)
 
     def graph(
         self,

@@ -234,9 +234,8 @@ def cut_candidate(
         return _cut_along_courses(replace(prepared, job=job), request, candidate, solved, begin)
     else:
         graph = graph_of_runs(
-            candidate.nodes, job.robot, tool=job.tool, placement=job.placement,
-            speed=candidate.speed, options=asked, cell=cell, progress=solved,
-        )  # fmt: skip
+            candidate.nodes, job.setup_in(cell), asked, speed=candidate.speed, progress=solved
+        )
     whole = _whole(job, request, candidate, graph, cell, begin)
     every, kept = graph, cell
     if run is not None:
@@ -250,9 +249,14 @@ def cut_candidate(
 
     def follow(run: Subproblem) -> Plan:
         return plan_run(
-            run, candidate.nodes, job.robot, tool=job.tool, placement=job.placement,
-            speed=candidate.speed, options=job.options, cell=cell, graph=every, phase=begin,
-        )  # fmt: skip
+            run,
+            candidate.nodes,
+            job.setup_in(cell),
+            job.options,
+            speed=candidate.speed,
+            graph=every,
+            phase=begin,
+        )
 
     try:
         try:

@@ -230,10 +230,7 @@ class OffGridEvaluator(PlacementEvaluator):
             objective="sum", closure="free", feed="constant", rotation=None, certify=None,
         )  # fmt: skip
         try:
-            best_motion(
-                run.nodes, job.robot, tool=job.tool, placement=job.placement, speed=run.speed,
-                options=options, cell=self.cell, graph=graph,
-            )  # fmt: skip
+            best_motion(run.nodes, job.setup_in(self.cell), options, speed=run.speed, graph=graph)
         except NoFeasiblePath as broken:
             raise self._infeasible(index, graph, broken, 2.0, first) from None
 
