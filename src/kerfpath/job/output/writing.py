@@ -14,11 +14,11 @@ import numpy as np
 from kerfpath.arrays import Array, short_repr
 from kerfpath.cad import Departure
 from kerfpath.errors import AuditFailed, InputError
+from kerfpath.job.audit_report import collision_note
 from kerfpath.job.format import Job, ProgramOptions, refusal_at
 from kerfpath.job.plan_file import (
     ContourData,
     broken_entry,
-    collision_note,
     plan_document,
     plan_entry,
     plan_text,

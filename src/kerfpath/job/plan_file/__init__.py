@@ -2,13 +2,8 @@
 
 from kerfpath.job.plan_file.audit import PlanAudit as PlanAudit
 from kerfpath.job.plan_file.audit import audit_file as audit_file
-from kerfpath.job.plan_file.audit import check_order as check_order
 from kerfpath.job.plan_file.layout import ContourData as ContourData
-from kerfpath.job.plan_file.reading import AuditReport as AuditReport
 from kerfpath.job.plan_file.reading import PlanFile as PlanFile
-from kerfpath.job.plan_file.reading import check as check
-from kerfpath.job.plan_file.reading import collision_note as collision_note
-from kerfpath.job.plan_file.reading import count as count
 from kerfpath.job.plan_file.reading import read_plan_file as read_plan_file
 from kerfpath.job.plan_file.reading import table_of as table_of
 from kerfpath.job.plan_file.schema import sequence_entry as sequence_entry

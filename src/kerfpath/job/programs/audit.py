@@ -26,8 +26,8 @@ from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError
 from kerfpath.execution import from_stop_to_stop, run_along
 from kerfpath.job.as_run import checks_of_unknown, run_judged
+from kerfpath.job.audit_report import AuditReport, check, check_order, collision_note, count
 from kerfpath.job.format import Candidate, Job, PreparedJob, ProgramOptions, prepare, read_job
-from kerfpath.job.plan_file import AuditReport, check, check_order, collision_note, count
 from kerfpath.job.programs.expected import TargetNodes, check_pins, expect_program, nodes_at_targets
 from kerfpath.job.programs.reading import (
     ReadCut,
