@@ -23,15 +23,14 @@ which every motion costs more than the plan drop out, and the next stage covers 
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import TypedDict, cast
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath.arrays import Array, scalar, short_repr
 from kerfpath.errors import InputError
-from kerfpath.setting import documented, setting
+from kerfpath.setting import Settings, documented, setting
 
 __all__ = [
     "ALLOWANCE",
@@ -40,7 +39,6 @@ __all__ = [
     "USUAL",
     "Certificate",
     "Certify",
-    "CertifyData",
     "Stage",
     "cell_bounds",
 ]
@@ -54,17 +52,9 @@ ALLOWANCE = 2e-4
 enclosure of the same joints may be a little wider."""
 
 
-class CertifyData(TypedDict):
-    """A `Certify` as JSON data."""
-
-    gap: float
-    seconds: float | None
-    keep: bool
-
-
 @documented
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Certify:
+class Certify(Settings):
     """How plans are certified: the gap to reach, and the time for it.
 
     Raises
@@ -93,6 +83,7 @@ class Certify:
         above=0,
         example="10",
         key="certify_seconds",
+        data="seconds",
         group="Bound",
         label="Time limit",
         concerns="proof",
@@ -115,15 +106,6 @@ class Certify:
             object.__setattr__(self, "seconds", seconds)
         if not isinstance(self.keep, bool):
             raise InputError(f"certify keep: expected True or False, got {self.keep!r}")
-
-    def to_data(self) -> CertifyData:
-        """Return it as JSON data, which `from_data` reads."""
-        return cast(CertifyData, asdict(self))
-
-    @classmethod
-    def from_data(cls, data: CertifyData) -> Certify:
-        """Return what `to_data` wrote."""
-        return cls(**data)
 
 
 USUAL = Certify()

@@ -18,7 +18,7 @@ from kerfpath.errors import InputError, OptionConflict
 from kerfpath.limits import Limits
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
-from kerfpath.setting import documented, from_json, setting, settings, to_json
+from kerfpath.setting import Settings, documented, setting, settings
 from kerfpath.tilt import Tilt
 from kerfpath.windows import GammaWindow
 
@@ -74,7 +74,7 @@ def _usual_certify() -> Certify | None:
 
 @documented
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PlanOptions:
+class PlanOptions(Settings):
     """Options of a plan: the search space, the objective, and the limits to keep.
 
     Raises
@@ -110,7 +110,6 @@ class PlanOptions:
         "weight of each joint in the distance (1/m for a rail); "
         "none: 1 / (velocity limit * time between nodes)",
         takes=tuple[float, ...],
-        what="a number not below 0 for every joint",
         unit="1/rad",
         least=0,
         example="[1, 1, 1, 1, 1, 1]",
@@ -344,25 +343,6 @@ class PlanOptions:
             tilt=None if self.tilt is None else replace(self.tilt, cost=0.0),
             comfort=None if self.comfort is None else self.comfort.hard,
         )
-
-    def to_data(self) -> dict[str, Any]:
-        """Return the options as JSON data, which `from_data` reads."""
-        known = settings(PlanOptions).items()
-        return {each.data: to_json(getattr(self, name)) for name, each in known}
-
-    @classmethod
-    def from_data(cls, data: Mapping[str, Any]) -> PlanOptions:
-        """Return the options that `to_data` wrote; other keys of `data` are ignored.
-
-        Raises
-        ------
-        InputError
-            As `PlanOptions`.
-        KeyError
-            A key is missing.
-        """
-        known = settings(PlanOptions).items()
-        return cls(**{name: from_json(data[each.data], each.kind) for name, each in known})
 
 
 def with_keywords(

@@ -13,14 +13,23 @@ from functools import cache
 from inspect import cleandoc
 from textwrap import wrap
 from types import NoneType
-from typing import Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
+from typing import (
+    Any,
+    Literal,
+    Self,
+    TypedDict,
+    TypeVar,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 
 from kerfpath.arrays import Array, require_one_of, scalar
 from kerfpath.errors import InputError
 
-__all__ = ["Setting", "documented", "from_json", "keys", "setting", "settings", "to_json"]
+__all__ = ["Setting", "Settings", "documented", "keys", "setting", "settings"]
 
 T = TypeVar("T")
 UNITS: Mapping[str, tuple[str, Callable[[Any], Any]]] = {
@@ -115,7 +124,8 @@ class Setting:
         bounds = {"above": self.above, "not below": self.least}
         bounds |= {"at most": self.most, "below": self.below}
         found = [f"{word} {bound}" for word, bound in bounds.items() if bound is not None]
-        said = self.what or f"a number {', '.join(found)}"
+        every = " for every joint" if get_origin(self.takes) is tuple else ""
+        said = self.what or f"a number {', '.join(found)}{every}"
         return f"{said}, in {self.unit.replace('%', 'per cent')}" if self.unit else said
 
     def checked(self, value: Any) -> Any:
@@ -136,8 +146,8 @@ class Setting:
             return scalar(value, self.name, unit=self.si_unit, above=above)
         elif kind is int and not (isinstance(value, int) and value >= (self.least or 0)):
             raise InputError(f"{self.name}: expected a whole number >= {self.least}, got {value!r}")
-        elif is_dataclass(kind) and not isinstance(value, kind):  # type: ignore[arg-type]  # a type
-            expected = f"kerfpath.{kind.__name__}{' or None' if self.optional else ''}"  # type: ignore[union-attr]
+        elif isinstance(kind, type) and is_dataclass(kind) and not isinstance(value, kind):
+            expected = f"kerfpath.{kind.__name__}{' or None' if self.optional else ''}"
             raise InputError(f"{self.name}: expected {expected}, got {value!r}")
         return value
 
@@ -150,9 +160,13 @@ def setting(default: Any, help: str, **about: Any) -> Any:
     return field(default=said.si(default), metadata={"setting": said})
 
 
-@cache
 def settings(kind: Any) -> dict[str, Setting]:
     """Return the settings of a dataclass by their names; none of any other type."""
+    return _settings(kind)
+
+
+@cache
+def _settings(kind: Any) -> dict[str, Setting]:
     if not is_dataclass(kind):
         return {}
     hints, found = get_type_hints(kind), {}
@@ -187,8 +201,8 @@ def _suffix(unit: str) -> str:
 
 def documented(kind: type[T]) -> type[T]:
     """Add the settings of a class to its docstring, as parameters."""
-    lines, declared = ["Parameters", "----------"], settings(cast(Any, kind))
-    for name, each in declared.items():
+    lines = ["Parameters", "----------"]
+    for name, each in settings(kind).items():
         words = "{" + ", ".join(map(repr, get_args(each.kind))) + "}"
         what = words if get_origin(each.kind) is Literal else getattr(each.kind, "__name__", "")
         what = " ".join([what, each.si_unit]).strip() + ", optional" * each.optional
@@ -202,11 +216,37 @@ def documented(kind: type[T]) -> type[T]:
 
 
 # -----------------------------------------------------------------------------
-# Values as JSON data: SI units, null for infinity.
+# Settings as JSON data: SI units, null for infinity.
+
+
+class Settings:
+    """The base of dataclasses of settings, which can be kept as JSON data."""
+
+    __slots__ = ()
+
+    def to_data(self) -> dict[str, Any]:
+        """Return the settings as JSON data, which `from_data` reads."""
+        known = settings(type(self)).items()
+        return {each.data: _to_json(getattr(self, name)) for name, each in known}
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> Self:
+        """Return the settings that `to_data` wrote; other keys of `data` are ignored.
+
+        Raises
+        ------
+        InputError
+            As the class.
+        KeyError
+            A key is missing.
+        """
+        known = settings(cls).items()
+        return cls(**{name: _from_json(data[each.data], each.kind) for name, each in known})
 
 
 def _json_type(kind: Any) -> Any:
-    """Return the type that `to_json` makes of values of a type."""
+    if declared := settings(kind):
+        return TypedDict(kind.__name__, {each.data: each.json for each in declared.values()})  # type: ignore[operator]
     if hasattr(kind, "to_data"):
         return get_type_hints(kind.to_data)["return"]
     if kind == Array:
@@ -214,17 +254,15 @@ def _json_type(kind: Any) -> Any:
     return list[_json_type(get_args(kind)[0])] if get_origin(kind) is tuple else kind  # type: ignore[misc]  # made here
 
 
-def to_json(value: Any) -> Any:
-    """Return a value as JSON data."""
+def _to_json(value: Any) -> Any:
     if hasattr(value, "to_data"):
         return value.to_data()
     if isinstance(value, np.ndarray):
         return [number if np.isfinite(number) else None for number in value.tolist()]
-    return [to_json(each) for each in value] if isinstance(value, tuple) else value
+    return [_to_json(each) for each in value] if isinstance(value, tuple) else value
 
 
-def from_json(data: Any, kind: Any) -> Any:
-    """Return the value of a type that `to_json` made into data."""
+def _from_json(data: Any, kind: Any) -> Any:
     if data is None:
         return None
     if hasattr(kind, "from_data"):
@@ -232,5 +270,5 @@ def from_json(data: Any, kind: Any) -> Any:
     if kind == Array:
         return [np.inf if number is None else number for number in data]
     if get_origin(kind) is tuple:
-        return tuple(from_json(each, get_args(kind)[0]) for each in data)
+        return tuple(_from_json(each, get_args(kind)[0]) for each in data)
     return data

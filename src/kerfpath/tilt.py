@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import MISSING, dataclass
-from typing import TypedDict
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, freeze, not_negative
 from kerfpath.errors import InputError
-from kerfpath.setting import documented, setting
+from kerfpath.setting import Settings, documented, setting
 
-__all__ = ["Tilt", "TiltData", "tilt_frames"]
-
-
-class TiltData(TypedDict):
-    """A `Tilt` as JSON data."""
-
-    cone_rad: float
-    steps: int
-    cost_per_rad: float
+__all__ = ["Tilt", "tilt_frames"]
 
 
 @documented
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tilt:
+class Tilt(Settings):
     """Tilt allowed away from the nominal tool axis: largest angle, steps and cost.
 
     Lead and lean are in the frame of travel: x along the path, z along the nominal tool axis
@@ -83,15 +74,6 @@ class Tilt:
         if not (isinstance(self.steps, int | np.integer) and self.steps >= 0):
             raise InputError(f"tilt steps: expected a whole number >= 0, got {self.steps!r}")
         object.__setattr__(self, "steps", int(self.steps))
-
-    def to_data(self) -> TiltData:
-        """Return the tilt as JSON data, which `from_data` reads."""
-        return {"cone_rad": self.cone, "steps": self.steps, "cost_per_rad": self.cost}
-
-    @classmethod
-    def from_data(cls, data: TiltData) -> Tilt:
-        """Return the tilt that `to_data` wrote."""
-        return cls(cone=data["cone_rad"], steps=data["steps"], cost=data["cost_per_rad"])
 
     def samples(self) -> Array:
         """Return lead and lean of every sample (T, 2) rad, the nominal axis first."""
