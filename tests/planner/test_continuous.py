@@ -90,9 +90,9 @@ def test_very_many_nodes_are_planned_from_every_few_of_them(
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "postures": (0, 1)}
     options = options | {"speed": 0.1} | TASKS[name]
     plain = plan(circle, arm, **options)
-    lifted, lift = [], on_grid.ThinTask.lifted
+    lifted, lift = [], on_grid.SubsampledTask.at_all_nodes
     monkeypatch.setattr(
-        on_grid.ThinTask, "lifted", lambda *of: lifted.append(lift(*of)) or lifted[-1]
+        on_grid.SubsampledTask, "at_all_nodes", lambda *of: lifted.append(lift(*of)) or lifted[-1]
     )
     change_effort(subsampled_from=100)
     made = plan(circle, arm, **options)
@@ -105,7 +105,7 @@ def test_every_few_nodes_are_those_of_the_whole(circle, arm, tool, placement, ch
     change_effort(subsampled_from=100)
     asked = PlanOptions(gamma_step=STEP, frames="rotation-minimising")
     whole = planning_task(circle, Setup.of(arm, tool, placement), asked, speed=0.1)
-    thin = on_grid.thinned(whole)
+    thin = on_grid.subsampled(whole)
     graph, nodes = thin.task.graph, [*range(0, 120, 5), 120]
     assert thin.nodes.tolist() == nodes
     assert thin.task.dt == 5 * whole.dt
@@ -117,7 +117,7 @@ def test_every_few_nodes_are_those_of_the_whole(circle, arm, tool, placement, ch
     # Gamma counts from the same directions.
     at = some.frames[:, :3, :3], (placement @ circle.frames(asked.frames))[nodes, :3, :3]
     np.testing.assert_allclose(*at, atol=1e-12)
-    assert thin.lifted(replace(some, posture=np.arange(25) % 2)) is None
+    assert thin.at_all_nodes(replace(some, posture=np.arange(25) % 2)) is None
 
 
 def solved(circle, arm, tool, placement, **options):
@@ -141,7 +141,7 @@ def test_poses_of_very_many_nodes_are_solved_only_where_those_of_a_few_do_not_do
     made, nodes = solved(*space)
     assert nodes == 25
     assert sum(made.counts.values()) * 121 == sum(whole.counts.values()) * 25
-    monkeypatch.setattr(on_grid.ThinTask, "lifted", lambda *of: None)
+    monkeypatch.setattr(on_grid.SubsampledTask, "at_all_nodes", lambda *of: None)
     again, nodes = solved(*space)
     assert nodes == 25 + 121
     np.testing.assert_array_equal(again.q, whole.q)
@@ -158,10 +158,10 @@ def test_a_node_without_a_pose_is_named_among_very_many(circle, arm, tool, place
         broken.append(solved(far, *space)[0])
         with changed_effort(subsampled_from=100):
             broken.append(solved(far, *space)[0])
-    for plain, thinned in (broken[:2], broken[2:]):
+    for plain, sampled in (broken[:2], broken[2:]):
         assert isinstance(plain, NoFeasiblePath)
-        assert str(thinned) == str(plain)
-        assert thinned.node == plain.node
+        assert str(sampled) == str(plain)
+        assert sampled.node == plain.node
 
 
 @pytest.mark.parametrize(("intervals", "every"), [(104, 4), (105, 5), (111, 3), (103, 5)])
@@ -171,16 +171,16 @@ def test_a_motion_along_some_nodes_is_one_along_all(
     change_effort(subsampled_from=100)
     asked, nodes = PlanOptions(gamma_step=STEP), circle.resample(count=intervals + 1)
     whole = planning_task(nodes, Setup.of(arm, tool, placement), asked, speed=0.1)
-    thin = on_grid.thinned(whole)
+    thin = on_grid.subsampled(whole)
     assert (np.diff(thin.nodes) == every).all()
     assert intervals - every < thin.nodes[-1] <= intervals
     some = thin.task.plan(np.zeros(len(thin.nodes), int), 0.0, Proof(optimal=False, statement=""))
     along = 0.3 * thin.nodes / intervals  # gamma turns evenly, and so it does along all
-    made = thin.lifted(replace(some, gamma=along, posture=np.zeros(len(along), int)))
+    made = thin.at_all_nodes(replace(some, gamma=along, posture=np.zeros(len(along), int)))
     np.testing.assert_allclose(made.gamma, 0.3 * np.arange(intervals + 1) / intervals, atol=1e-12)
     assert made.time[-1] == whole.times[-1]
     periodic = replace(whole, settings=replace(whole.settings, closure="periodic"))
-    assert (on_grid.thinned(periodic) is None) == (intervals == 103)
+    assert (on_grid.subsampled(periodic) is None) == (intervals == 103)
 
 
 def test_with_fewer_nodes_a_tilt_or_another_axis_no_node_is_left_out(
@@ -188,7 +188,7 @@ def test_with_fewer_nodes_a_tilt_or_another_axis_no_node_is_left_out(
 ):
     def thin(robot=arm, **options):
         asked = PlanOptions(gamma_step=np.radians(30), **options)
-        return on_grid.thinned(
+        return on_grid.subsampled(
             planning_task(circle, Setup.of(robot, tool, placement), asked, speed=0.1)
         )
 

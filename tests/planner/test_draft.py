@@ -1,4 +1,4 @@
-"""draft(): a motion near the one before, within what is asked for now."""
+"""warm_start(): a motion near the one before, within what is asked for now."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 
 from kerfpath import audit, plan
 from kerfpath.options import PlanOptions
-from kerfpath.planner import draft, layered_graph
+from kerfpath.planner import layered_graph, warm_start
 
 OPTIONS = PlanOptions(gamma_step=np.radians(4), postures=(0, 1))
 SPEED = 0.1
@@ -40,7 +40,7 @@ def test_a_draft_keeps_the_limits_and_is_between_the_motion_before_and_the_plan(
     change, planned, before
 ):
     options = replace(OPTIONS, **CHANGES[change])
-    made = draft(before, options, dt=before.dt)
+    made = warm_start(before, options, dt=before.dt)
     assert audit(made) == []
     settings = made.settings
     for name, value in CHANGES[change].items():
@@ -63,7 +63,7 @@ def draft_cost(made):
 
 
 def test_a_draft_at_another_speed_takes_its_time(before):
-    made = draft(before, OPTIONS, dt=before.dt * 1.25)
+    made = warm_start(before, OPTIONS, dt=before.dt * 1.25)
     assert made.dt == pytest.approx(before.dt * 1.25)
     assert audit(made) == []
 
@@ -71,8 +71,8 @@ def test_a_draft_at_another_speed_takes_its_time(before):
 def test_a_draft_is_not_made_where_it_would_be_another_task(before):
     dt = before.dt
     for change in ({"method": "exact"}, {"closure": "periodic"}, {"feed": "dip"}):
-        assert draft(before, replace(OPTIONS, **change), dt=dt) is None
+        assert warm_start(before, replace(OPTIONS, **change), dt=dt) is None
 
 
 def test_a_draft_that_cannot_keep_the_limits_is_none(before):
-    assert draft(before, replace(OPTIONS, eta_v=1e-3), dt=before.dt) is None
+    assert warm_start(before, replace(OPTIONS, eta_v=1e-3), dt=before.dt) is None

@@ -10,7 +10,7 @@ from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan, ref
 from kerfpath.contour import Contour
 from kerfpath.options import PlanOptions
 from kerfpath.planner import quickest as quickest_module
-from kerfpath.planner.collision_free import ClearSearch
+from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.quickest import quick_motions
 from kerfpath.planner.task import planning_task
 from kerfpath.plans import path_cost
@@ -70,7 +70,7 @@ def test_at_the_fastest_speed_and_below_there_is_a_plan(seed, method, arm, space
 @pytest.mark.parametrize("seed", range(3))
 def test_motions_grow_quicker_and_keep_every_limit_at_their_own_speed(seed, arm, tool, placement):
     posed = task(drawn(seed), arm, tool, placement)
-    found = list(quick_motions(posed, ClearSearch(posed)))
+    found = list(quick_motions(posed, CollisionFreeSearch(posed)))
     assert len(found) >= 2
     steps = [motion.dt for motion in found]
     assert steps == sorted(steps, reverse=True)
@@ -91,7 +91,7 @@ def test_what_a_plan_aims_at_plays_no_part(arm, tool, placement):
         {"objective": "max", "speed": 0.1},
     ):
         posed = task(nodes, arm, tool, placement, **aim)
-        finder = ClearSearch(posed)
+        finder = CollisionFreeSearch(posed)
         steps.append([motion.dt for motion in islice(quick_motions(posed, finder), 3)])
     assert steps[0] == steps[1] == steps[2]
 
@@ -99,7 +99,7 @@ def test_what_a_plan_aims_at_plays_no_part(arm, tool, placement):
 def test_the_fastest_speed_is_that_of_the_quickest_motion(arm, tool, placement, space):
     nodes = drawn(1)
     posed = task(nodes, arm, tool, placement)
-    *_, best = quick_motions(posed, ClearSearch(posed))
+    *_, best = quick_motions(posed, CollisionFreeSearch(posed))
     told = fastest_speed(nodes, arm, refine=True, **space)
     # dt is a mean of differences of times.
     assert told.speed == pytest.approx(np.diff(nodes.s).max() / best.dt, rel=1e-12)
@@ -157,7 +157,7 @@ def test_with_an_external_axis_motions_grow_quicker_too(kind, arm, tool, placeme
     else:
         robot = arm.with_positioner([0, 0, 1], [1.2, 0, 0], **limits)
     posed = task(drawn(0, nodes=11), robot, tool, placement)
-    found = list(quick_motions(posed, ClearSearch(posed)))
+    found = list(quick_motions(posed, CollisionFreeSearch(posed)))
     # What the fastest path on the grid is quickened to, its axis with it, may be the last.
     assert found[-1].dt <= found[1].dt < found[0].dt
     for motion in found[1:]:

@@ -13,7 +13,7 @@ from kerfpath.planner.layers import longest_step as longest_step
 from kerfpath.planner.layers import node_interval as node_interval
 from kerfpath.planner.layers import samples_of as samples_of
 from kerfpath.planner.on_grid import coarse_places as coarse_places
-from kerfpath.planner.on_grid import draft as draft
+from kerfpath.planner.on_grid import warm_start as warm_start
 from kerfpath.planner.planning import best_motion as best_motion
 from kerfpath.planner.planning import plan as plan
 from kerfpath.planner.planning import plan_in_pieces as plan_in_pieces

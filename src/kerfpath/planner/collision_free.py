@@ -34,7 +34,7 @@ SAME_PLACE = 1e-9
 """m: largest difference (rounding) of two poses of the same tool or part."""
 
 
-class ClearSearch:
+class CollisionFreeSearch:
     """Runs the searches of a task: as they are or, in a cell, for clear paths."""
 
     def __init__(self, task: Task) -> None:
@@ -77,9 +77,9 @@ class ClearSearch:
         """Return which joint vectors q (B, n) rad are clear, (B,), in the graph or not."""
         return np.ones(len(q), np.bool_) if self._cell is None else self._cell.clear(q)
 
-    def of(self, task: Task) -> ClearSearch:
-        """Return a `ClearSearch` of another task in the same cell."""
-        return ClearSearch(task)
+    def of(self, task: Task) -> CollisionFreeSearch:
+        """Return a `CollisionFreeSearch` of another task in the same cell."""
+        return CollisionFreeSearch(task)
 
     def find(self, search: Callable[[SearchProblem], _P], problem: SearchProblem) -> _P:
         """Return the path that a search finds for a problem on the graph of the task."""

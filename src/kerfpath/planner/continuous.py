@@ -9,8 +9,9 @@ import numpy as np
 
 from kerfpath import refiner
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.planner.collision_free import ClearSearch
-from kerfpath.planner.on_grid import plan_on_grid, shaken, thinned
+from kerfpath.planner.attempt import Attempt, Strategy, first_plan
+from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.on_grid import plan_on_grid, refine_from_random_starts, subsampled
 from kerfpath.planner.quickest import alike, clear_paths, wide
 from kerfpath.planner.statements import plan_off_grid
 from kerfpath.planner.task import Task
@@ -41,38 +42,74 @@ FREE = 1.0
 """rad or m: how far external axes may at first leave their course in a cell."""
 
 
-def plan_continuous(task: Task, finder: ClearSearch, begin: Callable[[str], None]) -> Plan:
-    """Return the best motion found over continuous gamma, or on the grid if that is not possible.
+def plan_continuous(task: Task, finder: CollisionFreeSearch, begin: Callable[[str], None]) -> Plan:
+    """Return the plan of the first strategy of `OVER_CONTINUOUS_GAMMA` that has one.
 
     Raises
     ------
     NoFeasiblePath
         No motion was found, not even on the grid.
     """
-    if reason := grid_reason(task):
-        return _from_grid(task, finder, begin, f"planned on the grid: {reason}")
-    begin("search")
-    found = clear_motion(task, finder, begin)
-    if found is not None:
-        return claimed(found, finder)
+    return first_plan(Attempt(task=task, finder=finder, begin=begin), OVER_CONTINUOUS_GAMMA)
+
+
+def best_motion_found(attempt: Attempt) -> Plan | None:
+    """Plan the best motion found from paths between the samples of gamma."""
+    if grid_reason(attempt.task):
+        return None
+    attempt.begin("search")
+    found = clear_motion(attempt.task, attempt.finder, attempt.begin)
+    return None if found is None else claimed(found, attempt.finder)
+
+
+def motion_from_grid(attempt: Attempt) -> Plan | None:
+    """Plan on the grid, and refine what it has, from random starts too."""
+    reason = grid_reason(attempt.task)
     why = "begun from the grid: the search between its samples found no motion"
     try:
-        made = _from_grid(task, finder, begin, why)
+        made = _from_grid(
+            attempt.task,
+            attempt.finder,
+            attempt.begin,
+            f"planned on the grid: {reason}" if reason else why,
+        )
     except NoFeasiblePath as none:
-        finer = _from_more_samples(task, finder, begin, none)
-        if finer is None:
-            raise
-        made = finer
-    return shaken(made, finder) if made.feed is None else made
+        attempt.failure = none
+        return None
+    return made if reason else _improved(made, attempt.finder)
 
 
-def claimed(found: Refinement, finder: ClearSearch) -> Plan:
+def motion_from_finer_grid(attempt: Attempt) -> Plan | None:
+    """Plan with twice as many samples of gamma, if a motion nearly as fast was found."""
+    if grid_reason(attempt.task):
+        return None
+    assert attempt.failure is not None, "the grid has no plan"
+    made = _from_more_samples(attempt.task, attempt.finder, attempt.begin, attempt.failure)
+    return None if made is None else _improved(made, attempt.finder)
+
+
+OVER_CONTINUOUS_GAMMA: tuple[Strategy, ...] = (
+    best_motion_found,
+    motion_from_grid,
+    motion_from_finer_grid,
+)
+"""The strategies over continuous gamma, in the order in which they are tried."""
+
+
+def _improved(made: Plan, finder: CollisionFreeSearch) -> Plan:
+    """Return the plan refined from random starts, unless its feed is reduced."""
+    return refine_from_random_starts(made, finder) if made.feed is None else made
+
+
+def claimed(found: Refinement, finder: CollisionFreeSearch) -> Plan:
     """Return the plan of a motion with the claim about it."""
     claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
 
 
-def _from_grid(task: Task, finder: ClearSearch, begin: Callable[[str], None], why: str) -> Plan:
+def _from_grid(
+    task: Task, finder: CollisionFreeSearch, begin: Callable[[str], None], why: str
+) -> Plan:
     """Return the best plan of the grid, refined if possible; its proof begins with `why`.
 
     Raises
@@ -89,7 +126,7 @@ def _from_grid(task: Task, finder: ClearSearch, begin: Callable[[str], None], wh
 
 
 def _from_more_samples(
-    task: Task, finder: ClearSearch, begin: Callable[[str], None], none: NoFeasiblePath
+    task: Task, finder: CollisionFreeSearch, begin: Callable[[str], None], none: NoFeasiblePath
 ) -> Plan | None:
     """Return a plan found with twice as many samples of gamma; None if there is none.
 
@@ -119,7 +156,7 @@ def _finer(task: Task) -> Task | None:
 
 def clear_motion(
     task: Task,
-    finder: ClearSearch,
+    finder: CollisionFreeSearch,
     begin: Callable[[str], None] = lambda what: None,
     *,
     thorough: bool = True,
@@ -162,31 +199,31 @@ def clear_motion(
         width, _, ways = wide(task)
         paths += search.paths(BeamWidth(width, OTHERWISE, ways))
         starts.refine(paths, unpromising=True)
-        made = shaken(starts.best.plan, finder)
+        made = refine_from_random_starts(starts.best.plan, finder)
         return replace(starts.best, plan=made, cost_after=made.cost)
     return starts.best
 
 
-def _from_fewer_nodes(task: Task, finder: ClearSearch) -> tuple[Plan | None, float]:
+def _from_fewer_nodes(task: Task, finder: CollisionFreeSearch) -> tuple[Plan | None, float]:
     """Return the motion along some of very many nodes, extended to all, and a cost to compare with.
 
     None if there is none. No motion along all nodes costs less than the best one along some: its
-    steps together are no shorter, and the thinned nodes impose no more (5), (6). The cost is 0 if
-    this does not apply.
+    steps together are no shorter, and the subsample imposes no more (5), (6). The cost is 0 if this
+    does not apply.
     """
-    thin = thinned(task)
+    thin = subsampled(task)
     found = None if thin is None else clear_motion(thin.task, finder.of(thin.task))
     if thin is None or found is None:
         return None, 0.0
     comfort = task.settings.comfort
     told = task.settings.objective == "sum" and (comfort is None or not comfort.costs)
-    return thin.lifted(found.plan), found.cost_after if told else 0.0
+    return thin.at_all_nodes(found.plan), found.cost_after if told else 0.0
 
 
 class _Starts:
     """Starts of refinements, and the best motion that was reached from them."""
 
-    def __init__(self, task: Task, finder: ClearSearch) -> None:
+    def __init__(self, task: Task, finder: CollisionFreeSearch) -> None:
         self._task, self._finder = task, finder
         self._tried: list[Plan] = []
         self.best: Refinement | None = None
@@ -242,7 +279,7 @@ class _Starts:
 
 
 def _refine_path(
-    task: Task, finder: ClearSearch, path: ContinuousPath, made: Plan
+    task: Task, finder: CollisionFreeSearch, path: ContinuousPath, made: Plan
 ) -> Refinement | None:
     """Return the refinement of a path; None if it does not keep the limits or is not clear.
 

@@ -18,7 +18,8 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments, wrap
 from kerfpath.options import PlanOptions
-from kerfpath.planner.collision_free import ClearSearch
+from kerfpath.planner.attempt import Attempt
+from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.continuous import claimed, clear_motion, plan_continuous
 from kerfpath.planner.layers import layered_graph
 from kerfpath.planner.on_grid import (
@@ -84,7 +85,7 @@ def external_course(
         asked,
         speed=SLOW if free else speed,
     )
-    return next(courses(task, (GENTLE,) if free else STYLES, ClearSearch(task).clear))
+    return next(courses(task, (GENTLE,) if free else STYLES, CollisionFreeSearch(task).clear))
 
 
 def along_a_course(
@@ -204,7 +205,7 @@ RUNGS = (1.25, 1.06)
 """Multiples of the speed reached at which quicker courses are looked for."""
 
 
-def plan_over_courses(task: Task, finder: ClearSearch, begin: Callable[[str], None]) -> Plan:
+def best_external_motion(attempt: Attempt) -> Plan:
     """Return the best motion found of all joints together, if poses leave some joints free.
 
     A tolerance of the tool axis is searched along the course of the best motion with the nominal
@@ -216,7 +217,8 @@ def plan_over_courses(task: Task, finder: ClearSearch, begin: Callable[[str], No
         No motion was found; the message says where the best try ended. Nothing is proved about
         other courses.
     """
-    return min(_plans(task, finder, begin), key=lambda plan: plan.cost)
+    plans = _plans(attempt.task, attempt.finder, attempt.begin)
+    return min(plans, key=lambda plan: plan.cost)
 
 
 def graph_over_courses(
@@ -235,10 +237,10 @@ def graph_over_courses(
     Raises
     ------
     NoFeasiblePath
-        No plan is found, see `plan_over_courses`.
+        No plan is found, see `best_external_motion`.
     """
     task = planning_task(contour, setup, options, speed=speed)
-    plans = _plans(task, ClearSearch(task), lambda what: None)
+    plans = _plans(task, CollisionFreeSearch(task), lambda what: None)
     ways: list[Array] = []
     for made in sorted(plans, key=lambda plan: plan.cost):
         if not any(np.allclose(made.course, other, atol=ALIKE) for other in ways):
@@ -254,13 +256,13 @@ def graph_over_courses(
     )
 
 
-def _plans(task: Task, finder: ClearSearch, begin: Callable[[str], None]) -> list[Plan]:
+def _plans(task: Task, finder: CollisionFreeSearch, begin: Callable[[str], None]) -> list[Plan]:
     """Return the plans found along the courses, at least one.
 
     Raises
     ------
     NoFeasiblePath
-        As `plan_over_courses`.
+        As `best_external_motion`.
     """
     begin(f"search for a course of {task.robot.free_names}")
     places = coarse_places(task.robot)
@@ -286,7 +288,9 @@ def _plans(task: Task, finder: ClearSearch, begin: Callable[[str], None]) -> lis
     raise _unproved(task, max(failed, key=lambda broken: broken.node))
 
 
-def faster_motions(task: Task, finder: ClearSearch, best: QuickMotion) -> Iterator[QuickMotion]:
+def faster_motions(
+    task: Task, finder: CollisionFreeSearch, best: QuickMotion
+) -> Iterator[QuickMotion]:
     """Yield successively quicker motions along the most promising courses at higher speeds."""
     rung = 0
     while rung < len(RUNGS):
@@ -318,7 +322,7 @@ class _Tried(NamedTuple):
 def _along(
     ways: Iterator[Array],
     task: Task,
-    finder: ClearSearch,
+    finder: CollisionFreeSearch,
     begin: Callable[[str], None],
     known: Plan | None = None,
     least: int = 1,
@@ -347,7 +351,7 @@ def _along(
     return tried
 
 
-def _nominal(task: Task, finder: ClearSearch, begin: Callable[[str], None]) -> Plan | None:
+def _nominal(task: Task, finder: CollisionFreeSearch, begin: Callable[[str], None]) -> Plan | None:
     """Return the best motion with the nominal tool axis; None without a tilt or a motion."""
     if task.settings.tilt is None:
         return None

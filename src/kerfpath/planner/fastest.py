@@ -17,7 +17,7 @@ from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.limits import Limits
 from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
-from kerfpath.planner.collision_free import ClearSearch
+from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.external_motion import along_a_course, faster_motions
 from kerfpath.planner.layers import longest_step, node_interval, require_even
 from kerfpath.planner.on_grid import binding_nodes, impossible_share
@@ -138,7 +138,7 @@ def fastest_speed(
         external=external,
         progress=progress,
     )
-    finder = ClearSearch(task)
+    finder = CollisionFreeSearch(task)
     along = along_a_course(task, finder.clear, at_any_speed=True)
     found, nodes = _fastest(task, along.whole(), finder, enough)
     if not ceiling:
@@ -159,7 +159,7 @@ def require_rates_alone(robot: Robot, what: str) -> None:
 
 
 def _fastest(
-    task: Task, along: Task, finder: ClearSearch, enough: float | None
+    task: Task, along: Task, finder: CollisionFreeSearch, enough: float | None
 ) -> tuple[FastestSpeed, list[int]]:
     """Return the largest speed, on the grid or with `refine` off it, and the nodes where it binds.
 
@@ -189,7 +189,7 @@ def _fastest(
 
 
 def _over_courses(
-    task: Task, finder: ClearSearch, ways: Iterator[QuickMotion]
+    task: Task, finder: CollisionFreeSearch, ways: Iterator[QuickMotion]
 ) -> Iterator[QuickMotion]:
     """Yield ever quicker motions: the first two along one course, then those along others."""
     for best in islice(ways, 2):

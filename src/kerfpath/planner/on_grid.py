@@ -21,7 +21,8 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.courses import CoarseLayer, Nearby, best_steps
 from kerfpath.limits import rates_of
 from kerfpath.options import PlanOptions
-from kerfpath.planner.collision_free import ClearSearch
+from kerfpath.planner.attempt import Attempt, Strategy, first_plan
+from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.layers import layered_graph
 from kerfpath.planner.quickest import QuickMotion, quick_motions, slow_motions
 from kerfpath.planner.statements import (
@@ -488,7 +489,7 @@ def _stuck(coarse: Coarse, robot: Robot, k: int) -> str:
 
 
 # -----------------------------------------------------------------------------
-# Drafts: a motion moved quickly towards new options, not yet the best one.
+# Warm start: an existing plan, adapted to new options; fast, not optimal.
 
 FIRST = np.radians(2.0)
 """rad: first change of gamma; larger steps fail more often than they gain."""
@@ -497,7 +498,7 @@ PROGRAMS = 2
 a change of weights."""
 
 
-def draft(made: Plan, options: PlanOptions, *, dt: float) -> Plan | None:
+def warm_start(made: Plan, options: PlanOptions, *, dt: float) -> Plan | None:
     """Return a motion near an existing one that keeps the limits of new options and costs less.
 
     It stays in the posture and near the gamma of the existing motion; `plan` searches everywhere.
@@ -535,24 +536,24 @@ def draft(made: Plan, options: PlanOptions, *, dt: float) -> Plan | None:
 
 
 # -----------------------------------------------------------------------------
-# Leave a local optimum: change gamma smoothly at random and refine again.
+# Refine again from random starts, to leave a local optimum.
 
-SHAKES = (0.05, 0.1, 0.2, 0.4)
-"""Largest change of gamma of each shake, rad, in this order."""
+CHANGES = (0.05, 0.1, 0.2, 0.4)
+"""Largest change of gamma of each start, rad, in this order."""
 WAVES = 4
-"""Number of cosines in a shake; the slower ones are larger."""
+"""Number of cosines in a change; the slower ones are larger."""
 SEED = 16
-"""Fixed, so that the same motion always gets the same shakes."""
+"""Fixed, so that the same motion always gets the same starts."""
 
 
-def shaken(begun: Plan, finder: ClearSearch) -> Plan:
+def refine_from_random_starts(begun: Plan, finder: CollisionFreeSearch) -> Plan:
     """Return the best of a motion and its refinements from random changes of its gamma.
 
-    If (6) binds at many nodes, there are many narrow local optima. Each shake starts from the best
+    If (6) binds at many nodes, there are many narrow local optima. Each change is made to the best
     motion so far. The result keeps every limit and is clear.
     """
     rng, best = np.random.default_rng(SEED), begun
-    for size in SHAKES:
+    for size in CHANGES:
         change = _smooth(rng, len(best.q), size)
         if best.settings.closure == "periodic":
             change -= np.linspace(change[0], change[-1], len(change))
@@ -573,20 +574,20 @@ def _smooth(rng: np.random.Generator, nodes: int, size: float) -> Array:
 
 
 # -----------------------------------------------------------------------------
-# Very many nodes: a motion along every few of them is the start for all of them.
+# Very many nodes: a subsample is planned first, and its motion is the start for all of them.
 
 EVERY = 5, 4, 6, 3, 7
 """One of this many nodes is kept: the first number that divides the intervals, else the first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ThinTask:
+class SubsampledTask:
     """A task with every few nodes of another task, at the same speed.
 
     Parameters
     ----------
     task : Task
-        The thinned task; it lacks the last few nodes if the intervals do not divide evenly.
+        The subsampled task; it lacks the last few nodes if the intervals do not divide evenly.
     whole : Task
         The other task, with all nodes.
     nodes : (M,) int
@@ -599,7 +600,7 @@ class ThinTask:
 
     __repr__ = short_repr
 
-    def lifted(self, made: Plan) -> Plan | None:
+    def at_all_nodes(self, made: Plan) -> Plan | None:
         """Return the motion at all nodes, with gamma and external axes interpolated by splines.
 
         It need not keep the limits; beyond the last kept node it goes on at the same rate. None if
@@ -631,8 +632,8 @@ class ThinTask:
         )
 
 
-def thinned(task: Task) -> ThinTask | None:
-    """Return a task with very many nodes thinned to every few of them; None if it has fewer.
+def subsampled(task: Task) -> SubsampledTask | None:
+    """Return a task with every few of very many nodes; None if it has fewer.
 
     It is also None with a tilt or a grid of external axes, with a periodic closure whose intervals
     do not divide evenly, and if one of the kept nodes has no pose. The graph of all nodes is not
@@ -662,7 +663,7 @@ def thinned(task: Task) -> ThinTask | None:
     few = replace(few, problem=replace(few.problem, dt=every * task.dt))
     x = None if task.external is None else task.external[nodes]
     thin = replace(task.on(few), contour=contour, external=x)
-    return ThinTask(task=thin, whole=task, nodes=nodes)
+    return SubsampledTask(task=thin, whole=task, nodes=nodes)
 
 
 # -----------------------------------------------------------------------------
@@ -677,68 +678,82 @@ next search: for the fastest path on the grid, and for quicker motions."""
 
 
 def plan_on_grid(
-    task: Task, finder: ClearSearch, begin: Callable[[str], None], *, refine: bool
+    task: Task, finder: CollisionFreeSearch, begin: Callable[[str], None], *, refine: bool
 ) -> Plan:
-    """Return the plan of the best path on the graph of a task, refined if `refine`.
+    """Return the plan of the first strategy of `ON_GRID` that has one; it is refined if `refine`.
 
     Raises
     ------
     NoFeasiblePath
-        A node has no pose, or there is no path, nor one that is slower or off the grid if that is
-        allowed.
+        A node has no pose, or no strategy has a plan.
     """
-    task = task.whole()
-    begin("search")
+    return first_plan(Attempt(task=task, finder=finder, begin=begin, refine=refine), ON_GRID)
+
+
+def best_path(attempt: Attempt) -> Plan | None:
+    """Plan along the best path of the graph, and refine it if the attempt may leave the grid."""
+    attempt.task = task = attempt.task.whole()
+    attempt.begin("search")
     try:
-        path = finder.find(find_shortest, task.problem)
-    except NoFeasiblePath as at_speed:
-        return _otherwise(task, finder, at_speed, begin, refine=refine)
-    proof = _proof(task.problem, path.optimal, finder)
+        path = attempt.finder.find(find_shortest, task.problem)
+    except NoFeasiblePath as none:
+        attempt.failure = _said_of_grid(none, task)
+        return None
+    proof = _proof(task.problem, path.optimal, attempt.finder)
     made = task.plan(path.index, path.cost, proof)
-    if not refine:
+    if not attempt.refine:
         return made
-    begin("refinement")
-    return refine_plan(task, finder, made)
+    attempt.begin("refinement")
+    return refine_plan(task, attempt.finder, made)
 
 
-def _otherwise(
-    task: Task,
-    finder: ClearSearch,
-    broken: NoFeasiblePath,
-    begin: Callable[[str], None],
-    *,
-    refine: bool,
-) -> Plan:
-    """Return a slower plan, or one off the grid, if the graph has none at the speed asked for.
+def slowed_path(attempt: Attempt) -> Plan | None:
+    """Plan with a reduced feed where the limits need it, if the feed may be reduced."""
+    if attempt.task.settings.feed != "dip":
+        return None
+    try:
+        return plan_slowed(attempt.task, attempt.finder, refine=attempt.refine)
+    except NoFeasiblePath as none:
+        attempt.failure = _said_of_grid(none, attempt.task)
+        return None
 
-    Raises
-    ------
-    NoFeasiblePath
-        There is none, or neither is allowed.
-    """
-    asked, found = task.settings, None
-    if asked.feed == "dip":
-        try:
-            return plan_slowed(task, finder, refine=refine)
-        except NoFeasiblePath as at_any_speed:
-            broken = at_any_speed
-    elif refine and asked.closure == "free":
-        begin("refinement")
-        found = plan_off_grid(task, finder)
-        if found is not None and found.done:
-            return found.plan
-    tried = "" if found is None else f"; off the grid {found.statement}"
-    where = f"{ON_THIS_GRID} " if task.robot.family.free_rotation else ""
-    broken = broken.with_message(
-        f"contour {task.contour.name!r}: {where}{broken}{_bracket(broken, task)}{tried}"
+
+def path_off_grid(attempt: Attempt) -> Plan | None:
+    """Refine the best path without acceleration limits until it keeps them."""
+    asked = attempt.task.settings
+    if asked.feed == "dip" or asked.closure != "free" or not attempt.refine:
+        return None
+    attempt.begin("refinement")
+    found = plan_off_grid(attempt.task, attempt.finder)
+    if found is None or found.done:
+        return None if found is None else found.plan
+    assert attempt.failure is not None, "the search of the grid found no path"
+    attempt.failure = attempt.failure.with_message(
+        f"{attempt.failure}; off the grid {found.statement}"
     )
-    if not refine or asked.feed == "dip":
-        raise broken from None
-    return _from_quickest(task, finder, broken, begin)
+    return None
+
+
+def quickest_motion(attempt: Attempt) -> Plan | None:
+    """Refine a motion that is at least as quick as asked for; else prove that there is none."""
+    if attempt.task.settings.feed == "dip" or not attempt.refine:
+        return None
+    assert attempt.failure is not None, "the search of the grid found no path"
+    return _from_quickest(attempt.task, attempt.finder, attempt.failure, attempt.begin)
+
+
+ON_GRID: tuple[Strategy, ...] = (best_path, slowed_path, path_off_grid, quickest_motion)
+"""The strategies on the grid of gamma, in the order in which they are tried."""
+
+
+def _said_of_grid(none: NoFeasiblePath, task: Task) -> NoFeasiblePath:
+    """Return the failure of a search of the grid with the contour named, and where paths end."""
+    where = f"{ON_THIS_GRID} " if task.robot.family.free_rotation else ""
+    return none.with_message(f"contour {task.contour.name!r}: {where}{none}{_bracket(none, task)}")
 
 
 def _from_quickest(
-    task: Task, finder: ClearSearch, broken: NoFeasiblePath, begin: Callable[[str], None]
+    task: Task, finder: CollisionFreeSearch, broken: NoFeasiblePath, begin: Callable[[str], None]
 ) -> Plan:
     """Return the refinement of a motion that is at least as quick as asked for.
 
@@ -807,7 +822,7 @@ def _bracket(broken: NoFeasiblePath, task: Task) -> str:
     return f"{said}; the posture would have to change from {' to '.join(names)}"
 
 
-def _proof(problem: SearchProblem, optimal: bool, finder: ClearSearch) -> Proof:
+def _proof(problem: SearchProblem, optimal: bool, finder: CollisionFreeSearch) -> Proof:
     if optimal:
         claim = finder.claimed(f"the best path on this graph under {limits_named(problem)}")
     elif problem.method == "known":

@@ -17,11 +17,12 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import KEEPS, PlanKeywords, PlanOptions, with_keywords
-from kerfpath.planner.collision_free import ClearSearch
-from kerfpath.planner.continuous import clear_motion, grid_reason, plan_continuous
-from kerfpath.planner.external_motion import along_a_course, plan_over_courses
-from kerfpath.planner.on_grid import plan_on_grid
-from kerfpath.planner.statements import limits_named, refine_plan, with_windows_said
+from kerfpath.planner.attempt import Attempt, Strategy, first_plan
+from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.continuous import OVER_CONTINUOUS_GAMMA, clear_motion, grid_reason
+from kerfpath.planner.external_motion import along_a_course, best_external_motion
+from kerfpath.planner.on_grid import ON_GRID
+from kerfpath.planner.statements import add_window_note, limits_named, refine_plan
 from kerfpath.planner.task import Task, planning_task
 from kerfpath.plans import Plan, Proof
 from kerfpath.progress import Progress, no_progress
@@ -62,8 +63,8 @@ def best_motion(
     """
     options = replace(options, certify=None)
     task = planning_task(contour, setup, options, speed=speed, graph=graph)
-    task = along_a_course(task, ClearSearch(task).clear)
-    finder, begin = ClearSearch(task), phase or (lambda what: None)
+    task = along_a_course(task, CollisionFreeSearch(task).clear)
+    finder, begin = CollisionFreeSearch(task), phase or (lambda what: None)
     why = grid_reason(task)
     begin("search")
     found = None if why else clear_motion(task, finder, begin)
@@ -229,18 +230,26 @@ def plan(
         external=external,
         progress=progress,
     )
-    finder = ClearSearch(task)
-    begin = phase or (lambda what: None)
+    attempt = Attempt(
+        task=task,
+        finder=CollisionFreeSearch(task),
+        begin=phase or (lambda what: None),
+        refine=asked.refine,
+    )
     try:
-        if asked.method == "continuous" and robot.free.size and not task.placed:
-            made = plan_over_courses(task, finder, begin)
-        elif asked.method == "continuous":
-            made = plan_continuous(task, finder, begin)
-        else:
-            made = plan_on_grid(task, finder, begin, refine=asked.refine)
+        made = first_plan(attempt, strategies(task))
     except NoFeasiblePath as broken:
-        raise with_windows_said(broken, asked) from None
+        raise add_window_note(broken, asked) from None
     return with_bound(made, asked.certify, phase=phase)
+
+
+def strategies(task: Task) -> tuple[Strategy, ...]:
+    """Return the strategies for a task, in the order in which they are tried."""
+    if task.settings.method != "continuous":
+        return ON_GRID
+    if task.robot.free.size and not task.placed:
+        return (best_external_motion,)
+    return OVER_CONTINUOUS_GAMMA
 
 
 def require_nodes_alone(options: PlanOptions, what: str) -> None:
@@ -323,8 +332,8 @@ def plan_in_pieces(
         graph=graph,
         progress=progress,
     )
-    task = along_a_course(task, ClearSearch(task).clear).whole()
-    finder = ClearSearch(task)
+    task = along_a_course(task, CollisionFreeSearch(task).clear).whole()
+    finder = CollisionFreeSearch(task)
     begin = phase or (lambda what: None)
     begin("search for pieces")
     try:
@@ -339,12 +348,12 @@ def plan_in_pieces(
         part, made = _plan_piece(task, finder, piece, number, len(found.pieces))
         if asked.refine or asked.method == "continuous":
             begin(f"refinement of piece {number} of {len(found.pieces)}")
-            made = _off_grid(part, ClearSearch(part), made)
+            made = _off_grid(part, CollisionFreeSearch(part), made)
         plans.append(with_bound(made, asked.certify, phase=begin))
     return tuple(plans)
 
 
-def _off_grid(part: Task, finder: ClearSearch, made: Plan) -> Plan:
+def _off_grid(part: Task, finder: CollisionFreeSearch, made: Plan) -> Plan:
     """Return the plan of a piece moved off its grid: the best motion found there."""
     refined = refine_plan(part, finder, made)
     found = None
@@ -357,7 +366,7 @@ def _off_grid(part: Task, finder: ClearSearch, made: Plan) -> Plan:
 
 
 def _plan_piece(
-    task: Task, finder: ClearSearch, piece: Piece, number: int, count: int
+    task: Task, finder: CollisionFreeSearch, piece: Piece, number: int, count: int
 ) -> tuple[Task, Plan]:
     """Return the task of one piece, and its plan on the grid."""
     claim = f"the best path on this graph under {limits_named(task.problem)}"

@@ -10,7 +10,7 @@ import numpy as np
 from kerfpath.arrays import short_repr
 from kerfpath.effort import current_effort
 from kerfpath.kernels.metric import wrap
-from kerfpath.planner.collision_free import ClearSearch
+from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Binding, quicken
@@ -67,7 +67,7 @@ class QuickMotion:
         return self.dt * (1 - SLACK / 2) <= dt
 
 
-def quick_motions(task: Task, finder: ClearSearch) -> Iterator[QuickMotion]:
+def quick_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMotion]:
     """Yield successively quicker motions along the contour of a task, clear and within its margins.
 
     The first is the fastest path on the grid. The second, if the robot leaves a rotation free, is
@@ -105,7 +105,7 @@ def quick_motions(task: Task, finder: ClearSearch) -> Iterator[QuickMotion]:
         without_gain = 0 if best.dt < (1 - GAIN) * before else without_gain + 1
 
 
-def slow_motions(task: Task, finder: ClearSearch) -> Iterator[QuickMotion]:
+def slow_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMotion]:
     """Yield motions of a task whose speed is much too high: the quickest if these take little time.
 
     If the velocities leave very many edges in the time that a path takes, they are the shortest
@@ -155,7 +155,7 @@ def _claim() -> Proof:
     return Proof(optimal=False, statement="the quickest motion found")
 
 
-def quicker(task: Task, finder: ClearSearch, start: Plan, best: QuickMotion) -> QuickMotion:
+def quicker(task: Task, finder: CollisionFreeSearch, start: Plan, best: QuickMotion) -> QuickMotion:
     """Return the better of the best motion so far and a start with its interval minimised."""
     quickened = quicken(start)
     if quickened is None:
@@ -176,7 +176,7 @@ def wide(task: Task) -> BeamWidth:
 
 
 def clear_paths(
-    task: Task, finder: ClearSearch, beams: tuple[BeamWidth, ...]
+    task: Task, finder: CollisionFreeSearch, beams: tuple[BeamWidth, ...]
 ) -> tuple[ContinuousSearch, list[ContinuousPath]] | None:
     """Return a search over continuous gamma and its paths, clear at the samples that they use.
 

@@ -15,7 +15,7 @@ from kerfpath import refiner
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.losses import Loss
 from kerfpath.options import PlanOptions
-from kerfpath.planner.collision_free import ClearSearch
+from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.quickest import QuickMotion
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof, path_cost
@@ -27,7 +27,7 @@ from kerfpath.search import BeamWidth, ContinuousSearch, SearchProblem, find_sho
 # Plans off the grid: the best refinement of the paths worth starting from.
 
 
-def refine_plan(task: Task, finder: ClearSearch, made: Plan) -> Plan:
+def refine_plan(task: Task, finder: CollisionFreeSearch, made: Plan) -> Plan:
     """Return the plan moved off its grid, clear and at least as good; unchanged if that fails.
 
     A refinement ends in the nearest optimum. The grid quantises the acceleration, so its best
@@ -70,7 +70,7 @@ def refine_plan(task: Task, finder: ClearSearch, made: Plan) -> Plan:
     return replace(best.plan, proof=proof)
 
 
-def plan_off_grid(task: Task, finder: ClearSearch) -> Refinement | None:
+def plan_off_grid(task: Task, finder: CollisionFreeSearch) -> Refinement | None:
     """Look for a motion close to the best path without (6), for graphs without a path.
 
     If a path breaks (6) only because gamma changes in steps, a motion close to it may keep (6). The
@@ -80,7 +80,7 @@ def plan_off_grid(task: Task, finder: ClearSearch) -> Refinement | None:
     return None if first is None else _keep_if_clear(refiner.refine(first), finder)
 
 
-def plan_slowly(task: Task, quick: QuickMotion, finder: ClearSearch) -> Plan | None:
+def plan_slowly(task: Task, quick: QuickMotion, finder: CollisionFreeSearch) -> Plan | None:
     """Return the plan at the speed asked for, refined from a motion that is at least as quick.
 
     Slowed down, that motion uses less of every limit, so it keeps them, too. None if a limit on the
@@ -99,14 +99,14 @@ def plan_slowly(task: Task, quick: QuickMotion, finder: ClearSearch) -> Plan | N
     return begun if asked.rotation is None else None
 
 
-def _keep_if_clear(found: Refinement, finder: ClearSearch) -> Refinement:
+def _keep_if_clear(found: Refinement, finder: CollisionFreeSearch) -> Refinement:
     """Return the refinement, marked as not done if its plan is not clear."""
     if not found.done or finder.is_clear(found.plan):
         return found
     return replace(found, done=False, statement="the motion within the limits would not be clear")
 
 
-def plan_first_order(task: Task, finder: ClearSearch) -> Plan | None:
+def plan_first_order(task: Task, finder: CollisionFreeSearch) -> Plan | None:
     """Return the best path without (6); None if (5) alone leaves no path."""
     limits = task.problem.limits.without_acceleration()
     try:
@@ -128,7 +128,7 @@ MOST_LOOKS = 20
 """Most searches for a path whose samples are clear in the cell."""
 
 
-def plan_slowed(task: Task, finder: ClearSearch, *, refine: bool) -> Plan:
+def plan_slowed(task: Task, finder: CollisionFreeSearch, *, refine: bool) -> Plan:
     """Return a plan at the speed asked for where its path allows it, and slower elsewhere.
 
     Two paths of the grid get the least times under all limits: the one that loses the least time
@@ -166,7 +166,7 @@ def _off_grid(task: Task, start: Plan) -> Plan:
     return min(eased, _with_least_times(task, refiner.refine(eased).plan), key=_time_and_cost)
 
 
-def _between_the_samples(task: Task, finder: ClearSearch) -> list[Plan]:
+def _between_the_samples(task: Task, finder: CollisionFreeSearch) -> list[Plan]:
     """Return the paths over continuous gamma that are worth slowing down; there may be none.
 
     Each has a constant interval: the one asked for, without (6), and the least of `SLOWER` with it.
@@ -181,7 +181,7 @@ def _between_the_samples(task: Task, finder: ClearSearch) -> list[Plan]:
     return [path for path in found if path is not None]
 
 
-def _between(task: Task, finder: ClearSearch, problem: SearchProblem) -> Plan | None:
+def _between(task: Task, finder: CollisionFreeSearch, problem: SearchProblem) -> Plan | None:
     """Return the best path over continuous gamma of a problem; None if none is found."""
     claim = "no motion was found at constant speed; slowed down from a path over continuous gamma"
     for _ in range(MOST_LOOKS):
@@ -205,7 +205,7 @@ def _time_and_cost(made: Plan) -> tuple[float, float]:
     return round(float(made.time[-1]), 9), made.cost
 
 
-def _broken(task: Task, finder: ClearSearch, made: Plan) -> str:
+def _broken(task: Task, finder: CollisionFreeSearch, made: Plan) -> str:
     """Return what a plan off the grid would break, as text; "" if nothing."""
     comfort = task.settings.comfort
     if comfort is not None and comfort.broken(task.robot, made.q, task.setup.tool):
@@ -213,7 +213,7 @@ def _broken(task: Task, finder: ClearSearch, made: Plan) -> str:
     return "" if finder.is_clear(made) else "not be clear"
 
 
-def _least_lost(task: Task, finder: ClearSearch) -> Plan:
+def _least_lost(task: Task, finder: CollisionFreeSearch) -> Plan:
     found = finder.find(find_slowed, task.problem)
     claim = finder.claimed(
         "at constant speed the graph has no path; of all its paths this one loses the least time "
@@ -255,7 +255,7 @@ def limits_named(problem: SearchProblem) -> str:
     return f"the {', '.join(held[:-1])} and {held[-1]} limits"
 
 
-def with_windows_said(broken: NoFeasiblePath, asked: PlanOptions) -> NoFeasiblePath:
+def add_window_note(broken: NoFeasiblePath, asked: PlanOptions) -> NoFeasiblePath:
     """Return an answer without a path that mentions windows of gamma if they may be the cause."""
     count = len(asked.gamma_windows)
     if not count or broken.closed is not None or broken.lost_by(Loss.PINNED):

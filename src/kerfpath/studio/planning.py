@@ -32,7 +32,7 @@ from kerfpath.job import (
     order_cuts,
     warm_up,
 )
-from kerfpath.planner import at_most, draft
+from kerfpath.planner import at_most, warm_start
 from kerfpath.plans import Plan
 from kerfpath.studio.cache import (
     PROVING,
@@ -311,7 +311,7 @@ def drafts_of(
     if spec is task and windows - {task.windows}:
         return None
     slower = task.speed / spec.speed
-    made = draft(before, spec.asked(job.options), dt=cut.candidate.dt * slower)
+    made = warm_start(before, spec.asked(job.options), dt=cut.candidate.dt * slower)
     if made is None:
         return None
     message = plan_message(
