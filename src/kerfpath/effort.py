@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
+from kerfpath.arrays import short_repr
+
 __all__ = ["Effort", "changed_effort", "current_effort", "set_effort"]
 
 
@@ -57,6 +59,8 @@ class Effort:
     exact_edges: int = 20_000_000
     recorded_states: int = 10_000_000
     subsampled_from: int = 800
+
+    __repr__ = short_repr
 
 
 _current = Effort()
