@@ -328,7 +328,7 @@ def differences(
     found += [each for each, _ in _compare_targets(both, digits)]
     found += [each for each, _ in _compare_values(both, digits, b.externals, names)]
     if strict:
-        found += _find_unsaid(both, names)
+        found += _find_given_once(both, names)
     found += _compare_handshakes([(one[i], two[j]) for i, j in same], names)
     return found
 
@@ -536,7 +536,7 @@ def _unequal(code: str, moves: Both, worst: int, message: str, words: Sequence[s
     )
 
 
-def _find_unsaid(both: Both, names: Names) -> Iterator[Difference]:
+def _find_given_once(both: Both, names: Names) -> Iterator[Difference]:
     """Find moves that have a speed, a time or a zone in only one of the programs."""
     for attribute, code in OPTIONAL:
         said = [[getattr(stop.move, attribute) is not None for stop in pair] for pair in both]

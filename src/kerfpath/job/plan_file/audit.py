@@ -214,8 +214,9 @@ def _of_contour(
             counts = sorted({len(c.nodes) for c in prepared.contours[number].candidates})
             row = _node_count(made, " or ".join(map(str, counts)))
             return [ExpectedPlan(name=name, number=number, checks=(row,))]
-        own = _divided(candidate, made, job.options.refine_parts)
-        return [_expected(prepared, number, made, candidate, own, picked=made.name in picked)]
+        own, parts = _divided(candidate, made, job.options.refine_parts)
+        shown = made.name in picked
+        return [_expected(prepared, number, made, own, candidate.dt, parts, picked=shown)]
     words = [f"{name}, piece {k + 1} of {len(plans)}" for k in range(len(plans))]
     by_name = {p.name: p for p in plans}
     if len(plans) == 1 or job.options.interruptions == "none" or set(by_name) != set(words):
@@ -246,8 +247,8 @@ def _pieces(prepared: PreparedJob, number: int, plans: Sequence[Plan]) -> list[E
             continue
         part = replace(whole.part(at, last, job.options.frames), name=p.name)
         path = candidate.path.between(float(whole.s[at]), float(whole.s[last]))
-        own = _divided(Candidate(path=path, nodes=part), p, job.options.refine_parts)
-        found.append(_expected(prepared, number, p, candidate, own, picked=False))
+        own, parts = _divided(Candidate(path=path, nodes=part), p, job.options.refine_parts)
+        found.append(_expected(prepared, number, p, own, candidate.dt, parts, picked=False))
         at = last
     return found
 
@@ -264,20 +265,21 @@ def _nearest(candidates: Sequence[Candidate], made: Plan, parts: int) -> Candida
     return min(fitting, key=off, default=None)
 
 
-def _divided(candidate: Candidate, made: Plan, parts: int) -> Candidate:
-    """Return the candidate with its intervals divided, if those of the plan are."""
+def _divided(candidate: Candidate, made: Plan, parts: int) -> tuple[Candidate, int]:
+    """Return the candidate with its intervals divided as those of the plan, and into how many."""
     if parts == 1 or len(made.contour) != (len(candidate.nodes) - 1) * parts + 1:
-        return candidate
-    return replace(candidate, nodes=divide_nodes(candidate.path, candidate.nodes, parts))
+        return candidate, 1
+    return replace(candidate, nodes=divide_nodes(candidate.path, candidate.nodes, parts)), parts
 
 
 def _expected(
-    prepared: PreparedJob, number: int, made: Plan, whole: Candidate, own: Candidate,
+    prepared: PreparedJob, number: int, made: Plan, own: Candidate, dt: float, parts: int,
     *, picked: bool,
 ) -> ExpectedPlan:  # fmt: skip
     """Return the plan that has the joints of a plan and all else of the job.
 
-    Its nodes are those of its `own` candidate: a piece of the `whole` one, or its nodes divided.
+    Its nodes are those of its `own` candidate, which may be a piece, or divide each interval of
+    `dt` (s) into `parts`.
     """
     job, nodes = prepared.job, own.nodes
     if len(nodes) != len(made.contour):
@@ -290,19 +292,18 @@ def _expected(
     worst = int(np.argmax(far))
     title = "distance of the nodes from those of the job"
     place = check("place", title, far[worst], SAME_PLACE, "m", worst)
-    parts = _parts(whole, nodes, job.options.refine_parts)
     plan = replace(
         made,
         contour=replace(nodes, time=None),
         robot=job.robot,
         T_flange_tip=job.tool,
         T_base_part=job.placement,
-        time=whole.dt / parts * np.arange(len(nodes), dtype=float),
-        settings=_options(prepared, number, whole.dt, made.settings, picked=picked),
+        time=dt / parts * np.arange(len(nodes), dtype=float),
+        settings=_options(prepared, number, dt, made.settings, picked=picked),
         feed=None,
     )
     if job.options.feed == "dip" and made.feed is not None and not picked:
-        plan = _dipping(plan, whole.dt, made.time)
+        plan = _dipping(plan, dt, made.time)
     plan = recompute(plan)
     requested = job.options.retract
     room = retract_checks(plan, None if requested == made.settings.retract else requested)
@@ -311,12 +312,6 @@ def _expected(
     return ExpectedPlan(
         name=made.name, number=number, plan=plan, path=own.path, checks=rows, drawing=(*drawing,)
     )
-
-
-def _parts(candidate: Candidate, nodes: Contour, parts: int) -> int:
-    """Return the number of parts into which the nodes divide intervals of the candidate."""
-    step = float(np.median(np.diff(candidate.nodes.s)) / np.median(np.diff(nodes.s)))
-    return parts if parts > 1 and step > (1 + parts) / 2 else 1
 
 
 def _options(
