@@ -27,7 +27,7 @@ from kerfpath.plans import Feed
 
 __all__ = ["feed", "retime"]
 
-SLACK = 1e-9
+LIMIT_ROUNDING = 1e-9
 """Relative slack of the limits in the result, for rounding."""
 MARGIN = 1e-7
 """Share of the acceleration kept from the solver, so that its tolerance breaks no limit."""
@@ -135,7 +135,7 @@ def feed(
     dq, dt, velocity, acceleration = _inputs(dq, dt, limits)
     tau = positive(tau, "tau", dt.shape)
     length = floats(length, "length", dt.shape)
-    at_speed = tau <= dt * (1 + SLACK)
+    at_speed = tau <= dt * (1 + LIMIT_ROUNDING)
     full = float(length[at_speed].sum() / length.sum()) if length.any() else float(at_speed.mean())
     if at_speed.all():
         return Feed(full=full, slowest=1.0, node=-1, joint=-1, limit=None)
@@ -188,7 +188,7 @@ def _rows(step: Array, least: Array, periodic: bool) -> _LimitRows:
 def _stretch_times(rows: _LimitRows, tau: Array) -> Array:
     """Return times that keep the rows: all of `tau` stretched by the factor of the worst row."""
     worst = rows.excess(tau).max(initial=0.0)
-    return tau if worst <= 1 + SLACK / 2 else tau * np.sqrt(worst)
+    return tau if worst <= 1 + LIMIT_ROUNDING / 2 else tau * np.sqrt(worst)
 
 
 def _snap_times(rows: _LimitRows, least: Array, tau: Array) -> Array:
@@ -196,7 +196,7 @@ def _snap_times(rows: _LimitRows, least: Array, tau: Array) -> Array:
     near = tau <= least * (1 + SNAP)
     while True:
         snapped = np.where(near, least, tau)
-        broken = rows.excess(snapped) > 1 + SLACK / 2
+        broken = rows.excess(snapped) > 1 + LIMIT_ROUNDING / 2
         blamed = np.zeros_like(near)
         blamed[rows.before[broken]] = blamed[rows.after[broken]] = True
         if not (blamed & near).any():

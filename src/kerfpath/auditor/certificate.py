@@ -30,7 +30,7 @@ MOST_HELD = 16_000_000
 Costs = tuple[NDArray[np.int32], NDArray[np.int32], Array]
 LARGEST = 1e12
 """Largest value or slope of a potential."""
-SAME = 1e-9
+COST_ROUNDING = 1e-9
 """Relative rounding error of a cost, a bound and the gap between them."""
 
 
@@ -52,11 +52,12 @@ def bound_checks(plan: Plan) -> list[Check]:
     claims = (
         ("bound above what its certificate proves", proof.bound, proved),
         ("bound of the certificate above what it proves", proof.certificate.bound, proved),
-        ("bound above the cost of the plan", proof.bound, plan.cost * (1 + SAME)),
+        ("bound above the cost of the plan", proof.bound, plan.cost * (1 + COST_ROUNDING)),
     )
     rows = [_row(words, claim, true) for words, claim, true in claims]
     gap = (plan.cost - proof.bound) / plan.cost if plan.cost else 0.0
-    if proof.gap is None or not abs(proof.gap - gap) <= SAME * max(1.0, size / abs(plan.cost or 1)):
+    most = COST_ROUNDING * max(1.0, size / abs(plan.cost or 1))
+    if proof.gap is None or not abs(proof.gap - gap) <= most:
         rows.append(_row("gap that does not match cost and bound", 1.0, 0.0))
     # Only the worst row is returned; NaN counts as broken.
     broken = [row for row in rows if not row.ok]

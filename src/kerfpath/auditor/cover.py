@@ -29,7 +29,7 @@ EDGE = 1e-9
 """rad: by how much a motion may leave the ranges."""
 ON_TURN = 2e-14
 """rad: rounding error of joints on a turn, up to ten turns."""
-SAME_PLACE = 1e-9
+SAME_MIDDLE = 1e-9
 """rad: tolerance within which two enclosures of an interval have the same middle."""
 EVERYWHERE, IN_MIDDLE, SAME = range(3)
 """Where the joints of wanted places are known, see `_Wanted`."""
@@ -238,7 +238,7 @@ def _full_circle(where: Reachable, nodes: Ints) -> _Wanted:
 
 def _same_intervals(places: Places) -> _Wanted:
     """Return places of another stage, only on their own turns."""
-    room, known = np.full(places.q.shape, SAME_PLACE), np.full(len(places), SAME)
+    room, known = np.full(places.q.shape, SAME_MIDDLE), np.full(len(places), SAME)
     return _Wanted(places.node, places.index, places.posture, places.q, room, known)
 
 
@@ -253,7 +253,7 @@ def _bisected(places: Places) -> _Wanted:
     t = ((right - 0.5) * at.half)[:, None]
     smooth = at.smooth[:, None]
     near = at.q + at.slope * t + (at.low + at.high) * (t * t / 4)
-    room = at.radius + (at.high - at.low) * (t * t / 4) + SAME_PLACE
+    room = at.radius + (at.high - at.low) * (t * t / 4) + SAME_MIDDLE
     near, room = np.where(smooth, near, at.q), np.where(smooth, room, at.reach)
     return _Wanted(
         at.node,

@@ -158,13 +158,13 @@ def _per_joint(
 # -----------------------------------------------------------------------------
 # Check that gamma keeps its windows, from the joints and the path alone.
 
-SLACK = 1e-6
+WINDOW_SLACK = 1e-6
 """rad: allowance for two kinematics and for the digits of a window's ends, far below a degree."""
 ON_IT = 1e-9
 """m: a node this close to the end of a stretch is on it."""
 
 
-def window_checks(plan: Plan, tool: Array, *, slack: float = SLACK) -> list[Check]:
+def window_checks(plan: Plan, tool: Array, *, slack: float = WINDOW_SLACK) -> list[Check]:
     """Return the check of the windows of gamma; no check if there are none.
 
     Parameters

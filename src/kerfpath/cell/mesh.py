@@ -166,7 +166,7 @@ LARGEST = 100.0
 """m: a mesh larger than this has the wrong unit."""
 SMALLEST = 1e-4
 """m: a mesh smaller than this has the wrong unit."""
-SAME = 1e-6
+SAME_VERTEX = 1e-6
 """Vertices closer than this share of the body's size are one, as files have single precision."""
 CROWDED = 64
 """Average number of vertices within the tolerance of each that welding accepts; memory grows with
@@ -299,7 +299,7 @@ class Mesh:
         ]
         points = np.vstack([self.vertices, rim, rim.mean(axis=0)])
         size = float(np.ptp(self.bounds, axis=0).max())
-        vertices, corners = weld(points, np.vstack(triangles), SAME * size)
+        vertices, corners = weld(points, np.vstack(triangles), SAME_VERTEX * size)
         used, corners = np.unique(corners, return_inverse=True)
         return Mesh(
             vertices=vertices[used],
@@ -458,7 +458,7 @@ def close_surface(vertices: Array, triangles: Ints, scale: Array | float, name: 
     with np.errstate(over="ignore"):  # infinite values are refused for their size
         points = vertices * scale
     size = size_of(points, triangles, name)
-    points, triangles = weld(points, triangles, SAME * size, name)
+    points, triangles = weld(points, triangles, SAME_VERTEX * size, name)
     return Mesh(vertices=points, triangles=triangles, name=name)
 
 

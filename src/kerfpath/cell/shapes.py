@@ -15,7 +15,7 @@ from kerfpath.errors import InputError
 
 RING = 24
 """Corners of the polygon drawn around a circle; it projects by less than 1 % of the radius."""
-SAME = 1e-7
+SAME_CORNER = 1e-7
 """m: corners that differ by less are the same, except for rounding."""
 
 MOST_NEIGHBOURS = 254
@@ -193,7 +193,7 @@ def _axis(value: ArrayLike, points: Array) -> Array:
     along = axis[1] - axis[0]
     turn = Rotation.from_rotvec(2 * np.pi / RING * along / np.linalg.norm(along))
     off, _ = cKDTree(points).query(turn.apply(points - axis[0]) + axis[0])
-    if not np.max(off) < SAME:
+    if not np.max(off) < SAME_CORNER:
         raise InputError(
             f"hull axis: the points are not rings of {RING} evenly spaced corners about it"
         )

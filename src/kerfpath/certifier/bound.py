@@ -15,8 +15,10 @@ from kerfpath.arrays import Array, scalar, short_repr
 from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier.cells import CellMaker, CellSet
 from kerfpath.certifier.infeasibility import (
+    CARE,
     DEAREST,
     NARROW,
+    SAME_COST,
     Parts,
     between,
     cells_to_divide,
@@ -176,8 +178,6 @@ DROPPED = 0.25
 """Share of its cells that a stage must rule out to be kept in the certificate."""
 STALLED = 0.5
 """Share of the gap that a stage must close; if it closes less, nodes are added in between."""
-CARE = 0.05
-"""Share of the cost beyond the cheapest step up to which steps are bounded with care."""
 FINE = 3
 """Level below which cells are too coarse to show whether more nodes, or (6), are needed."""
 NEAR = 0.9
@@ -189,8 +189,7 @@ MOST_CELLS = 2_000_000
 CLEARLY, USUAL_LEVEL, WIDER = 0.02, 3, 2.0
 """For checkable certificates: a cell of this level drops out if motions through it cost more than
 the plan by this share, four times the share per coarser level, because a checker's own enclosures
-may give less; and the factor on the curvature. Otherwise only `SAME`, for rounding."""
-SAME = 1e-9
+may give less; and the factor on the curvature. Otherwise only `SAME_COST`, for rounding."""
 NOT_KEPT = 'a bound of the objective "max" has no certificate to keep'
 AT_LIMIT = 0.98
 """Share of the acceleration limit from which (6) may keep the plan from costing less."""
@@ -338,7 +337,7 @@ class _Course:
     ) -> None:
         robot, asked = plan.robot, plan.settings
         self.steps = steps
-        self.margin, width = (CLEARLY, WIDER) if checkable else (SAME, 1.0)
+        self.margin, width = (CLEARLY, WIDER) if checkable else (SAME_COST, 1.0)
         self.maker = CellMaker(robot, plan.frames, plan.T_flange_tip, asked.postures, width)
         self.cost, self.until, self.progress = plan.cost, until, progress
         self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)

@@ -141,7 +141,7 @@ def cells_to_divide(
 # breaks (6), it shows where prices are missing in the part. Bounds that are known for cells stay
 # valid.
 
-SAME = 1e-9
+SAME_COST = 1e-9
 """Share of the cost by which motions must cost more than the plan to drop out, for rounding."""
 CARE = 0.05
 """Share of the cost beyond the cheapest step up to which steps are bounded with care."""
@@ -232,7 +232,7 @@ class Parts:
         """Bound a part, and queue smaller parts of it that may cost less than the target."""
         self.count += 1
         through, result, prices = self._solved(part)
-        kept = through <= self._cost * (1 + SAME)
+        kept = through <= self._cost * (1 + SAME_COST)
         if not kept.any():
             return
         cells = replace(result.cells, floor=through)
@@ -288,7 +288,7 @@ class Parts:
         return through, result, best.multipliers
 
     def _stage(self, cells: CellSet, prices: Array | None) -> StageResult:
-        most = self._cost * (1 + SAME)
+        most = self._cost * (1 + SAME_COST)
         result = solve_stage(cells, self._steps, prices, care=CARE * self._cost, most=most)
         self.pairs += result.pairs
         return result

@@ -15,6 +15,7 @@ from kerfpath.contour import sampling
 from kerfpath.contour.sampling import unit
 from kerfpath.errors import InputError
 from kerfpath.kernels.frames import closing_twist, rotation_minimising_x, tangent_x
+from kerfpath.tolerances import SAME_PLACE
 
 # -----------------------------------------------------------------------------
 # The contour: points, tool axes and kinds of stretches (the augmented line of section 2.1).
@@ -25,8 +26,6 @@ FRAME_KINDS: tuple[FrameKind, ...] = ("tangent", "rotation-minimising")
 REPEATED_POINT = 1e-9
 """Consecutive nodes closer than this (m) are one point: they define no direction of travel."""
 
-SAME_PLACE = 1e-6
-"""A path whose ends are closer than this (m) returns to its start."""
 
 KINDS = ("cut", "pierce", "lead-in", "micro joint", "overlap", "lead-out", "loop", "corner")
 """Kinds of stretches of a contour; `Contour.kind` holds indices into this tuple."""

@@ -36,7 +36,7 @@ __all__ = [
     "run_judged",
 ]
 
-SLACK = 1e-3
+ZONE_SLACK = 1e-3
 """Share by which limits may be exceeded, as zones in a program are rounded down to steps."""
 
 
@@ -128,7 +128,7 @@ def _torque(run: Executed, plan: Plan) -> Iterator[Check]:
             title=f"joint torque share as run, sampled, without friction and rotors (highest: "
             f"joint {peak.joint + 1})",
             value=peak.share,
-            limit=1.0 + SLACK,
+            limit=1.0 + ZONE_SLACK,
             unit="share",
             node=_node(run, plan, peak.time),
             advice=f"joint {peak.joint + 1} exceeds its limit: go more slowly, or carry less",
@@ -241,7 +241,7 @@ def _check(what: str, peak: Peak, bound: float, run: Executed, plan: Plan) -> Ch
         code=f"{what}-as-run",
         title=f"joint {what} share as run, {how}",
         value=max(peak.share, bound) if proved else peak.share,
-        limit=1.0 + SLACK,
+        limit=1.0 + ZONE_SLACK,
         unit="share",
         node=_node(run, plan, peak.time),
         advice=f"{plan.robot.joint_names[peak.joint]} exceeds its limit, so the controller slows "

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from kerfpath.arrays import Array, Ints, floats, freeze, integers, scalar
 from kerfpath.contour import KINDS, Contour, angle_between, slerp, unit
 from kerfpath.errors import InputError
+from kerfpath.tolerances import SAME_POINT
 
 # -----------------------------------------------------------------------------
 # Sides of a contour, and the surface that leads are laid on.
@@ -22,8 +23,6 @@ TOUCH = 1e-5
 deviates from the curve's first chord by some micrometres."""
 SURFACE_ENDS = 1e-3
 """m: a point farther than this from the surface has left it."""
-SAME_PLACE = 1e-9
-"""m: points closer than this are the same."""
 
 IN_SCRAP = [KINDS.index(word) for word in ("pierce", "lead-in", "lead-out", "loop")]
 """Kinds of the stretches that run in the scrap."""
@@ -112,7 +111,7 @@ def edge(contour: Contour) -> Contour:
     on = ~np.isin(contour.kind[:-1], IN_SCRAP)
     keep = np.append(on, False) | np.append(False, on)
     points, axes = contour.points[keep], contour.axes[keep]
-    new = np.append(np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME_PLACE, True)
+    new = np.append(np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME_POINT, True)
     return Contour(points[new], axes[new], closed=contour.closed, name=contour.name)
 
 
@@ -121,11 +120,11 @@ def require_in_scrap(contour: Contour, points: Array, side: Side, what: str) -> 
     where, k = nearest(contour, points)
     across = lateral(contour.axes[:-1], np.diff(contour.points, axis=0), side)
     last, nodes = len(across) - 1, contour.points
-    ring = np.linalg.norm(nodes[0] - nodes[-1]) <= SAME_PLACE
+    ring = np.linalg.norm(nodes[0] - nodes[-1]) <= SAME_POINT
     before = np.where(k > 0, k - 1, last if ring else 0)
     after = np.where(k < last, k + 1, 0 if ring else last)
     # Close to a corner, one of its segments alone may give the wrong side.
-    at_start, at_end = (np.linalg.norm(where - nodes[i], axis=1) <= SAME_PLACE for i in (k, k + 1))
+    at_start, at_end = (np.linalg.norm(where - nodes[i], axis=1) <= SAME_POINT for i in (k, k + 1))
     other = np.where(at_start, before, np.where(at_end, after, k))
     depth = ((points - where) * (across[k] + across[other]) / 2).sum(1)
     if (depth < -TOUCH).any():

@@ -19,6 +19,7 @@ from kerfpath.planner.task import Task
 from kerfpath.plans import Plan
 from kerfpath.robots import require_axes
 from kerfpath.search import CheckedEdges, FoundPath, SearchProblem, find_clear
+from kerfpath.tolerances import SAME_POINT
 
 _P = TypeVar("_P", bound=FoundPath)
 
@@ -30,8 +31,6 @@ POSES_SETTLED = 20_000
 """Most poses checked to find the nodes without a clear pose."""
 RANGES_LISTED = 6
 """Most ranges of nodes listed in a message."""
-SAME_PLACE = 1e-9
-"""m: largest difference (rounding) of two poses of the same tool or part."""
 
 
 class CollisionFreeSearch:
@@ -229,7 +228,7 @@ def _require_same_cell(task: Task, cell: Cell) -> None:
 
 
 def _same(a: Array, b: Array) -> bool:
-    return bool(np.abs(a - b).max() <= SAME_PLACE)
+    return bool(np.abs(a - b).max() <= SAME_POINT)
 
 
 def _gamma_neighbours(graph: LayeredGraph) -> Ints:

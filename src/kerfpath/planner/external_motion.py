@@ -195,9 +195,9 @@ def _eased(low: Array, high: Array, nodes: Ints) -> Array:
 
 GAMMA_STEP = np.radians(3)
 """rad: step of gamma; few samples are enough, as the refinement moves gamma and axes together."""
-SAME = 1e-3
+SAME_OPTIMUM = 1e-3
 """Relative difference of costs up to which two motions count as the same optimum."""
-ALIKE = 1e-3
+SAME_COURSE = 1e-3
 """rad or m: largest distance of two courses that count as one."""
 ENDS, MOST_NODES = 4, 1600
 """Most ends of the cheapest courses; and the ends times the nodes, which bounds them further."""
@@ -243,7 +243,7 @@ def graph_over_courses(
     plans = _plans(task, CollisionFreeSearch(task), lambda what: None)
     ways: list[Array] = []
     for made in sorted(plans, key=lambda plan: plan.cost):
-        if not any(np.allclose(made.course, other, atol=ALIKE) for other in ways):
+        if not any(np.allclose(made.course, other, atol=SAME_COURSE) for other in ways):
             ways.append(made.course)
     return layered_graph(
         contour,
@@ -345,7 +345,7 @@ def _along(
             continue
         made, best = replace(claimed(found, there), settings=task.settings), tried.best
         tried.plans.append(made)
-        same = best is not None and abs(made.cost - best.cost) <= SAME * best.cost
+        same = best is not None and abs(made.cost - best.cost) <= SAME_OPTIMUM * best.cost
         if same and len(tried.plans) >= least and task.robot.family.given is None:
             break  # two courses led to one optimum; not for elbows, whose courses have mirror twins
     return tried

@@ -40,6 +40,7 @@ from kerfpath.plans import Plan, Proof, on_turns
 from kerfpath.refiner import refine
 from kerfpath.robots import Robot, posture_name
 from kerfpath.search import SearchProblem, find_shortest, velocity_allows
+from kerfpath.tolerances import LIMIT_MARGIN
 
 # -----------------------------------------------------------------------------
 # Proofs that a task has no motion at any gamma, posture and turn.
@@ -49,8 +50,6 @@ MOST_NODES = 5_000
 BINDS, APART = 0.9, 3
 """Share of the limits, in speed, from which they bind at a node; and distance in nodes that further
 binding nodes keep."""
-SLACK = 1e-6
-"""Share of a limit that is left free, for rounding."""
 FAR, CLOSE = 300.0, 1.02
 """Largest factor on the speed that is tried to find an impossible speed; and the factor to which
 the impossible speed is then narrowed down."""
@@ -93,7 +92,7 @@ def with_relaxation(broken: NoFeasiblePath, task: Task, quick: QuickMotion) -> N
         float((np.abs(rates) / limit.usable).max(initial=0.0))
         for rates, limit in ((v, limits.velocity), (a, limits.acceleration))
     )
-    fast, sharp = (float(at_least(max(1.0, share * (1 + SLACK)))) for share in shares)
+    fast, sharp = (float(at_least(max(1.0, share * (1 + LIMIT_MARGIN)))) for share in shares)
     needed = Relaxation(speed=float(at_most(task.dt / quick.dt)), velocity=fast, acceleration=sharp)
     limits_said = " and ".join(
         f"{value:g} times the {what}"

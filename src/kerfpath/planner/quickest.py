@@ -23,15 +23,14 @@ from kerfpath.search import (
     find_least_interval,
     find_slow_path,
 )
+from kerfpath.tolerances import LIMIT_MARGIN
 
 GAIN = 2e-3
 """Relative gain of speed below which a search counts as without gain."""
 WIDE, MOST_STATES = 1600, 5_000_000
 """Most states kept in a wide search, in each layer and in all layers."""
-ALIKE = (1.1, 0.5)
+WIDE_ALIKE = (1.1, 0.5)
 """`BeamWidth.alike` of a wide search."""
-SLACK = 1e-6
-"""Share of the interval that is left free, so that the motion keeps the limits after rounding."""
 SAME_VALLEY = 0.05
 """rad: paths whose gamma differs by less are refined to the same motion."""
 MOST_SEARCHES = 40
@@ -64,7 +63,7 @@ class QuickMotion:
 
     def is_enough(self, dt: float) -> bool:
         """Return whether it keeps every limit, rounding included, with `dt` s between its nodes."""
-        return self.dt * (1 - SLACK / 2) <= dt
+        return self.dt * (1 - LIMIT_MARGIN / 2) <= dt
 
 
 def quick_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMotion]:
@@ -161,7 +160,7 @@ def quicker(task: Task, finder: CollisionFreeSearch, start: Plan, best: QuickMot
     if quickened is None:
         return best
     made, at = quickened
-    made = replace(made, time=made.time * (1 + SLACK))
+    made = replace(made, time=made.time * (1 + LIMIT_MARGIN))
     comfort = task.settings.comfort
     if made.dt >= best.dt:
         return best
@@ -172,7 +171,7 @@ def quicker(task: Task, finder: CollisionFreeSearch, start: Plan, best: QuickMot
 
 def wide(task: Task) -> BeamWidth:
     """Return the beam of a wide search, less wide over very many nodes."""
-    return BeamWidth(min(WIDE, MOST_STATES // len(task.contour) + 1), ALIKE, 1)
+    return BeamWidth(min(WIDE, MOST_STATES // len(task.contour) + 1), WIDE_ALIKE, 1)
 
 
 def clear_paths(

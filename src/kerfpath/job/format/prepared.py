@@ -43,6 +43,7 @@ from kerfpath.operations import edge, nearest
 from kerfpath.options import PlanOptions
 from kerfpath.planner import node_interval
 from kerfpath.sequence import inner_first
+from kerfpath.tolerances import SAME_PLACE
 from kerfpath.urdf import read_srdf
 
 # -----------------------------------------------------------------------------
@@ -52,8 +53,6 @@ SIZES = (
     "nozzle_length_mm", "nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm",
 )  # fmt: skip
 """Keys of [cell.head] that are arguments of `CuttingHead` without their unit."""
-SAME = 1e-6
-"""Distance in m below which corners of neighbouring faces are merged; CAD systems stay below it."""
 
 
 def cell_of_job(job: Job, part: Part) -> Cell | None:
@@ -253,7 +252,7 @@ def _solid_in(path: Path, unit: str | None, deviation: float, _stamp: tuple[int,
 
 @lru_cache(maxsize=2)
 def _triangles(part: Part, deviation: float) -> tuple[Array, Ints]:
-    return weld(*part.mesh(deviation), SAME)
+    return weld(*part.mesh(deviation), SAME_PLACE)
 
 
 # -----------------------------------------------------------------------------
@@ -332,8 +331,6 @@ def _between(path: Contour, nodes: Contour) -> tuple[float, float]:
 # -----------------------------------------------------------------------------
 # Prepare a job: read its drawing and cell, and list the ways to cut each contour.
 
-SAME_PLACE = 1e-6
-"""Distance in m that is attributed to rounding."""
 SHORTER = 0.1
 """Share of its length by which chords may be shorter than a path of which they sample all."""
 

@@ -21,6 +21,7 @@ from kerfpath.options import PlanOptions
 from kerfpath.robots import robot as robot_of
 from kerfpath.setting import settings
 from kerfpath.tilt import Tilt
+from kerfpath.tolerances import SAME_PLACE
 
 # -----------------------------------------------------------------------------
 # Write the cell of a job as lines of a Python script.
@@ -29,8 +30,6 @@ SIZES = (
     "nozzle_length_mm", "nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm",
 )  # fmt: skip
 """Keys of [cell.head] that are arguments of `CuttingHead` without their unit."""
-SAME = 1e-6
-"""Distance in m below which corners of the part are merged, as in jobs."""
 
 
 def has_files(table: CellTable) -> bool:
@@ -45,7 +44,7 @@ def cell_lines(job: Job, cell: Cell) -> Iterator[str]:
     yield "# The bodies that the motions keep clear of."
     named = {"tool": "T_flange_tip", "head": _head(table)}
     if table.part:
-        yield f"vertices, triangles = weld(*part.mesh({table.deviation_mm!r} * MM), {SAME!r})"
+        yield f"vertices, triangles = weld(*part.mesh({table.deviation_mm!r} * MM), {SAME_PLACE!r})"
         if table.sheet_mm is not None:
             yield f"vertices, triangles = thicken(vertices, triangles, {table.sheet_mm!r} * MM)"
         yield "solid = Mesh("

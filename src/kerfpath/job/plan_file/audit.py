@@ -47,12 +47,13 @@ from kerfpath.plans import Plan, path_cost
 from kerfpath.retime import feed, retime
 from kerfpath.robots import Robot
 from kerfpath.sequence import Order, PartPlan
+from kerfpath.tolerances import SAME_PLACE
 from kerfpath.transfer import End, TransferMove, back_off, least_time
 
 # -----------------------------------------------------------------------------
 # Compute what follows from the joints of a plan: gamma, tilt, posture, turns, and cost.
 
-SAME = 1e-7
+SAME_VALUE = 1e-7
 """Tolerance, relative or absolute below 1 (m, rad, s); two machines agree far better."""
 SAME_POSTURE = 1e-5
 """Error of an inverse near a singularity, rad; postures are much farther apart."""
@@ -97,7 +98,7 @@ def _rotation(plan: Plan) -> tuple[Array, Array]:
     x = tip[:, :3, 0]
     gamma = np.arctan2((x * frames[:, :3, 1]).sum(axis=1), (x * frames[:, :3, 0]).sum(axis=1))
     off = np.remainder(plan.gamma - gamma + np.pi, 2 * np.pi) - np.pi
-    agrees = (np.abs(off) <= SAME) & (np.abs(plan.gamma) <= np.pi + SAME)
+    agrees = (np.abs(off) <= SAME_VALUE) & (np.abs(plan.gamma) <= np.pi + SAME_VALUE)
     return tilt, np.where(agrees, plan.gamma, gamma)
 
 
@@ -120,7 +121,7 @@ def _posture(robot: Robot, q: Array, said: Ints) -> Ints:
 def _turn(robot: Robot, q: Array, said: Ints) -> Ints:
     """Return the turns (K, n) from (-pi, pi] to joints q (K, n); free joints have none."""
     turn = np.ceil((q - np.pi) / (2 * np.pi)).astype(np.int64)
-    kept = np.abs(q - 2 * np.pi * said) <= np.pi + SAME
+    kept = np.abs(q - 2 * np.pi * said) <= np.pi + SAME_VALUE
     turn = np.where(kept, said, turn)
     turn[:, robot.free] = 0
     return turn
@@ -133,7 +134,7 @@ def _cost(plan: Plan) -> float:
     band = None if s.comfort is None else s.comfort.clearance
     if band is not None and band.cost:
         most = band.cost * (len(plan.q) if s.objective == "sum" else 1)
-        if cost * (1 - SAME) <= plan.cost <= cost + most:
+        if cost * (1 - SAME_VALUE) <= plan.cost <= cost + most:
             return plan.cost
     return cost
 
@@ -141,8 +142,6 @@ def _cost(plan: Plan) -> float:
 # -----------------------------------------------------------------------------
 # The plans that a plan.json should have: its joints, with all else from the job.
 
-SAME_PLACE = 1e-6
-"""Largest distance in m between a node and the same node of the job."""
 RETIMED = 1e-3
 """Share of an interval by which times of a reduced feed may differ: they are a local optimum."""
 
@@ -676,7 +675,7 @@ def _far(
         yield _Difference(path, f"{one.shape} numbers", f"{two.shape} numbers")
         return
     off = np.abs(one - two) / np.maximum(1.0, np.abs(one))
-    far = np.argwhere(~(off <= SAME))
+    far = np.argwhere(~(off <= SAME_VALUE))
     for index in far[np.argsort([-off[tuple(i)] for i in far], kind="stable")]:
         at = tuple(int(i) for i in index)
         yield _Difference((*path, *at), float(one[at]), float(two[at]))
@@ -686,7 +685,7 @@ def _allowed(path: tuple[str | int, ...], value: float) -> float:
     """Return how far a number may be from `value`."""
     if path[:2] == ("audit", "checks") and path[-1] == "value":
         return DISTANCE
-    return SAME * max(1.0, abs(value))
+    return SAME_VALUE * max(1.0, abs(value))
 
 
 def _numbers(values: Any) -> NDArray[np.float64] | None:
@@ -860,7 +859,9 @@ def _claims(plan: Plan) -> list[Check]:
     before, rows = plan.proof.grid_cost, []
     if before is not None:
         title = "cost above that of the path it was refined from"
-        rows.append(check("grid-cost", title, plan.cost - before * (1 + SAME), SAME, "count"))
+        rows.append(
+            check("grid-cost", title, plan.cost - before * (1 + SAME_VALUE), SAME_VALUE, "count")
+        )
     if plan.settings.method not in EXACT_OR_BETTER:
         title = "claims of optimality that its method cannot prove"
         rows.append(count("optimal", title, plan.proof.optimal))

@@ -21,6 +21,7 @@ from kerfpath.operations import touched_up
 from kerfpath.plans import Plan
 from kerfpath.post import ReadGroup, ReadMove, differences, groups_of, read_program
 from kerfpath.progress import Progress, no_progress
+from kerfpath.tolerances import SAME_PLACE
 
 MOVED = 1e-6
 """Least distance (m) of a moved target from the planned one."""
@@ -30,8 +31,6 @@ MOST_MOVED = 0.1
 """Largest share of moved targets; if more were moved, the part itself is elsewhere."""
 SAME_PATH = 1e-5
 """Distance (m) of a plan's nodes from the drawn path beyond which it was touched up before."""
-SAME_PLACE = 1e-6
-"""Difference in m of the same place in a plan.json and its job that is attributed to rounding."""
 ALONG = ("added", "removed", "order", "kinds")
 """Codes of differences other than moved targets."""
 MEASURE = "for a part that is elsewhere: kerfpath post PLAN.json --measured POINTS.csv"

@@ -25,6 +25,7 @@ from kerfpath.job.format import (
 )
 from kerfpath.plans import has_room
 from kerfpath.sequence import best_order, distances_between
+from kerfpath.tolerances import SAME_PLACE
 
 # -----------------------------------------------------------------------------
 # Check a job without planning it: its cell, and the poses at the start of its contours.
@@ -118,8 +119,6 @@ HALVINGS = 7
 """Bisections of a length to find one that would do."""
 FINE = np.radians(1.0)
 """Largest step of gamma, rad, for the poses of both ends, even if that of the job is coarser."""
-SAME_PLACE = 1e-6
-"""Depth in m below the floor that is attributed to rounding."""
 SECONDS = 2.0
 """Time limit, s, for finding that no order of the contours is possible."""
 

@@ -194,7 +194,7 @@ def placement_of(prepared: PreparedJob) -> Placement:
 # -----------------------------------------------------------------------------
 # Values of placements, contour by contour, and their comparison.
 
-SLACK = 1e-9
+BOUND_ROUNDING = 1e-9
 """Relative amount by which rounding may lift a value above its bound."""
 
 Stage = Literal["reach", "stretch", "exact", "estimate", "proved", "planned"]
@@ -316,8 +316,8 @@ def is_better(goal: str, value: float, other: float | None) -> bool:
     if other is None:
         return True
     if goal == "motion":
-        return value < other * (1 - SLACK)
-    return value > other * (1 + SLACK)
+        return value < other * (1 - BOUND_ROUNDING)
+    return value > other * (1 + BOUND_ROUNDING)
 
 
 def is_estimated(value: PlacementValue) -> bool:

@@ -28,7 +28,7 @@ from kerfpath.progress import Progress
 from kerfpath.search import ContinuousSearch, SearchProblem, find_shortest
 from kerfpath.study.evaluator import SampledContour
 from kerfpath.study.placing.evaluator import (
-    SLACK,
+    BOUND_ROUNDING,
     Beams,
     ContourValue,
     InfeasiblePlacement,
@@ -620,7 +620,7 @@ class PlacementSearch:
     def _may_win(self, trial: PlacementTrial) -> bool:
         if not trial.result.feasible:
             return False
-        bound, slack = trial.result.bound, SLACK
+        bound, slack = trial.result.bound, BOUND_ROUNDING
         if bound is None:  # estimates are not proved
             bound, slack = trial.result.estimate, self.ease
         if bound is None or self.floor is None:
