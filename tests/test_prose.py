@@ -42,15 +42,15 @@ def test_the_glossary_lists_the_words_that_are_not_used():
 @pytest.mark.parametrize(
     ("name", "text", "line"),
     [
-        ("a.md", "# Title\n\nThe job is planned\nanew.\n", 4),
+        ("a.md", "# Title\n\nThe job is\nunrolled.\n", 4),
         ("a.md", "A phrase goes on: moves\nthrough the air take time.", 1),
-        ("a.py", '"""Plan a job.\n\nIt is planned anew."""\n', 3),
-        ("a.py", 'def plan():\n    """Plan anew."""\n', 2),
-        ("a.py", 'x = 1\nraise ValueError(\n    f"the job {x} "\n    f"is planned anew"\n)\n', 4),
-        ("a.py", 'help = "Plan the job anew."\n', 1),
-        ("a.js", '// a comment\nconst text = "Plan the job anew.";\n', 2),
-        ("a.html", "<p>\nPlan the job anew.</p>\n", 2),
-        ("a.toml", "# the job\n# is planned anew\n[plan]\n", 2),
+        ("a.py", '"""Plan a job.\n\nIt is unrolled."""\n', 3),
+        ("a.py", 'def plan():\n    """Plan unrolled turns."""\n', 2),
+        ("a.py", 'x = 1\nraise ValueError(\n    f"the job {x} "\n    f"is unrolled"\n)\n', 4),
+        ("a.py", 'help = "Plan unrolled turns."\n', 1),
+        ("a.js", '// a comment\nconst text = "Plan unrolled turns.";\n', 2),
+        ("a.html", "<p>\nPlan unrolled turns.</p>\n", 2),
+        ("a.toml", "# the job\n# is unrolled\n[plan]\n", 2),
     ],
 )
 def test_a_word_is_found_in_its_line(name, text, line):
@@ -60,13 +60,13 @@ def test_a_word_is_found_in_its_line(name, text, line):
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("a.md", "The key `anew`, in\n\n    anew = 1\n\n```\nanew\n```\n"),
-        ("a.md", "See [the page](anew.md)."),
-        ("a.md", f"Text.\n\n{terms.LISTED}\n\n| anew | again |\n"),
-        ("a.py", "anew = told\n# planned anew, a comment\nkey = 'anew'\n"),
-        ("a.py", 'def _plan():\n    """Plan anew, where no user reads."""\n'),
-        ("a.js", "// planned anew\nconst anew = told['anew'];\n"),
-        ("a.toml", 'anew = "planned anew"\n'),
+        ("a.md", "The key `unrolled`, in\n\n    unrolled = 1\n\n```\nunrolled\n```\n"),
+        ("a.md", "See [the page](unrolled.md)."),
+        ("a.md", f"Text.\n\n{terms.LISTED}\n\n| unrolled | again |\n"),
+        ("a.py", "unrolled = told\n# unrolled, a comment\nkey = 'unrolled'\n"),
+        ("a.py", 'def _plan():\n    """Plan unrolled turns, where no user reads."""\n'),
+        ("a.js", "// unrolled\nconst unrolled = told['unrolled'];\n"),
+        ("a.toml", 'unrolled = "unrolled"\n'),
     ],
 )
 def test_names_in_code_are_left_alone(name, text):
@@ -74,8 +74,8 @@ def test_names_in_code_are_left_alone(name, text):
 
 
 def test_a_finding_says_where_it_is_and_what_to_write_and_why():
-    (finding,) = terms.findings("The job is planned anew.", "docs/page.md")
-    assert str(finding) == 'docs/page.md:1: "anew": write again, because it is out of use'
+    (finding,) = terms.findings("The turns are unrolled.", "docs/page.md")
+    assert str(finding) == 'docs/page.md:1: "unrolled": write not wrapped, because the glossary defines wrapped'
 
 
 def test_the_checker_fails_where_something_is_found(monkeypatch, tmp_path, capsys):
@@ -83,10 +83,10 @@ def test_the_checker_fails_where_something_is_found(monkeypatch, tmp_path, capsy
     monkeypatch.setattr(terms, "LIST", tmp_path / "docs/terms.toml")
     (tmp_path / "README.md").write_text("The job is planned again.\n")
     assert terms.main() == 0
-    (tmp_path / "README.md").write_text("The job\nis planned anew.\n")
+    (tmp_path / "README.md").write_text("The turns\nare unrolled.\n")
     capsys.readouterr()
     assert terms.main() == 1
-    assert capsys.readouterr().out.startswith('README.md:2: "anew": write again')
+    assert capsys.readouterr().out.startswith('README.md:2: "unrolled": write not wrapped')
 
 
 @pytest.mark.skipif(TYPOS is None, reason="typos is not installed")
