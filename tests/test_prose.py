@@ -75,7 +75,10 @@ def test_names_in_code_are_left_alone(name, text):
 
 def test_a_finding_says_where_it_is_and_what_to_write_and_why():
     (finding,) = terms.findings("The turns are unrolled.", "docs/page.md")
-    assert str(finding) == 'docs/page.md:1: "unrolled": write not wrapped, because the glossary defines wrapped'
+    assert (
+        str(finding)
+        == 'docs/page.md:1: "unrolled": write not wrapped, because the glossary defines wrapped'
+    )
 
 
 def test_the_checker_fails_where_something_is_found(monkeypatch, tmp_path, capsys):

@@ -13,7 +13,7 @@ from kerfpath.certifier import certify
 from kerfpath.certifier import stages as stage
 from kerfpath.certifier.bound import limit_prices
 from kerfpath.certifier.stages import Steps, cross_bends, solve_stage
-from kerfpath.kernels import outer
+from kerfpath.kernels import cell_elimination
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN
 
@@ -161,7 +161,7 @@ def through_pairs(packed, steps, result, most):
     ending = [np.flatnonzero(to == a) for a in range(len(packed.half))]
     origin = np.repeat(np.arange(len(packed.half)), np.diff(begin))
     first, last = packed.start[1], packed.start[-2]
-    D, bent_by = np.empty((2, len(bound))), from_python(outer.bent_by)
+    D, bent_by = np.empty((2, len(bound))), from_python(cell_elimination.bent_by)
 
     def follows(e, f):
         return bent_by(packed, step, bound, lead, origin[e], to[e], to[f], D) < 0

@@ -16,16 +16,16 @@ from kerfpath.certifier.cells import CellMaker, CellSet
 from kerfpath.certifier.stages import StageResult, Steps, arranged, distinct_groups, solve_stage
 from kerfpath.effort import current_effort
 from kerfpath.errors import Closed
-from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.metric import MANHATTAN, rho
-from kerfpath.kernels.outer import (
+from kerfpath.kernels.cell_elimination import (
     blame_bends,
-    blame_steps,
+    count_rejections,
     count_steps,
     keep_back,
     keep_on,
     list_steps,
 )
+from kerfpath.kernels.limits import LIMIT_TOLERANCE
+from kerfpath.kernels.metric import MANHATTAN, rho
 from kerfpath.limits import Limits
 from kerfpath.plans import Plan, path_cost
 from kerfpath.progress import Progress
@@ -519,7 +519,7 @@ class _Round:
         """Return the closed place at node k, from which no step continues."""
         blame = np.zeros(len(self._bound), np.int64)
         if limit == "velocity":
-            blame_steps(self._packed, self._step, k, live, blame)
+            count_rejections(self._packed, self._step, k, live, blame)
         else:
             before, layer = self._layers[-2:]
             blame_bends(

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from kerfpath.arrays import Array, Ints
+from kerfpath.kernels.cell_elimination import bent_by
 from kerfpath.kernels.jit import jit
-from kerfpath.kernels.outer import bent_by
 from kerfpath.kernels.reduced import Cells, Step
 
 __all__ = ["cross_back", "cross_on"]

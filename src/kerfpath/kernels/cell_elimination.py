@@ -29,7 +29,7 @@ from kerfpath.kernels.reduced import SLACK, Cells, Step, near, window
 __all__ = [
     "bent_by",
     "blame_bends",
-    "blame_steps",
+    "count_rejections",
     "count_steps",
     "keep_back",
     "keep_on",
@@ -55,7 +55,7 @@ def _factor(cells: Cells, b: int, i: int, r: int) -> float:
 
 
 @jit_inline
-def _dear(cells: Cells, step: Step, a: int, b: int, D: Array) -> bool:
+def _exceeds_bound(cells: Cells, step: Step, a: int, b: int, D: Array) -> bool:
     """Return whether every step from cell a to b, D between centres, costs over `step.most`."""
     if step.most == inf:
         return False
@@ -72,7 +72,7 @@ def _steps(cells: Cells, step: Step, lead: Ints, a: int, b: int, out_D: Array) -
     status = near(cells, step, a, b, out_D)
     if status != 1:
         return status > 0
-    if _dear(cells, step, a, b, out_D):
+    if _exceeds_bound(cells, step, a, b, out_D):
         return False
     r = lead[b]
     for i in range(len(out_D)):
@@ -205,7 +205,7 @@ def keep_back(
 
 
 @jit
-def blame_steps(cells: Cells, step: Step, k: int, live: Bools, out_blame: Ints) -> None:
+def count_rejections(cells: Cells, step: Step, k: int, live: Bools, out_blame: Ints) -> None:
     """Count the steps from live cells of layer k that break (5), by the joint with most excess."""
     for a in range(cells.start[k], cells.start[k + 1]):
         if not live[a]:
