@@ -26,7 +26,7 @@ from typing import (
 
 import numpy as np
 
-from kerfpath.arrays import Array, require_one_of, scalar
+from kerfpath.arrays import Array, require_one_of, scalar, short_repr
 from kerfpath.errors import InputError
 
 __all__ = ["Setting", "Settings", "documented", "keys", "setting", "settings"]
@@ -93,6 +93,8 @@ class Setting:
     name: str = ""
     kind: Any = None
     optional: bool = False
+
+    __repr__ = short_repr
 
     @property
     def si_unit(self) -> str:
