@@ -88,7 +88,7 @@ HALF = 0.5
 AIM, MOST = 0.5, 0.25
 """Share of the lack that the division is to gain; and the largest worth of a cell, as a share of
 its lack."""
-WIDE = 0.02
+BOX_WEIGHT = 0.02
 """Weight of the box of a cell, compared with the uncertainty of the joints on it."""
 
 
@@ -121,7 +121,7 @@ def cells_to_divide(
     if unsure[cheapest].sum() <= DECIDES * (target - least):
         return low, False
     lack = np.maximum(least + AIM * (target - least) - through, 0.0)
-    worth = np.minimum(unsure + WIDE * (cells.box @ weight), MOST * lack)
+    worth = np.minimum(unsure + BOX_WEIGHT * (cells.box @ weight), MOST * lack)
     order = np.argsort(-worth, kind="stable")
     total = np.cumsum(worth[order])
     which = np.zeros(len(worth), np.bool_)
