@@ -111,7 +111,6 @@ def _vector(at: gp_XYZ) -> Array:
 # Loops of a face: its wires without seams, with each edge in the direction of travel.
 
 FORWARD, REVERSED = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
-LINE, PLANE = GeomAbs_CurveType.GeomAbs_Line, GeomAbs_SurfaceType.GeomAbs_Plane
 
 SINGULAR = 1e-9
 """Sine of the angle between the two directions of a surface below which they define no normal, as
