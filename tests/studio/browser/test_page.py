@@ -161,7 +161,7 @@ def test_a_fault_of_the_job_and_an_error_are_said(page, studio, first):
     page.get_by_role("button", name="Save over it").click()
     until(page, lambda: sent(studio, "save"))
     assert sent(studio, "save") == [{"type": "save", "over": True}]
-    assert page.get_by_text("the file has changed since it was read").count() == 0
+    page.get_by_text("the file has changed since it was read").wait_for(state="detached")
     assert serious(page) == []
 
 
@@ -284,9 +284,9 @@ def test_undo_redo_and_save_by_keys(page, studio, first):
 
 def test_names_are_text_and_never_markup(page, studio, first):
     name = "<img src=x onerror=alert(1)>"
-    job, scene = first[:2]
+    job, options, scene = first[:3]
     contours = [contour | {"name": name} for contour in scene["contours"][:1]]
-    studio.open(job | {"name": name}, scene | {"contours": contours})
+    studio.open(job | {"name": name}, options, scene | {"contours": contours})
     page.locator("#contours button").wait_for()
     assert page.locator("#contours .name").inner_text() == name
     assert page.locator("#file").inner_text() == name
