@@ -4,6 +4,8 @@ It closes with each module: a page that waits turns its spinner, which takes mos
 a graphics card.
 """
 
+import contextlib
+import functools
 import json
 import struct
 
@@ -20,6 +22,15 @@ SWITCHES = [
 # A tetrahedron of 0.2 m stands in for every mesh.
 CORNERS = [(0, 0, 0), (0.2, 0, 0), (0, 0.2, 0), (0, 0, 0.2)]
 FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
+# What a person does; each is answered by the page in its next frames.
+GESTURES = {
+    "Page": ("evaluate",),
+    "Locator": ("check", "click", "dblclick", "fill", "focus", "press", "select_option", "uncheck"),
+    "Keyboard": ("down", "press", "type", "up"),
+    "Mouse": ("click", "dblclick", "down", "move", "up", "wheel"),
+}
+# Two frames: a panel renders in the first one and its effects follow; the second begins after them.
+FRAMES = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
 MESH = (
     struct.pack("<2I", len(CORNERS), len(FACES))
     + b"".join(struct.pack("<3f", *corner) for corner in CORNERS)
@@ -39,15 +50,43 @@ def chromium():
         browser.close()
 
 
+def settle_after_gestures(page, monkeypatch):
+    """Let every gesture return only when the page has drawn the frames that answer it.
+
+    Playwright returns as soon as the page has the event; on a busy machine the page draws later.
+    """
+    from playwright import sync_api
+
+    evaluate = sync_api.Page.evaluate
+
+    def settling(act):
+        @functools.wraps(act)
+        def settled(actor, *args, **kwargs):
+            result = act(actor, *args, **kwargs)
+            # A gesture may leave the page, which ends the wait.
+            with contextlib.suppress(sync_api.Error):
+                evaluate(actor.page if isinstance(actor, sync_api.Locator) else page, FRAMES)
+            return result
+
+        return settled
+
+    for actor, names in GESTURES.items():
+        kind = getattr(sync_api, actor)
+        for name in names:
+            monkeypatch.setattr(kind, name, settling(getattr(kind, name)))
+
+
 @pytest.fixture
-def page(chromium, request):
+def page(chromium, request, monkeypatch):
     """A page of its own; a test asks for another size or theme by indirect parameters."""
     theme, width, height = getattr(request, "param", ("light", 1280, 720))
     context = chromium.new_context(
         viewport={"width": width, "height": height}, color_scheme=theme, accept_downloads=True
     )
     context.set_default_timeout(30_000)
-    yield context.new_page()
+    page = context.new_page()
+    settle_after_gestures(page, monkeypatch)
+    yield page
     context.close()
 
 
