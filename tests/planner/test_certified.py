@@ -100,9 +100,9 @@ def nudged(made):
         lambda made: refine(made).plan,
         lambda made: refine(made, eta_v=0.9).plan,
         lambda made: refiner.quicken(made)[0],
-        lambda made: refiner.ease(made),
+        lambda made: refiner.reduce_excess(made),
     ],
-    ids=["moved", "refined", "within other limits", "quickened", "eased"],
+    ids=["moved", "refined", "within other limits", "quickened", "with less excess"],
 )
 def test_another_motion_does_not_quote_the_bound(bounded, changed):
     found, made = bounded

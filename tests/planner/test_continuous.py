@@ -21,7 +21,7 @@ from kerfpath.cell import box_between, cell_of
 from kerfpath.contour import Contour
 from kerfpath.effort import changed_effort
 from kerfpath.options import PlanOptions
-from kerfpath.planner import layered_graph, on_grid, statements
+from kerfpath.planner import feed_reduction, layered_graph, subsampled
 from kerfpath.planner.task import planning_task
 from kerfpath.plans import Proof
 from kerfpath.setup import Setup
@@ -90,9 +90,11 @@ def test_very_many_nodes_are_planned_from_every_few_of_them(
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "postures": (0, 1)}
     options = options | {"speed": 0.1} | TASKS[name]
     plain = plan(circle, arm, **options)
-    lifted, lift = [], on_grid.SubsampledTask.at_all_nodes
+    lifted, lift = [], subsampled.SubsampledTask.at_all_nodes
     monkeypatch.setattr(
-        on_grid.SubsampledTask, "at_all_nodes", lambda *of: lifted.append(lift(*of)) or lifted[-1]
+        subsampled.SubsampledTask,
+        "at_all_nodes",
+        lambda *of: lifted.append(lift(*of)) or lifted[-1],
     )
     change_effort(subsampled_from=100)
     made = plan(circle, arm, **options)
@@ -105,7 +107,7 @@ def test_every_few_nodes_are_those_of_the_whole(circle, arm, tool, placement, ch
     change_effort(subsampled_from=100)
     asked = PlanOptions(gamma_step=STEP, frames="rotation-minimising")
     whole = planning_task(circle, Setup.of(arm, tool, placement), asked, speed=0.1)
-    thin = on_grid.subsampled(whole)
+    thin = subsampled.subsampled(whole)
     graph, nodes = thin.task.graph, [*range(0, 120, 5), 120]
     assert thin.nodes.tolist() == nodes
     assert thin.task.dt == 5 * whole.dt
@@ -141,7 +143,7 @@ def test_poses_of_very_many_nodes_are_solved_only_where_those_of_a_few_do_not_do
     made, nodes = solved(*space)
     assert nodes == 25
     assert sum(made.counts.values()) * 121 == sum(whole.counts.values()) * 25
-    monkeypatch.setattr(on_grid.SubsampledTask, "at_all_nodes", lambda *of: None)
+    monkeypatch.setattr(subsampled.SubsampledTask, "at_all_nodes", lambda *of: None)
     again, nodes = solved(*space)
     assert nodes == 25 + 121
     np.testing.assert_array_equal(again.q, whole.q)
@@ -171,7 +173,7 @@ def test_a_motion_along_some_nodes_is_one_along_all(
     change_effort(subsampled_from=100)
     asked, nodes = PlanOptions(gamma_step=STEP), circle.resample(count=intervals + 1)
     whole = planning_task(nodes, Setup.of(arm, tool, placement), asked, speed=0.1)
-    thin = on_grid.subsampled(whole)
+    thin = subsampled.subsampled(whole)
     assert (np.diff(thin.nodes) == every).all()
     assert intervals - every < thin.nodes[-1] <= intervals
     some = thin.task.plan(np.zeros(len(thin.nodes), int), 0.0, Proof(optimal=False, statement=""))
@@ -180,7 +182,7 @@ def test_a_motion_along_some_nodes_is_one_along_all(
     np.testing.assert_allclose(made.gamma, 0.3 * np.arange(intervals + 1) / intervals, atol=1e-12)
     assert made.time[-1] == whole.times[-1]
     periodic = replace(whole, settings=replace(whole.settings, closure="periodic"))
-    assert (on_grid.subsampled(periodic) is None) == (intervals == 103)
+    assert (subsampled.subsampled(periodic) is None) == (intervals == 103)
 
 
 def test_with_fewer_nodes_a_tilt_or_another_axis_no_node_is_left_out(
@@ -188,7 +190,7 @@ def test_with_fewer_nodes_a_tilt_or_another_axis_no_node_is_left_out(
 ):
     def thin(robot=arm, **options):
         asked = PlanOptions(gamma_step=np.radians(30), **options)
-        return on_grid.subsampled(
+        return subsampled.subsampled(
             planning_task(circle, Setup.of(robot, tool, placement), asked, speed=0.1)
         )
 
@@ -313,7 +315,7 @@ def test_a_feed_reduction_is_no_slower_for_paths_between_the_samples(
     corner = Contour(points, np.c_[lean, 0 * along, -np.ones(81)], name="corner")
     options = {"tool": tool, "placement": placement, "gamma_step": np.radians(5), "feed": "dip"}
     made = plan(corner, arm, speed=speed, **options)
-    monkeypatch.setattr(statements, "_between_the_samples", lambda task, finder: [])
+    monkeypatch.setattr(feed_reduction, "_between_the_samples", lambda task, finder: [])
     without = plan(corner, arm, speed=speed, **options)
     assert made.time[-1] <= without.time[-1]
     if speed == 0.4:

@@ -112,7 +112,7 @@ def test_a_cell_of_another_rail_is_refused(along_a_wall, arm, tool):
 def test_ends_that_are_apart_begin_with_the_best_and_lie_far_from_each_other():
     from types import SimpleNamespace
 
-    from kerfpath.planner.on_grid import DEARER, ELSEWHERE, FARTHEST, Coarse, apart
+    from kerfpath.planner.coarse import DEARER, ELSEWHERE, FARTHEST, Coarse, apart
 
     rng = np.random.default_rng(8)
     counts, samples = (6, 9), 18

@@ -11,9 +11,10 @@ from kerfpath import refiner
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner.attempt import Attempt, Strategy, first_plan
 from kerfpath.planner.collision_free import CollisionFreeSearch
-from kerfpath.planner.on_grid import plan_on_grid, refine_from_random_starts, subsampled
+from kerfpath.planner.on_grid import plan_on_grid
 from kerfpath.planner.quickest import alike, clear_paths, wide
-from kerfpath.planner.statements import plan_off_grid
+from kerfpath.planner.refinements import plan_off_grid, refine_from_random_starts
+from kerfpath.planner.subsampled import subsampled
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement

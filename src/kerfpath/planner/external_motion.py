@@ -19,10 +19,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments, wrap
 from kerfpath.options import PlanOptions
 from kerfpath.planner.attempt import Attempt
-from kerfpath.planner.collision_free import CollisionFreeSearch
-from kerfpath.planner.continuous import claimed, clear_motion, plan_continuous
-from kerfpath.planner.layers import layered_graph
-from kerfpath.planner.on_grid import (
+from kerfpath.planner.coarse import (
     Coarse,
     End,
     Style,
@@ -33,7 +30,10 @@ from kerfpath.planner.on_grid import (
     sampled,
     steps_of,
 )
-from kerfpath.planner.quickest import QuickMotion, quicker
+from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.continuous import claimed, clear_motion, plan_continuous
+from kerfpath.planner.layers import layered_graph
+from kerfpath.planner.quickest import QuickMotion, faster_motion
 from kerfpath.planner.task import Task, planning_task
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot
@@ -202,7 +202,7 @@ SAME_COURSE = 1e-3
 ENDS, MOST_NODES = 4, 1600
 """Most ends of the cheapest courses; and the ends times the nodes, which bounds them further."""
 RUNGS = (1.25, 1.06)
-"""Multiples of the speed reached at which quicker courses are looked for."""
+"""Multiples of the speed reached at which faster courses are looked for."""
 
 
 def best_external_motion(attempt: Attempt) -> Plan:
@@ -291,7 +291,7 @@ def _plans(task: Task, finder: CollisionFreeSearch, begin: Callable[[str], None]
 def faster_motions(
     task: Task, finder: CollisionFreeSearch, best: QuickMotion
 ) -> Iterator[QuickMotion]:
-    """Yield successively quicker motions along the most promising courses at higher speeds."""
+    """Yield successively faster motions along the most promising courses at higher speeds."""
     rung = 0
     while rung < len(RUNGS):
         at = replace(task, dt=best.dt / RUNGS[rung])
@@ -299,7 +299,7 @@ def faster_motions(
             made = _along(courses(at, clear=finder.clear), at, finder, lambda what: None).best
         except NoFeasiblePath:
             made = None
-        faster = best if made is None else quicker(task, finder, made, best)
+        faster = best if made is None else faster_motion(task, finder, made, best)
         rung = rung + 1 if faster is best else 0
         if faster is not best:
             best = faster

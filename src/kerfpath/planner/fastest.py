@@ -19,8 +19,8 @@ from kerfpath.limits import Limits
 from kerfpath.options import GraphKeywords, PlanOptions, with_keywords
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.external_motion import along_a_course, faster_motions
+from kerfpath.planner.impossible import binding_nodes, impossible_share
 from kerfpath.planner.layers import longest_step, node_interval, require_even
-from kerfpath.planner.on_grid import binding_nodes, impossible_share
 from kerfpath.planner.quickest import QuickMotion, quick_motions
 from kerfpath.planner.task import Task, planning_task
 from kerfpath.robots import Robot
@@ -191,7 +191,7 @@ def _fastest(
 def _over_courses(
     task: Task, finder: CollisionFreeSearch, ways: Iterator[QuickMotion]
 ) -> Iterator[QuickMotion]:
-    """Yield ever quicker motions: the first two along one course, then those along others."""
+    """Yield ever faster motions: the first two along one course, then those along others."""
     for best in islice(ways, 2):
         yield best
     yield from faster_motions(task, finder, best)

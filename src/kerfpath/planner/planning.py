@@ -22,7 +22,8 @@ from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.continuous import OVER_CONTINUOUS_GAMMA, clear_motion, grid_reason
 from kerfpath.planner.external_motion import along_a_course, best_external_motion
 from kerfpath.planner.on_grid import ON_GRID
-from kerfpath.planner.statements import add_window_note, limits_named, refine_plan
+from kerfpath.planner.refinements import refine_plan
+from kerfpath.planner.statements import add_window_note, limits_named
 from kerfpath.planner.task import Task, planning_task
 from kerfpath.plans import Plan, Proof
 from kerfpath.progress import Progress, no_progress

@@ -67,7 +67,7 @@ class QuickMotion:
 
 
 def quick_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMotion]:
-    """Yield successively quicker motions along the contour of a task, clear and within its margins.
+    """Yield successively faster motions along the contour of a task, clear and within its margins.
 
     The first is the fastest path on the grid. The second, if the robot leaves a rotation free, is
     that path with gamma moved off the grid, or the same again. Beam searches over continuous gamma
@@ -86,7 +86,7 @@ def quick_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMoti
     yield best
     if not task.robot.family.free_rotation:
         return
-    best = quicker(task, finder, path, best)
+    best = faster_motion(task, finder, path, best)
     yield best
     factors = current_effort().speed_factors
     without_gain, tried = 0, [path]
@@ -97,14 +97,14 @@ def quick_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMoti
             made = ahead.plan_between(between, _claim())
             if not any(alike(made, other) for other in tried):
                 tried.append(made)
-                faster = quicker(task, finder, made, best)
+                faster = faster_motion(task, finder, made, best)
                 if faster is not best:
                     best = faster
                     yield best
         without_gain = 0 if best.dt < (1 - GAIN) * before else without_gain + 1
 
 
-def slow_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMotion]:
+def velocity_limited_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMotion]:
     """Yield motions of a task whose speed is much too high: the quickest if these take little time.
 
     If the velocities leave very many edges in the time that a path takes, they are the shortest
@@ -119,7 +119,7 @@ def slow_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMotio
     task, best = slow, _along(slow, path)
     yield best
     if task.robot.family.free_rotation:
-        yield quicker(task, finder, best.plan, best)
+        yield faster_motion(task, finder, best.plan, best)
 
 
 def _along(task: Task, least: LeastInterval) -> QuickMotion:
@@ -154,7 +154,9 @@ def _claim() -> Proof:
     return Proof(optimal=False, statement="the quickest motion found")
 
 
-def quicker(task: Task, finder: CollisionFreeSearch, start: Plan, best: QuickMotion) -> QuickMotion:
+def faster_motion(
+    task: Task, finder: CollisionFreeSearch, start: Plan, best: QuickMotion
+) -> QuickMotion:
     """Return the better of the best motion so far and a start with its interval minimised."""
     quickened = quicken(start)
     if quickened is None:

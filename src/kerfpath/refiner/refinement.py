@@ -176,7 +176,7 @@ class Descent:
     def admitted(self, at: MotionState) -> tuple[MotionState, int]:
         """Return the first motion found that keeps every limit, and the number of programs.
 
-        It looks for one of little cost: from the motion as it is, then from the motion eased to
+        It looks for one of little cost: from the motion as it is, then from the motion moved to
         exceed the limits little; else at any cost. If none is found, it returns the motion that
         breaks the limits least.
         """
@@ -193,17 +193,17 @@ class Descent:
         return found, programs + more
 
     def _nearer(self, at: MotionState) -> Iterator[MotionState]:
-        """Yield motions to bring inside the limits: the motion as it is, then eased."""
+        """Yield motions to bring inside the limits: this one, then one with less excess."""
         yield at
-        eased = self.eased(at)
-        if eased.outside <= 0:
-            yield eased
+        moved = self.with_reduced_excess(at)
+        if moved.outside <= 0:
+            yield moved
 
     def gentlest(self, at: MotionState) -> MotionState:
         """Return the motion with the least largest share of a limit."""
         return self._run(at, "excess")[0]
 
-    def eased(self, at: MotionState) -> MotionState:
+    def with_reduced_excess(self, at: MotionState) -> MotionState:
         """Return a motion of little cost that exceeds the limits in few places and by little."""
         return self._run(at, "lost")[0]
 
@@ -504,13 +504,13 @@ def promise(plan: Plan) -> float:
     return start.cost * (1 + REPAIR * start.lost) if start.outside <= 0 else np.inf
 
 
-def ease(plan: Plan) -> Plan:
+def reduce_excess(plan: Plan) -> Plan:
     """Return the plan with gamma moved so that it exceeds the limits little, at little cost.
 
     The excess of every interval and every node over the limits has a price on top of the cost.
     """
     descent, start = _descent(plan)
-    return _plan_with_motion(plan, descent.eased(start))
+    return _plan_with_motion(plan, descent.with_reduced_excess(start))
 
 
 def quicken(plan: Plan) -> tuple[Plan, Binding] | None:

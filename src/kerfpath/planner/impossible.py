@@ -1,0 +1,131 @@
+"""Proofs that a task has no motion at any gamma, posture and turn, and what would allow one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sqrt
+
+import numpy as np
+
+from kerfpath.certifier import MotionTest
+from kerfpath.compiling import finish_compiling
+from kerfpath.effort import current_effort
+from kerfpath.errors import NoFeasiblePath, Relaxation
+from kerfpath.limits import rates_of
+from kerfpath.planner.quickest import QuickMotion
+from kerfpath.planner.statements import at_least, at_most
+from kerfpath.planner.task import Task
+from kerfpath.tolerances import LIMIT_MARGIN
+
+MOST_NODES = 5_000
+"""Most nodes whose cells are all held in memory at once: some 200 MB."""
+BINDS, APART = 0.9, 3
+"""Share of the limits, in speed, from which they bind at a node; and distance in nodes that further
+binding nodes keep."""
+FAR, CLOSE = 300.0, 1.02
+"""Largest factor on the speed that is tried to find an impossible speed; and the factor to which
+the impossible speed is then narrowed down."""
+
+
+def motion_test(task: Task) -> MotionTest | None:
+    """Return the test of a task for motions at any gamma; None if nothing can be proved.
+
+    Other constraints of a plan (cell, comfort, closure, rotation limits) only leave fewer motions.
+    """
+    asked = task.settings
+    if not task.robot.encloses or asked.tilt is not None or len(task.contour) > MOST_NODES:
+        return None
+    finish_compiling()
+    frames = task.setup.placement @ task.contour.frames(asked.frames)
+    return MotionTest(task.robot, frames, task.setup.tool, asked.postures)
+
+
+def at_any_gamma(broken: NoFeasiblePath, task: Task) -> NoFeasiblePath:
+    """Return the answer of a search without a path, with whether it is proved at every gamma."""
+    test = motion_test(task)
+    if test is None or task.settings.feed == "dip":
+        return broken
+    limits = task.problem.limits
+    closed = test.closed(limits, task.dt) or test.closed(limits, task.dt, broken.node + 1)
+    if closed is None:
+        return broken.with_message(f"{broken}; whether there is a motion off the grid is undecided")
+    return broken.with_message(f"{broken}; proved for every rotation: {closed}", closed=closed)
+
+
+def with_relaxation(broken: NoFeasiblePath, task: Task, quick: QuickMotion) -> NoFeasiblePath:
+    """Return an answer without a path, with the lower speed or higher limits that would suffice.
+
+    They are those of the quickest motion found, which is slower than asked for; the figures are
+    rounded so that they hold as printed.
+    """
+    limits = task.problem.limits
+    v, a = rates_of(quick.plan.increments, np.full(len(task.contour) - 1, task.dt))
+    shares = (
+        float((np.abs(rates) / limit.usable).max(initial=0.0))
+        for rates, limit in ((v, limits.velocity), (a, limits.acceleration))
+    )
+    fast, sharp = (float(at_least(max(1.0, share * (1 + LIMIT_MARGIN)))) for share in shares)
+    needed = Relaxation(speed=float(at_most(task.dt / quick.dt)), velocity=fast, acceleration=sharp)
+    limits_said = " and ".join(
+        f"{value:g} times the {what}"
+        for value, what in ((fast, "velocities"), (sharp, "accelerations"))
+        if value > 1
+    )
+    said = f"a motion was found at {needed.speed:g} of the speed, and at the speed asked for with "
+    return broken.with_message(f"{broken}; {said}{limits_said}", relaxation=needed)
+
+
+def impossible_share(task: Task, reached: float, nodes: Sequence[int]) -> float | None:
+    """Return an interval, as a share of `reached` s, that is too short for any motion at any gamma.
+
+    This is proved, and holds for every shorter interval, too; None if nothing is proved. `nodes`
+    are those where limits bind a motion with the interval `reached`, the most binding one first.
+    """
+    test = motion_test(task)
+    if test is None:
+        return None
+    limits = task.problem.limits
+
+    def impossible(times: float, around: int | None) -> bool:
+        """Return whether no motion is this many times as fast, tested around a node or at all."""
+        return test.closed(limits, reached / times, around) is not None
+
+    low, high = 1.0, 2.0
+    while not any(impossible(high, around) for around in (*nodes[:1], None)):
+        low, high = high, high * high
+        if high > FAR:
+            return None
+    for node in nodes:
+        # The part around another node may be closed at a lower speed, too.
+        least = low if node == nodes[0] else 1.0
+        if not impossible(high / CLOSE, node):
+            continue
+        high /= CLOSE
+        while high > CLOSE * least:
+            middle = sqrt(least * high)
+            if impossible(middle, node):
+                high = middle
+            else:
+                least = middle
+    return 1 / high
+
+
+def binding_nodes(motions: Sequence[QuickMotion]) -> list[int]:
+    """Return nodes where limits bind successively faster motions, that of the quickest first.
+
+    They are the binding node of each motion, and nodes where limits nearly bind the quickest one,
+    at most `Effort.binding_nodes`, not close to each other.
+    """
+    plan = motions[-1].plan
+    velocity = np.abs(plan.velocity_share).max(axis=1) / plan.settings.eta_v
+    acceleration = np.abs(plan.acceleration_share).max(axis=1) / plan.settings.eta_a
+    used = np.zeros(len(plan.q))
+    used[1:] = velocity
+    used[1:-1] = np.maximum(used[1:-1], np.sqrt(acceleration))
+    used[used < BINDS * used.max()] = 0.0
+    near = np.argsort(-used, kind="stable")[: np.count_nonzero(used)]
+    nodes: list[int] = []
+    for node in [*(motion.at.node for motion in reversed(motions)), *near.tolist()]:
+        if all(abs(node - other) > APART for other in nodes):
+            nodes.append(node)
+    return nodes[: current_effort().binding_nodes]
