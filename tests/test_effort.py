@@ -1,4 +1,4 @@
-"""The effort: changed for a while, and inherited by the processes of a sweep."""
+"""The effort: changed for a while, and taken over by the workers of a sweep."""
 
 import sweep_tasks
 from kerfpath import PlanOptions, sweep
@@ -25,3 +25,13 @@ def test_processes_of_a_sweep_inherit_the_effort(tmp_path):
     with changed_effort(binding_nodes=7):
         (found,) = sweep.run(sweep_tasks.binding_nodes, [{}], store=tmp_path / "s", processes=1)
     assert found.value == 7
+
+
+def test_workers_of_a_cluster_take_over_the_effort_of_each_sweep(workers, scheduler, tmp_path):
+    workers(1)
+    for nodes in (7, 9):
+        with changed_effort(binding_nodes=nodes):
+            (found,) = sweep.run(
+                sweep_tasks.binding_nodes, [{}], store=tmp_path / f"{nodes}", scheduler=scheduler
+            )
+        assert found.value == nodes

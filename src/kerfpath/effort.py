@@ -72,7 +72,7 @@ def current_effort() -> Effort:
 
 
 def set_effort(effort: Effort) -> None:
-    """Set the effort of this process and its threads; processes that a sweep starts inherit it."""
+    """Set the effort of this process and its threads; workers of a sweep take it over."""
     global _current
     _current = effort
 

@@ -18,6 +18,7 @@ import kerfpath
 import sweep_tasks
 from conftest import ROOT
 from kerfpath import sweep
+from kerfpath.effort import current_effort
 from kerfpath.errors import InputError
 from kerfpath.progress import stopped_by
 from kerfpath.sweep import store as store_module
@@ -408,12 +409,12 @@ def test_without_dask_a_scheduler_is_refused(tmp_path, monkeypatch):
 
 def test_a_worker_of_another_version_that_joins_later_does_nothing():
     with pytest.raises(InputError, match=r"a worker has kerfpath .*, this sweep needs 0\.0\.9"):
-        attempt("0.0.9", b"", Task("key", "{}"))
+        attempt("0.0.9", b"", current_effort(), Task("key", "{}"))
 
 
 def test_a_worker_that_cannot_import_the_function_is_told():
     with pytest.raises(InputError, match="cannot import the function of the sweep"):
-        attempt(kerfpath.__version__, b"cnowhere\nsquare\n.", Task("key", "{}"))
+        attempt(kerfpath.__version__, b"cnowhere\nsquare\n.", current_effort(), Task("key", "{}"))
 
 
 def test_a_wait_for_tasks_is_left_at_once_and_their_processes_end(tmp_path):

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 from kerfpath import __version__
 from kerfpath.arrays import short_repr
+from kerfpath.effort import Effort, set_effort
 from kerfpath.errors import InputError
 
 SCHEMA = 1
@@ -114,8 +115,8 @@ def task_of(function: Callable[..., Any], parameters: Mapping[str, Any], where: 
     return Task(hashlib.sha256(whole.encode()).hexdigest(), text)
 
 
-def attempt(version: str, function: bytes, task: Task) -> TaskOutcome:
-    """Call a pickled function in a worker; an exception becomes part of the outcome.
+def attempt(version: str, function: bytes, effort: Effort, task: Task) -> TaskOutcome:
+    """Call a pickled function in a worker, with an effort; an exception becomes the outcome.
 
     Raises
     ------
@@ -129,6 +130,7 @@ def attempt(version: str, function: bytes, task: Task) -> TaskOutcome:
         call = pickle.loads(function)
     except (ImportError, AttributeError) as error:
         raise UnfitWorker(f"a worker cannot import the function of the sweep: {error}") from error
+    set_effort(effort)
     value, failure = None, None
     begun = perf_counter()
     try:

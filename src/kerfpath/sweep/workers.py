@@ -17,7 +17,7 @@ from threading import Thread
 from typing import Any
 
 from kerfpath import __version__
-from kerfpath.effort import Effort, current_effort, set_effort
+from kerfpath.effort import current_effort
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
 from kerfpath.progress import may_stop
@@ -75,7 +75,7 @@ def _run_pool(
             processes,
             mp_context=context,
             initializer=_set_up,
-            initargs=(theirs, call, current_effort()),
+            initargs=(theirs, call),
         )
     flying: dict[Future[TaskOutcome], Task] = {}
     broken = False
@@ -84,7 +84,9 @@ def _run_pool(
             while waiting and not broken and len(flying) < ahead:
                 try:
                     with _starting():
-                        future = pool.submit(attempt, __version__, call, waiting[0])
+                        future = pool.submit(
+                            attempt, __version__, call, current_effort(), waiting[0]
+                        )
                 except BrokenProcessPool:
                     broken = True
                 else:
@@ -150,14 +152,13 @@ def _interrupt_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _set_up(link: Connection, call: bytes, effort: Effort) -> None:
+def _set_up(link: Connection, call: bytes) -> None:
     """Set up a process: use one thread, ignore Ctrl-C, and end as soon as the sweep ends.
 
     The function is imported here instead of in the first task.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ.update(ONE_THREAD)
-    set_effort(effort)
     Thread(target=_leave_with, args=(link,), daemon=True).start()
     with suppress(OSError):  # the sweep may have been killed meanwhile
         link.send(None)
@@ -244,14 +245,17 @@ def _check(client: Any, address: str) -> None:
 def _gather(
     distributed: Any, client: Any, function: Callable[..., Any], waiting: deque[Task]
 ) -> Iterator[list[TaskOutcome]]:
-    call = distributed.protocol.pickle.dumps(function)
+    call, effort = distributed.protocol.pickle.dumps(function), current_effort()
     coming = distributed.as_completed(loop=client.loop)
 
     def hand_out() -> None:
         count = min(len(waiting), AHEAD_CLUSTER - coming.count())
         tasks = [waiting.popleft() for _ in range(count)]
         coming.update(
-            [client.submit(attempt, __version__, call, t, key=f"{GROUP}{t.key}") for t in tasks]
+            [
+                client.submit(attempt, __version__, call, effort, t, key=f"{GROUP}{t.key}")
+                for t in tasks
+            ]
         )
 
     while True:
