@@ -29,7 +29,7 @@ from kerfpath.auditor.between import margins
 from kerfpath.cell import CollisionChecker, box_between, cell_of
 from kerfpath.comfort import MEASURES, jacobian, measure, measures
 from kerfpath.job import read_plan_file
-from kerfpath.job.plan_file.writing import plan_document, plan_entry, plan_text
+from kerfpath.job.plan_file import plan_document, plan_entry, plan_text
 from kerfpath.planner import layered_graph
 from kerfpath.robots import Robot
 from kerfpath.tilt import Tilt

@@ -24,7 +24,7 @@ from kerfpath import (
 from kerfpath.auditor import checks
 from kerfpath.graph import gamma_grid
 from kerfpath.job import read_plan_file
-from kerfpath.job.plan_file.writing import plan_document, plan_entry, plan_text
+from kerfpath.job.plan_file import plan_document, plan_entry, plan_text
 from kerfpath.planner import layered_graph
 from kerfpath.planner.collision_free import _gamma_neighbours
 from kerfpath.post import build_program, post

@@ -16,7 +16,7 @@ from kerfpath.certifier import certify
 from kerfpath.comfort import Band, Comfort, measure, measures
 from kerfpath.graph import external_grid, gamma_grid
 from kerfpath.job import read_plan_file
-from kerfpath.job.plan_file.writing import plan_document, plan_entry, plan_text
+from kerfpath.job.plan_file import plan_document, plan_entry, plan_text
 from kerfpath.planner import layered_graph
 from kerfpath.post import build_program
 from kerfpath.robots import Robot

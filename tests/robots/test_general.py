@@ -14,7 +14,7 @@ from kerfpath import Contour, InputError, Robot, audit, plan
 from kerfpath.auditor import chain_of, checks
 from kerfpath.graph import build, gamma_grid
 from kerfpath.job import read_plan_file
-from kerfpath.job.plan_file.writing import plan_document, plan_entry, plan_text
+from kerfpath.job.plan_file import plan_document, plan_entry, plan_text
 from kerfpath.robots import general, ssik_interface
 from kerfpath.urdf import KinematicChain
 

@@ -7,7 +7,7 @@ from conftest import pose
 from kerfpath import Contour, InputError
 from kerfpath.auditor import transfer_checks
 from kerfpath.cell import box, cell_of
-from kerfpath.job.plan_file.schema import read_moves, sequence_entry
+from kerfpath.job.plan_file import read_moves, sequence_entry
 from kerfpath.sequence import plan_part
 from kerfpath.transfer import back_off, least_time, transfer_move
 

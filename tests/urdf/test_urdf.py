@@ -13,7 +13,7 @@ from tests.robots.test_robot import joint_frames
 from kerfpath import InputError, Robot, audit, plan, robot
 from kerfpath.auditor import chain_of, checks
 from kerfpath.job import read_plan_file
-from kerfpath.job.plan_file.writing import plan_document, plan_entry, plan_text
+from kerfpath.job.plan_file import plan_document, plan_entry, plan_text
 from kerfpath.robots import robot_ids
 from kerfpath.urdf import read_urdf
 

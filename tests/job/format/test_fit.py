@@ -11,8 +11,8 @@ import pytest
 from commands import assert_refused, run
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job import plan_file_text, program_from_file, read_job, read_plan_file, run_job
-from kerfpath.job.programs.audit import audit_program
-from kerfpath.job.programs.reading import language_of
+from kerfpath.job.audit import audit_program
+from kerfpath.job.program_file import language_of
 from kerfpath.post import MANIFEST, groups_of, read_program, write_files
 from kerfpath.post import language as find_language
 from kerfpath.post.languages import SHIPPED

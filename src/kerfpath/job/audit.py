@@ -1,4 +1,4 @@
-"""Audit a plan.json against its job, or by itself if no job is given."""
+"""Audit a plan.json or a program against its job."""
 
 from __future__ import annotations
 
@@ -15,11 +15,21 @@ from pydantic import ValidationError
 from scipy.spatial import cKDTree
 
 from kerfpath import __version__
-from kerfpath.arrays import Array, Ints, short_repr
-from kerfpath.auditor import BOUND, Check, chain_of, retract_checks, transfer_checks, worst_of
-from kerfpath.contour import Contour
+from kerfpath.arrays import Array, short_repr
+from kerfpath.auditor import (
+    BOUND,
+    MOST_ROUNDED,
+    Check,
+    Rounding,
+    rounding_of,
+    transfer_checks,
+    worst_of,
+)
+from kerfpath.cell import Cell
+from kerfpath.contour import KINDS, Contour
 from kerfpath.errors import InputError
-from kerfpath.job.as_run import as_run
+from kerfpath.execution import from_stop_to_stop, run_along
+from kerfpath.job.as_run import as_run, checks_of_unknown, run_judged
 from kerfpath.job.audit_report import (
     AuditReport,
     check,
@@ -28,337 +38,59 @@ from kerfpath.job.audit_report import (
     count,
     count_at,
 )
+from kerfpath.job.expected import (
+    SAME_VALUE,
+    ExpectedPlan,
+    TargetNodes,
+    check_pins,
+    expect_plans,
+    expect_program,
+    nodes_at_targets,
+    recompute,
+)
 from kerfpath.job.format import (
     AuditTable,
     Candidate,
     Job,
     JobFile,
     PreparedJob,
-    divide_nodes,
     prepare,
     read_job,
     tolerances_of,
 )
-from kerfpath.job.plan_file.layout import NodesData, PlanData
-from kerfpath.job.plan_file.reading import PlanFile, read_plan_file, table_of
-from kerfpath.job.plan_file.writing import plan_document, plan_entry
-from kerfpath.options import EXACT_OR_BETTER, PlanOptions
-from kerfpath.plans import Plan, path_cost
-from kerfpath.retime import feed, retime
-from kerfpath.robots import Robot
+from kerfpath.job.laser_and_gas import SAME_TIME, BeamProcess, check_laser_and_gas
+from kerfpath.job.plan_file import (
+    NodesData,
+    PlanData,
+    PlanFile,
+    plan_document,
+    plan_entry,
+    read_plan_file,
+    table_of,
+)
+from kerfpath.job.program_file import (
+    ReadCut,
+    add_tips,
+    divide_arcs,
+    language_of,
+    program_on_disk,
+    read_cuts,
+)
+from kerfpath.options import EXACT_OR_BETTER
+from kerfpath.plans import Plan, Proof
+from kerfpath.post import (
+    CircularMove,
+    Controller,
+    Language,
+    LanguageSettings,
+    LinearMove,
+    ReadProgram,
+    Rules,
+    differences,
+)
 from kerfpath.sequence import Order, PartPlan
-from kerfpath.tolerances import SAME_PLACE
 from kerfpath.transfer import End, TransferMove, back_off, least_time
-
-# -----------------------------------------------------------------------------
-# Compute what follows from the joints of a plan: gamma, tilt, posture, turns, and cost.
-
-SAME_VALUE = 1e-7
-"""Tolerance, relative or absolute below 1 (m, rad, s); two machines agree far better."""
-SAME_POSTURE = 1e-5
-"""Error of an inverse near a singularity, rad; postures are much farther apart."""
-NO_TILT = 1e-9
-"""Tilt, rad, below which it is attributed to rounding."""
-
-
-def recompute(plan: Plan) -> Plan:
-    """Return the plan with everything that its joints, contour and settings decide.
-
-    Values of the plan that agree are kept to the last digit: an angle near pi may be written as one
-    near -pi, and at a singularity several postures fit the joints.
-    """
-    tilt, gamma = _rotation(plan)
-    made = replace(
-        plan,
-        tilt=tilt,
-        gamma=gamma,
-        posture=_posture(plan.robot, plan.q, plan.posture),
-        turn=_turn(plan.robot, plan.q, plan.turn),
-    )
-    return replace(made, cost=_cost(made))
-
-
-def _rotation(plan: Plan) -> tuple[Array, Array]:
-    """Return lead and lean (K, 2) and gamma (K,) of the joints, by the audit's kinematics."""
-    tip = chain_of(plan.robot).forward(plan.q) @ plan.T_flange_tip
-    tilt = np.zeros((len(plan.q), 2))
-    if plan.settings.tilt is not None:
-        along = plan.contour.along @ plan.T_base_part[:3, :3].T
-        nominal = plan.contour.axes @ plan.T_base_part[:3, :3].T
-        cross = np.cross(nominal, tip[:, :3, 2])
-        sine = np.linalg.norm(cross, axis=1)
-        angle = np.arctan2(sine, (nominal * tip[:, :3, 2]).sum(axis=1))
-        turn = cross * (angle / np.maximum(sine, 1e-300))[:, None]
-        tilt[:, 0] = (turn * np.cross(nominal, along)).sum(axis=1)
-        tilt[:, 1] = (turn * along).sum(axis=1)
-        tilt[np.abs(tilt) < NO_TILT] = 0.0
-    if not plan.robot.family.free_rotation:
-        return tilt, np.zeros(len(plan.q))
-    frames = replace(plan, tilt=tilt).frames
-    x = tip[:, :3, 0]
-    gamma = np.arctan2((x * frames[:, :3, 1]).sum(axis=1), (x * frames[:, :3, 0]).sum(axis=1))
-    off = np.remainder(plan.gamma - gamma + np.pi, 2 * np.pi) - np.pi
-    agrees = (np.abs(off) <= SAME_VALUE) & (np.abs(plan.gamma) <= np.pi + SAME_VALUE)
-    return tilt, np.where(agrees, plan.gamma, gamma)
-
-
-def _posture(robot: Robot, q: Array, said: Ints) -> Ints:
-    """Return the postures (K,) of joints q (K, n); those `said` where they fit, too.
-
-    At a singularity, where no posture gives the joints back, any may be right.
-    """
-    arm = robot.alone()
-    q = np.ascontiguousarray(q[:, : arm.joints])
-    solved, reach = arm.inverse_all(np.ascontiguousarray(arm.forward(q)), arm.given_of(q))
-    off = np.abs(np.remainder(solved - q[:, None] + np.pi, 2 * np.pi) - np.pi)
-    fits = reach & (np.where(reach[..., None], off, np.inf).max(axis=2) < SAME_POSTURE)
-    row = np.arange(len(q))
-    known = (said >= 0) & (said < arm.postures)
-    kept = known & (fits[row, np.where(known, said, 0)] | ~fits.any(axis=1))
-    return np.where(kept, said, np.argmax(fits, axis=1))
-
-
-def _turn(robot: Robot, q: Array, said: Ints) -> Ints:
-    """Return the turns (K, n) from (-pi, pi] to joints q (K, n); free joints have none."""
-    turn = np.ceil((q - np.pi) / (2 * np.pi)).astype(np.int64)
-    kept = np.abs(q - 2 * np.pi * said) <= np.pi + SAME_VALUE
-    turn = np.where(kept, said, turn)
-    turn[:, robot.free] = 0
-    return turn
-
-
-def _cost(plan: Plan) -> float:
-    """Return the objective of a plan; the penalty of clearance is the plan's, within its bounds."""
-    s = plan.settings
-    cost = path_cost(plan.increments, s.weights, s.metric, s.objective, plan.node_cost)
-    band = None if s.comfort is None else s.comfort.clearance
-    if band is not None and band.cost:
-        most = band.cost * (len(plan.q) if s.objective == "sum" else 1)
-        if cost * (1 - SAME_VALUE) <= plan.cost <= cost + most:
-            return plan.cost
-    return cost
-
-
-# -----------------------------------------------------------------------------
-# The plans that a plan.json should have: its joints, with all else from the job.
-
-RETIMED = 1e-3
-"""Share of an interval by which times of a reduced feed may differ: they are a local optimum."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ExpectedPlan:
-    """The plan that is expected for one contour, or piece, of a plan.json.
-
-    Parameters
-    ----------
-    name : str
-        Name of the plan in the file.
-    number : int
-        Number of its contour in the job, from 0; -1 for none.
-    plan : Plan or None
-        The joints of the file with all else from the job; None if the two do not fit.
-    path : Contour or None
-        The path that its nodes were sampled from.
-    checks : tuple of Check
-        Whether contour, nodes and joints fit the job.
-    drawing : tuple of Check
-        Checks of rounded corners against the drawing; the file has a record of them.
-    """
-
-    name: str
-    number: int
-    plan: Plan | None = None
-    path: Contour | None = None
-    checks: tuple[Check, ...] = ()
-    drawing: tuple[Check, ...] = ()
-
-
-def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[ExpectedPlan], list[Check]]:
-    """Return the expected plan for each plan of a file, and the checks of its contours."""
-    names = prepared.names
-    members = [[p for p in file.plans if file.contours[p.name] == name] for name in names]
-    found: dict[str, ExpectedPlan] = {}
-    for number, plans in enumerate(members):
-        for each in _of_contour(prepared, number, plans, file.picked):
-            found[each.name] = each
-    foreign = [p.name for p in file.plans if p.name not in found]
-    for name in foreign:
-        row = count("contour", "contours that the job does not ask for", 1)
-        found[name] = ExpectedPlan(name=name, number=-1, checks=(row,))
-    missing = [
-        name
-        for name, plans in zip(names, members, strict=True)
-        if not plans and name not in file.missing
-    ]
-    which = f": {', '.join(missing)}" if missing else ""
-    rows = [
-        count("contours", f"contours of the job that the plan lacks{which}", len(missing)),
-        count("contour", "contours that the job does not ask for", len(foreign)),
-    ]
-    return [found[p.name] for p in file.plans], rows
-
-
-def _of_contour(
-    prepared: PreparedJob, number: int, plans: Sequence[Plan], picked: frozenset[str]
-) -> list[ExpectedPlan]:
-    """Return the expected plans of one contour: a single one, or its pieces."""
-    if not plans:
-        return []
-    name, job = prepared.names[number], prepared.job
-    if len(plans) == 1 and plans[0].name == name:
-        (made,) = plans
-        candidate = _nearest(prepared.contours[number].candidates, made, job.options.refine_parts)
-        if candidate is None:
-            counts = sorted({len(c.nodes) for c in prepared.contours[number].candidates})
-            row = _node_count(made, " or ".join(map(str, counts)))
-            return [ExpectedPlan(name=name, number=number, checks=(row,))]
-        own, parts = _divided(candidate, made, job.options.refine_parts)
-        shown = made.name in picked
-        return [_expected(prepared, number, made, own, candidate.dt, parts, picked=shown)]
-    words = [f"{name}, piece {k + 1} of {len(plans)}" for k in range(len(plans))]
-    by_name = {p.name: p for p in plans}
-    if len(plans) == 1 or job.options.interruptions == "none" or set(by_name) != set(words):
-        row = count("once", "plans of a contour that is cut once", len(plans))
-        return [ExpectedPlan(name=p.name, number=number, checks=(row,)) for p in plans]
-    return _pieces(prepared, number, [by_name[word] for word in words])
-
-
-def _pieces(prepared: PreparedJob, number: int, plans: Sequence[Plan]) -> list[ExpectedPlan]:
-    """Return the expected plans of the pieces of a contour, in the order along it."""
-    job = prepared.job
-
-    def off(candidate: Candidate) -> float:
-        ends = [candidate.path.at(p.contour.s[[0, -1]])[0] for p in plans]
-        return max(
-            float(np.linalg.norm(p.contour.points[[0, -1]] - end, axis=1).max())
-            for p, end in zip(plans, ends, strict=True)
-        )
-
-    candidate = min(prepared.contours[number].candidates, key=off)
-    whole, found, at = candidate.nodes, [], 0
-    for p in plans:
-        last = int(np.argmin(np.abs(whole.s - p.contour.s[-1])))
-        last = len(whole) - 1 if p is plans[-1] else min(max(last, at + 1), len(whole) - 1)
-        if at >= last:
-            row = count("pieces", "pieces that do not begin where the piece before them ends", 1)
-            found.append(ExpectedPlan(name=p.name, number=number, checks=(row,)))
-            continue
-        part = replace(whole.part(at, last, job.options.frames), name=p.name)
-        path = candidate.path.between(float(whole.s[at]), float(whole.s[last]))
-        own, parts = _divided(Candidate(path=path, nodes=part), p, job.options.refine_parts)
-        found.append(_expected(prepared, number, p, own, candidate.dt, parts, picked=False))
-        at = last
-    return found
-
-
-def _nearest(candidates: Sequence[Candidate], made: Plan, parts: int) -> Candidate | None:
-    """Return the candidate with as many nodes as a plan, or so divided, that is nearest to it."""
-    K = len(made.contour)
-
-    def off(candidate: Candidate) -> float:
-        every = (K - 1) // (len(candidate.nodes) - 1)
-        return float(np.abs(made.contour.points[::every] - candidate.nodes.points).max())
-
-    fitting = [c for c in candidates if K in (len(c.nodes), (len(c.nodes) - 1) * parts + 1)]
-    return min(fitting, key=off, default=None)
-
-
-def _divided(candidate: Candidate, made: Plan, parts: int) -> tuple[Candidate, int]:
-    """Return the candidate with its intervals divided as those of the plan, and into how many."""
-    if parts == 1 or len(made.contour) != (len(candidate.nodes) - 1) * parts + 1:
-        return candidate, 1
-    return replace(candidate, nodes=divide_nodes(candidate.path, candidate.nodes, parts)), parts
-
-
-def _expected(
-    prepared: PreparedJob, number: int, made: Plan, own: Candidate, dt: float, parts: int,
-    *, picked: bool,
-) -> ExpectedPlan:  # fmt: skip
-    """Return the plan that has the joints of a plan and all else of the job.
-
-    Its nodes are those of its `own` candidate, which may be a piece, or divide each interval of
-    `dt` (s) into `parts`.
-    """
-    job, nodes = prepared.job, own.nodes
-    if len(nodes) != len(made.contour):
-        row = _node_count(made, str(len(nodes)))
-        return ExpectedPlan(name=made.name, number=number, checks=(row,))
-    if made.q.shape[1] != job.robot.joints:
-        row = count("joints", f"joints, where the robot has {job.robot.joints}", made.q.shape[1])
-        return ExpectedPlan(name=made.name, number=number, checks=(row,))
-    far = np.linalg.norm(made.contour.points - nodes.points, axis=1)
-    worst = int(np.argmax(far))
-    title = "distance of the nodes from those of the job"
-    place = check("place", title, far[worst], SAME_PLACE, "m", worst)
-    plan = replace(
-        made,
-        contour=replace(nodes, time=None),
-        robot=job.robot,
-        T_flange_tip=job.tool,
-        T_base_part=job.placement,
-        time=dt / parts * np.arange(len(nodes), dtype=float),
-        settings=_options(prepared, number, dt, made.settings, picked=picked),
-        feed=None,
-    )
-    if job.options.feed == "dip" and made.feed is not None and not picked:
-        plan = _dipping(plan, dt, made.time)
-    plan = recompute(plan)
-    requested = job.options.retract
-    room = retract_checks(plan, None if requested == made.settings.retract else requested)
-    rows = (place, *_postures(job, plan), *room)
-    drawing = prepared.contours[number].drawing_checks(own, plan.contour, job.tolerances.path)
-    return ExpectedPlan(
-        name=made.name, number=number, plan=plan, path=own.path, checks=rows, drawing=(*drawing,)
-    )
-
-
-def _options(
-    prepared: PreparedJob, number: int, dt: float, said: PlanOptions, *, picked: bool
-) -> PlanOptions:
-    """Return the plan options of the job; a picked plan may have lower shares of the limits."""
-    job, task = prepared.job, prepared.contours[number].task
-    # [program] may have been edited since: the current retract is checked separately.
-    options = replace(task.asked(job.options).resolve(job.robot, dt), retract=said.retract)
-    if not picked:
-        return options
-    return replace(
-        options,
-        objective=said.objective,
-        metric=said.metric,
-        weights=said.weights,
-        eta_v=min(options.eta_v, said.eta_v),
-        eta_a=min(options.eta_a, said.eta_a),
-        method="continuous" if said.method == "continuous" else "exact",
-        feed="constant",
-        refine=said.refine,
-    )
-
-
-def _dipping(plan: Plan, dt: float, said: Array) -> Plan:
-    """Return the plan in the least time within its limits; with the given times if they agree."""
-    limits = plan.settings.limits(plan.robot)
-    tau = retime(plan.increments, dt, limits)
-    time, found = np.concatenate([[0.0], np.cumsum(tau)]), np.diff(said)
-    if said[0] == 0 and (np.abs(found - tau) <= RETIMED * tau).all():
-        time, tau = said, found
-    dips = feed(tau, dt, plan.increments, limits, np.diff(plan.contour.s))
-    return replace(plan, time=time, feed=dips)
-
-
-def _postures(job: Job, made: Plan) -> list[Check]:
-    allowed = job.options.postures
-    if allowed is None:
-        return []
-    other = np.flatnonzero(~np.isin(made.posture, list(allowed)))
-    node = int(other[0]) if other.size else 0
-    return [count("posture", "nodes in a posture that the job does not allow", len(other), node)]
-
-
-def _node_count(made: Plan, expected: str) -> Check:
-    said = f"wrong number of nodes: expected {expected}, found {len(made.contour)}"
-    return count("nodes", said, 1)
-
+from kerfpath.windows import GammaWindow
 
 # -----------------------------------------------------------------------------
 # Check the order of cutting against the job.
@@ -723,6 +455,240 @@ def _shown(value: Any) -> str:
 
 
 # -----------------------------------------------------------------------------
+# Check the joint limits of a program as a controller runs its text, with rounded corners.
+
+SOME_ZONE = 1.0
+"""Zone, m, for a text that gives no length; any value except zero."""
+SHORTEST = 1e-9
+"""Least duration of a move, s."""
+
+
+def check_run(
+    job: Job, cut: ReadCut, made: Plan, path: Contour, digits: Rounding, chosen: Language,
+    settings: LanguageSettings,
+) -> list[Check]:  # fmt: skip
+    """Return the checks of a cut's motion along a path, by its own zones and speeds.
+
+    The checks allow for the digits of the text, which over short intervals add accelerations.
+    """
+    if not chosen.zones:
+        return [*checks_of_unknown(job, f"{chosen.name} has no zones")]
+    controller = chosen.controller(settings)
+    if any(move.zone is None for move in cut.targets) and not controller.rounds_by_itself:
+        return [*checks_of_unknown(job, f"the zones of {chosen.name} here are not lengths")]
+    runs = [
+        run_along(
+            part, job.robot, T_base_part=job.placement, T_flange_tip=job.tool,
+            controller=controller,
+        )
+        for part in from_stop_to_stop(_moves(cut, controller))
+    ]  # fmt: skip
+    if not runs:
+        return [*checks_of_unknown(job, "the robot stops at every node")]
+    run = max(runs, key=lambda each: each.most)
+    dq, dt = np.diff(made.q, axis=0), np.diff(made.time)
+    velocity, acceleration = job.robot.speed_limits()
+    allowed = (
+        (digits.of_velocity(dq, dt) / velocity).max(),
+        (digits.of_acceleration(dq, dt) / acceleration).max(initial=0.0),
+    )
+    fast, sharp, *others = run_judged(job, run, made, path).checks
+    more = [min(float(each), MOST_ROUNDED) for each in allowed]
+    return [
+        replace(fast, limit=fast.limit + more[0]),
+        replace(sharp, limit=sharp.limit + more[1]),
+        *others,
+    ]
+
+
+def _moves(cut: ReadCut, controller: Controller) -> list[LinearMove]:
+    """Return the moves of a cut as in its text; of the first one only the end matters.
+
+    If the text gives no length for a zone, it is that of the controller.
+    """
+    found: list[LinearMove] = []
+    before = int(cut.ends[0])
+    for move, node in zip(cut.targets, cut.ends, strict=True):
+        T, q = cut.T_part_tip[node], cut.q[node]
+        took = max(float(cut.took[before:node].sum()), SHORTEST)
+        way = np.diff(cut.T_part_tip[before : node + 1, :3, 3], axis=0)
+        speed = move.speed or float(np.linalg.norm(way, axis=1).sum()) / took
+        zone = controller.zone(SOME_ZONE, speed) if move.zone is None else move.zone
+        if move.T_part_via is None:
+            made = LinearMove(T_part_tip=T, q=q, speed=speed, duration=took, zone=zone)
+        else:
+            made = CircularMove(
+                T_part_tip=T, q=q, speed=speed, duration=took, zone=zone,
+                T_part_via=move.T_part_via, q_via=q,
+            )  # fmt: skip
+        found.append(made)
+        before = int(node)
+    return found
+
+
+# -----------------------------------------------------------------------------
+# The checks of one cut of a program: its path, motion, speeds, nodes and posture.
+
+SAME_SPEED = 0.02
+"""Share by which a speed may differ from that of the job, beyond its digits."""
+CLIMB = 0.05
+"""Weight of distances along the path against those from it, in the search for a place on it."""
+
+
+def check_cut(
+    job: Job, candidate: Candidate, cut: ReadCut, cell: Cell | None, chosen: Language,
+    settings: LanguageSettings,
+) -> tuple[list[Check], tuple[TargetNodes, Plan] | None]:  # fmt: skip
+    """Return the checks of a cut, and its nodes and plan if it can be compared with the job."""
+    unreached = np.flatnonzero(np.isnan(cut.q).any(axis=1))
+    if unreached.size:
+        said = "targets out of the robot's reach in the posture of the start"
+        return [count("reach", said, unreached.size, int(unreached[0]))], None
+    reference = candidate.path
+    s, ends = _along(cut, reference)
+    rows = [check("ends", "distance of the ends from those of the contour", ends.max(), 1e-4, "m")]
+    if (np.diff(s) <= 0).any():
+        node = int(np.flatnonzero(np.diff(s) <= 0)[0])
+        said = "stretches that go back along the contour"
+        return [*rows, count("order", said, (np.diff(s) <= 0).sum(), node)], None
+    took = np.where(np.isnan(cut.speed), cut.took, np.diff(s) / cut.speed)
+    made = _plan(job, candidate.nodes.name, cut, s, np.append(0.0, np.cumsum(took)))
+    allowed, tilt = job.tolerances, job.options.tilt
+    if tilt is not None:
+        allowed = replace(allowed, axis=allowed.axis + tilt.cone)
+    rules = chosen.rules(settings)
+    digits = _rounding(cut, made, rules)
+    rows += allowed.checks(made, reference=reference, cell=cell, rounding=digits)
+    rows += _process_checks(job, candidate, cut, made, digits.time, ahead=chosen.ahead)
+    rows += _postures(job, cut, chosen, settings, digits.q)
+    rows += check_run(job, cut, made, reference, digits, chosen, settings)
+    found = nodes_at_targets(job, candidate, cut, s)
+    off, alone = int(np.argmax(found.off)), int(np.argmax(found.alone))
+    said = "distance of the targets from the nodes of the job"
+    rows.append(check("nodes", said, found.off[off], allowed.path, "m", int(cut.ends[off])))
+    said = "targets that skip a node of the job, or are not at a new one"
+    rows.append(count("every-node", said, found.alone.sum(), int(cut.ends[alone])))
+    return rows, (found, made) if found.complete else None
+
+
+def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
+    """Return arc lengths (K,) m of the nodes on the contour, and distances (2,) m of its ends.
+
+    If the contour passes the same place twice, the share of the length decides.
+    """
+    points = cut.T_part_tip[:, :3, 3]
+    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    guess = reference.s[0] + way / way[-1] * reference.length
+    # A drawn line with few corners needs samples as close as the nodes of the cut.
+    fine = np.linspace(reference.s[0], reference.s[-1], 8 * max(len(reference), len(points)))
+    at = np.unique(np.concatenate([reference.s, fine]))
+    tree = cKDTree(np.c_[reference.at(at)[0], CLIMB * at])
+    near = np.asarray(tree.query(np.c_[points, CLIMB * guess])[1])
+    s = at[near]
+    for _ in range(3):  # on the chords beside the nearest sample
+        before, after = (
+            reference.at(np.maximum(s - 1e-5, at[0]))[0],
+            reference.at(np.minimum(s + 1e-5, at[-1]))[0],
+        )
+        chord = after - before
+        step = ((points - reference.at(s)[0]) * chord).sum(axis=1) / np.maximum(
+            np.linalg.norm(chord, axis=1), 1e-12
+        )
+        s = np.clip(s + step, at[0], at[-1])
+    ends = np.linalg.norm(points[[0, -1]] - reference.points[[0, -1]], axis=1)
+    s[0], s[-1] = reference.s[0], reference.s[-1]
+    return s, ends
+
+
+def _plan(job: Job, name: str, cut: ReadCut, s: Array, time: Array) -> Plan:
+    """Return the cut in the text as a plan, so that it can be audited as one."""
+    K = len(cut.q)
+    return Plan(
+        contour=Contour(cut.T_part_tip[:, :3, 3], cut.T_part_tip[:, :3, 2], s=s, name=name),
+        robot=job.robot,
+        T_flange_tip=job.tool,
+        T_base_part=job.placement,
+        q=cut.q,
+        gamma=np.zeros(K),
+        posture=np.zeros(K, dtype=np.int64),
+        turn=np.zeros(cut.q.shape, dtype=np.int64),
+        time=time,
+        settings=replace(job.options, tilt=None, closure="free"),
+        cost=0.0,
+        proof=Proof(optimal=False, statement="read from a program"),
+        counts={},
+    )
+
+
+def _rounding(cut: ReadCut, made: Plan, rules: Rules) -> Rounding:
+    """Return the rounding of joints and times of a cut by the digits of a language."""
+    jointed = all(move.T_part_tip is None for move in cut.moves)
+    time = np.where(np.isnan(cut.speed), 0.0, rules.speed_step / 2 / cut.speed)
+    return rounding_of(made, rules.point_step, rules.angle_step, time, jointed=jointed)
+
+
+def _process_checks(
+    job: Job, candidate: Candidate, cut: ReadCut, made: Plan, digits: Array, *, ahead: bool
+) -> list[Check]:
+    """Compare speeds, switches and waits with those of the job.
+
+    If the language cannot switch `ahead` of a target, it must switch at the target.
+    """
+    s, nodes, path = made.contour.s, candidate.nodes, candidate.path
+    middle = (s[1:] + s[:-1]) / 2
+    when = candidate.dt * np.arange(len(nodes))
+    k = np.clip(np.searchsorted(path.s, middle, side="right") - 1, 0, len(path) - 1)
+    wrong = (path.kind[k] != KINDS.index("micro joint")) != cut.laser
+    excess = np.diff(np.interp(s, nodes.s, when)) / np.diff(made.time) - 1
+    if job.options.feed == "constant":
+        excess = np.abs(excess)
+    fast = int(np.argmax(excess - digits))
+    most = SAME_SPEED + digits[fast]
+    node = int(np.argmax(wrong)) if wrong.any() else 0
+    lead = np.abs(cut.lead_times - (job.program.lead_time if ahead else 0.0))
+    wait = abs(float(cut.waits.sum()) - job.program.pierce_time)
+    lengths = np.diff(s)[wrong].sum()
+    return [
+        check("speed", "difference of the speed from the job's", excess[fast], most, "share", fast),
+        check("laser", "length with the laser wrongly on or off", lengths, 1e-6, "m", node),
+        count("laser-off", "laser left on at the end", cut.left_on, len(s) - 1),
+        check(
+            "lead-time",
+            "difference of the laser's lead time from the job's",
+            lead.max(initial=0),
+            SAME_TIME,
+            "s",
+        ),
+        check("pierce", "difference of the wait at the start from the job's", wait, SAME_TIME, "s"),
+    ]
+
+
+def _postures(
+    job: Job, cut: ReadCut, chosen: Language, settings: LanguageSettings, left: Array
+) -> list[Check]:
+    """Count the targets whose words for posture and turn do not fit the joints there.
+
+    Digits leave joints uncertain by `left` (K, n) rad: that near to a change of a word, both words
+    are right.
+    """
+    moves, q = (*cut.moves, cut.group.path[-1]), np.vstack([cut.q, cut.q_out])
+    left = np.vstack([left, left[-1:]])
+    worded = [k for k in (*cut.ends.tolist(), len(cut.moves)) if moves[k].posture]
+    if not worded or chosen.posture is None:
+        return []
+    ways = [q[worded] + sign * left[worded] for sign in (0, -1, 1)]
+    expected = zip(*(chosen.posture(job.robot, way, settings) for way in ways), strict=True)
+    wrong = [
+        k
+        for k, words in zip(worded, expected, strict=True)
+        if len(moves[k].posture) != len(words[0])
+        or any(said not in right for said, *right in zip(moves[k].posture, *words, strict=True))
+    ]
+    said = "targets whose posture or turn differs from the motion"
+    return [count("posture", said, len(wrong), wrong[0] if wrong else 0)]
+
+
+# -----------------------------------------------------------------------------
 # Audit a plan.json against its job, or by itself if no job is given.
 
 JOB, FILE = "those of the job and the joints", "those of the joints"
@@ -917,3 +883,239 @@ def _by_itself(file: PlanFile) -> AuditReport:
     )
     note = f"{note} {collisions} {_list_claims(file, tables)}".strip()
     return AuditReport(tables=tables, missing=file.missing, note=note)
+
+
+# -----------------------------------------------------------------------------
+# Audit a program on disk: compare the motion that its text means with the job.
+
+NEAR = 5e-3
+"""Median distance (m) from a contour of the job beyond which a cut is not of that contour."""
+SAME_FRAME = 1e-6
+"""Tolerance (m, sine) of tool and part against those of the job."""
+FOLLOWED = ("postures",)
+"""Codes of differences that follow from the path that was read, and are checked with it."""
+WHAT = {
+    "added": "moves",
+    "removed": "moves",
+    "targets": "targets beside the cut",
+    "joints": "joint targets",
+    "external": "external axes",
+    "times": "times of moves",
+    "zones": "corners and stops",
+    "switches": "laser and gas",
+    "kinds": "kinds of moves",
+}
+"""What differs, by the code of the difference."""
+
+
+def audit_program(path: Path, job_file: Path) -> AuditReport:
+    """Audit every cut of a program against its job.
+
+    The joints of its targets follow from the robot's kinematics and are audited like those of a
+    plan: against the drawing, the limits and the cell of the job. Frames, speeds, switches and
+    waits are compared with those of the job.
+
+    Parameters
+    ----------
+    path : Path
+        The main file of the program.
+    job_file : Path
+        The job that the program was made for.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, a line was not written by kerfpath, or programs of such a job cannot
+        be audited.
+    """
+    audit = ProgramAudit.of(job_file)
+    chosen, settings = language_of(path, audit.job)
+    read = program_on_disk(path, chosen, settings, audit.job.robot)
+    return audit.audited(read, chosen, settings, path.name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProgramAudit:
+    """The audit of programs of one job, whose drawing and cell are read once.
+
+    Parameters
+    ----------
+    job : Job
+    contours : tuple of tuples of Candidate
+        The ways to cut each contour; their nodes have its name.
+    windows : tuple of tuples of GammaWindow
+        The windows of gamma of each contour.
+    cell : Cell or None
+    inner_first : tuple of (int, int)
+        Pairs of contours (from 0) of which the first is to be cut before the second.
+    """
+
+    job: Job
+    contours: tuple[tuple[Candidate, ...], ...]
+    windows: tuple[tuple[GammaWindow, ...], ...]
+    cell: Cell | None
+    inner_first: tuple[tuple[int, int], ...] = ()
+
+    __repr__ = short_repr
+
+    @classmethod
+    def of(cls, job_file: Path) -> ProgramAudit:
+        """Return the audit of a job's programs.
+
+        Raises
+        ------
+        InputError
+            A file cannot be read, or programs of such a job cannot be audited.
+        """
+        return cls.by(prepare(read_job(job_file)))
+
+    @classmethod
+    def by(cls, prepared: PreparedJob) -> ProgramAudit:
+        """Return the audit of a prepared job's programs.
+
+        Raises
+        ------
+        InputError
+            The job has interruptions.
+        """
+        job = prepared.job
+        if job.options.interruptions != "none":
+            raise InputError(
+                f"{job.path}: programs of jobs with interruptions cannot be compared with the "
+                "drawing yet; audit the plan.json"
+            )
+        return cls(
+            job=job,
+            contours=tuple(contour.candidates for contour in prepared.contours),
+            windows=tuple(contour.options.gamma_windows for contour in prepared.contours),
+            cell=prepared.cell,
+            inner_first=prepared.inner_first,
+        )
+
+    def audited(
+        self, read: ReadProgram, chosen: Language, settings: LanguageSettings, name: str
+    ) -> AuditReport:
+        """Audit every cut of a program that was read."""
+        job, contours, cell = self.job, self.contours, self.cell
+        names = [candidates[0].nodes.name for candidates in contours]
+        read = add_tips(read, job)
+        cuts, home = read_cuts(read, job)
+        tables: dict[str, list[Check]] = {}
+        places: dict[str, tuple[str, ...]] = {name: tuple(step.place for step in read.steps)}
+        tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
+        placed = job.placement if read.T_base_part is None else read.T_base_part
+        off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
+        process = BeamProcess.of(job.program, ahead=chosen.ahead)
+        tables[name] = [
+            check("frames", "distance of tool and part from the job's", off, SAME_FRAME, "m"),
+            *check_laser_and_gas(read, job.robot, process),
+        ]
+        done: list[int] = []
+        starts: list[str] = []
+        followed: list[tuple[ReadCut, TargetNodes, Plan]] = []
+        for cut in cuts:
+            apart, which, c = _closest(cut, contours)
+            title = _new_title(f"{cut.name} ({names[which]})" if apart < NEAR else cut.name, tables)
+            places[title] = tuple(move.place for move in cut.moves)
+            if apart >= NEAR:
+                said = "distance from the nearest contour of the job"
+                tables[title] = [check("contour", said, apart, NEAR, "m")]
+                continue
+            candidate = contours[which][c]
+            cut = divide_arcs(cut, candidate.dt, job)
+            places[title] = tuple(move.place for move in (*cut.moves, cut.group.path[-1]))
+            tables[title], along = check_cut(job, candidate, cut, cell, chosen, settings)
+            tables[title].append(count("once", "earlier cuts of this contour", done.count(which)))
+            done.append(which)
+            starts.append(cut.moves[0].place)
+            if along is not None:
+                followed.append((cut, *along))
+                pins, rules = self.windows[which], chosen.rules(settings)
+                tables[title] += check_pins(job, cut, *along, pins, rules)
+        steps = [places[name].index(start) for start in starts]
+        tables[name] += [
+            row if row.ok else replace(row, node=steps[row.node])
+            for row in check_order(job.sequence, self.inner_first, done)
+        ]
+        tables[name] += _compared(job, followed, home, read, chosen, settings)
+        tables[_new_title("air", tables)] = _air(
+            job, cuts, home, cell if job.sequence is not None else None
+        )
+        missing = tuple(name for i, name in enumerate(names) if i not in done)
+        note = collision_note(cell, moves_too=job.sequence is not None)
+        return AuditReport(tables=tables, missing=missing, note=note, places=places)
+
+
+def _new_title(title: str, tables: Mapping[str, object]) -> str:
+    """Return a title that no table has yet, so that a repeated cut does not hide the first."""
+    return title if title not in tables else _new_title(f"{title}, again", tables)
+
+
+def _compared(
+    job: Job, followed: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array,
+    read: ReadProgram, chosen: Language, settings: LanguageSettings,
+) -> list[Check]:  # fmt: skip
+    """Compare a program with the one that the job would have along the same paths.
+
+    Each kind of difference is a check, with the number of moves and the place of the largest.
+    """
+    if not followed:
+        return []
+    try:
+        expected = expect_program(job, followed, home, chosen, settings)
+    except InputError as error:
+        said = f"the program of the job cannot be made along these paths ({error})"
+        return [count("asked", said, 1)]
+    rules = chosen.rules(settings)
+    expected = add_tips(expected, job)
+    found = differences(expected, read, rules=(rules,), names=("the job", "the text"), strict=True)
+    places = [step.place for step in read.steps]
+    rows = [
+        count(
+            f"asked-{each.code}",
+            f"different from the job, {WHAT.get(each.code, each.code)}: {each.message}"
+            + (f" (from {each.said_at})" if each.said_at else ""),
+            each.count,
+            places.index(each.place) if each.place in places else 0,
+        )
+        for each in found
+        if each.code not in FOLLOWED
+    ]
+    return rows or [count("asked", "differences from the job", 0)]
+
+
+def _closest(cut: ReadCut, contours: Sequence[Sequence[Candidate]]) -> tuple[float, int, int]:
+    """Return the distance (m) of a cut from the contour that it follows best, and the candidate.
+
+    Points at the same share of the length are compared.
+    """
+    points = cut.T_part_tip[:, :3, 3]
+    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    some = np.unique(np.linspace(0, len(points) - 1, 100).round().astype(int))
+    found = []
+    for i, candidates in enumerate(contours):
+        for c, path in enumerate(candidate.path for candidate in candidates):
+            s = path.s[0] + way[some] / way[-1] * path.length
+            apart = np.linalg.norm(path.at(s)[0] - points[some], axis=1)
+            found.append((float(np.median(apart)), i, c))
+    return min(found)
+
+
+def _air(job: Job, cuts: Sequence[ReadCut], home: Array, cell: Cell | None) -> list[Check]:
+    """Check the joint moves to, between and after the cuts; the node is the number of the move."""
+    starts: list[Array | None] = [None, *(cut.q_out for cut in cuts)]
+    corners = [cut.approach for cut in cuts] + [home]
+    ways = (
+        way if start is None else np.vstack([start[None], way])
+        for start, way in zip(starts, corners, strict=True)
+    )
+    return worst_of(_way_checks(job, way[~np.isnan(way).any(axis=1)], cell) for way in ways)
+
+
+def _way_checks(job: Job, q: Array, cell: Cell | None) -> list[Check]:
+    """Check straight joint motions between corners (m, n) rad in the least time that they need."""
+    if len(q) < 2:
+        return []
+    took = np.maximum(least_time(np.diff(q, axis=0), *job.robot.speed_limits()), 1e-9)
+    time = np.append(0.0, np.cumsum(took))
+    return [row for row in transfer_checks(job.robot, q, time, cell=cell) if row.code != "air-time"]

@@ -12,6 +12,7 @@ import numpy as np
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
+from kerfpath.job.audit import PlanAudit, ProgramAudit
 from kerfpath.job.audit_report import AuditReport
 from kerfpath.job.format import (
     AuditTable,
@@ -31,8 +32,7 @@ from kerfpath.job.format import (
     read_job,
     tolerances_of,
 )
-from kerfpath.job.plan_file import PlanAudit, PlanFile, read_plan_file, table_of
-from kerfpath.job.programs.audit import ProgramAudit
+from kerfpath.job.plan_file import PlanFile, read_plan_file, table_of
 from kerfpath.job.run import CutResult
 from kerfpath.placement import MeasuredFrame, place_moves, placed, planned_again
 from kerfpath.plans import Plan

@@ -14,8 +14,8 @@ from kerfpath.contour import Contour, angle_between
 from kerfpath.errors import InputError
 from kerfpath.job.format import Candidate, CutRequest, Job, prepare, read_job
 from kerfpath.job.plan_file import PlanFile, read_plan_file
-from kerfpath.job.programs.from_plan import audit_of_plans, program_of
-from kerfpath.job.programs.reading import add_tips, language_of, program_on_disk
+from kerfpath.job.program_file import add_tips, language_of, program_on_disk
+from kerfpath.job.programs import audit_of_plans, program_of
 from kerfpath.job.run import JobResult, run_prepared
 from kerfpath.operations import touched_up
 from kerfpath.plans import Plan

@@ -8,8 +8,13 @@ from pydantic import ValidationError
 
 from kerfpath import InputError
 from kerfpath.certificate import Certificate, Stage
-from kerfpath.job.plan_file.layout import CertificateData
-from kerfpath.job.plan_file.schema import TYPES, _model, certificate_entry, read_certificate
+from kerfpath.job.plan_file import (
+    TYPES,
+    CertificateData,
+    _model,
+    certificate_entry,
+    read_certificate,
+)
 
 
 @pytest.fixture

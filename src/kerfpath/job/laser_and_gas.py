@@ -1,0 +1,335 @@
+"""Check beam and gas of a program with a state machine over all its steps, in running order.
+
+Times follow from the text: a move along the path takes its length divided by its speed, or the
+stated time; a joint move takes the least time within the limits. A switch acts its lead time
+before the tip arrives. The source answers after the job's lead time, and then the beam is on,
+or off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from kerfpath.auditor import Check, Unit
+from kerfpath.job.audit_report import check
+from kerfpath.job.format import ProgramOptions
+from kerfpath.post import ReadMove, ReadProgram, ReadWait, Signal, groups_of
+from kerfpath.robots import Robot
+from kerfpath.transfer import least_time
+
+SAME_TIME = 2e-3
+"""Tolerance (s) of lead times and waits against the job; controllers round them."""
+ENDLESS = 60.0
+"""Assumed duration, s, of a move whose speed or limits are not known."""
+
+What = Literal["air", "approach", "start", "cut", "end", "retract"]
+WORDS: dict[What, str] = {
+    "air": "laser on in a transfer move, or while the robot waits there",
+    "approach": "laser on during the approach",
+    "start": "laser on at the start for longer than the pierce",
+    "cut": "laser on while the robot waits in the cut",
+    "end": "laser on while the robot waits at the end of the cut",
+    "retract": "laser on during the retract",
+}
+"""Where the beam must not be on, and the title of the check."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BeamProcess:
+    """Requirements of the job on beam and gas.
+
+    Parameters
+    ----------
+    lead_time : float s
+        Lead time of the laser.
+    pierce_time : float s
+    gas_lead : float s or None
+        How long before the start the gas is to flow; None: the program does not switch it.
+    stops : bool
+        Whether the job asks for a stop at every node.
+    """
+
+    lead_time: float
+    pierce_time: float
+    gas_lead: float | None
+    stops: bool
+
+    @classmethod
+    def of(cls, options: ProgramOptions, *, ahead: bool) -> BeamProcess:
+        """Return the requirements of [program], in a language that can switch `ahead` or not."""
+        gas = options.gas_lead
+        return cls(
+            lead_time=options.lead_time if ahead else 0.0,
+            pierce_time=options.pierce_time,
+            gas_lead=gas if gas is None or ahead else 0.0,
+            stops=options.zone == 0,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Span:
+    """What the robot does from one time (s) to another, and the step of the program."""
+
+    what: What
+    start: float
+    end: float
+    step: int
+    waits: bool = False
+    move: ReadMove | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Event:
+    """A switch, the time (s) when it acts, and the step of the program."""
+
+    time: float
+    signal: Signal
+    on: bool
+    step: int
+
+
+def check_laser_and_gas(read: ReadProgram, robot: Robot, process: BeamProcess) -> list[Check]:
+    """Return the checks of beam and gas over a whole program; their node is its step.
+
+    Parameters
+    ----------
+    read : ReadProgram
+        The program, with the tip poses of its path.
+    robot : Robot
+    process : BeamProcess
+    """
+    spans, events = _timeline(read, robot)
+    beam = _on(events, "laser", shift=process.lead_time)
+    rows = [
+        _row(f"beam-{what}", WORDS[what], _wrongly(spans, beam, what, process), SAME_TIME, "s")
+        for what in WORDS
+    ]
+    said = "stop points in the cut with the laser on"
+    stops = _row("beam-stop", said, _stops(spans, beam), 0, "count")
+    rows.append(replace(stops, level="warning") if process.stops else stops)
+    said = "changes of the file in the cut with the laser on"
+    rows.append(_row("beam-file", said, _borders(spans, beam), 0, "count"))
+    said = "switches of the laser that change nothing"
+    rows.append(_row("beam-twice", said, _idle(events), 0, "count"))
+    for signal in ("laser", "gas"):
+        left = [event for event in events if event.signal == signal][-1:]
+        found = [(float(event.on), event.step) for event in left]
+        rows.append(_row(f"{signal}-at-the-end", f"{signal} on at the end", found, 0, "count"))
+    return rows + _gas(spans, events, beam, process)
+
+
+def _row(
+    code: str, title: str, found: Sequence[tuple[float, int]], limit: float, unit: Unit
+) -> Check:
+    """Return a check of the largest of values with their steps; counts are summed."""
+    value, step = max(found, default=(0.0, 0), key=lambda one: (one[0], -one[1]))
+    if unit == "count":
+        value = float(sum(one for one, _ in found))
+    return check(code, title, value, limit, unit, step)
+
+
+def _timeline(read: ReadProgram, robot: Robot) -> tuple[list[_Span], list[_Event]]:
+    """Return what a program does and switches over time, from 0 on."""
+    steps = {id(step): k for k, step in enumerate(read.steps)}
+    spans: list[_Span] = []
+    events: list[_Event] = []
+    clock, q, T = 0.0, None, None
+    for group in groups_of(read):
+        waits: dict[int, list[ReadWait]] = {}
+        for behind, wait in group.waits:
+            waits.setdefault(behind, []).append(wait)
+        moves = [*group.joint, *group.path]
+        for k, move in enumerate(moves):
+            at = k - len(group.joint) + 1  # how many moves of the path are done
+            took = _took(move, robot, q, T)
+            what = _what(at, len(group.path))
+            spans.append(
+                _Span(what=what, start=clock, end=clock + took, step=steps[id(move)], move=move)
+            )
+            clock += took
+            for switch in move.switches:
+                time = clock - switch.lead_time
+                events.append(
+                    _Event(time=time, signal=switch.signal, on=switch.on, step=steps[id(move)])
+                )
+            if move.kind == "joint":
+                q, T = move.q, None
+            else:
+                T = move.T_part_tip
+            for wait in waits.get(at, []):  # those before the path behind its last joint move
+                stands = _stands(at, len(group.path))
+                spans.append(
+                    _Span(what=stands, start=clock, end=clock + wait.time, step=steps[id(wait)],
+                          waits=True)
+                )  # fmt: skip
+                clock += wait.time
+    return spans, sorted(events, key=lambda event: event.time)
+
+
+def _what(at: int, count: int) -> What:
+    """Return the kind of a move after which `at` of `count` moves of the path are done."""
+    if at < 1:
+        return "air"
+    if at == 1:
+        return "approach"
+    return "retract" if at == count else "cut"
+
+
+def _stands(at: int, count: int) -> What:
+    """Return where the robot waits after `at` of `count` moves of the path."""
+    if at < 1 or at == count:
+        return "air"
+    if at == 1:
+        return "start"
+    return "end" if at == count - 1 else "cut"
+
+
+def _took(move: ReadMove, robot: Robot, q: object, T: object) -> float:
+    """Return how long (s) a move takes that begins at joints q or a tip pose T."""
+    if move.duration is not None:
+        return move.duration
+    if move.kind == "joint":
+        known = robot.velocity is not None and robot.acceleration is not None
+        if not known or q is None or move.q is None or not move.speed:
+            return ENDLESS
+        way = np.abs(move.q - np.asarray(q))[None]
+        return float(least_time(way, *robot.speed_limits())[0]) / move.speed
+    if T is None or move.T_part_tip is None or not move.speed:
+        return ENDLESS
+    way = move.T_part_tip[:3, 3] - np.asarray(T)[:3, 3]
+    return float(np.linalg.norm(way)) / move.speed
+
+
+def _on(
+    events: Sequence[_Event], signal: Signal, *, shift: float
+) -> list[tuple[float, float, int]]:
+    """Return from when to when (s) a signal is on, and the step that switched it so."""
+    found: list[tuple[float, float, int]] = []
+    since: tuple[float, int] | None = None
+    for event in events:
+        if event.signal != signal:
+            continue
+        if event.on and since is None:
+            since = (event.time + shift, event.step)
+        elif not event.on and since is not None:
+            found.append((since[0], event.time + shift, since[1]))
+            since = None
+    if since is not None:
+        found.append((since[0], np.inf, since[1]))
+    return found
+
+
+def _overlap(start: float, end: float, on: Sequence[tuple[float, float, int]]) -> float:
+    """Return for how long (s) of a span something is on."""
+    return sum(max(min(end, off) - max(start, one), 0.0) for one, off, _ in on)
+
+
+def _wrongly(
+    spans: Sequence[_Span],
+    beam: Sequence[tuple[float, float, int]],
+    what: What,
+    process: BeamProcess,
+) -> list[tuple[float, int]]:
+    """Return for how long (s) the beam is on where it must not be, and the step there.
+
+    A beam that begins in one span and ends in the next is counted in each.
+    """
+    found = []
+    pierced = 0.0
+    for span in spans:
+        pierced = 0.0 if span.what in ("air", "approach") else pierced
+        if span.what != what or (what == "cut" and not span.waits):
+            continue
+        on = _overlap(span.start, span.end, beam)
+        if what == "start":
+            pierced += on
+            on = max(pierced - process.pierce_time, 0.0)
+        found.append((on, span.step))
+    return found
+
+
+def _stops(
+    spans: Sequence[_Span], beam: Sequence[tuple[float, float, int]]
+) -> list[tuple[float, int]]:
+    """Return the inner targets of cuts where the robot stops and the beam stays on."""
+    moves = [span for span in spans if span.move is not None]
+    stops = [a for a, b in pairwise(moves) if a.what == b.what == "cut"]
+    # A switch at the stop itself may act slightly before or after it.
+    return [
+        (1.0, span.step)
+        for span in stops
+        if span.move is not None and span.move.zone == 0 and _through(span.end, beam)
+    ]
+
+
+def _borders(
+    spans: Sequence[_Span], beam: Sequence[tuple[float, float, int]]
+) -> list[tuple[float, int]]:
+    """Return where a cut continues in another file while the beam is on."""
+    moves = [span for span in spans if span.move is not None]
+    return [
+        (1.0, b.step)
+        for a, b in pairwise(moves)
+        if b.what == "cut" or (b.what == "retract" and a.what == "cut")
+        if a.move is not None and b.move is not None and a.move.file != b.move.file
+        if _through(a.end, beam)
+    ]
+
+
+def _through(time: float, on: Sequence[tuple[float, float, int]]) -> bool:
+    return any(one < time - SAME_TIME and time + SAME_TIME < off for one, off, _ in on)
+
+
+def _idle(events: Sequence[_Event]) -> list[tuple[float, int]]:
+    """Return the switches that change nothing: another is missing, or acts too early or late."""
+    state = {"laser": False, "gas": False}
+    found = []
+    for event in events:
+        if state[event.signal] == event.on:
+            found.append((1.0, event.step))
+        state[event.signal] = event.on
+    return found
+
+
+def _gas(
+    spans: Sequence[_Span], events: Sequence[_Event], beam: Sequence[tuple[float, float, int]],
+    process: BeamProcess,
+) -> list[Check]:  # fmt: skip
+    """Return the checks that the gas flows before and with the beam, and nowhere else."""
+    gas = _on(events, "gas", shift=0.0)
+    if process.gas_lead is None:
+        found = [(1.0, event.step) for event in events if event.signal == "gas"]
+        return [_row("gas", "gas switches that the job does not ask for", found, 0, "count")]
+    spread = [(max(on, 0.0), off, step) for on, off, step in beam if off < np.inf]
+    without = [(off - on - _overlap(on, off, gas), step) for on, off, step in spread]
+    starts = [span for span in spans if span.what == "approach"]
+    late = [
+        (process.gas_lead - _overlap(span.end - process.gas_lead, span.end, gas), span.step)
+        for span in starts
+    ]
+    # The gas may also start at the beginning of the approach.
+    ahead = [(min(span.end - process.gas_lead, span.start), span.end, span.step) for span in starts]
+    idle = [
+        (_overlap(span.start, span.end, gas) - _overlap(span.start, span.end, _both(gas, ahead)),
+         span.step)
+        for span in spans
+        if span.what in ("air", "approach", "retract")
+    ]  # fmt: skip
+    return [
+        _row("gas", "laser on without gas", without, SAME_TIME, "s"),
+        _row("gas-lead", "delay of the gas before the start", late, SAME_TIME, "s"),
+        _row("gas-idle", "gas on where it is not asked for", idle, SAME_TIME, "s"),
+    ]
+
+
+def _both(
+    one: Sequence[tuple[float, float, int]], two: Sequence[tuple[float, float, int]]
+) -> list[tuple[float, float, int]]:
+    """Return the times when both are on."""
+    found = [(max(a, c), min(b, d), step) for a, b, step in one for c, d, _ in two]
+    return [(start, end, step) for start, end, step in found if end > start]
