@@ -8,8 +8,7 @@ import pytest
 from kerfpath import Contour, InputError, plan
 from kerfpath.auditor import bound_checks, certified_bound
 from kerfpath.certificate import BASE
-from kerfpath.certifier import bound as course
-from kerfpath.certifier import certify
+from kerfpath.certifier import bound, certify
 from kerfpath.plans import Proof
 
 FIELDS = ("node", "posture", "level", "index", "lift", "value", "dual")
@@ -33,7 +32,7 @@ def certified(arm, tool, placement):
             gamma_step=np.radians(5), postures=(0, 1),
         )  # fmt: skip
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(course, "DROPPED", 0.02)  # more stages, so that each rules cells out
+            patch.setattr(proving, "DROPPED", 0.02)  # more stages, so that each rules cells out
             return certify(made, gap=0.002).plan
 
     return of

@@ -9,12 +9,9 @@ from jobs import DEMO
 from kerfpath import InputError, plan
 from kerfpath.auditor import certified_bound
 from kerfpath.certificate import BASE
-from kerfpath.certifier import MotionTest, certify
-from kerfpath.certifier import bound as course
-from kerfpath.certifier import infeasibility as largest
-from kerfpath.certifier import stages as stages
+from kerfpath.certifier import MotionTest, bound, certify, minimax, stages
 from kerfpath.certifier.cells import CellMaker
-from kerfpath.certifier.infeasibility import between, turning_nodes
+from kerfpath.certifier.division import between, turning_nodes
 from kerfpath.certifier.stages import Steps
 from kerfpath.job import read_job
 from kerfpath.kernels.metric import rho
@@ -46,7 +43,7 @@ def steps_of(one):
         weight=one.settings.weights,
         velocity=limits.velocity.per_interval(dt) + 1e-9,
         acceleration=limits.acceleration.per_interval(dt) + 1e-9,
-        metric=course.METRIC_CODES[one.settings.metric],
+        metric=bound.METRIC_CODES[one.settings.metric],
         endless=one.robot.endless,
     )
 
@@ -184,7 +181,7 @@ def test_the_plan_itself_passes_cells_that_let_it(made, metric):
 def test_the_certificate_has_what_proves_its_bound(made, metric, dropped, monkeypatch):
     """Of stages that are left out one may be the best: the next may prove less."""
     one, bounds = made(metric), []
-    solve = course.solve_stage
+    solve = bound.solve_stage
 
     def noted(*given, **named):
         result = solve(*given, **named)
@@ -194,8 +191,8 @@ def test_the_certificate_has_what_proves_its_bound(made, metric, dropped, monkey
         bounds.append(result)
         return result
 
-    monkeypatch.setattr(course, "solve_stage", noted)
-    monkeypatch.setattr(course, "DROPPED", dropped)
+    monkeypatch.setattr(bound, "solve_stage", noted)
+    monkeypatch.setattr(bound, "DROPPED", dropped)
     found = certify(one, gap=0.004)
     best = max(bounds, key=lambda result: result.bound)
     stages = found.plan.proof.certificate.stages
@@ -253,7 +250,7 @@ def test_of_the_largest_step_the_bound_is_below_every_motion(metric, arc, arm, t
     test = MotionTest(best.robot, best.frames, best.T_flange_tip)
     for share in (1.0, 1.05):
         assert (
-            test.closed_to(largest._capped(steps_of(best), share * best.cost), 30_000_000) is None
+            test.closed_to(minimax._capped(steps_of(best), share * best.cost), 30_000_000) is None
         )
     kept = certify(best, gap=0.01)
     assert kept.plan.proof.certificate is None

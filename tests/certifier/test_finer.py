@@ -8,10 +8,9 @@ from benchmarks import _arm
 from benchmarks._random_contours import cut
 
 from kerfpath import PlanOptions, plan
-from kerfpath.certifier import bound as course
-from kerfpath.certifier import certify
+from kerfpath.certifier import bound, certify
 from kerfpath.certifier.cells import CellSet
-from kerfpath.certifier.infeasibility import cells_to_divide
+from kerfpath.certifier.division import cells_to_divide
 
 WEIGHT = np.array([1.0, 2.0])
 
@@ -78,9 +77,9 @@ def test_joints_that_may_be_anywhere_do_not_make_coarse_cells_worthless(monkeypa
 
     Where potentials slope with a joint that may be anywhere it is -3 times the cost.
     """
-    first, solve = [], course.solve_stage
+    first, solve = [], bound.solve_stage
     monkeypatch.setattr(
-        course, "solve_stage", lambda *of, **how: first.append(solve(*of, **how)) or first[-1]
+        bound, "solve_stage", lambda *of, **how: first.append(solve(*of, **how)) or first[-1]
     )
     arm = _arm.arm()
     arm = arm.with_limits(acceleration=3 * arm.speed_limits()[1], endless=np.zeros(6, bool))

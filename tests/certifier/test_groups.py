@@ -5,8 +5,7 @@ import pytest
 from benchmarks import _arm
 
 from kerfpath import plan
-from kerfpath.certifier import bound as course
-from kerfpath.certifier import certify, infeasibility
+from kerfpath.certifier import bound, certify, parts
 from kerfpath.certifier.cells import CellMaker
 from kerfpath.certifier.stages import Steps, distinct_groups, solve_stage
 from kerfpath.kernels.metric import MANHATTAN
@@ -114,7 +113,7 @@ def test_bounding_repeated_motions_once_proves_the_same(robot, arc, tool, placem
     def every(result, kept, maker):
         return [np.isin(np.arange(len(kept)), group) for group in groups(result, kept)]
 
-    for module in (course, infeasibility):
+    for module in (bound, parts):
         monkeypatch.setattr(module, "distinct_groups", every)
     twice = certify(best, checkable=False)
     assert once.pairs < twice.pairs

@@ -8,10 +8,9 @@ import pytest
 from from_python import from_python
 from kerfpath import plan
 from kerfpath.certificate import cell_bounds
-from kerfpath.certifier import bound as course
-from kerfpath.certifier import certify
+from kerfpath.certifier import bound, certify
 from kerfpath.certifier import stages as stage
-from kerfpath.certifier.bound import limit_prices
+from kerfpath.certifier.multipliers import limit_prices
 from kerfpath.certifier.stages import Steps, cross_bends, solve_stage
 from kerfpath.kernels import cell_elimination
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
@@ -43,7 +42,7 @@ def others(planned):
 
 
 def course_of(one, gap=0.1):
-    return course._Course(one, course._steps_of(one), gap, np.inf, False, lambda *_: None)
+    return proving._Certification(one, proving._steps_of(one), gap, np.inf, False, lambda *_: None)
 
 
 @pytest.mark.slow
@@ -59,8 +58,8 @@ def test_any_multipliers_bound_no_motion_too_high(metric, size, planned, others,
         prices[1:-1] = size * rng.normal(size=prices[1:-1].shape) * best.settings.weights
         return prices
 
-    monkeypatch.setattr(course._Course, "_prices", drawn)
-    monkeypatch.setattr(course._Course, "_priced", True)
+    monkeypatch.setattr(proving._Certification, "_prices", drawn)
+    monkeypatch.setattr(proving._Certification, "_priced", True)
     bound = certify(best, checkable=False).plan.proof.bound
     assert 0 <= bound <= min(best.cost, *others[metric])
 
@@ -70,7 +69,7 @@ def test_any_multipliers_bound_no_motion_too_high(metric, size, planned, others,
 def test_the_multipliers_of_a_plan_bound_it_closer(metric, planned, others, monkeypatch):
     best = planned(metric=metric)
     with_them = certify(best, checkable=False).plan.proof
-    monkeypatch.setattr(course._Course, "_priced", False)
+    monkeypatch.setattr(proving._Certification, "_priced", False)
     without = certify(best, checkable=False).plan.proof
     assert with_them.bound <= min(best.cost, *others[metric])
     assert with_them.gap < without.gap
@@ -78,8 +77,8 @@ def test_the_multipliers_of_a_plan_bound_it_closer(metric, planned, others, monk
 
 def test_the_cheapest_cells_are_joined_by_steps(planned):
     """They stand for a motion: prices about it show where it breaks (6)."""
-    one = course._Course(
-        planned(), course._steps_of(planned()), 0.1, np.inf, False, lambda *_: None
+    one = proving._Certification(
+        planned(), proving._steps_of(planned()), 0.1, np.inf, False, lambda *_: None
     )
     result = solve_stage(one.maker.coarsest(np.arange(one.last + 1)), one.steps)
     motion = result.cheapest()
@@ -97,9 +96,9 @@ def test_a_certificate_is_there_for_those_who_check_it_only(planned):
 
 
 def test_multipliers_ask_for_cells_at_every_node(planned):
-    one = course._Course(
+    one = proving._Certification(
         planned(speed=0.3),
-        course._steps_of(planned(speed=0.3)),
+        proving._steps_of(planned(speed=0.3)),
         0.1,
         np.inf,
         False,
@@ -146,8 +145,8 @@ def test_a_plan_at_the_limit_has_prices(metric, planned):
     one = course_of(planned(metric=metric), 0.005)
     posture = int(one.plan.posture[0])
     assert one._priced
-    for most in course.DEAREST:
-        prices = one._prices(one.plan.gamma, posture, course.NARROW, most)
+    for most in proving.DEAREST:
+        prices = one._prices(one.plan.gamma, posture, proving.NARROW, most)
         assert one.steps.price(prices) > 0
         assert (np.abs(prices) <= most * one.steps.weight * (1 + 1e-6)).all()
 

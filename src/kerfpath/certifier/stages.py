@@ -1,4 +1,9 @@
-"""Compile the kernels of the certified bound by a small stage."""
+"""A stage: cells at some nodes, a potential on them, and the bounds that it proves.
+
+The potential is laid from the last layer to the first, so that no step from cell to cell costs less
+than the potential falls. What a motion through a cell costs at least follows from it; pairs of
+steps that break (6) are excluded where that is asked for.
+"""
 
 from __future__ import annotations
 
