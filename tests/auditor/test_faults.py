@@ -8,7 +8,8 @@ import pytest
 from kerfpath import Contour, InputError, plan
 from kerfpath.auditor import bound_checks, certified_bound
 from kerfpath.certificate import BASE
-from kerfpath.certifier import bound, certify
+from kerfpath.certifier import bound as proving
+from kerfpath.certifier import certify
 from kerfpath.plans import Proof
 
 FIELDS = ("node", "posture", "level", "index", "lift", "value", "dual")

@@ -8,7 +8,8 @@ import pytest
 from from_python import from_python
 from kerfpath import plan
 from kerfpath.certificate import cell_bounds
-from kerfpath.certifier import bound, certify
+from kerfpath.certifier import bound as proving
+from kerfpath.certifier import certify
 from kerfpath.certifier import stages as stage
 from kerfpath.certifier.multipliers import limit_prices
 from kerfpath.certifier.stages import Steps, cross_bends, solve_stage
