@@ -24,6 +24,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
+from kerfpath.cli.show import out
 from readers import READERS
 from spoilt import complaint, spoilt
 
@@ -38,6 +39,7 @@ def child(name: str) -> None:
     faulthandler.enable()
     answers = sys.stdout
     sys.stdout = sys.stderr
+    out.quiet = True  # as with --json
     reader = READERS[name]
     folder = Path(tempfile.mkdtemp(prefix=f"fuzz-{name}-"))
     try:

@@ -20,8 +20,8 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 from kerfpath.cad import read, read_measured
 from kerfpath.cell import Hull, link_bodies
 from kerfpath.cell.mesh import close_surface, read_surface
-from kerfpath.cli.check_output import show_audit
 from kerfpath.cli.drawing_output import list_contours
+from kerfpath.cli.program_output import show_audit
 from kerfpath.errors import InputError, about
 from kerfpath.job import (
     cell_of_job,
@@ -213,7 +213,7 @@ def tables(folder: Path) -> list[Whole]:
 
 def read_drawing(path: Path) -> None:
     unit = "mm" if path.suffix == ".dxf" else None
-    list_contours(read(path, unit), None, everything=True, as_json=True)
+    list_contours(read(path, unit), None, everything=True)
     part = read(path, unit)
     part.mesh()
     for loop in part.loops[:LOOPS]:
@@ -354,8 +354,8 @@ def plans(folder: Path) -> list[Whole]:
 
 
 def read_plan(path: Path) -> None:
-    show_audit(path, None, as_json=True)
-    show_audit(path, path.parents[1] / "job.toml", as_json=True)
+    show_audit(path, None)
+    show_audit(path, path.parents[1] / "job.toml")
     with about(path):
         program_from_file(path, "csv")
 
@@ -379,7 +379,7 @@ def _main_of(language: str, texts: list[Path]) -> Path:
 
 def read_a_program(path: Path) -> None:
     at = next(folder for folder in path.parents if (folder / "job.toml").exists())
-    show_audit(path, at / "job.toml", as_json=True)
+    show_audit(path, at / "job.toml")
 
 
 # ------------------------------------------------------------------------------ measured, stores

@@ -30,7 +30,16 @@ app = typer.Typer(
     "Exit codes: 0 done, 1 no feasible plan or failed audit, 2 bad input.",
 )
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
+
+def _choose_json(asked: bool) -> None:
+    out.quiet = asked
+
+
+Json = Annotated[
+    bool,
+    typer.Option("--json", callback=_choose_json, help="Print one JSON object instead of tables."),
+]
+"""Silences `out`; `print_json` prints then."""
 Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; the command makes it if needed.")
 ]
@@ -72,6 +81,7 @@ def _root(
         bool, typer.Option("--quiet", help="Show results, notes and errors, but no progress.")
     ] = False,
 ) -> None:
+    out.quiet = False
     if silent:
         quiet.set()
     else:
@@ -89,7 +99,7 @@ def demo(to: Out = None, as_json: Json = False) -> None:
     from kerfpath.cli.plan_output import plan_job
 
     with as_file(files("kerfpath").joinpath("demo")) as folder:
-        plan_job(folder / "b_pillar.toml", to or Path("kerfpath-demo"), as_json=as_json)
+        plan_job(folder / "b_pillar.toml", to or Path("kerfpath-demo"))
 
 
 @app.command()
@@ -113,7 +123,7 @@ def plan(
     """
     from kerfpath.cli.plan_output import plan_job
 
-    plan_job(job, to or Path(f"{job.stem}-plan"), as_json=as_json, draw_map=draw_map, strict=strict)
+    plan_job(job, to or Path(f"{job.stem}-plan"), draw_map=draw_map, strict=strict)
 
 
 @app.command()
@@ -135,12 +145,11 @@ def check(job: JobArgument, as_json: Json = False) -> None:
 
     read = read_job(job)
     part = drawing_of(read)
-    if not as_json:
-        show_drawing(part)
+    show_drawing(part)
     compile_kernels(read.robot.kinematics)
     with busy("checking the cell"):
         checked = check_job(read, part)
-    show_check(checked, as_json=as_json)
+    show_check(checked)
     require_foreseen(prepare(read, part, checked.cell))
 
 
@@ -167,7 +176,7 @@ def speed(
     compile_kernels(read.robot.kinematics)
     with progress_bars("contours") as progress:
         answers = fastest_speeds(read, progress=progress)
-    if not show_speeds(answers, as_json=as_json):
+    if not show_speeds(answers):
         raise typer.Exit(1)
 
 
@@ -225,7 +234,7 @@ def contours(
         axis=axis,
         columns=columns,
     )
-    list_contours(part, html, everything=everything, as_json=as_json)
+    list_contours(part, html, everything=everything)
 
 
 @app.command()
@@ -250,10 +259,10 @@ def robots(
     from kerfpath.robots import external_ids
 
     if urdf is not None:
-        write_urdf(name, urdf, as_json=as_json)
+        write_urdf(name, urdf)
     elif name is None:
-        list_robots(as_json=as_json)
+        list_robots()
     elif name in external_ids():
-        show_external(name, as_json=as_json)
+        show_external(name)
     else:
-        show_robot(name, as_json=as_json)
+        show_robot(name)

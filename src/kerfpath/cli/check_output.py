@@ -2,147 +2,42 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from pathlib import Path
-
 import numpy as np
 from rich.markup import escape
 
-from kerfpath.auditor import format_value
 from kerfpath.cell import Body, Capsule, Cell, Mesh, caveats, unlikely_sizes
 from kerfpath.cli.drawing_output import drawing_entry
-from kerfpath.cli.show import busy, out, print_json, table
-from kerfpath.errors import InputError, about
+from kerfpath.cli.show import out, print_json, table
 from kerfpath.job import (
-    AuditReport,
     JobPreview,
-    audit_file,
-    audit_program,
     collision_note,
-    compare_programs,
 )
 
-# -----------------------------------------------------------------------------
-# `kerfpath audit`: check every contour of a plan or a program again.
 
-
-def show_audit(file: Path, job: Path | None, *, as_json: bool) -> bool:
-    """Print the table of checks of each contour of a file; return whether all of them pass."""
-    found = _run_audit(file, job)
-    if as_json:
-        print_json(
-            {
-                "passed": found.passed,
-                "notes": [found.note],
-                "missing": list(found.missing),
-                "contours": {
-                    name: [asdict(c) | {"ok": c.ok, "place": found.place(name, c)} for c in checks]
-                    for name, checks in found.tables.items()
-                },
-            }
-        )
-    else:
-        for name, checks in found.tables.items():
-            if found.places and all(c.ok for c in checks):
-                out.print(f"{escape(name)}: {len(checks)} checks passed")
-                continue
-            rows = [
-                [
-                    escape(c.title),
-                    format_value(c.value, c.unit),
-                    format_value(c.limit, c.unit),
-                    str(c.node),
-                    "ok" if c.ok else c.level.upper(),
-                ]
-                for c in checks
-            ]
-            table(
-                ["check", "worst", "allowed", "node", "verdict"],
-                rows,
-                title=escape(name),
-                numbers=["worst", "allowed", "node"],
-                whole=["verdict"],
-            )
-            for c in checks:
-                if not c.ok:
-                    said = f"{name}: {c.issue()}"
-                    if name in found.places:
-                        said = found.sentence(name, c)
-                    out.print(escape(said), soft_wrap=True)
-        for name in found.missing:
-            out.print(f"{escape(name)}: {'not cut' if found.places else 'no plan'}")
-        out.print(f"note: {escape(found.note)}")
-        out.print("audit passed" if found.passed else "audit FAILED")
-    return found.passed
-
-
-def _run_audit(file: Path, job: Path | None) -> AuditReport:
-    if file.suffix.lower() == ".json":
-        with about(file):
-            return audit_file(file, job)
-    if job is None:
-        raise InputError(f"{file}: a program is compared with its job; give it with --job JOB.toml")
-    with about(file), busy("auditing the program"):
-        return audit_program(file, job)
-
-
-# -----------------------------------------------------------------------------
-# `kerfpath compare`: describe in words what differs between two programs.
-
-
-def show_differences(a: Path, b: Path, job: Path, *, as_json: bool) -> bool:
-    """Print what differs between two programs; return whether they are the same."""
-    with busy("comparing the programs"):
-        found = compare_programs(a, b, job)
-    same = not found.differences
-    if as_json:
-        print_json(
-            {
-                "same": same,
-                "differences": [asdict(each) for each in found.differences],
-                "not_compared": list(found.not_compared),
-            }
-        )
-        return same
-    for each in found.differences:
-        out.print(escape(str(each)), soft_wrap=True)
-    if found.not_compared:
-        out.print(f"note: not compared: {', '.join(found.not_compared)}")
-    alike = "the same" if not found.not_compared else "the same in what was compared"
-    out.print(alike if same else "not the same")
-    return same
-
-
-# -----------------------------------------------------------------------------
-# `kerfpath check`: print bodies and pairs of the cell of a job, and the start of each contour.
-
-
-def show_check(checked: JobPreview, *, as_json: bool) -> None:
+def show_check(checked: JobPreview) -> None:
     """Print a job's robot, the bodies and pairs of its cell, and the start of every contour."""
     job, cell = checked.job, checked.cell
-    if as_json:
-        print_json(
-            {
-                "drawing": drawing_entry(checked.part),
-                "robot": job.robot.id,
-                "joints": job.robot.joints,
-                "language": job.program.language,
-                "cell": None if cell is None else _cell_entry(cell),
-                "contours": [
-                    {
-                        "name": s.name,
-                        "nodes": s.nodes,
-                        "poses": s.poses,
-                        "clear": None if cell is None else s.clear,
-                        "clearance_m": None if np.isnan(s.clearance) else s.clearance,
-                        "pair": s.pair,
-                    }
-                    for s in checked.starts
-                ],
-                "notes": [_note(checked)],
-            }
-        )
-        return
+    print_json(
+        {
+            "drawing": drawing_entry(checked.part),
+            "robot": job.robot.id,
+            "joints": job.robot.joints,
+            "language": job.program.language,
+            "cell": None if cell is None else _cell_entry(cell),
+            "contours": [
+                {
+                    "name": s.name,
+                    "nodes": s.nodes,
+                    "poses": s.poses,
+                    "clear": None if cell is None else s.clear,
+                    "clearance_m": None if np.isnan(s.clearance) else s.clearance,
+                    "pair": s.pair,
+                }
+                for s in checked.starts
+            ],
+            "notes": [_note(checked)],
+        }
+    )
     out.print(f"robot {escape(job.robot.id)}, {job.robot.joints} joints; {job.part_file.name}")
     if cell is not None:
         _show_cell(cell)

@@ -11,7 +11,7 @@ from rich.markup import escape
 from kerfpath.arrays import counted
 from kerfpath.cad import Loop, Part
 from kerfpath.cad import read as read_drawing
-from kerfpath.cli.show import busy, out, print_json, progress_bars, table
+from kerfpath.cli.show import busy, out, print_json, progress_bars, show_files, table
 from kerfpath.job import Job
 from kerfpath.post import write_program
 from kerfpath.report import DrawnLoop, render_drawing
@@ -111,15 +111,13 @@ def drawing_entry(part: Part) -> dict[str, object]:
 # `kerfpath contours`: list the loops of a drawing by the names that jobs use.
 
 
-def list_contours(part: Part, html: Path | None, *, everything: bool, as_json: bool) -> None:
+def list_contours(part: Part, html: Path | None, *, everything: bool) -> None:
     """Print the size of a part, and the name, surface, length, edges and place of every loop."""
     main = [loop for loop in part.loops if not loop.skin and loop.side != "edge"]
     if html is not None:
         with busy(f"drawing {html.name}"):
             write_program(html, _page(part, main))
-    if as_json:
-        print_json(_contours_entry(part, html))
-        return
+    print_json(_contours_entry(part, html))
     show_drawing(part)
     shown = part.loops if everything else main
     optional = [
@@ -153,7 +151,7 @@ def list_contours(part: Part, html: Path | None, *, everything: bool, as_json: b
             "thickness of the sheet, are listed with --all"
         )
     if html is not None:
-        out.print(f"wrote {escape(str(html))}")
+        show_files([html])
 
 
 def _page(part: Part, main: list[Loop]) -> str:

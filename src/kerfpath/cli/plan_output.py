@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -11,8 +10,7 @@ import numpy as np
 import typer
 from rich.markup import escape
 
-from kerfpath.arrays import Array
-from kerfpath.cad import Loop, Part, read
+from kerfpath.cad import Part
 from kerfpath.cli.drawing_output import drawing_entry, drawing_of, show_drawing
 from kerfpath.cli.show import (
     busy,
@@ -25,16 +23,12 @@ from kerfpath.cli.show import (
     show_files,
     table,
 )
-from kerfpath.errors import InputError
-from kerfpath.files import write_whole
 from kerfpath.job import (
     AsRun,
     ContourSpeed,
     CutResult,
     JobResult,
-    pose,
     prepare,
-    python_script,
     read_job,
     require_folder,
     require_foreseen,
@@ -47,142 +41,10 @@ from kerfpath.job import (
 from kerfpath.planner import FastestSpeed, at_least, at_most
 
 # -----------------------------------------------------------------------------
-# Write a first job for a drawing that has none; all its values are guesses to be changed.
-
-MOST_LOOPS = 8
-"""Most loops in a first job; the longest are taken."""
-NODES = 400
-"""Most nodes of a loop; shorter loops are spaced by `SPACING`."""
-SPACING = 2.0
-"""Least distance between nodes, mm."""
-TURNS = ((0, 0, 0), (180, 0, 0), (90, 0, 0), (-90, 0, 0), (0, 90, 0), (0, -90, 0))
-"""Roll, pitch and yaw in deg of the ways to lay a part down; the first of the best is taken."""
-PLACE = (1300.0, 0.0, 500.0)
-"""x and y of the middle of the part and z of its lowest point, mm, robot base; within reach."""
-HEAD = """\
-# A first job for {drawing}: robot, head, placement, loops and speed are guesses to be changed.
-
-[robot]
-model = "abb_irb4600_60_205"                              # kerfpath robots lists the others
-endless = [4, 6]
-acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]   # assumed: the maker publishes none
-
-[tool]
-head = "laser-head-45"
-
-[part]
-file = {name}
-xyz_mm = {xyz}
-rpy_deg = {rpy}
-
-# {count} of {total} loops; kerfpath contours {drawing} lists them all.
-"""
-TAIL = """\
-[plan]
-gamma_step_deg = 2
-"""
-
-
-def first_job(drawing: Path) -> Path:
-    """Return the job beside a drawing with the same name; write one if there is none.
-
-    Raises
-    ------
-    InputError
-        The drawing cannot be read or has no closed loop; the job cannot be written.
-    """
-    job = drawing.with_suffix(".toml")
-    if job.exists():
-        return job
-    text = job_text(read(drawing))
-    try:
-        write_whole({job: text.encode()})
-    except OSError as error:
-        raise InputError(
-            f"{job}: cannot write a job for the drawing ({error.strerror}); copy the drawing to "
-            "a writable folder"
-        ) from None
-    return job
-
-
-def job_text(part: Part) -> str:
-    """Return a job that cuts the longest closed loops of a part, placed in front of the robot.
-
-    Raises
-    ------
-    InputError
-        The part has no closed loop.
-    """
-    closed = [loop for loop in part.loops if loop.closed and loop.kind != "open"]
-    main = [loop for loop in closed if not loop.skin and loop.side in ("outer", "")] or closed
-    if not main:
-        raise InputError(
-            f"{part.path}: expected a closed loop, got none; write a job that picks its open lines"
-        )
-    chosen = sorted(main, key=lambda loop: loop.length)[-MOST_LOOPS:]
-    xyz, rpy = _place(part, chosen)
-    head = HEAD.format(
-        drawing=part.path.name,
-        name=json.dumps(part.path.name, ensure_ascii=False),
-        xyz=xyz,
-        rpy=list(rpy),
-        count=len(chosen),
-        total=len(part.loops),
-    )
-    return head + "".join(map(_contour, chosen)) + TAIL
-
-
-def _contour(loop: Loop) -> str:
-    spacing = max(SPACING, round(loop.length * 1e3 / NODES, 1))
-    name = json.dumps(loop.name, ensure_ascii=False)
-    return f"[[contour]]\npick = {name}\nspeed_m_min = 3\nspacing_mm = {spacing:g}\n\n"
-
-
-def _place(part: Part, loops: Sequence[Loop]) -> tuple[list[float], tuple[int, ...]]:
-    """Return xyz in mm and rpy in deg with which the beam comes mainly from above."""
-    axes = np.vstack([part.contour(loop.name).axes.mean(axis=0) for loop in loops])
-    weighed = (axes * np.array([[loop.length] for loop in loops])).sum(axis=0)
-
-    def turned(rpy: tuple[int, ...]) -> Array:
-        return np.asarray(pose((0.0, 0.0, 0.0), rpy)[:3, :3])
-
-    rpy = max(TURNS, key=lambda one: round(float(-(turned(one) @ weighed)[2]), 9))
-    corners = np.array(np.meshgrid(*part.bounding_box.T)).reshape(3, -1).T @ turned(rpy).T * 1e3
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    from_middle = np.array([*(low + high)[:2] / 2, low[2]])
-    return (np.array(PLACE) - from_middle).round(1).tolist(), rpy
-
-
-# -----------------------------------------------------------------------------
-# `kerfpath script`: write a job as a Python script.
-
-
-def write_script(path: Path, output: Path | None) -> None:
-    """Write the script of a job to a file, or print it without one.
-
-    Raises
-    ------
-    InputError
-        The job cannot be prepared or written as a script, or the file cannot be written.
-    """
-    job = read_job(path)
-    folder = None if output is None else output.absolute().parent
-    text = python_script(prepare(job, drawing_of(job)), folder)
-    if output is None:
-        print(text, end="")
-        return
-    try:
-        write_whole({output: text.encode()})
-    except OSError as error:
-        raise InputError(f"{output}: cannot write ({error.strerror}); choose another -o") from None
-    out.print(f"wrote {escape(str(output))}")
-
-
-# -----------------------------------------------------------------------------
 # `kerfpath speed`: find the fastest constant speed of each contour, and the limit that binds.
 
 
-def show_speeds(answers: Sequence[ContourSpeed], *, as_json: bool) -> bool:
+def show_speeds(answers: Sequence[ContourSpeed]) -> bool:
     """Print the fastest speed of each contour; return whether every contour has one."""
     entries: list[dict[str, object]] = []
     rows = []
@@ -214,28 +76,26 @@ def show_speeds(answers: Sequence[ContourSpeed], *, as_json: bool) -> bool:
             entry |= {"fastest_m_min": None, "reason": str(found), "proved_for": found.scope}
             rows.append([*row, "-", "-", "-", "-", str(found.node + 1), "no admissible pose", ""])
         entries.append(entry)
-    if as_json:
-        print_json({"contours": entries})
-    else:
-        columns = [
-            "contour",
-            "asked m/min",
-            "on the grid",
-            "refined",
-            "as run",
-            "impossible from",
-            "node",
-            "what binds",
-        ]
-        at = "at x y z mm"
-        table([*columns, at], rows, numbers=columns[1:7], spare=[at])
-        out.print(
-            "on the grid: the fastest constant speed there, exact; refined: the fastest speed "
-            "found off the grid, not proved to be the fastest possible; both keep the limits at "
-            "the nodes; as run: a speed at which the program keeps them between the nodes, too, "
-            "if the job asks for it (between_nodes) and one was found; impossible from: at this "
-            "speed and above it is proved that there is no motion, at any rotation"
-        )
+    print_json({"contours": entries})
+    columns = [
+        "contour",
+        "asked m/min",
+        "on the grid",
+        "refined",
+        "as run",
+        "impossible from",
+        "node",
+        "what binds",
+    ]
+    at = "at x y z mm"
+    table([*columns, at], rows, numbers=columns[1:7], spare=[at])
+    out.print(
+        "on the grid: the fastest constant speed there, exact; refined: the fastest speed "
+        "found off the grid, not proved to be the fastest possible; both keep the limits at "
+        "the nodes; as run: a speed at which the program keeps them between the nodes, too, "
+        "if the job asks for it (between_nodes) and one was found; impossible from: at this "
+        "speed and above it is proved that there is no motion, at any rotation"
+    )
     return all(entry["fastest_m_min"] is not None for entry in entries)
 
 
@@ -247,7 +107,6 @@ def plan_job(
     job_file: Path,
     folder: Path,
     *,
-    as_json: bool,
     draw_map: bool = False,
     strict: bool = False,
 ) -> None:
@@ -264,14 +123,13 @@ def plan_job(
     if draw_map:
         job = with_map(job)
     part = drawing_of(job)
-    if not as_json:
-        show_drawing(part)
+    show_drawing(part)
     prepared = prepare(job, part)
     compile_kernels(job.robot.kinematics)
     require_foreseen(prepared)
     with progress_bars() as progress:
         outcome = run_prepared(prepared, progress=progress)
-    finish_run(outcome, part, folder, as_json=as_json, strict=strict)
+    finish_run(outcome, part, folder, strict=strict)
 
 
 def finish_run(
@@ -279,7 +137,6 @@ def finish_run(
     part: Part,
     folder: Path,
     *,
-    as_json: bool,
     strict: bool = False,
     more: Mapping[str, object] | None = None,
 ) -> None:
@@ -292,37 +149,35 @@ def finish_run(
     """
     with busy("writing"):
         written = write_result(outcome, folder, strict=strict)
-    if as_json:
-        print_json(
-            {
-                "passed": outcome.passed,
-                "drawing": drawing_entry(part),
-                "contours": [_cut_entry(cut) for cut in outcome.cuts],
-                "sequence": None if outcome.part is None else sequence_entry(outcome.part),
-                "files": [str(f) for f in written.files],
-                "removed": [str(f) for f in written.removed],
-                "notes": list(written.notes),
-                "faults": list(written.faults),
-                **(more or {}),
-            }
-        )
-    else:
-        _show_cuts(outcome.cuts)
-        for cut in outcome.cuts:
-            if cut.broken is not None:
-                out.print(f"[bold]{escape(cut.name)}[/]: {escape(cut.failure)}")
-            if cut.plan is not None and cut.plan.feed is not None:
-                out.print(f"[bold]{escape(cut.name)}[/]: {cut.plan.feed}")
-            if (tilt := _largest_tilt(cut)) is not None:
-                out.print(f"[bold]{escape(cut.name)}[/]: tool axis tilted by up to {tilt:.2f} deg")
-            for check in (*cut.checks, *cut.as_run.checks):
-                if not check.ok:
-                    out.print(f"[bold]{escape(cut.name)}[/]: {escape(str(check.issue()))}")
-        for note in merge_notes(written.notes, [cut.name for cut in outcome.cuts]):
-            out.print(f"note: {escape(note)}")
-        for fault in written.faults:
-            out.print(f"[bold red]do not cut:[/] {escape(fault)}")
-        show_files(written.files, written.removed, of="an earlier run")
+    print_json(
+        {
+            "passed": outcome.passed,
+            "drawing": drawing_entry(part),
+            "contours": [_cut_entry(cut) for cut in outcome.cuts],
+            "sequence": None if outcome.part is None else sequence_entry(outcome.part),
+            "files": [str(f) for f in written.files],
+            "removed": [str(f) for f in written.removed],
+            "notes": list(written.notes),
+            "faults": list(written.faults),
+            **(more or {}),
+        }
+    )
+    _show_cuts(outcome.cuts)
+    for cut in outcome.cuts:
+        if cut.broken is not None:
+            out.print(f"[bold]{escape(cut.name)}[/]: {escape(cut.failure)}")
+        if cut.plan is not None and cut.plan.feed is not None:
+            out.print(f"[bold]{escape(cut.name)}[/]: {cut.plan.feed}")
+        if (tilt := _largest_tilt(cut)) is not None:
+            out.print(f"[bold]{escape(cut.name)}[/]: tool axis tilted by up to {tilt:.2f} deg")
+        for check in (*cut.checks, *cut.as_run.checks):
+            if not check.ok:
+                out.print(f"[bold]{escape(cut.name)}[/]: {escape(str(check.issue()))}")
+    for note in merge_notes(written.notes, [cut.name for cut in outcome.cuts]):
+        out.print(f"note: {escape(note)}")
+    for fault in written.faults:
+        out.print(f"[bold red]do not cut:[/] {escape(fault)}")
+    show_files(written.files, written.removed, of="an earlier run")
     if written.stale is not None:
         errors.print(
             f"kerfpath: {escape(str(written.stale))} is from an earlier run and does not belong "

@@ -1,4 +1,4 @@
-"""`kerfpath post`: write or print the program of a plan."""
+"""The output of the commands for programs: post, audit, compare, touch-up and script."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from pathlib import Path
 import numpy as np
 from rich.markup import escape
 
+from kerfpath.auditor import format_value
 from kerfpath.cad import read_measured
+from kerfpath.cli.drawing_output import drawing_of
 from kerfpath.cli.plan_output import finish_run
 from kerfpath.cli.show import (
+    busy,
     compile_kernels,
     errors,
     merge_notes,
@@ -18,11 +21,19 @@ from kerfpath.cli.show import (
     print_json,
     progress_bars,
     show_files,
+    table,
+    write_text,
 )
-from kerfpath.errors import InputError, KerfpathError
+from kerfpath.errors import InputError, KerfpathError, about
 from kerfpath.job import (
+    AuditReport,
+    audit_file,
+    audit_program,
+    compare_programs,
+    prepare,
     program_from_file,
     program_language,
+    python_script,
     read_job,
     read_plan_file,
     require_folder,
@@ -40,35 +51,11 @@ from kerfpath.post import (
 from kerfpath.post import language as find_language
 
 # -----------------------------------------------------------------------------
-# `kerfpath touch-up`: plan a job again around targets that a person has moved.
-
-
-def touch_up_program(
-    program: Path, job: Path, plan: Path, folder: Path, ease_mm: float, *, as_json: bool
-) -> None:
-    """Plan a job again around the moved targets of a program, and print the result."""
-    require_folder(folder)
-    compile_kernels()
-    with progress_bars() as progress:
-        done = touch_up(program, plan, job, ease=ease_mm / 1000, progress=progress)
-    more = {"targets": [asdict(each) for each in done.targets], "not_kept": list(done.notes)}
-    if not as_json:
-        for each in done.targets:
-            out.print(
-                f"{escape(each.place)}: {escape(each.contour)}, node {each.node}, moved by "
-                f"{each.off * 1e3:.3f} mm, axis turned by {np.degrees(each.turned):.3f} deg"
-            )
-        for note in merge_notes(done.notes):
-            out.print(f"note: {escape(note)}")
-    finish_run(done.outcome, done.part, folder, as_json=as_json, more=more)
-
-
-# -----------------------------------------------------------------------------
 # `kerfpath post`: write or print the program of a plan.
 
 
 def write_post(
-    plan_file: Path, language: str | None, output: Path | None, *, strict: bool, as_json: bool,
+    plan_file: Path, language: str | None, output: Path | None, *, strict: bool,
     job: Path | None = None, dry_share: float | None = None, measured: Path | None = None,
     residual_mm: float = 0.5,
 ) -> None:  # fmt: skip
@@ -82,12 +69,15 @@ def write_post(
         source = read_plan_file(plan_file).job if job is None else read_job(job).source
         language = program_language(source, job or plan_file)
     frame = None
+    frame_lines: list[str] = []
+    # If the program is printed, nothing else goes to stdout.
+    console = out if out.quiet or output is not None else errors
     if measured is not None:
         points = read_measured(measured)
         frame = placement_from_points(*points, most_residual=residual_mm / 1000)
-        if not as_json:  # printed first, so that it is shown even if there will be no program
-            for line in _frame_lines(frame, plan_file):
-                (errors if output is None else out).print(line)
+        frame_lines = _frame_lines(frame, plan_file)
+        for line in frame_lines:  # before the program, which may be refused
+            console.print(line)
     name = _name(output, find_language(language))
     if name is not None and dry_share is not None:
         name = name.removeprefix("dry_")  # dry runs add this prefix themselves
@@ -97,7 +87,7 @@ def write_post(
             frame=frame,
         )  # fmt: skip
     except KerfpathError:
-        for line in _frame_lines(frame, plan_file) if as_json and frame is not None else ():
+        for line in frame_lines if out.quiet else ():
             errors.print(line)
         raise
     written: list[Path] = []
@@ -115,21 +105,17 @@ def write_post(
     elif output is not None:
         write_program(output, next(iter(files.values())))
         written = [output]
-    if as_json:
-        print_json(
-            {
-                "language": language,
-                "files": [str(path) for path in written],
-                "removed": [] if replaced is None else [str(p) for p in replaced.removed],
-                "texts": None if written else files,
-                "measured": None if frame is None else _frame_entry(frame),
-                "notes": notes,
-            }
-        )
-        return
-    # If the program is printed, nothing else goes to stdout.
-    console = out if written else errors
-    if not written:
+    print_json(
+        {
+            "language": language,
+            "files": [str(path) for path in written],
+            "removed": [] if replaced is None else [str(p) for p in replaced.removed],
+            "texts": None if written else files,
+            "measured": None if frame is None else _frame_entry(frame),
+            "notes": notes,
+        }
+    )
+    if not written and not out.quiet:
         for name, text in files.items():
             if len(files) > 1:
                 print(f"----- {name} -----")
@@ -190,3 +176,132 @@ def _frame_entry(frame: MeasuredFrame) -> dict[str, object]:
         "xyz_mm": frame.xyz_mm,
         "rpy_deg": frame.rpy_deg,
     }
+
+
+# -----------------------------------------------------------------------------
+# `kerfpath audit`: check every contour of a plan or a program again.
+
+
+def show_audit(file: Path, job: Path | None) -> bool:
+    """Print the table of checks of each contour of a file; return whether all of them pass."""
+    found = _run_audit(file, job)
+    print_json(
+        {
+            "passed": found.passed,
+            "notes": [found.note],
+            "missing": list(found.missing),
+            "contours": {
+                name: [asdict(c) | {"ok": c.ok, "place": found.place(name, c)} for c in checks]
+                for name, checks in found.tables.items()
+            },
+        }
+    )
+    for name, checks in found.tables.items():
+        if found.places and all(c.ok for c in checks):
+            out.print(f"{escape(name)}: {len(checks)} checks passed")
+            continue
+        rows = [
+            [
+                escape(c.title),
+                format_value(c.value, c.unit),
+                format_value(c.limit, c.unit),
+                str(c.node),
+                "ok" if c.ok else c.level.upper(),
+            ]
+            for c in checks
+        ]
+        table(
+            ["check", "worst", "allowed", "node", "verdict"],
+            rows,
+            title=escape(name),
+            numbers=["worst", "allowed", "node"],
+            whole=["verdict"],
+        )
+        for c in checks:
+            if not c.ok:
+                said = f"{name}: {c.issue()}"
+                if name in found.places:
+                    said = found.sentence(name, c)
+                out.print(escape(said), soft_wrap=True)
+    for name in found.missing:
+        out.print(f"{escape(name)}: {'not cut' if found.places else 'no plan'}")
+    out.print(f"note: {escape(found.note)}")
+    out.print("audit passed" if found.passed else "audit FAILED")
+    return found.passed
+
+
+def _run_audit(file: Path, job: Path | None) -> AuditReport:
+    if file.suffix.lower() == ".json":
+        with about(file):
+            return audit_file(file, job)
+    if job is None:
+        raise InputError(f"{file}: a program is compared with its job; give it with --job JOB.toml")
+    with about(file), busy("auditing the program"):
+        return audit_program(file, job)
+
+
+# -----------------------------------------------------------------------------
+# `kerfpath compare`: describe in words what differs between two programs.
+
+
+def show_differences(a: Path, b: Path, job: Path) -> bool:
+    """Print what differs between two programs; return whether they are the same."""
+    with busy("comparing the programs"):
+        found = compare_programs(a, b, job)
+    same = not found.differences
+    print_json(
+        {
+            "same": same,
+            "differences": [asdict(each) for each in found.differences],
+            "not_compared": list(found.not_compared),
+        }
+    )
+    for each in found.differences:
+        out.print(escape(str(each)), soft_wrap=True)
+    if found.not_compared:
+        out.print(f"note: not compared: {', '.join(found.not_compared)}")
+    alike = "the same" if not found.not_compared else "the same in what was compared"
+    out.print(alike if same else "not the same")
+    return same
+
+
+# -----------------------------------------------------------------------------
+# `kerfpath touch-up`: plan a job again around targets that a person has moved.
+
+
+def touch_up_program(program: Path, job: Path, plan: Path, folder: Path, ease_mm: float) -> None:
+    """Plan a job again around the moved targets of a program, and print the result."""
+    require_folder(folder)
+    compile_kernels()
+    with progress_bars() as progress:
+        done = touch_up(program, plan, job, ease=ease_mm / 1000, progress=progress)
+    more = {"targets": [asdict(each) for each in done.targets], "not_kept": list(done.notes)}
+    for each in done.targets:
+        out.print(
+            f"{escape(each.place)}: {escape(each.contour)}, node {each.node}, moved by "
+            f"{each.off * 1e3:.3f} mm, axis turned by {np.degrees(each.turned):.3f} deg"
+        )
+    for note in merge_notes(done.notes):
+        out.print(f"note: {escape(note)}")
+    finish_run(done.outcome, done.part, folder, more=more)
+
+
+# -----------------------------------------------------------------------------
+# `kerfpath script`: write a job as a Python script.
+
+
+def write_script(path: Path, output: Path | None) -> None:
+    """Write the script of a job to a file, or print it without one.
+
+    Raises
+    ------
+    InputError
+        The job cannot be prepared or written as a script, or the file cannot be written.
+    """
+    job = read_job(path)
+    folder = None if output is None else output.absolute().parent
+    text = python_script(prepare(job, drawing_of(job)), folder)
+    if output is None:
+        print(text, end="")
+    else:
+        write_text(output, text, "-o")

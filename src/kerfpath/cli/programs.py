@@ -77,7 +77,7 @@ def post(
     from kerfpath.cli.program_output import write_post
 
     write_post(
-        plan_file, language, output, strict=strict, as_json=as_json, job=job,
+        plan_file, language, output, strict=strict, job=job,
         dry_share=dry_share, measured=measured, residual_mm=residual_mm,
     )  # fmt: skip
 
@@ -106,9 +106,9 @@ def audit(
 
     Example: kerfpath audit door/door.mod --job door.toml
     """
-    from kerfpath.cli.check_output import show_audit
+    from kerfpath.cli.program_output import show_audit
 
-    if not show_audit(file, job, as_json=as_json):
+    if not show_audit(file, job):
         raise typer.Exit(1)
 
 
@@ -126,9 +126,9 @@ def compare(
 
     Example: kerfpath compare door/door.mod edited.mod --job door.toml
     """
-    from kerfpath.cli.check_output import show_differences
+    from kerfpath.cli.program_output import show_differences
 
-    if not show_differences(a, b, job, as_json=as_json):
+    if not show_differences(a, b, job):
         raise typer.Exit(1)
 
 
@@ -157,7 +157,7 @@ def touch_up(
     from kerfpath.cli.program_output import touch_up_program
 
     folder = to or Path(f"{program.stem}-touched")
-    touch_up_program(program, job, plan, folder, ease_mm, as_json=as_json)
+    touch_up_program(program, job, plan, folder, ease_mm)
 
 
 @app.command()
@@ -176,6 +176,6 @@ def script(
 
     Example: kerfpath script door.toml -o door.py
     """
-    from kerfpath.cli.plan_output import write_script
+    from kerfpath.cli.program_output import write_script
 
     write_script(job, output)

@@ -8,41 +8,38 @@ import numpy as np
 from rich.markup import escape
 
 from kerfpath.arrays import Array
-from kerfpath.cli.show import out, print_json, table
+from kerfpath.cli.show import out, print_json, table, write_text
 from kerfpath.errors import InputError
-from kerfpath.files import write_whole
 from kerfpath.robots import ExternalProduct, KnownAxis, external, external_ids, robot, robot_ids
 
 UNITS = {"lower": "", "upper": "", "velocity": "/s", "acceleration": "/s^2"}
 """Limits of external axes, and the end of their units after mm or deg."""
 
 
-def list_robots(*, as_json: bool) -> None:
+def list_robots() -> None:
     """Print id, maker, model, payload and reach of every robot, and which limits are known.
 
     The axes of every rail and positioner follow with their limits.
     """
     known = [robot(name) for name in robot_ids()]
     products = [external(name) for name in external_ids()]
-    if as_json:
-        print_json(
-            {
-                "robots": [
-                    {
-                        "id": r.id,
-                        "manufacturer": r.manufacturer,
-                        "model": r.model,
-                        "payload_kg": r.payload,
-                        "reach_m": r.reach,
-                        "limits_known": not r.limits_missing,
-                        "acceleration_known": r.acceleration is not None,
-                    }
-                    for r in known
-                ],
-                "externals": [_entry(product) for product in products],
-            }
-        )
-        return
+    print_json(
+        {
+            "robots": [
+                {
+                    "id": r.id,
+                    "manufacturer": r.manufacturer,
+                    "model": r.model,
+                    "payload_kg": r.payload,
+                    "reach_m": r.reach,
+                    "limits_known": not r.limits_missing,
+                    "acceleration_known": r.acceleration is not None,
+                }
+                for r in known
+            ],
+            "externals": [_entry(product) for product in products],
+        }
+    )
     rows = [
         [
             r.id,
@@ -79,12 +76,10 @@ def list_robots(*, as_json: bool) -> None:
     )
 
 
-def show_external(name: str, *, as_json: bool) -> None:
+def show_external(name: str) -> None:
     """Print the axes, limits, notes and sources of one rail or positioner."""
     product = external(name)
-    if as_json:
-        print_json(_entry(product))
-        return
+    print_json(_entry(product))
     out.print(f"[bold]{escape(product.manufacturer)} {escape(product.model)}[/] ({product.id})")
     out.print(f"payload {product.payload:g} kg")
     heads = ["axis", "carries", "range", "velocity", "acceleration", "direction", "through mm"]
@@ -159,7 +154,7 @@ def _entry(product: ExternalProduct) -> dict[str, object]:
     }
 
 
-def show_robot(name: str, *, as_json: bool) -> None:
+def show_robot(name: str) -> None:
     """Print geometry, limits, notes and sources of one robot."""
     r = robot(name)
     limits = {
@@ -177,31 +172,29 @@ def show_robot(name: str, *, as_json: bool) -> None:
         }
         for c in r.couplings
     ]
-    if as_json:
-        print_json(
-            {
-                "id": r.id,
-                "manufacturer": r.manufacturer,
-                "model": r.model,
-                "payload_kg": r.payload,
-                "reach_m": r.reach,
-                "kinematics": r.kinematics,
-                "geometry_m": dict(r.geometry),
-                "sign": r.sign.tolist(),
-                "offset_deg": _degrees(r.offset),
-                **{_key(k): v for k, v in limits.items()},
-                "axis_3": r.axis_3,
-                "couplings": couplings,
-                "endless": (np.flatnonzero(r.endless) + 1).tolist(),
-                "limits_missing": r.limits_missing,
-                "acceleration_source": r.acceleration_source,
-                "acceleration_ratio": r.acceleration_ratio,
-                "notes": list(r.notes),
-                "frames": r.frames,
-                "sources": r.sources,
-            }
-        )
-        return
+    print_json(
+        {
+            "id": r.id,
+            "manufacturer": r.manufacturer,
+            "model": r.model,
+            "payload_kg": r.payload,
+            "reach_m": r.reach,
+            "kinematics": r.kinematics,
+            "geometry_m": dict(r.geometry),
+            "sign": r.sign.tolist(),
+            "offset_deg": _degrees(r.offset),
+            **{_key(k): v for k, v in limits.items()},
+            "axis_3": r.axis_3,
+            "couplings": couplings,
+            "endless": (np.flatnonzero(r.endless) + 1).tolist(),
+            "limits_missing": r.limits_missing,
+            "acceleration_source": r.acceleration_source,
+            "acceleration_ratio": r.acceleration_ratio,
+            "notes": list(r.notes),
+            "frames": r.frames,
+            "sources": r.sources,
+        }
+    )
     out.print(f"[bold]{escape(r.manufacturer)} {escape(r.model)}[/] ({r.id})")
     out.print(f"payload {r.payload:g} kg, reach {r.reach:g} m")
     lengths = ", ".join(f"{k} {v * 1000:g}" for k, v in r.geometry.items())
@@ -229,7 +222,7 @@ def show_robot(name: str, *, as_json: bool) -> None:
         out.print(f"source of {what.replace('_', ' ')}: {escape(source)}")
 
 
-def write_urdf(name: str | None, path: Path, *, as_json: bool) -> None:
+def write_urdf(name: str | None, path: Path) -> None:
     """Write the description of a robot of the library to a file, and say so.
 
     Raises
@@ -241,17 +234,8 @@ def write_urdf(name: str | None, path: Path, *, as_json: bool) -> None:
         raise InputError(
             f"--urdf: expected the id of a robot, got {name or 'none'}; kerfpath robots lists them"
         )
-    text = robot(name).to_urdf()
-    try:
-        write_whole({path: text.encode()})
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot write ({error.strerror}); choose another --urdf"
-        ) from None
-    if as_json:
-        print_json({"id": name, "files": [str(path)]})
-    else:
-        out.print(f"wrote {escape(str(path))}")
+    write_text(path, robot(name).to_urdf(), "--urdf")
+    print_json({"id": name, "files": [str(path)]})
 
 
 def _key(said: str) -> str:

@@ -1,4 +1,7 @@
-"""Output of commands: tables for people or one JSON object on stdout, progress on stderr."""
+"""Output of commands: tables for people or one JSON object on stdout, progress on stderr.
+
+A command prints both: with --json `out` is silent, without it `print_json` is.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +23,8 @@ from rich.table import Table
 from rich.text import Text
 
 from kerfpath.cli.stop import stop_in_order
+from kerfpath.errors import InputError
+from kerfpath.files import write_whole
 from kerfpath.progress import Progress, no_progress
 
 _PIPED = 200
@@ -44,8 +49,9 @@ errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def print_json(data: Mapping[str, object]) -> None:
-    """Print one JSON object on stdout."""
-    print(json.dumps(data, allow_nan=False))
+    """Print the result of a command as one JSON object on stdout, if --json asks for it."""
+    if out.quiet:
+        print(json.dumps(data, allow_nan=False))
 
 
 def table(
@@ -123,6 +129,23 @@ def show_files(written: Iterable[Path], removed: Iterable[Path] = (), *, of: str
         out.print(f"removed {escape(str(path))}, of {of}")
     for path in written:
         out.print(f"wrote {escape(str(path))}")
+
+
+def write_text(path: Path, text: str, option: str) -> None:
+    """Write the file that an option of the command names, and print that.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written; the message names the option.
+    """
+    try:
+        write_whole({path: text.encode()})
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot write ({error.strerror}); choose another {option}"
+        ) from None
+    show_files([path])
 
 
 @contextmanager

@@ -79,14 +79,14 @@ def pareto(
 
     folder = to or Path(f"{job.stem}-pareto")
     if pick is not None:
-        pick_plan(job, folder, pick, refine=refine, strict=strict, as_json=as_json)
+        pick_plan(job, folder, pick, refine=refine, strict=strict)
         return
     if refine or strict:
         raise InputError("--refine and --strict: only with --pick, which writes a plan")
     names = [name.strip() for name in criteria.split(",")]
     show_front(
         job, folder, contour=contour, criteria=names, runs=runs, search=search, seed=seed,
-        ahead=ahead, scheduler=scheduler, processes=processes, as_json=as_json,
+        ahead=ahead, scheduler=scheduler, processes=processes,
     )  # fmt: skip
 
 
@@ -115,7 +115,7 @@ def batch(
     """
     from kerfpath.cli.study_output import plan_jobs
 
-    if not plan_jobs(jobs, to or Path("kerfpath-batch"), scheduler, processes, as_json=as_json):
+    if not plan_jobs(jobs, to or Path("kerfpath-batch"), scheduler, processes):
         raise typer.Exit(1)
 
 
@@ -208,14 +208,13 @@ def layout(
             raise InputError(f"--robots moves nothing; remove {', '.join(given)}")
         found = show_robots_for(
             job, folder, scheduler=scheduler, processes=processes, ratio=acceleration_ratio,
-            as_json=as_json,
         )  # fmt: skip
     elif acceleration_ratio is not None:
         raise InputError("--acceleration-ratio: only with --robots; else set it in the job")
     else:
         found = show_layout(
             job, folder, vary=vary or [], options=options, scheduler=scheduler,
-            processes=processes, as_json=as_json,
+            processes=processes,
         )  # fmt: skip
     if not found:
         raise typer.Exit(1)

@@ -52,12 +52,7 @@ from kerfpath.study import batch as plan_batch
 
 
 def plan_jobs(
-    jobs: Sequence[Path],
-    folder: Path,
-    scheduler: str | None,
-    processes: int | None,
-    *,
-    as_json: bool,
+    jobs: Sequence[Path], folder: Path, scheduler: str | None, processes: int | None
 ) -> bool:
     """Plan jobs, write their files and print a row for each; return whether all have passed."""
     if scheduler is None:
@@ -67,15 +62,13 @@ def plan_jobs(
             jobs, folder, scheduler=scheduler, processes=processes, progress=progress
         )
     passed = sum(row.passed for row in found)
-    if as_json:
-        print_json({"passed": passed == len(found), "jobs": [_batch_entry(row) for row in found]})
-    else:
-        columns = ["job", "contours", "passed", "cutting s", "seconds", "program or reason"]
-        table(columns, [_cells(row) for row in found], numbers=columns[1:5])
-        out.print(
-            f"{passed} of {len(found)} jobs passed; their files are in {escape(str(folder))}, "
-            "in one folder for each job"
-        )
+    print_json({"passed": passed == len(found), "jobs": [_batch_entry(row) for row in found]})
+    columns = ["job", "contours", "passed", "cutting s", "seconds", "program or reason"]
+    table(columns, [_cells(row) for row in found], numbers=columns[1:5])
+    out.print(
+        f"{passed} of {len(found)} jobs passed; their files are in {escape(str(folder))}, "
+        "in one folder for each job"
+    )
     return passed == len(found)
 
 
@@ -124,7 +117,6 @@ def show_front(
     ahead: int,
     scheduler: str | None,
     processes: int | None,
-    as_json: bool,
 ) -> None:
     """Find the front of a contour, write pareto.json and pareto.html, and print its plans."""
     make_folder(folder)
@@ -145,9 +137,7 @@ def show_front(
         )
     with busy("writing"):
         written = write_pareto(found, folder)
-    if as_json:
-        print_json(_pareto_entry(found, written))
-        return
+    print_json(_pareto_entry(found, written))
     front = found.front
     chosen = "" if contour or not found.others else f", the longest of {len(found.others) + 1}"
     out.print(
@@ -203,9 +193,7 @@ def _pareto_entry(found: JobFront, written: Sequence[Path]) -> dict[str, object]
     }
 
 
-def pick_plan(
-    job_file: Path, folder: Path, which: str, *, refine: bool, strict: bool, as_json: bool
-) -> None:
+def pick_plan(job_file: Path, folder: Path, which: str, *, refine: bool, strict: bool) -> None:
     """Plan the job with the picked plan of one contour, and write its files.
 
     Raises
@@ -221,11 +209,10 @@ def pick_plan(
     compile_kernels(job.robot.kinematics)
     with progress_bars() as progress:
         part, outcome = plan_picked(job_file, pick, refine=refine, progress=progress)
-    if not as_json:
-        show_drawing(part)
-        out.print(f"[bold]{escape(pick.contour)}[/] as plan {pick.number} of its front")
+    show_drawing(part)
+    out.print(f"[bold]{escape(pick.contour)}[/] as plan {pick.number} of its front")
     more = {"picked": {"contour": pick.contour, "number": pick.number, "refined": refine}}
-    finish_run(outcome, part, to, as_json=as_json, strict=strict, more=more)
+    finish_run(outcome, part, to, strict=strict, more=more)
 
 
 # -----------------------------------------------------------------------------
@@ -239,7 +226,6 @@ def show_robots_for(
     scheduler: str | None,
     processes: int | None,
     ratio: str | None,
-    as_json: bool,
 ) -> bool:
     """Print how fast each robot can do a job, write the list; return whether one is fast enough.
 
@@ -262,10 +248,8 @@ def show_robots_for(
         )
     written = write_robots(job, found, folder)
     able = any(each.binding and (each.binding.margin or 0.0) >= 1 for each in found)
-    if as_json:
-        files = [str(path) for path in written]
-        print_json({"able": able, "robots": robots_entry(found), "files": files})
-        return able
+    files = [str(path) for path in written]
+    print_json({"able": able, "robots": robots_entry(found), "files": files})
     columns = [f"{what.lower()} {unit}".strip() for what, unit in ROBOT_COLUMNS]
     numbers = [column for i, column in enumerate(columns) if i not in ROBOT_WORDS]
     rows = [[escape(v) for v in row] for row in robot_rows(found)]
@@ -312,7 +296,6 @@ def show_layout(
     options: LayoutOptions,
     scheduler: str | None,
     processes: int | None,
-    as_json: bool,
 ) -> bool:
     """Find the best placement, write its files, print it; return whether any is feasible."""
     ranges = ranges_of(vary)
@@ -331,9 +314,7 @@ def show_layout(
     with busy("writing"):
         written = write_layout(found, folder)
     entry = layout_entry(found)
-    if as_json:
-        print_json({**entry, "files": [str(path) for path in written]})
-        return bool(entry["feasible"])
+    print_json({**entry, "files": [str(path) for path in written]})
     by_default = " (by default: no range in [layout] or --vary)" if found.by_default else ""
     spans = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in found.ranges.items())
     out.print(escape(f"varied{by_default}: {spans}"))
