@@ -65,17 +65,13 @@ def read_apt(
         A word that is not known or changes the path (its line is named), a missing number, no unit,
         no tool axis, no cut.
     """
-    try:
-        return part_of_tool_path(path, _tool_path(lines_of(content)), unit, gap, axis)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-
-
-def _tool_path(lines: Sequence[str]) -> ToolPath:
     reader = _Reader()
-    for line, word, rest in _statements(lines):
+    for line, word, rest in _statements(lines_of(content)):
         reader.take(line, word, rest)
-    return ToolPath(moves=reader.moves, unit=reader.unit, notes=reader.notes, unused=reader.unused)
+    tool_path = ToolPath(
+        moves=reader.moves, unit=reader.unit, notes=reader.notes, unused=reader.unused
+    )
+    return part_of_tool_path(path, tool_path, unit, gap, axis)
 
 
 def _statements(lines: Sequence[str]) -> Iterator[tuple[int, str, str]]:

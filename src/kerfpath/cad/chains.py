@@ -235,9 +235,7 @@ def part_of_strokes(
         chains += [(style, chain) for chain in found]
     if not chains:
         why = f"; {left_out[0]}" if left_out else ""
-        raise InputError(
-            f"{path}: holds nothing to cut: no line, arc, polyline, ellipse or spline{why}"
-        )
+        raise InputError(f"holds nothing to cut: no line, arc, polyline, ellipse or spline{why}")
     depth = iter(_nesting_depths([chain for _, chain in chains if chain.is_closed]))
     kinds: list[Kind] = []
     for k, (style, chain) in enumerate(chains):

@@ -256,13 +256,12 @@ def read_dxf(
         insunits = int(document.header.get("$INSUNITS", 0))
     except DAMAGED as error:
         raise InputError(
-            f"{path}: not a DXF file, or a damaged one ({_reason(error)}); save the drawing as DXF "
-            "again"
+            f"not a DXF file, or a damaged one ({_reason(error)}); save the drawing as DXF again"
         ) from None
     declared = INSUNITS.get(insunits, "")
     if unit is None and not declared:
         raise InputError(
-            f"{path}: states no length unit ($INSUNITS is {insunits}); "
+            f"states no length unit ($INSUNITS is {insunits}); "
             f"give the unit of its numbers with unit= one of {', '.join(UNITS_MM)}"
         )
     notes = []
@@ -278,10 +277,10 @@ def read_dxf(
         with np.errstate(all="ignore"):  # ezdxf divides by lengths that may be 0
             sheet.add(document.modelspace(), np.diag([scale, scale, scale, 1.0]))
             sheet.look_on_paper()
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    except InputError:
+        raise
     except DAMAGED as error:
-        raise InputError(f"{path}: damaged ({_reason(error)}); repair it in CAD") from None
+        raise InputError(f"damaged ({_reason(error)}); repair it in CAD") from None
     sheet.left_out.update(lost)
     part = part_of_strokes(
         path, unit or declared, sheet.strokes, gap=gap, notes=notes, left_out=sheet.summed(),

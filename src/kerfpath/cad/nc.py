@@ -74,12 +74,9 @@ def read_nc(
         A word that is not known, that changes the path, or that needs the kinematics of the machine
         (its line is named), no unit, no tool axis, no cut.
     """
-    try:
-        lines = lines_of(content)
-        tool_path = klartext_path(lines) if is_klartext(lines) else _siemens_path(lines)
-        return part_of_tool_path(path, tool_path, unit, gap, axis)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    lines = lines_of(content)
+    tool_path = klartext_path(lines) if is_klartext(lines) else _siemens_path(lines)
+    return part_of_tool_path(path, tool_path, unit, gap, axis)
 
 
 def _siemens_path(lines: Sequence[str]) -> ToolPath:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.arrays import Array, floats, freeze, scalar, short_repr
-from kerfpath.cad.left_out import nothing_drawn
 from kerfpath.cad.part import Part
 from kerfpath.cad.table import TableCells, cells_of
 from kerfpath.cad.units import GAP, MM, UNITS_MM, require_unit
@@ -156,35 +155,43 @@ def content_of(path: Path, expected: str) -> bytes:
 def _read_file(
     kind: str, path: Path, content: bytes, options: _ReadOptions, progress: Progress
 ) -> Part:
-    """Return the part; each reader is loaded when it is needed, as OCCT takes over a second.
-
-    STEP and IGES are translated in another process, because OCCT may crash.
-    """
+    """Return the part; each reader is loaded when it is needed, as OCCT takes over a second."""
     progress(f"reading {path.name}", 0, 0)
     unit, gap = options.unit, options.gap
     axis = None if options.axis is None else np.array(options.axis)
-    if kind == "table":
-        from kerfpath.cad.table import read_table
+    try:
+        if kind == "table":
+            from kerfpath.cad.table import read_table
 
-        return read_table(path, content, unit, gap, axis=axis, columns=options.columns)
-    if kind == "tool path":
-        from kerfpath.cad.apt import read_apt
+            return read_table(path, content, unit, gap, axis=axis, columns=options.columns)
+        if kind == "tool path":
+            from kerfpath.cad.apt import read_apt
 
-        return read_apt(path, content, unit, gap, axis)
-    if kind == "NC program":
-        from kerfpath.cad.nc import read_nc
+            return read_apt(path, content, unit, gap, axis)
+        if kind == "NC program":
+            from kerfpath.cad.nc import read_nc
 
-        return read_nc(path, content, unit, gap, axis)
-    require_extra("cad", f"{path}: reading {kind}")
-    if kind == "DXF":
-        from kerfpath.cad.dxf import read_dxf
+            return read_nc(path, content, unit, gap, axis)
+        require_extra("cad", f"reading {kind}")
+        if kind == "DXF":
+            from kerfpath.cad.dxf import read_dxf
 
-        return read_dxf(path, content, unit, gap, axis)
+            return read_dxf(path, content, unit, gap, axis)
+        return _translated(kind, path, content, options, progress)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _translated(
+    kind: str, path: Path, content: bytes, options: _ReadOptions, progress: Progress
+) -> Part:
+    """Return the part in a STEP or IGES file, translated in another process: OCCT may crash."""
     stand_by()
     from kerfpath.cad.iges import read_iges
     from kerfpath.cad.shape import occt, uncollected
-    from kerfpath.cad.step import read_step
+    from kerfpath.cad.step import read_step, require_grammar
 
+    unit, gap = options.unit, options.gap
     key = (kind, sha256(content).digest(), unit, gap, options.outer_towards, options.axis)
     part = _cache.pop(key, None)
     if part is None:
@@ -193,8 +200,10 @@ def _read_file(
             drawn = call_apart(translate, path.absolute(), unit, gap, size=len(content))
             with occt(), uncollected():
                 part = _part_of(path, drawn, options, progress)
-        except InputError as error:
-            raise InputError(f"{path}: {_grammar_fault(kind, content, error)}") from None
+        except InputError:
+            if kind == "STEP" and b"END-ISO-10303-21;" in content:
+                require_grammar(content)  # a fault of the grammar explains the failure better
+            raise
     _cache[key] = part
     while len(_cache) > CACHED:
         _cache.pop(next(iter(_cache)), None)
@@ -204,7 +213,7 @@ def _read_file(
 def _read_shape(shape: object, options: _ReadOptions, progress: Progress) -> Part:
     """Return the part in a shape in memory."""
     require_extra("cad", "shape: reading it")
-    from kerfpath.cad.given import shape_in_memory
+    from kerfpath.cad.in_memory import shape_in_memory
     from kerfpath.cad.shape import occt, uncollected
 
     try:
@@ -218,29 +227,12 @@ def _read_shape(shape: object, options: _ReadOptions, progress: Progress) -> Par
 
 
 def _part_of(path: Path, drawn: NamedShape, options: _ReadOptions, progress: Progress) -> Part:
-    """Return the part made of faces, or of lines with an axis."""
-    from kerfpath.cad.faces import part_of
-    from kerfpath.cad.wires import part_of_wires
+    from kerfpath.cad.from_shape import part_of_shape
 
-    if drawn.faces and options.axis is not None:
-        raise InputError("axis: expected a drawing of lines, got one of faces")
-    if drawn.faces:
-        return part_of(path, drawn, options.gap, options.outer_towards, progress)
-    if options.axis is None:
-        raise nothing_drawn(drawn.left_out)
-    return part_of_wires(path, drawn, options.gap, np.array(options.axis))
-
-
-def _grammar_fault(kind: str, content: bytes, error: InputError) -> InputError:
-    """Return the fault in the grammar of a STEP file that cannot be read, else the error itself."""
-    from kerfpath.cad.part21 import require_grammar
-
-    try:
-        if kind == "STEP" and b"END-ISO-10303-21;" in content:
-            require_grammar(content)
-    except InputError as broken:
-        return broken
-    return error
+    return part_of_shape(
+        path, drawn, options.gap, outer_towards=options.outer_towards,
+        axis=None if options.axis is None else np.array(options.axis), progress=progress,
+    )  # fmt: skip
 
 
 _cache: dict[tuple[object, ...], Part] = {}

@@ -173,30 +173,27 @@ def read_table(
     InputError
         Anything wrong with a row (its line is named), unknown columns, or no known unit.
     """
-    try:
-        names, declared, table = _rows(cells_of(content, EXPECTED), columns, axis is not None)
-        if not (unit or declared):
-            raise InputError(
-                f"states no length unit; give it with unit= one of {', '.join(UNITS_MM)}, "
-                "or in the header, as x_mm"
-            )
-        notes = []
-        if unit and declared and unit != declared:
-            notes.append(f"unit {unit} as given; the header says {declared}")
-        if unknown := [name for name in names if name not in (*KNOWN, UNUSED)]:
-            notes.append(f"columns not used: {', '.join(unknown)}")
-        points, normals = _numbers(names, table, UNITS_MM[unit or declared], axis)
-        loops = []
-        for name, chosen in _contours(names, table):
-            lines = np.array(table.lines)[chosen]
-            trace, repaired = trace_of_points(points[chosen], normals[chosen], lines, gap / MM)
-            notes += [f"contour {name!r}: {what}" for what in repaired]
-            kind = kind_of_points(trace)
-            loops.append(
-                loop_of(name=name, face=name, kind=kind, trace=trace, surface="points", gap=gap)
-            )
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    names, declared, table = _rows(cells_of(content, EXPECTED), columns, axis is not None)
+    if not (unit or declared):
+        raise InputError(
+            f"states no length unit; give it with unit= one of {', '.join(UNITS_MM)}, "
+            "or in the header, as x_mm"
+        )
+    notes = []
+    if unit and declared and unit != declared:
+        notes.append(f"unit {unit} as given; the header says {declared}")
+    if unknown := [name for name in names if name not in (*KNOWN, UNUSED)]:
+        notes.append(f"columns not used: {', '.join(unknown)}")
+    points, normals = _numbers(names, table, UNITS_MM[unit or declared], axis)
+    loops = []
+    for name, chosen in _contours(names, table):
+        lines = np.array(table.lines)[chosen]
+        trace, repaired = trace_of_points(points[chosen], normals[chosen], lines, gap / MM)
+        notes += [f"contour {name!r}: {what}" for what in repaired]
+        kind = kind_of_points(trace)
+        loops.append(
+            loop_of(name=name, face=name, kind=kind, trace=trace, surface="points", gap=gap)
+        )
     return part_without_faces(path, unit or declared, loops, gap=gap, notes=notes)
 
 

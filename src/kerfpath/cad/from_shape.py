@@ -1,4 +1,4 @@
-"""Build a part from faces: the loops of every face, and of the skins that faces make up."""
+"""Build a part from a shape: from its faces and the skins that they make up, or from its lines."""
 
 from __future__ import annotations
 
@@ -9,14 +9,22 @@ from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
-from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
 from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
-from OCP.GeomAbs import GeomAbs_SurfaceType
+from OCP.Geom import Geom_TrimmedCurve
+from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
+from OCP.GeomConvert import GeomConvert
+from OCP.gp import gp_Ax2, gp_Pnt, gp_Vec
 from OCP.Standard import Standard_Failure
 from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopoDS import TopoDS, TopoDS_Edge
+from scipy.interpolate import BSpline
 
-from kerfpath.arrays import freeze
+from kerfpath.arrays import Array, freeze
 from kerfpath.cad.build import named_loops
+from kerfpath.cad.chains import part_of_strokes
+from kerfpath.cad.curves import Arc, Curve, Line, Spline
 from kerfpath.cad.left_out import LeftOut, counted, nothing_drawn
 from kerfpath.cad.loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad.part import Loop, Part
@@ -24,7 +32,7 @@ from kerfpath.cad.shape import NamedFace, NamedShape, list_shapes, triangulate, 
 from kerfpath.cad.skins import Skin, skins_of
 from kerfpath.cad.units import MM
 from kerfpath.errors import InputError
-from kerfpath.progress import Progress, no_progress
+from kerfpath.progress import Progress
 
 MESHES = 2
 """Number of meshes of a part that are kept: one for its cell, one for its pictures."""
@@ -44,14 +52,55 @@ SURFACES = {
 }
 
 
-def part_of(
+def part_of_shape(
     path: Path,
     drawn: NamedShape,
     gap: float,
-    outer_towards: tuple[float, float, float] | None = None,
-    progress: Progress = no_progress,
+    *,
+    outer_towards: tuple[float, float, float] | None,
+    axis: Array | None,
+    progress: Progress,
 ) -> Part:
-    """Return the part in a drawing, with names for every face, skin and loop; `gap` is in m."""
+    """Return the part that faces make up, or if there are none, lines cut along an axis.
+
+    Parameters
+    ----------
+    path : Path
+    drawn : NamedShape
+    gap : float m
+        Distance between ends that a loop bridges.
+    outer_towards : (3,), optional
+        Direction that the outer sides of sheets face.
+    axis : (3,), optional
+        The tool axis of all lines.
+    progress : callable
+
+    Raises
+    ------
+    InputError
+        Nothing is drawn, or an axis is given for faces.
+    """
+    if not drawn.faces:
+        if axis is None:
+            raise nothing_drawn(drawn.left_out)
+        return _part_of_lines(path, drawn, gap, axis)
+    if axis is not None:
+        raise InputError("axis: expected a drawing of lines, got one of faces")
+    return _part_of_faces(path, drawn, gap, outer_towards, progress)
+
+
+# -----------------------------------------------------------------------------
+# The loops of faces and of skins.
+
+
+def _part_of_faces(
+    path: Path,
+    drawn: NamedShape,
+    gap: float,
+    outer_towards: tuple[float, float, float] | None,
+    progress: Progress,
+) -> Part:
+    """Return the part, with names for every face, skin and loop."""
     faces, found, unread = _readable(drawn.faces, progress)
     towards = None if outer_towards is None else np.array(outer_towards)
     skins = skins_of([named.face for named in faces], found, towards)
@@ -160,3 +209,64 @@ def _skin_names(skins: Sequence[Skin], taken: set[str]) -> list[str]:
                 name = f"skin{number}"
         names.append(name)
     return names
+
+
+# -----------------------------------------------------------------------------
+# Lines that bound no face.
+
+WIRE_STYLE = ("curves", "")
+"""Layer and colour of these lines, by which loops are named."""
+
+
+def _part_of_lines(path: Path, drawn: NamedShape, gap: float, axis: Array) -> Part:
+    """Return the part that the lines of a shape without faces make up."""
+    edges = ShapeMap()
+    for edge in list_shapes(drawn.shape, TopAbs_ShapeEnum.TopAbs_EDGE):
+        edges.Add(edge)
+    numbers = range(1, edges.Extent() + 1)
+    strokes = [(_curve(TopoDS.Edge(edges.FindKey(number))),) for number in numbers]
+    part = part_of_strokes(
+        path, drawn.unit, {WIRE_STYLE: strokes}, gap=gap, notes=drawn.notes,
+        left_out=drawn.left_out, axis=axis,
+    )  # fmt: skip
+    return replace(part, frames=drawn.frames)
+
+
+def _curve(edge: TopoDS_Edge) -> Curve:
+    adaptor = BRepAdaptor_Curve(edge)
+    first, last = adaptor.FirstParameter(), adaptor.LastParameter()
+    kind = adaptor.GetType()
+    if kind == GeomAbs_CurveType.GeomAbs_Line:
+        return Line(_vector(adaptor.Value(first)), _vector(adaptor.Value(last)))
+    if kind == GeomAbs_CurveType.GeomAbs_Circle:
+        circle = adaptor.Circle()
+        return _arc(circle.Position(), circle.Radius(), circle.Radius(), first, last)
+    if kind == GeomAbs_CurveType.GeomAbs_Ellipse:
+        ellipse = adaptor.Ellipse()
+        radii = ellipse.MajorRadius(), ellipse.MinorRadius()
+        return _arc(ellipse.Position(), *radii, first, last)
+    trimmed = Geom_TrimmedCurve(BRep_Tool.Curve_s(edge, first, last), first, last)
+    spline = GeomConvert.CurveToBSplineCurve_s(trimmed)
+    poles = range(1, spline.NbPoles() + 1)
+    weights = np.array([spline.Weight(k) for k in poles])
+    points = np.array([_vector(spline.Pole(k)) for k in poles])
+    net = np.column_stack([points * weights[:, None], weights])
+    knots = [
+        spline.Knot(k)
+        for k in range(1, spline.NbKnots() + 1)
+        for _ in range(spline.Multiplicity(k))
+    ]
+    return Spline(
+        BSpline(np.array(knots), net, spline.Degree()),
+        spline.FirstParameter(),
+        spline.LastParameter(),
+    )
+
+
+def _arc(at: gp_Ax2, major: float, minor: float, first: float, last: float) -> Arc:
+    x, y = gp_Vec(at.XDirection()), gp_Vec(at.YDirection())
+    return Arc(_vector(at.Location()), major * _vector(x), minor * _vector(y), first, last)
+
+
+def _vector(at: gp_Pnt | gp_Vec) -> Array:
+    return np.array([at.X(), at.Y(), at.Z()])
