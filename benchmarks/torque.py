@@ -14,7 +14,7 @@ from benchmarks import _arm
 from benchmarks._figures import Figure, Report, in_turn
 from kerfpath import NoFeasiblePath, Robot, shortest_path
 from kerfpath.arrays import Array, Bools, Ints
-from kerfpath.auditor.steps import LagrangeArm
+from kerfpath.auditor.dynamics import LagrangeArm
 from kerfpath.dynamics import Load
 from kerfpath.limits import TorqueLimit
 from kerfpath.planner import layered_graph, node_interval

@@ -25,7 +25,7 @@ from kerfpath import (
     shortest_path,
 )
 from kerfpath.auditor import chain_of, checks
-from kerfpath.auditor.between import margins
+from kerfpath.auditor.margins import margins
 from kerfpath.cell import CollisionChecker, box_between, cell_of
 from kerfpath.comfort import MEASURES, jacobian, measure, measures
 from kerfpath.job import read_plan_file

@@ -6,7 +6,7 @@ import pytest
 from tests.arms import described_with_masses
 from tests.test_dynamics import LOAD, model_of, motions
 
-from kerfpath.auditor.steps import LagrangeArm
+from kerfpath.auditor.dynamics import LagrangeArm
 
 
 @pytest.mark.parametrize("load", [None, LOAD])

@@ -15,7 +15,7 @@ from kerfpath.certifier.division import between, turning_nodes
 from kerfpath.certifier.stages import Steps
 from kerfpath.job import read_job
 from kerfpath.kernels.metric import rho
-from kerfpath.refiner.convex_program import JointCurves
+from kerfpath.refiner.joint_curves import JointCurves
 from kerfpath.tilt import Tilt
 
 pytestmark = pytest.mark.usefixtures("certifier_at_work")

@@ -9,7 +9,7 @@ from scipy.optimize import linprog, minimize
 from kerfpath import InputError, audit, plan, refine
 from kerfpath.limits import Limits
 from kerfpath.refiner.convex_program import LinearModel, solve
-from kerfpath.refiner.rows import RateLimits
+from kerfpath.refiner.rates import RateLimits
 
 METRICS = ["manhattan", "chebychev", "euclid"]
 STEP = np.radians(2)

@@ -13,8 +13,9 @@ from kerfpath.auditor import audit, checks
 from kerfpath.dynamics import Load
 from kerfpath.limits import JerkLimit, Limits, jerks_of, rates_of
 from kerfpath.options import PlanOptions
-from kerfpath.refiner.convex_program import JointCurves, solve
-from kerfpath.refiner.rows import LinearTorque, RateLimits
+from kerfpath.refiner.convex_program import solve
+from kerfpath.refiner.joint_curves import JointCurves
+from kerfpath.refiner.rates import LinearTorque, RateLimits
 from kerfpath.retime import retime
 
 STEP = np.radians(5)

@@ -8,7 +8,7 @@ from tests.search.posed import interrupted_path
 
 import naive
 from kerfpath import InputError, NoFeasiblePath, shortest_path
-from kerfpath.search import long_enough as long_enough
+from kerfpath.search import piece_spans
 
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [0.1]}
 
@@ -109,9 +109,9 @@ def tracks(rng):
 @pytest.mark.parametrize(("make", "count"), [(instance, 400), (tracks, 200)])
 def test_pieces_of_a_least_length_agree_with_trying_everything(make, count, monkeypatch):
     looked_at = []
-    tight = long_enough._tight
+    tight = piece_spans._tight
     monkeypatch.setattr(
-        long_enough, "_tight", lambda *given: looked_at.append(given) or tight(*given)
+        piece_spans, "_tight", lambda *given: looked_at.append(given) or tight(*given)
     )
     rng = np.random.default_rng(35 + count)
     seen = [agree(rng, make, long=True) for _ in range(count)]

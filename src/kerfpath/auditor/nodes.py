@@ -9,13 +9,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, Ints, scalar
-from kerfpath.auditor.between import BetweenNodes, bound_between_nodes, margins, retract_checks
+from kerfpath.auditor.between import BetweenNodes, bound_between_nodes
 from kerfpath.auditor.certificate import bound_checks
 from kerfpath.auditor.chain import chain_of
 from kerfpath.auditor.collision import collisions
+from kerfpath.auditor.dynamics import LagrangeArm
+from kerfpath.auditor.margins import margins
 from kerfpath.auditor.motion import Interpolation, Motion, joint_increments, motion_of
-from kerfpath.auditor.steps import LagrangeArm
-from kerfpath.auditor.table import MOST_ROUNDED, Check, Issue, Level, Rounding, Unit
+from kerfpath.auditor.rounding import MOST_ROUNDED, Rounding
+from kerfpath.auditor.table import Check, Issue, Level, Unit
+from kerfpath.auditor.transfer import retract_checks
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -227,9 +230,6 @@ def _across(v: Array, n: Array) -> Array:
     across = v - (v * n).sum(axis=-1, keepdims=True) * n
     return np.asarray(across / np.linalg.norm(across, axis=-1, keepdims=True))
 
-
-# -----------------------------------------------------------------------------
-# The checks of a plan: tool against contour, joints against limits, at and between the nodes.
 
 TIP_AT_NODES = 1e-6
 """m: two kinematics in double precision agree far better; a wrong tool or frame is far worse."""

@@ -1,9 +1,9 @@
 """Refinement off the grid: gamma and external axes are continuous, postures and turns fixed."""
 
+from kerfpath.refiner.rates import KeptShares as KeptShares
 from kerfpath.refiner.refinement import Binding as Binding
 from kerfpath.refiner.refinement import Refinement as Refinement
 from kerfpath.refiner.refinement import promise as promise
 from kerfpath.refiner.refinement import quicken as quicken
 from kerfpath.refiner.refinement import reduce_excess as reduce_excess
 from kerfpath.refiner.refinement import refine as refine
-from kerfpath.refiner.rows import KeptShares as KeptShares

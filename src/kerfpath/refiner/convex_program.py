@@ -1,11 +1,4 @@
-"""The convex program of one step: limits and ranges linear in the free variables, costs convex.
-
-The free variables of a node are gamma and its external axes, F numbers f_k. With
-q_k(f_k + delta_k) = q_k + J_k delta_k, the limits (5), (6) and on jerks and the ranges of the
-joints are linear in delta; the torques of arms without such axes are linearised. The distances of
-(14) and (15) are convex: a linear program for the Manhattan and Chebychev metrics, a second-order
-cone program for the Euclidean one. The unknowns are x = delta / radius, which lie in [-1, 1].
-"""
+"""The convex program of one step: limits and ranges linear in the free variables, costs convex."""
 
 from __future__ import annotations
 
@@ -16,112 +9,9 @@ import numpy as np
 from scipy import sparse
 
 from kerfpath.arrays import Array, Ints, short_repr
-from kerfpath.plans import Plan, has_room
-from kerfpath.refiner.rows import ConstraintRows, LinearTorque, RateLimits, Sparse, span_of, wide
-from kerfpath.robots import Robot, base_in_part
+from kerfpath.refiner.rates import LinearTorque, RateLimits
+from kerfpath.refiner.rows import ConstraintRows, Sparse, span_of, wide
 from kerfpath.search import Metric
-
-# -----------------------------------------------------------------------------
-# Joints as functions of the free variables of every node, with posture and turns fixed.
-
-DERIVATIVE_STEP = 1e-5
-"""rad or m: central differences are exact to 1e-10 of the third derivative, rounding to 1e-11."""
-
-
-class JointCurves:
-    """Joints q_k of every node in its posture, by the true kinematics.
-
-    The free variables of a node are gamma, rad, joint 3 of a seven-axis arm, and the external
-    axes, rad or m, in this order: F = 1 + E numbers.
-
-    Parameters
-    ----------
-    robot : Robot
-    H : (K, 4, 4)
-        Task frames in the robot base, m.
-    T_flange_tip : (4, 4)
-        Tool, m.
-    posture : (K,) int
-        Posture of each node.
-    """
-
-    def __init__(self, robot: Robot, H: Array, T_flange_tip: Array, posture: Ints) -> None:
-        self._robot = robot.alone()
-        self._externals = robot.externals
-        self._inner = self._robot.free
-        self._H = H
-        self._T_tip_flange = np.linalg.inv(T_flange_tip)
-        self._posture = posture
-
-    def at(self, free: Array, near: Array) -> Array:
-        """Return the joints (K, n) rad at `free` (K, F), each on the turn nearest to `near` (K, n).
-
-        Nodes that are out of reach get NaN.
-        """
-        x = free[:, 1 + len(self._inner) :]
-        H = self._H
-        if self._externals:
-            H = np.linalg.inv(base_in_part(self._externals, x)) @ H
-        near = np.array(near[:, : self._robot.joints])
-        near[:, self._inner] = free[:, 1 : 1 + len(self._inner)]
-        arm = self._of_arm(H, free[:, 0], near)
-        return np.concatenate([arm, x], axis=1)
-
-    def _of_arm(self, H: Array, gamma: Array, near: Array) -> Array:
-        K = len(gamma)
-        spin = np.tile(np.eye(4), (K, 1, 1))
-        spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
-        spin[:, 1, 0] = np.sin(gamma)
-        spin[:, 0, 1] = -spin[:, 1, 0]
-        return self._robot.follow(H @ spin @ self._T_tip_flange, near, self._posture)
-
-    def slope(self, free: Array, q: Array) -> Array:
-        """Return dq/dfree (K, n, F) at joints `q` (K, n); NaN at the edge of reach."""
-        slopes = []
-        for step in DERIVATIVE_STEP * np.eye(free.shape[1]):
-            ahead, behind = self.at(free + step, q), self.at(free - step, q)
-            slopes.append((ahead - behind) / (2 * DERIVATIVE_STEP))
-        return np.stack(slopes, axis=2)
-
-
-# -----------------------------------------------------------------------------
-# Range of gamma at both ends of a plan in which the tool can back off.
-
-STEP = np.radians(1.5)
-"""rad: step in which gamma is tested, from that of the plan on; the range may lose up to this."""
-AWAY = STEP * np.arange(61)
-"""rad: distances tested in either direction; if all of them have room, gamma is not bounded."""
-
-
-def room_at_ends(plan: Plan) -> tuple[Array, Array]:
-    """Return the least and the largest gamma (K,) rad with room for the retract of a plan.
-
-    They are infinite between the ends, without a retract, and at an end that has no room as it is.
-    """
-    K, n = plan.q.shape
-    low, high = np.full(K, -np.inf), np.full(K, np.inf)
-    if plan.settings.retract is None:
-        return low, high
-    frames, q = plan.frames, plan.unwrapped
-    for end in (0, K - 1):
-        for bound, sign in ((low, -1.0), (high, 1.0)):
-            posture = np.full(len(AWAY), plan.posture[end])
-            H = np.broadcast_to(frames[end], (len(AWAY), 4, 4))
-            curves = JointCurves(plan.robot, H, plan.T_flange_tip, posture)
-            near = np.broadcast_to(q[end], (len(AWAY), n))
-            gamma = plan.gamma[end] + sign * AWAY
-            there = curves.at(np.column_stack([gamma, near[:, plan.robot.free]]), near)
-            reached = np.asarray(np.isfinite(there).all(axis=1))
-            there = np.where(reached[:, None], there, near)
-            tool = plan.T_flange_tip
-            room = has_room(plan.settings, plan.robot, there, posture, tool) & reached
-            if room[0] and not room.all():
-                bound[end] = plan.gamma[end] + sign * AWAY[np.argmin(room) - 1]
-    return low, high
-
-
-# -----------------------------------------------------------------------------
-# The convex program of one step: limits and ranges linear in the free variables, costs convex.
 
 Target = Literal["sum", "max", "excess", "lost"]
 """Objectives: (14); (15); the largest share of a limit, whatever the distances; or (14) plus, at

@@ -20,9 +20,11 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.kernels.metric import increments_between
 from kerfpath.losses import Loss, Reason
 from kerfpath.progress import may_stop
+from kerfpath.search.least_interval import LeastInterval
+from kerfpath.search.pieces import InterruptedPath
 from kerfpath.search.problem import SearchProblem, offsets
 from kerfpath.search.shortest import LayeredPath
-from kerfpath.search.slowed import InterruptedPath, LeastInterval, SlowedPath
+from kerfpath.search.slowed import SlowedPath
 
 Price = Callable[[Ints], Array]
 Passable = Callable[[Ints, Ints], Bools]

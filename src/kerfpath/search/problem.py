@@ -405,9 +405,6 @@ def _every_copy(shut: Ints, origin: Ints, vertices: int) -> Ints:
     return np.asarray(by[(first[shut][:, None] + each)[there]])
 
 
-# -----------------------------------------------------------------------------
-# Search problem: a layered graph, limits and objective, cast and checked once.
-
 Metric = Literal["manhattan", "chebychev", "euclid"]
 ObjectiveKind = Literal["sum", "max"]
 Method = Literal["exact", "paper", "known"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ from kerfpath.kernels.exact import count_closing
 from kerfpath.kernels.metric import increments_between
 from kerfpath.kernels.search import Aim, SortedLayers
 from kerfpath.kernels.states import States
-from kerfpath.limits import AccelerationLimit, Limits, TorqueLimit
+from kerfpath.limits import Limits, TorqueLimit
 from kerfpath.search.branch import best_closed_path
 from kerfpath.search.exact import BestPath, best_path, dead_end
 from kerfpath.search.problem import (
@@ -28,20 +28,10 @@ from kerfpath.search.problem import (
     broken_edge,
     closed_before,
     empty_layer,
-    require_joined,
     reverse,
     sort_layers,
     too_far,
     why_closed,
-)
-from kerfpath.search.slowed import (
-    LeastInterval,
-    aim_at_least_time,
-    binding,
-    find_least_interval,
-    first_guess,
-    quickest,
-    sampled_steps,
 )
 
 SAME_END = 1e-6
@@ -309,161 +299,3 @@ def _require_same_ends(given: Layers) -> None:
             "closure: periodic needs a last layer that repeats the first, but their vertices "
             f"{i} differ by {gap[i].max():.3g} rad"
         )
-
-
-# -----------------------------------------------------------------------------
-# Relaxations for a graph without a path: the exact least one of each limit on its own.
-
-LARGEST_ETA_V = 2.0
-"""Largest eta_v that is tried; no robot exceeds its velocity limits by more."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Relaxations:
-    """The least change of each limit with which a path exists, with the other limits unchanged.
-
-    Parameters
-    ----------
-    eta_v : float or None
-        Least share of the velocity limits; None if no share up to 2 gives a path.
-    eta_a : float or None
-        Least share of the acceleration limits; None if the velocity limits alone leave no path.
-    slower : LeastInterval
-        Least node interval, and the limit that binds there.
-    """
-
-    eta_v: float | None
-    eta_a: float | None
-    slower: LeastInterval
-
-    __repr__ = short_repr
-
-    @property
-    def dt(self) -> float:
-        """Least node interval, s."""
-        return self.slower.dt
-
-
-def find_relaxations(problem: SearchProblem) -> Relaxations:
-    """Return the least eta_v, eta_a and dt, each on its own, with which a path exists.
-
-    Each is the exact solution of a second-order minimax problem on the graph.
-
-    Parameters
-    ----------
-    problem : SearchProblem
-        As in `find_least_interval`.
-
-    Raises
-    ------
-    NoFeasiblePath
-        A layer is empty, so no limit helps.
-    InputError
-        As `find_least_interval`.
-    """
-    slower = find_least_interval(problem)
-    # Velocity limits unchanged; of all paths the one whose sharpest change needs the least time.
-    velocity, limits = problem.aim.velocity, problem.limits
-    changes = aim_at_least_time(np.zeros(len(velocity)), limits.acceleration.bound)
-    sharpest = quickest(problem.layers, changes, velocity, np.inf)
-    return Relaxations(
-        eta_v=_least_eta_v(problem),
-        eta_a=None if sharpest is None else (sharpest[1] / problem.dt) ** 2,
-        slower=slower,
-    )
-
-
-def _least_eta_v(problem: SearchProblem) -> float | None:
-    """Return the least eta_v with which a path exists; None if it is above `LARGEST_ETA_V`."""
-    limits, tried = problem.limits, problem.limits.velocity.share
-    while True:
-        # Within the share tried, the share needed is a Chebychev distance to be minimised.
-        asked = replace(
-            problem,
-            limits=replace(limits, velocity=replace(limits.velocity, share=tried)),
-            weights=1.0 / (limits.velocity.bound * problem.dt),
-            metric="chebychev",
-            objective="max",
-        )
-        try:
-            return find_shortest(asked).cost
-        except NoFeasiblePath:
-            if tried >= LARGEST_ETA_V:
-                return None
-            tried = min(2 * tried, LARGEST_ETA_V)
-
-
-# -----------------------------------------------------------------------------
-# A path for speeds far below the one asked for, by first-order recursions alone.
-#
-# The exact search for the least interval remembers edges. If nodes must be far apart in time, the
-# velocity limits leave nearly all edges and it takes minutes; a recursion over vertices does not.
-
-LAYERS_SAMPLED = 16
-"""Layers sampled to estimate the number of edges."""
-ROUNDING = 1e-9
-"""Relative slack of an interval, so that a path that needs exactly this interval passes."""
-
-
-def velocity_allows(problem: SearchProblem, dt: float) -> bool:
-    """Return whether some path keeps (5), at any acceleration, with `dt` s from node to node."""
-    try:
-        find_shortest(_first_order(problem, dt))
-    except NoFeasiblePath:
-        return False
-    return True
-
-
-def find_slow_path(problem: SearchProblem) -> LeastInterval:
-    """Return the shortest path that keeps (5) in the least interval in which any path does.
-
-    Its `dt` is the interval in which that path keeps (6), too. Another path may keep both in less,
-    but none in less than the least interval for (5) alone.
-
-    Raises
-    ------
-    NoFeasiblePath
-        A layer is empty, or closed vertices and shut edges leave no path; the message says where.
-    """
-    require_joined(problem.layers)
-    v, a = problem.limits.velocity.usable, problem.limits.acceleration.usable
-    quickest, dt = None, first_guess(problem.layers, v)
-    while quickest is None:
-        try:
-            quickest = find_shortest(_slowest_step(problem, dt))
-        except NoFeasiblePath:
-            dt *= 2
-    least = quickest.cost * (1 + ROUNDING) or dt
-    path: LayeredPath = find_shortest(_first_order(problem, least))
-    return binding(problem.layers, path.index, v, a)
-
-
-def edges_allowed(problem: SearchProblem, dt: float) -> float:
-    """Return an estimate, from samples, of the edges that keep (5) with `dt` s between nodes."""
-    sizes = np.diff(problem.start)
-    most = problem.limits.velocity.per_interval(dt)
-    looked_at, kept = 0, 0
-    for steps in sampled_steps(problem.layers, LAYERS_SAMPLED):
-        for step in steps:
-            kept += int((step <= most).all(axis=1).sum())
-            looked_at += len(step)
-    return float((sizes[:-1] * sizes[1:]).sum()) * kept / max(looked_at, 1)
-
-
-def _first_order(problem: SearchProblem, dt: float) -> SearchProblem:
-    """Return the problem of the shortest path under the velocity limits at an interval."""
-    free = AccelerationLimit(bound=np.full(len(problem.weights), np.inf))
-    return replace(
-        problem.free(),
-        dt=dt,
-        limits=replace(problem.limits, acceleration=free),
-        metric="manhattan",
-        objective="sum",
-        weights=1 / problem.limits.velocity.usable,
-        method="paper",
-    )
-
-
-def _slowest_step(problem: SearchProblem, dt: float) -> SearchProblem:
-    """Return the problem of the path whose longest step takes the least time, s."""
-    return replace(_first_order(problem, dt), metric="chebychev", objective="max")
