@@ -57,6 +57,7 @@ def test_the_dense_recursion_says_when_there_is_no_path():
     assert dense(q, start, dt=1.0, velocity=ones, **task) == pytest.approx(6.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_the_brute_recursion_finds_the_cost_of_the_exact_path(seed):
     rng = np.random.default_rng(seed)
@@ -115,6 +116,7 @@ def cut():
     pytest.fail("none of ten cuts has a path")
 
 
+@pytest.mark.slow
 def test_the_seed_decides_the_random_cuts():
     for name in _random_contours.ROBOTS:
         one, again, other = (_random_contours.cut(name, i) for i in (3, 3, 4))
@@ -127,6 +129,7 @@ def test_the_seed_decides_the_random_cuts():
         assert np.diff(one.graph.start).all()
 
 
+@pytest.mark.slow
 def test_following_the_gamma_of_a_plan_gives_its_cost_and_keeps_its_limits(cut):
     task, made = cut
     follower = _following.Follower(task)
@@ -170,6 +173,7 @@ def test_the_genetic_algorithm_repeats_itself(cut):
     np.testing.assert_allclose(basis.sum(axis=1), 1, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_sampling_finds_a_course_that_keeps_the_velocity_limits(cut):
     pytest.importorskip("ompl")
     from benchmarks import _sampling as sampling
@@ -239,6 +243,7 @@ def test_the_nearest_order_goes_on_to_the_nearest_that_may_come():
     assert nearest(between, [(3, 0), (1, 0)]) == [2, 1, 3, 0]
 
 
+@pytest.mark.slow
 def test_both_methods_are_weighed_on_the_same_task(cut):
     task, made = cut
     asked = _certified.Task(
@@ -276,6 +281,7 @@ def test_samples_of_gamma_are_moved_with_the_tool(cut):
     np.testing.assert_allclose(T[:, :3, 2], task.contour.axes, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_narrow_task_leaves_the_joints_little_room():
     task = _narrow.narrow_task(np.random.default_rng([17, 1]))
     again = _narrow.narrow_task(np.random.default_rng([17, 1]))

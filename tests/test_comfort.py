@@ -381,6 +381,7 @@ def test_the_fastest_speed_keeps_margins_and_knows_no_costs(fine):
         fastest_speed(nodes, arm, comfort=EVERY, **options)
 
 
+@pytest.mark.slow
 def test_pieces_and_dips_keep_comfort(fine):
     nodes, arm, options = fine
     fast = options | {"speed": 1.2 * fastest_speed(nodes, arm, **options).speed}

@@ -73,6 +73,7 @@ def done(command, folder):
     return result
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [
@@ -88,6 +89,7 @@ def test_the_command_imports_nothing_from_there(folder, imported, words):
     assert imported() == set()
 
 
+@pytest.mark.slow
 def test_python_m_imports_no_more_than_python_itself(folder, imported):
     """What it imports before kerfpath runs is out of reach, and so is kerfpath.py."""
     (folder / "nothing.py").touch()
@@ -104,6 +106,7 @@ def test_python_m_imports_no_more_than_python_itself(folder, imported):
     assert imported() == set()
 
 
+@pytest.mark.slow
 def test_the_studio_imports_nothing_from_there(folder, imported):
     process = subprocess.Popen(
         [*COMMAND, "studio", "small.toml", "--port", "0", "--no-browser"], cwd=folder,
@@ -122,6 +125,7 @@ def test_the_studio_imports_nothing_from_there(folder, imported):
     assert imported() == set()
 
 
+@pytest.mark.slow
 def test_processes_import_from_where_this_one_does(folder, imported):
     code = "import multiprocessing, numpy, kerfpath.compiling; print(sys.path)"
     assert done(python_command(code), folder).stdout == f"{sys.path}\n"

@@ -183,6 +183,7 @@ def test_the_example_of_a_whole_part_runs(capsys):
     assert said.strip().endswith("True")
 
 
+@pytest.mark.slow
 def test_no_path_shows_every_way_out(capsys):
     no_path.main()
     said = capsys.readouterr().out
@@ -194,6 +195,7 @@ def test_no_path_shows_every_way_out(capsys):
     assert "warning" not in off
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("certifier_at_work")
 def test_the_pictures_of_the_idea_are_drawn_and_those_kept_show_the_same(
     tmp_path, monkeypatch, capsys

@@ -38,6 +38,7 @@ def test_what_an_extra_needs_is_what_it_installs():
     assert extras["all"] == [f"kerfpath[{','.join(sorted(NEEDS))}]"]
 
 
+@pytest.mark.slow
 def test_planning_from_arrays_needs_no_extra():
     done = run((ROOT / "tests" / "core_alone.py").read_text())
     assert done.stdout.split() == ["[]", "True"], done.stderr

@@ -294,6 +294,7 @@ def test_another_figure_is_refused_and_a_missing_library_said(plain, monkeypatch
 # The page.
 
 
+@pytest.mark.slow
 def test_the_examples_of_the_page_run_in_a_new_session(tmp_path):
     code = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     done = subprocess.run(

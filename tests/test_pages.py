@@ -85,6 +85,7 @@ def script(page, folder):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_the_code_about_certificates_proves_a_bound(tmp_path):
     cost, bound, gap = map(float, script("certificate.md", tmp_path).split()[:3])
     assert 0 < bound <= cost

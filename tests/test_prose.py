@@ -22,6 +22,7 @@ def where(term):
     return term.where[0].replace("*.md", "docs/page.md").replace("*", "docs/page.md", 1)
 
 
+@pytest.mark.slow
 def test_no_text_has_a_word_that_is_not_used(capsys):
     assert terms.main() == 0, capsys.readouterr().out
 

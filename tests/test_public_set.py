@@ -230,6 +230,7 @@ def test_the_best_of_the_answers_is_kept_and_no_worse_one(tmp_path, monkeypatch)
         after(scope="every gamma", where={"node": 1}, says="")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["table-03", "table-04", "rail-05", "rail-10"])
 def test_plans_with_external_axes_come_near_the_best_known(name):
     # One course after the other was taken here once, and cost 4 to 12 % more.

@@ -9,6 +9,7 @@ from conftest import ROOT
 README = (ROOT / "README.md").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("certified_by_default")
 def test_the_python_example_runs_and_its_audit_is_clean(capsys):
     (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)

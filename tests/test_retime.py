@@ -89,6 +89,7 @@ def require_lawful(tau, dq, dt, velocity, acceleration, periodic):
     assert sharp <= 1 + 1e-9
 
 
+@pytest.mark.slow
 def test_the_limits_hold_and_nothing_is_faster_than_commanded():
     rng = np.random.default_rng(41)
     slowed = 0
@@ -103,6 +104,7 @@ def test_the_limits_hold_and_nothing_is_faster_than_commanded():
     assert 100 < slowed < 290
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # SLSQP leaves its bounds by rounding
 def test_a_general_solver_from_many_starts_finds_nothing_quicker():
     rng = np.random.default_rng(42)

@@ -79,6 +79,7 @@ def test_no_steps_and_no_cone_are_no_tilt(arc, arm, options):
         assert not same.tilt.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", ["sum", "max"])
 def test_freedom_lowers_the_cost_and_its_price_raises_it(objective, arc, arm, options):
     plain = plan(arc, arm, objective=objective, **options).cost
@@ -221,6 +222,7 @@ def test_tilt_is_all_the_freedom_of_five_axes():
     assert audit(made, interpolation="joint", path_tolerance=1e-2, axis_tolerance=0.1) == []
 
 
+@pytest.mark.slow
 def test_a_loop_may_return_to_where_it_began(circle, arm, options):
     coarse = circle.resample(count=41)
     closed = plan(coarse, arm, tilt=Tilt(cone=CONE, steps=1), closure="periodic", **options)
@@ -296,6 +298,7 @@ def test_what_a_tilt_does_not_go_with_is_refused(arc, arm, options):
         plan_in_pieces(arc, arm, tilt=Tilt(cone=CONE), **options)
 
 
+@pytest.mark.slow
 def test_the_example_of_the_page_runs(capsys):
     page = (ROOT / "docs" / "tilt-and-extra-axes.md").read_text()
     for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):

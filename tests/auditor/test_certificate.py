@@ -198,6 +198,7 @@ def test_costs_that_are_not_held_are_worked_out_again(which, request, monkeypatc
     assert certified_bound(certificate, of) == bound
 
 
+@pytest.mark.slow
 def test_one_step_is_bounded_by_the_nearest_pair_of_poses(arm, tool, placement):
     # Without a potential, ever finer: the least over both gammas, as a dense scan has it.
     of = plan(

@@ -92,6 +92,7 @@ def test_operations_are_tight():
         assert (c.hi - c.lo <= 12 * 2.0**-52 * c.magnitude()).all()
 
 
+@pytest.mark.slow
 def test_sine_cosine_and_arctangent_hold_those_of_any_angle_within():
     rng = np.random.default_rng(3)
     middle = rng.uniform(-7, 7, MANY)

@@ -52,6 +52,7 @@ def maker_of(one, postures=(0, 1)):
     return CellMaker(one.robot, one.frames, one.T_flange_tip, postures)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("metric", METRICS)
 def test_the_bound_is_close_below_the_plan_and_every_other_motion(
     made, metric, arc, arm, tool, placement
@@ -176,6 +177,7 @@ def test_the_plan_itself_passes_cells_that_let_it(made, metric):
         cells = maker_of(one).halves(cells)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dropped", [0.02, 1.0])
 @pytest.mark.parametrize("metric", METRICS)
 def test_the_certificate_has_what_proves_its_bound(made, metric, dropped, monkeypatch):

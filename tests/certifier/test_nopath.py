@@ -164,6 +164,7 @@ def test_without_an_enclosure_nothing_is_said_of_other_gammas(circle, arm, tool,
     assert "rotation: no motion" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_what_is_undecided_is_said_to_be(circle, arm, tool, placement):
     nodes = circle.resample(count=31)
     options = {"tool": tool, "placement": placement, "gamma_step": STEP}

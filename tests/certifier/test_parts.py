@@ -76,6 +76,7 @@ def test_the_multipliers_of_a_plan_bound_it_closer(metric, planned, others, monk
     assert with_them.gap < without.gap
 
 
+@pytest.mark.slow
 def test_the_cheapest_cells_are_joined_by_steps(planned):
     """They stand for a motion: prices about it show where it breaks (6)."""
     one = proving._Certification(
@@ -141,6 +142,7 @@ def test_no_prices_where_nothing_near_breaks_the_limit():
     assert limit_prices(u, slope, steps(acceleration=100.0), reach=0.5, most=5.0) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("metric", ["manhattan", "euclid"])
 def test_a_plan_at_the_limit_has_prices(metric, planned):
     one = course_of(planned(metric=metric), 0.005)
@@ -186,6 +188,7 @@ def through_pairs(packed, steps, result, most):
     return found
 
 
+@pytest.mark.slow
 def test_steps_that_may_not_follow_each_other_are_left_out(planned, monkeypatch):
     """As trying all pairs says; and no cell that the plan passes costs more than the plan."""
     best = planned()

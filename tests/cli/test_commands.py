@@ -340,6 +340,7 @@ def test_speed_names_the_fastest_and_what_binds(folder, fastest):
     assert "no admissible pose" in far.stdout
 
 
+@pytest.mark.slow
 def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
     """Over the fastest speed on the grid: slowed down in places, or cut in pieces."""
     # The cut stops where a pose is at the edge of what the arm can do: little room to back off.
@@ -366,6 +367,7 @@ def test_a_job_may_dip_or_be_interrupted_and_is_read_back(folder):
         assert again.replace("MODULE again", "MODULE over") == first
 
 
+@pytest.mark.slow
 def test_short_pieces_are_warned_of_and_a_job_may_ask_for_longer_ones(folder):
     base = SMALL.replace("speed_m_min = 3", "speed_m_min = 3.7", 1).replace("= 50", "= 1", 1)
     base = base.replace(
@@ -503,6 +505,7 @@ def test_wrong_usage_has_exit_code_two_and_no_traceback(arguments):
     assert "--help" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_reader_that_leaves_early_is_no_error():
     code = "from kerfpath.cli import main; main()"
     pipe = f"{sys.executable} -c '{code}' contours {DEMO / 'b_pillar.step'} --json | head -c 10"
@@ -510,6 +513,7 @@ def test_a_reader_that_leaves_early_is_no_error():
     assert "Traceback" not in result.stderr
 
 
+@pytest.mark.slow
 def test_a_program_with_a_folder_of_its_own_is_written_audited_and_removed(folder):
     text = SMALL.replace('model = "abb_irb4600_60_205"', 'model = "staubli_tx2_160l"')
     text = text.replace('"rapid"', '"val3"\nname = "a_very_long_program_name"')

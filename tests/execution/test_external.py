@@ -148,6 +148,7 @@ def test_the_joints_turn_smoothly_through_every_border_of_a_zone(cell, zone):
     assert (jump <= most * d * 1.01 + 1e-7 * velocity).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cell", "zone"), HOW)
 def test_the_peaks_are_those_of_dense_differences_and_below_the_bounds(cell, zone):
     plan, run = moving(cell), run_of(cell, zone)
@@ -188,6 +189,7 @@ def test_under_a_tip_that_stands_the_table_turns_the_part():
     assert run.velocity_share[:, 6] == pytest.approx(-0.05 / RADIUS / 4.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_what_axes_need_between_the_nodes_is_brought_within_the_limits():
     plan = moving("rail+table")
     sharp = np.abs(run_of("rail+table").acceleration_share).max(axis=0)

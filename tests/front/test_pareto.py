@@ -140,6 +140,7 @@ def test_the_first_plan_is_that_of_the_planner(task, found):
     assert found.values[0, 0] == pytest.approx(usual.cost * usual.dt, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", ["adaptive", "grid"])
 def test_a_seed_says_it_all_whatever_the_workers(task, search):
     options = task | {"runs": 14, "search": search, "seed": 3}
@@ -168,6 +169,7 @@ def test_progress_is_told_run_by_run(task):
     assert len(told) > 2
 
 
+@pytest.mark.slow
 def test_a_closed_contour_may_end_as_it_began(circle, arm, tool, placement):
     where = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
     options = where | {"criteria": ("displacement", "range_6"), "runs": 16, "postures": (0,)}
@@ -480,6 +482,7 @@ def test_a_new_criterion_is_one_object(task, monkeypatch):
     assert (np.diff(made.values[:, 1]) > 0).all()
 
 
+@pytest.mark.slow
 def test_in_a_cell_every_plan_is_clear(task, tool, placement):
     blind, arm = plan(**task), task["robot"]
     slab = box_between([-0.3, -0.3, -0.09], [0.3, 0.3, -0.06])
@@ -500,6 +503,7 @@ def test_in_a_cell_every_plan_is_clear(task, tool, placement):
         assert audit(clear, cell=room) == []
 
 
+@pytest.mark.slow
 def test_more_clearance_is_asked_for_and_found(task, tool, placement):
     post = box_between([1.61, 0.17, 0.55], [1.63, 0.19, 0.92])  # m: beside the head
     room = cell_of(

@@ -127,6 +127,7 @@ def test_a_target_moved_by_hand_is_found_with_its_line(folder, written):
     assert abs(line - (k + 1)) <= 1
 
 
+@pytest.mark.slow
 def test_what_else_people_change_is_found(folder, written):
     k, lines = nth(written, r"CONST speeddata vCut", 0)
     doubled = written.replace(
@@ -302,6 +303,7 @@ def test_the_program_of_a_measured_part_passes_the_audit_of_a_job_that_places_it
     assert f"xyz_mm = {frame['xyz_mm']}, rpy_deg = {frame['rpy_deg']}" in said
 
 
+@pytest.mark.slow
 def test_a_measured_part_that_is_none_or_out_of_reach_gives_no_program(folder):
     out = folder / "none.mod"
     path, _ = with_points(folder, noise=3.0)
@@ -328,6 +330,7 @@ def test_a_measured_part_that_is_none_or_out_of_reach_gives_no_program(folder):
     assert said in result.stdout
 
 
+@pytest.mark.slow
 def test_a_plan_on_its_limits_is_planned_again_around_a_part_that_was_measured(folder):
     """Refined, a plan uses all of eta: a part a little off asks for a little more."""
     (folder / "edge.toml").write_text(SMALL.replace("[plan]", '[plan]\nmethod = "exact"'))

@@ -67,6 +67,7 @@ def line_of(result):
     return line
 
 
+@pytest.mark.slow
 def test_a_certificate_that_holds_is_said_to(audited, made):
     for options in ((), ("--job", made[1])):
         result = audited(lambda data: None, *options)
@@ -90,6 +91,7 @@ def test_a_plan_without_a_bound_claims_none(audited):
     assert "Proved again" not in result.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "words"),
     [

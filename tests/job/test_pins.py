@@ -20,6 +20,7 @@ def failed(found):
     return {row.code for table in found.tables.values() for row in table if not row.ok}
 
 
+@pytest.mark.slow
 def test_a_program_that_leaves_its_windows_fails(tmp_path):
     path = job_in(tmp_path, PINNED)
     written = write_result(run_job(read_job(path)), tmp_path / "out")
@@ -35,6 +36,7 @@ def test_a_program_that_leaves_its_windows_fails(tmp_path):
     assert "gamma-window" not in {row.code for t in free.tables.values() for row in t}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("window", ["[[0, 10, 20, 20]]", "[[0, 31, 20, 20.5], [10, 20, 20, 21]]"])
 def test_digits_of_a_text_leave_no_window(tmp_path, window):
     path = job_in(tmp_path, window)

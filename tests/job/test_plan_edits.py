@@ -87,6 +87,7 @@ def test_what_is_only_claimed_is_said_to_be(made):
     assert "Claimed, not verified: the bound of hole, trim and that no order" in note
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -155,6 +155,7 @@ def test_names_cannot_become_code(tmp_path):
     assert [plan.name for plan in made["plans"]] == [spec.name for spec in job.contours]
 
 
+@pytest.mark.slow
 def test_a_cell_is_that_of_the_job(tmp_path):
     job, script = scripted(tmp_path, CELLED)
     made, meant = runpy.run_path(str(script))["cell"], prepare(job).cell

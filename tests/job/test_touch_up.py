@@ -170,6 +170,7 @@ def touch(folder, text, *more, plan="out", name="edited.mod"):
                folder / plan / "plan.json", *more)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_taught_targets_are_kept_and_the_rest_is_planned_again(folder):
     text = (folder / "out/job.mod").read_text()
     hand = edited(text, "led_in", 21, (0.1, -0.2, 0.4))
@@ -212,6 +213,7 @@ def test_taught_targets_are_kept_and_the_rest_is_planned_again(folder):
     assert run("audit", folder / "one/plan.json").returncode == 0
 
 
+@pytest.mark.slow
 def test_a_second_touch_up_keeps_the_first(folder):
     text = (folder / "out/job.mod").read_text()
     first = edited(text, "led_in", 21, (0, 0, 0.4))

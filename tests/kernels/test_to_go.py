@@ -93,6 +93,7 @@ def test_lost_time_and_leaps_count_with_the_distance(metric, leap):
     assert finite > 300
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bool(numba.config.BOUNDSCHECK), reason="a loop that checks indices jumps")
 def test_its_innermost_loop_takes_several_numbers_at_once():
     # Python's own min, a sum that may be reordered or a constant infinity would undo it unnoticed.
@@ -134,6 +135,7 @@ def feasible_instances(count):
     return found
 
 
+@pytest.mark.slow
 def test_the_answer_is_the_same_from_any_thread_or_process():
     asked = feasible_instances(40)
 

@@ -40,6 +40,7 @@ def test_a_polygon_that_stands_for_a_circle_too_small_is_refused() -> None:
         offset(regular(36, 4e-4), 5e-4)
 
 
+@pytest.mark.slow
 def test_offsets_are_those_of_geos() -> None:
     rng = np.random.default_rng(5)
     wrong, count = 0, 0

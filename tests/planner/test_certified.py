@@ -120,6 +120,7 @@ def test_a_bound_that_is_proved_again_is_said_once(bounded, asked):
     assert made.proof.without_bound().without_bound() == made.proof.without_bound()
 
 
+@pytest.mark.slow
 def test_what_is_not_refined_keeps_its_bound(bounded):
     _, made = bounded
     left = refine(replace(made, settings=replace(made.settings, eta_a=1e-6)))

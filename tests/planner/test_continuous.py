@@ -270,6 +270,7 @@ def test_it_goes_around_what_is_in_the_way(
     assert made.cost <= grid.cost * (1 + 5 * SAME)
 
 
+@pytest.mark.slow
 def test_what_clearance_costs_is_planned_on_the_grid_and_said(task, arm, tool, placement):
     there = posts(arm, tool, placement, 6)
     comfort = Comfort(clearance=Band(width=0.1, cost=1))
@@ -287,6 +288,7 @@ def test_a_graph_without_neighbours_is_planned_on_the_grid(task):
     assert made.cost <= exact.cost * (1 + SAME)
 
 
+@pytest.mark.slow
 def test_feed_and_pieces_go_on_from_it(task, arm, tool, placement):
     along = np.linspace(0, 0.16, 81)
     points = np.stack([np.minimum(along, 0.08), np.maximum(along - 0.08, 0), 0 * along], axis=1)

@@ -35,6 +35,7 @@ def along_a_wall(arm, tool):
     return line(0.8, 41), robot, cell, options
 
 
+@pytest.mark.slow
 def test_a_plan_on_a_rail_keeps_clear_of_what_stands_beside_it(along_a_wall):
     contour, robot, cell, options = along_a_wall
     made = plan(contour, robot, cell=cell, **options)
@@ -69,6 +70,7 @@ def _all(q):
     return np.ones(len(q), np.bool_)
 
 
+@pytest.mark.slow
 def test_an_edited_value_of_an_external_axis_that_collides_is_found(arm, tool):
     """A clamp on the table is turned into the head."""
     turns = AXES | {"lower": -np.pi, "upper": np.pi, "endless": True}

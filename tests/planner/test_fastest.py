@@ -214,6 +214,7 @@ def test_what_is_asked_for_stays_in_the_plan_that_a_quick_motion_leads_to(arm, s
     )
 
 
+@pytest.mark.slow
 def test_a_speed_that_is_enough_ends_the_search(arm, space, quickest_at_work):
     nodes = drawn(1)
     fastest = fastest_speed(nodes, arm, refine=True, **space)

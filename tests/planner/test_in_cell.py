@@ -73,6 +73,7 @@ def test_where_nothing_is_in_the_way_the_plan_is_the_same(task, blind, arm, tool
     assert "in 1 searches" in made.proof.statement
 
 
+@pytest.mark.slow
 def test_where_something_is_the_plan_goes_around_it(task, blind, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
     assert not there.clear(blind.q).all()
@@ -97,6 +98,7 @@ def test_the_audit_s_least_distance_is_the_cell_s(task, blind, arm, tool, placem
     assert not check.ok
 
 
+@pytest.mark.slow
 def test_a_refined_plan_is_clear_or_stays_on_the_grid(task, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
     made = on_grid(*task[0], **task[1], cell=there, refine=True)
@@ -108,6 +110,7 @@ def is_clear(there, q):
     return there.clear(q).all() and there.clear_motion(q[:-1], q[1:]).all()
 
 
+@pytest.mark.slow
 def test_closed_and_turning_little_the_plan_is_clear_too(task, blind, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
     closed = on_grid(*task[0], **task[1], cell=there, closure="periodic")
@@ -120,6 +123,7 @@ def test_closed_and_turning_little_the_plan_is_clear_too(task, blind, arm, tool,
     assert little.cost >= on_grid(*task[0], **task[1], cell=there).cost
 
 
+@pytest.mark.slow
 def test_where_the_speed_must_dip_the_plan_is_clear_too(half, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
     fast = half[1] | {"speed": 1.0}
@@ -131,6 +135,7 @@ def test_where_the_speed_must_dip_the_plan_is_clear_too(half, arm, tool, placeme
         assert audit(made, cell=there) == []
 
 
+@pytest.mark.slow
 def test_pieces_and_the_fastest_speed_are_clear_too(half, arm, tool, placement, posts):
     there = cell(arm, tool, placement, posts)
     pieces = plan_in_pieces(*half[0], **half[1] | {"speed": 0.3}, cell=there)
@@ -144,6 +149,7 @@ def test_pieces_and_the_fastest_speed_are_clear_too(half, arm, tool, placement, 
         on_grid(*half[0], **half[1] | {"speed": around.speed * (1 + 1e-6)}, cell=there)
 
 
+@pytest.mark.slow
 def test_behind_a_cage_no_speed_and_no_interruption_helps(half, arm, tool, placement):
     lid = {"lid": box_between([0.9, -0.3, 0.5], [1.5, 0.3, 0.52])}
     caged = cell(arm, tool, placement, lid)
@@ -159,6 +165,7 @@ def test_behind_a_cage_no_speed_and_no_interruption_helps(half, arm, tool, place
         fastest_speed(*half[0], **options, cell=caged)
 
 
+@pytest.mark.slow
 def test_a_cage_is_no_way_and_says_so(task, arm, tool, placement):
     lid = {"lid": box_between([0.9, -0.3, 0.5], [1.5, 0.3, 0.52])}
     with pytest.raises(
@@ -192,6 +199,7 @@ def test_a_cell_of_another_task_is_refused(task, arm, tool, placement):
         plan(*task[0], **task[1], method="paper", cell=cell(arm, tool, placement, {}))
 
 
+@pytest.mark.slow
 def test_the_first_node_without_a_clear_pose_is_told_wherever_the_search_breaks(
     task, arm, tool, placement
 ):

@@ -194,6 +194,7 @@ def test_a_change_of_posture_that_no_path_can_make_is_named(circle, arm, tool, p
     assert (cut.value.node, cut.value.back) == (59, 60)
 
 
+@pytest.mark.slow
 def test_where_the_grid_has_no_path_one_is_found_off_it(circle, arm, tool, placement):
     """A coarse grid quantises the acceleration: (6) fails on it and holds beside it."""
     options = {"tool": tool, "placement": placement, "speed": 0.6, "gamma_step": np.radians(4)}
@@ -223,6 +224,7 @@ def corner():
     return Contour(points, np.c_[lean, 0 * along, -np.ones(81)], name="corner")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("refine", [False, True])
 def test_the_feed_dips_where_the_limits_ask_for_it(corner, arm, tool, placement, refine):
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "speed": 0.4}
@@ -249,6 +251,7 @@ def test_off_the_grid_the_feed_dips_less(corner, arm, tool, placement):
     assert off.time[-1] < grid.time[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moved", [True, False])
 def test_a_dip_is_never_slower_than_on_the_grid(monkeypatch, corner, arm, tool, placement, moved):
     if not moved:  # off the grid nothing is gained

@@ -73,6 +73,7 @@ def test_a_plan_that_is_to_back_off_can_where_any_does_or_the_audit_says_so(draw
             assert row.ok or cannot(free)
 
 
+@pytest.mark.slow
 def test_with_a_margin_the_motion_between_nodes_at_a_limit_keeps_it(arm, tool):
     # Nodes may lie on a limit, and what is straight between them then goes beyond it.
     draw, margin, beyond = np.random.default_rng(17), Comfort(limits=Band(margin=0.0017)), 0

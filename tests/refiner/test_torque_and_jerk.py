@@ -218,6 +218,7 @@ def test_a_closed_contour_keeps_them_across_its_seam(circle, arm, tool, placemen
     assert (np.abs(jerks_of(a, tau, periodic=True)) <= robot.jerk * (1 + 1e-9)).all()
 
 
+@pytest.mark.slow
 def test_what_cannot_be_brought_inside_is_said(made):
     torque, jerk = needs(made)
     weak = made.robot.with_limits(torque=torque * [1, 0.3, 1, 1, 1, 1]).with_load(LOAD)
@@ -263,6 +264,7 @@ def test_plans_off_the_grid_keep_both(circle, made, arm, tool, placement, method
     assert found.cost >= free.cost * (1 - 1e-2)
 
 
+@pytest.mark.slow
 def test_where_no_motion_keeps_them_that_is_the_answer(circle, made, arm, tool, placement):
     torque, jerk = needs(made)
     here = {"tool": tool, "placement": placement, "speed": SPEED, "gamma_step": STEP}

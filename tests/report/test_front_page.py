@@ -183,6 +183,7 @@ def seen(page, folder, acts):
     return found
 
 
+@pytest.mark.slow
 @needs_chromium
 def test_views_are_linked(tmp_path):
     found = seen(
@@ -252,6 +253,7 @@ def test_views_are_linked(tmp_path):
     assert found["labels"] == ["least displacement", "balanced"]
 
 
+@pytest.mark.slow
 @needs_chromium
 def test_one_plan_of_one_criterion_is_picked_by_itself(tmp_path):
     page = front(axes=AXES[:1], plans=[plan(3, (1.0,))], dominated=[(2.0,)], marks={})

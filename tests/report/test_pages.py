@@ -458,6 +458,7 @@ def test_fine_maps_stay_small(section: ContourSection) -> None:
     assert len(_own(render("Part", [fine]))) < 0.8e6
 
 
+@pytest.mark.slow
 @needs_chromium
 def test_browser_draws_every_figure_in_view(
     section: ContourSection, infeasible: ContourSection, tmp_path: Path
@@ -477,6 +478,7 @@ def test_browser_draws_every_figure_in_view(
     assert "Download plot" in dom
 
 
+@pytest.mark.slow
 @needs_chromium
 def test_pointing_at_a_figure_marks_the_node_in_all_of_the_contour_and_on_the_part(
     section: ContourSection, tmp_path: Path

@@ -114,6 +114,7 @@ def test_a_positioner_turns_the_part_about_its_axis(turning, arm):
     np.testing.assert_allclose(R.as_matrix() @ seen[:3, :3], plain[:3, :3], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_cut_beyond_the_reach_needs_the_rail(arm, railed, tool, placement):
     long = line(2.4, 97)  # nodes 50 mm apart; the arm reaches 2.05 m
     options = {"tool": tool, "placement": placement, "gamma_step": np.radians(15), "speed": 0.05}

@@ -100,6 +100,7 @@ def chuck(arm, **change):
     return arm.with_positioner([0, 1, 0], POINT, name="chuck", **travel)
 
 
+@pytest.mark.slow
 def test_a_tube_is_cut_all_round_on_a_chuck_where_the_arm_alone_cannot(arm, tool):
     options = {"tool": tool, "placement": at_point(), "speed": 0.04, "gamma_step": np.radians(6)}
     contour = ring(121)

@@ -116,6 +116,7 @@ def agree(rng, closure, share, cost=0.0, **sizes):
     return None if want is None else known
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
 def test_the_lazy_optimum_is_that_of_checking_everything(share):
     rng = np.random.default_rng(31)
@@ -150,6 +151,7 @@ SLOWED = ("dt", "velocity", "acceleration", "endless", "vertex_cost", "weights",
 LEAST = ("velocity", "acceleration", "endless", "eta_v", "eta_a")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", [interrupted_path, slowed_path, least_interval])
 def test_every_search_finds_its_lazy_optimum(search):
     """The searches themselves are held against oracles with closures in `test_shut`."""

@@ -95,6 +95,7 @@ def test_costs_below_zero_change_nothing_but_the_optimum(change_effort, closure,
             assert path.cost == min(cost)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closure", ["free", "periodic"])
 def test_half_a_turn_goes_the_way_that_the_values_go(closure):
     rng = np.random.default_rng(27)

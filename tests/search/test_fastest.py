@@ -36,6 +36,7 @@ def slack(dt, o):
     return fast + 1e-9 / (2 * dt * (o["eta_a"] * o["acceleration"]).min())
 
 
+@pytest.mark.slow
 def test_the_interval_agrees_with_bisection_over_shortest_path():
     rng = np.random.default_rng(31)
     for _ in range(150):
@@ -160,6 +161,7 @@ def test_off_the_grid_a_plan_is_found_up_to_the_fastest_speed(circle, arm, tool,
         assert audit(made) == []
 
 
+@pytest.mark.slow
 def test_an_interval_found_past_the_ceiling_of_a_search_is_not_believed():
     # The search leaves out edges beyond its ceiling: up to 8 % of these intervals was given away.
     rng = np.random.default_rng(777)

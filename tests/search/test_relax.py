@@ -16,6 +16,7 @@ def is_feasible(q, start, **options):
     return True
 
 
+@pytest.mark.slow
 def test_each_relaxation_is_just_enough():
     rng = np.random.default_rng(41)
     closed = 0

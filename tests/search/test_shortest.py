@@ -15,6 +15,7 @@ from kerfpath.kernels import limits, metric
 ONE = {"dt": 1.0, "velocity": [1.0], "acceleration": [1.0], "method": "paper"}
 
 
+@pytest.mark.slow
 @pytest.mark.equation(16)
 def test_the_procedure_agrees_with_the_paper_line_by_line():
     rng = np.random.default_rng(7)

@@ -79,6 +79,7 @@ def test_the_paper_s_procedure_neither():
     assert 100 < found < 280
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closure", ["free", "periodic"])
 def test_nor_does_one_within_rotation_limits(closure):
     rng, found, limited = np.random.default_rng(63), 0, 0

@@ -47,12 +47,14 @@ def agree(rng, **sizes):
     return lost.sum() > 0
 
 
+@pytest.mark.slow
 def test_the_optimum_agrees_with_trying_every_pair_of_edges():
     rng = np.random.default_rng(51)
     lost = sum(agree(rng, layers=(1, 9), size=(1, 12)) for _ in range(2000))
     assert 500 < lost < 1900
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stretch", "corner", "around"), [(1.01, 1e-3, 1), (1.5, 1e-9, 2)])
 def test_where_the_search_begins_does_not_change_the_answer(
     monkeypatch, change_effort, stretch, corner, around

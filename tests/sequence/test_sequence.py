@@ -334,6 +334,7 @@ def test_where_no_way_is_found_the_contours_the_bodies_and_what_was_tried_are_na
     assert monotonic() - begun < longest_search(0.5)
 
 
+@pytest.mark.slow
 def test_a_posture_that_cannot_be_left_is_reconsidered(lane, arm):
     holes, cell, asked, ahead, behind, home, folded = lane
     questions = []

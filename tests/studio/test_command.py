@@ -45,6 +45,7 @@ def get(address):
         return answer.read().decode()
 
 
+@pytest.mark.slow
 def test_a_job_is_served_until_ctrl_c(started, tmp_path):
     job = write_job(tmp_path)
     process, address, line = started(job, "--port", 0)
@@ -56,6 +57,7 @@ def test_a_job_is_served_until_ctrl_c(started, tmp_path):
     assert process.stderr.read() == "kerfpath: stopped\n"
 
 
+@pytest.mark.slow
 def test_without_a_job_a_copy_of_the_demo_is_opened_and_found_again(started, tmp_path):
     process, address, _ = started("--port", 0)
     copied = tmp_path / "kerfpath-studio" / "b_pillar.toml"
@@ -68,6 +70,7 @@ def test_without_a_job_a_copy_of_the_demo_is_opened_and_found_again(started, tmp
     assert get(f"{address}export/job").startswith("# mine")
 
 
+@pytest.mark.slow
 def test_another_address_than_this_machines_needs_the_token(started, tmp_path):
     _, address, _ = started(write_job(tmp_path), "--port", 0, "--host", "0.0.0.0")
     found = re.fullmatch(r"http://[^/]+:(\d+)/\?token=([\w-]{32})", address)
@@ -98,6 +101,7 @@ def test_what_is_not_installed_is_said_in_one_line(tmp_path, monkeypatch):
     assert_refused(result, "starlette, uvicorn, websockets", "pip install 'kerfpath[studio]'")
 
 
+@pytest.mark.slow
 def test_a_drawing_gets_a_job_to_begin_with_that_can_be_planned(started, tmp_path):
     write_job(tmp_path)  # the part beside it
     _, address, line = started(tmp_path / "b_pillar.step", "--port", 0)

@@ -109,6 +109,7 @@ def test_a_page_that_does_as_it_is_told_has_the_frames_of_the_cell(planned, path
         assert np.array(frames(robot, q)[:-1]) == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_bodies_move_with_what_carries_them(tmp_path):
     for text, fixtures in ((TURNED, {}), (TURNED + CELL, {"plate": 0, "post": 1, "floor": 1})):
         scene, _ = scene_of(prepare(read_job(write_job(tmp_path, text))), 1)
@@ -179,6 +180,7 @@ def test_the_map_is_that_along_the_plan_and_so_are_its_poses(planned):
         assert np.exp(1j * angle) == pytest.approx(np.exp(1j * (pose["gamma"] - gamma)), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_what_is_changed_of_an_axis_is_planned_and_undone(planned):
     page, _ = planned
     page.say("edit", path=["robot", "external", 0, "velocity_mm_s"], value=500)

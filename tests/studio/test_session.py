@@ -141,6 +141,7 @@ def test_the_program_is_played_in_its_order_without_a_gap(planned):
     assert np.abs(speed[0]).max() < np.abs(speed[len(speed) // 2]).max() / 5  # it gains speed
 
 
+@pytest.mark.slow
 def test_the_outcome_is_that_of_the_command(planned, folder):
     client, _, heard = planned
     outcome = last(heard, "outcome")
@@ -286,6 +287,7 @@ def test_an_edit_is_planned_again_at_once_and_undone(studio):
     assert again["q"] == before["q"]
 
 
+@pytest.mark.slow
 def test_what_has_not_changed_is_not_planned_again(studio, monkeypatch):
     _, page, _ = studio
     asked, real = [], Job.graph
@@ -350,6 +352,7 @@ def test_a_loop_that_there_is_not_is_a_fault(studio):
     assert "not valid TOML" in page.until("error", about="edit")["message"]
 
 
+@pytest.mark.slow
 def test_no_path_says_why_and_its_relaxations_open_the_way(studio):
     _, page, _ = studio
     page.say("edit", path=["contour", 1, "speed_m_min"], value=60)
@@ -374,6 +377,7 @@ def test_no_path_says_why_and_its_relaxations_open_the_way(studio):
     assert "no relaxation" in page.until("error", about="relax")["message"]
 
 
+@pytest.mark.slow
 def test_the_fastest_speed_is_found_and_can_be_cut_at(studio):
     _, page, _ = studio
     page.say("fastest", contour="slot")
@@ -419,6 +423,7 @@ def test_work_is_found_again_after_the_server_has_gone(folder):
     assert path.read_text() == text
 
 
+@pytest.mark.slow
 def test_cancel_stops_and_plan_goes_on(folder):
     with serving(write_job(folder, name="cancel.toml")) as client, talking(client) as page:
         page.until("scene", lambda message: message["contours"])

@@ -68,6 +68,7 @@ def test_a_map_says_what_it_can_be_shaded_by(celled, winding):
         assert {each["by"] for each in shades} == {*MEASURES, *more}
 
 
+@pytest.mark.slow
 def test_clearance_is_that_of_the_cell(celled):
     page, prepared, _, graph = celled
     found, cell = shaded(page, "clearance"), prepared.cell

@@ -81,6 +81,7 @@ def test_each_job_has_its_row_with_what_came_of_it(done):
     assert all("\n" not in rows[name]["reason"] for name in reasons)
 
 
+@pytest.mark.slow
 def test_files_are_those_of_a_plan_in_a_folder_of_the_jobs_name(done):
     folder, _, told = done
     rows = rows_of(told)
@@ -120,6 +121,7 @@ def test_again_writes_what_is_missing_and_plans_nothing(done, idle):
     assert (good / "report.html").stat().st_mtime_ns == stamp, "it was there already"
 
 
+@pytest.mark.slow
 def test_a_job_that_was_refused_is_tried_again_once_it_has_changed(tmp_path):
     names = write_slit_jobs(tmp_path, {n: JOBS[n] for n in ("dry", "misspelt", "unknown")})
     command = ["batch", *names, "--out", "out", "--processes", 1, "--json"]
@@ -216,6 +218,7 @@ def test_no_jobs_at_all_is_bad_input(tmp_path):
     assert "Missing argument 'JOB.toml'" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_job_that_changes_meanwhile_ends_the_batch(tmp_path):
     write_slit_jobs(tmp_path, {"good": SLIT})
     job, out = tmp_path / "good.toml", tmp_path / "out"
@@ -228,6 +231,7 @@ def test_a_job_that_changes_meanwhile_ends_the_batch(tmp_path):
     assert not (out / "good").exists()
 
 
+@pytest.mark.slow
 def test_workers_of_a_cluster_need_the_job_folder_alone_and_that_they_need(
     workers, scheduler, tmp_path
 ):

@@ -149,6 +149,7 @@ def test_a_cluster_comes_to_the_same_though_a_worker_is_killed(
     np.testing.assert_array_equal(found.front.values, studied.front.values)
 
 
+@pytest.mark.slow
 def test_a_plan_that_is_picked_has_the_criteria_of_the_front(job, studied, tmp_path):
     write_pareto(studied, tmp_path)
     entry = json.loads((tmp_path / "pareto.json").read_text())
@@ -180,6 +181,7 @@ def test_a_plan_that_is_picked_has_the_criteria_of_the_front(job, studied, tmp_p
         assert "continuous rotation" in said, "the others are planned as the job says"
 
 
+@pytest.mark.slow
 def test_on_the_grid_where_that_is_asked_for_and_refined_from_there(job, tmp_path):
     exact = tmp_path / "exact.toml"
     shutil.copy(job.parent / "b_pillar.step", tmp_path)
@@ -195,6 +197,7 @@ def test_on_the_grid_where_that_is_asked_for_and_refined_from_there(job, tmp_pat
     assert cut.plan.cost < cut.plan.proof.grid_cost
 
 
+@pytest.mark.slow
 def test_speed_and_time_of_a_job(job, tmp_path):
     options = {"store": tmp_path / "s", "contour": "small", "runs": 8, "processes": 1}
     studied = pareto_of_job(job, criteria=["time", "speed"], **options)
@@ -217,6 +220,7 @@ def test_what_is_refused(job, studied, tmp_path):
     refused("not the store of a sweep", runs=1)
 
 
+@pytest.mark.slow
 def test_where_no_run_can_have_a_plan_it_says_why(job, tmp_path):
     fast = tmp_path / "fast.toml"
     shutil.copy(job.parent / "b_pillar.step", tmp_path)
@@ -260,6 +264,7 @@ def test_a_plan_that_is_not_on_the_front_is_refused(job, studied, tmp_path):
             read_pick(tmp_path, job, which)
 
 
+@pytest.mark.slow
 def test_the_command_finds_a_front_and_writes_a_plan_of_it(job, tmp_path):
     asked = ("--contour", "small", "--criteria", "displacement, velocity", "--runs", "10")
     command = ("pareto", job, "--processes", "1")

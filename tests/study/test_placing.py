@@ -66,6 +66,7 @@ def test_what_a_move_changes_takes_out_what_would_say_otherwise(tmp_path):
     assert tomllib.loads(again.text)["cell"]["fixture"][0]["xyz_mm"][0] == 1240
 
 
+@pytest.mark.slow
 def test_a_search_tells_of_each_placement_as_it_is_found(tmp_path):
     path = rings(tmp_path, 1200)
     table = read_job(path).layout.model_copy(update={"evaluations": 8, "map_points": 0})

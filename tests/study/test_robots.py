@@ -110,6 +110,7 @@ def test_reach_is_the_share_of_nodes_with_a_pose(tmp_path):
     assert a.reason.startswith(f"no pose at {21 - there.sum()} of 21 nodes")
 
 
+@pytest.mark.slow
 def test_accelerations_are_assumed_only_as_asked(folder, tmp_path):
     path = folder / "job.toml"
     given = {"store": tmp_path / "store.sqlite", "robots": [SILENT, STATED], "processes": 1}

@@ -189,6 +189,7 @@ def test_a_process_has_one_thread(tmp_path):
     assert done.value == ["1", "1"]
 
 
+@pytest.mark.slow
 def test_every_task_once_though_the_sweep_is_killed_again_and_again(tmp_path):
     marks = tmp_path / "marks"
     marks.mkdir()
@@ -327,6 +328,7 @@ def test_a_script_without_its_guard_is_told_so(tmp_path):
     assert query(tmp_path / "store.sqlite", "SELECT count(*) FROM result") == [(0,)]
 
 
+@pytest.mark.slow
 def test_the_example_of_the_docs_runs(tmp_path):
     text = (HERE.parent / "docs" / "sweeps.md").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
@@ -353,6 +355,7 @@ def groups(scheduler):
         return set(client.run_on_scheduler(lambda dask_scheduler: [*dask_scheduler.task_prefixes]))
 
 
+@pytest.mark.slow
 def test_a_cluster_that_loses_a_worker_in_the_middle_loses_nothing(workers, scheduler, tmp_path):
     first, second = workers(2)
     tasks = [{"x": x, "folder": str(tmp_path), "seconds": 0.01} for x in range(300)]

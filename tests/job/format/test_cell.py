@@ -126,6 +126,7 @@ def test_the_report_draws_the_cell(planned, folder):
     assert len(scene["layout"]["sliders"][0]["steps"]) == 3
 
 
+@pytest.mark.slow
 def test_the_audit_checks_the_cell_again_with_the_job_and_says_so_without(planned, folder):
     file = folder / "small-plan" / "plan.json"
     again = audit_file(file, folder / "small.toml")
@@ -142,6 +143,7 @@ def test_the_audit_checks_the_cell_again_with_the_job_and_says_so_without(planne
     assert "expected 0.501, found 0.5" in said
 
 
+@pytest.mark.slow
 def test_a_blocked_contour_says_that_it_is_collision(folder):
     blocked = with_keys("[cell]", "part = false").replace("spacing_mm = 1", "spacing_mm = 2")
     blocked = blocked.replace("xyz_mm = [1390, -210, 600]", "xyz_mm = [1225, -130, 700]")
@@ -162,6 +164,7 @@ def test_the_fastest_speed_in_a_cell_is_clear_and_no_higher(folder):
     assert 0 < alone.as_run <= alone.at_nodes.speed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ['feed = "dip"', 'interruptions = "fewest"'])
 def test_over_the_fastest_speed_a_cut_in_a_cell_dips_or_is_interrupted(folder, key):
     keys = ('method = "exact"', "refine = false", "certify = false", key)
@@ -177,6 +180,7 @@ def test_over_the_fastest_speed_a_cut_in_a_cell_dips_or_is_interrupted(folder, k
         assert {"collision", "collision-own"} <= {check.code for check in cut.checks}
 
 
+@pytest.mark.slow
 def test_a_tilted_cut_in_a_cell_stays_out_of_the_band_of_clearance(folder):
     keys = ("tilt_deg = 4", "tilt_cost_per_deg = 0.001", "rotation_deg = 10")
     keys = ('method = "exact"', "refine = false", *keys)
@@ -195,6 +199,7 @@ def test_a_tilted_cut_in_a_cell_stays_out_of_the_band_of_clearance(folder):
     assert apart.min() >= cell.near_miss + 0.03 - 1e-6  # convex distances are exact to 1e-6 m
 
 
+@pytest.mark.slow
 def test_check_shows_bodies_pairs_and_the_start(folder):
     checked = check_job(read_job(job(folder, SMALL, "small.toml")))
     (start,) = checked.starts

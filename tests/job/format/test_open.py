@@ -67,6 +67,7 @@ def made_of(folder, keys):
     return task.sample(task.candidates(part)[0]), task.drawn(part)
 
 
+@pytest.mark.slow
 def test_an_open_line_is_planned_first_inside_its_trim_and_audited(folder):
     path = job_of(folder, HEAD + TRIM + LINE + HOLE + PLAN + LAST)
     result = run("plan", str(path), "--out", str(folder / "out"), "--json")

@@ -64,6 +64,7 @@ def test_where_nothing_is_rounded_nothing_is_said(tmp_path, program):
     assert [cut.as_run for cut in cuts_of(tmp_path, text).cuts] == [AsRun(), AsRun()]
 
 
+@pytest.mark.slow
 def test_limits_that_hold_at_the_nodes_alone_are_brought_in_between_them(tmp_path):
     fast = QUICK.replace("[plan]", '[plan]\nbetween_nodes = "reported"')
     fast = re.sub("eta_acceleration = .*", "eta_acceleration = 1", fast)
@@ -88,6 +89,7 @@ def at_its_limits(folder, text):
     return "\n".join(lines).replace("[robot]", f"[robot]\nacceleration_deg_s2 = {most}", 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("program", "why"),
     [
@@ -112,6 +114,7 @@ def test_without_a_proof_a_guarantee_fails_the_audit(tmp_path, program, why):
     assert not list((tmp_path / "out").glob("*.mod")), written
 
 
+@pytest.mark.slow
 def test_a_program_is_judged_by_the_zones_of_its_text(tmp_path):
     text = QUICK.replace("[plan]", '[plan]\nbetween_nodes = "guaranteed"')
     result = cuts_of(tmp_path, text)
@@ -143,6 +146,7 @@ orientation = "wrist"
 """
 
 
+@pytest.mark.slow
 def test_where_the_wrist_goes_by_its_joints_samples_are_said_to_be_samples(tmp_path):
     plain, wrist = cuts_of(tmp_path, QUICK), cuts_of(tmp_path, QUICK + WRIST)
     assert wrist.passed

@@ -52,6 +52,7 @@ def test_what_passes_is_written(tmp_path, reach, seed, language):
     assert not texts.refused
 
 
+@pytest.mark.slow
 def test_what_can_be_written_without_regard_to_retract_and_limits_still_is(tmp_path, reach):
     refused = 0
     for seed in range(8):

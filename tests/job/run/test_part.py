@@ -156,6 +156,7 @@ def with_text(path, text):
     return path
 
 
+@pytest.mark.slow
 def test_the_given_order_is_kept_on_request(folder):
     job = folder / "given.toml"
     job.write_text(WHOLE.replace("[sequence]", '[sequence]\norder = "given"'))
@@ -211,6 +212,7 @@ def test_operations_that_cannot_be_are_one_line_and_code_2(folder, old, new, mes
     assert_refused(run("plan", str(bad), "--out", str(folder / "bad")), message)
 
 
+@pytest.mark.slow
 def test_every_cut_of_the_shipped_part_can_be_made():
     job = read_job(DEMO / "b_pillar_part.toml")
     part = read(job.part_file)

@@ -40,6 +40,7 @@ def test_at_the_speed_as_run_the_job_is_guaranteed_at_that_of_the_nodes_not(tmp_
     assert not run_job(read(tmp_path, at([0.9999 * most for most in fastest]))).passed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("without", ['between_nodes = "guaranteed"', 'language = "rapid"'])
 def test_where_nothing_is_kept_there_is_no_such_speed(tmp_path, without):
     instead = {"b": 'between_nodes = "reported"', "l": 'language = "none"'}[without[0]]

@@ -62,6 +62,7 @@ def test_torques_of_the_motion_as_run_are_in_the_checks(planned, folder):
     assert row.title in (folder / "out" / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_they_are_in_json_and_above_1_they_are_warned_of(folder, planned):
     job, result = planned
     (peak,) = (r.value for r in result.cuts[0].as_run.checks if r.code == "torque-as-run")
@@ -140,6 +141,7 @@ def test_a_robot_that_hangs_is_said_by_gravity(folder):
     np.testing.assert_allclose(one, -other, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_jobs_hold_torque_and_jerk_limits_at_the_nodes(folder, planned):
     """The audit judges by both, the run, plan.json with its job and without."""
     job, result = planned
@@ -189,6 +191,7 @@ def test_jobs_hold_torque_and_jerk_limits_at_the_nodes(folder, planned):
     assert "joint torque at the nodes" in found.stdout
 
 
+@pytest.mark.slow
 def test_jobs_that_no_motion_keeps_say_so(folder):
     text = job_of_arm(folder, QUICK, robot_keys=f"jerk_deg_s3 = {[0.01] * 6}")
     path = folder / "job.toml"

@@ -26,6 +26,7 @@ def job(tmp_path):
     return of
 
 
+@pytest.mark.slow
 def test_a_job_keeps_its_windows_and_another_job_does_not_pass_its_audit(job, tmp_path):
     path = job("[[0, 10, 20, 20.5]]")
     result = run_job(read_job(path))

@@ -121,6 +121,7 @@ def test_a_planned_job_is_shown_without_a_serious_fault(page, studio, first):
     assert serious(page) == []
 
 
+@pytest.mark.slow
 def test_before_anything_is_there_the_page_says_what_it_waits_for(page, studio, messages):
     studio.open(messages["progress"][0] | {"busy": True, "label": "reading the drawing"})
     page.get_by_text("Reading the cell").wait_for()
@@ -130,6 +131,7 @@ def test_before_anything_is_there_the_page_says_what_it_waits_for(page, studio, 
     assert serious(page) == []
 
 
+@pytest.mark.slow
 def test_no_path_says_where_and_why_and_its_relaxations_are_buttons(page, studio, first, messages):
     (answer,) = messages["nopath"]
     studio.open(*(each for each in first if each.get("contour") != answer["contour"]), answer)
@@ -144,6 +146,7 @@ def test_no_path_says_where_and_why_and_its_relaxations_are_buttons(page, studio
     assert sent(studio, "relax") == [{"type": "relax", "contour": answer["contour"], "index": 0}]
 
 
+@pytest.mark.slow
 def test_a_fault_of_the_job_and_an_error_are_said(page, studio, first):
     studio.open(*first)
     ready(page)
@@ -165,6 +168,7 @@ def test_a_fault_of_the_job_and_an_error_are_said(page, studio, first):
     assert serious(page) == []
 
 
+@pytest.mark.slow
 def test_without_its_server_the_page_says_so_and_comes_back_by_itself(page, studio, first):
     studio.open(*first)
     ready(page)
@@ -182,6 +186,7 @@ def test_without_its_server_the_page_says_so_and_comes_back_by_itself(page, stud
     assert page.locator("#speed").is_enabled()
 
 
+@pytest.mark.slow
 def test_space_plays_and_arrows_step(page, studio, first):
     studio.open(*first)
     ready(page)
@@ -199,6 +204,7 @@ def test_space_plays_and_arrows_step(page, studio, first):
     assert nodes[2] == nodes[0]
 
 
+@pytest.mark.slow
 def test_a_button_that_was_clicked_leaves_the_space_bar_to_the_player(page, studio, first):
     studio.open(*first)
     ready(page)
@@ -214,6 +220,7 @@ def test_a_button_that_was_clicked_leaves_the_space_bar_to_the_player(page, stud
     assert not page.evaluate("() => studio.player.playing")
 
 
+@pytest.mark.slow
 def test_playing_moves_the_robot_and_its_clock(page, studio, first):
     studio.open(*first)
     ready(page)
@@ -229,6 +236,7 @@ def test_playing_moves_the_robot_and_its_clock(page, studio, first):
     assert page.evaluate("() => studio.player.t") == total
 
 
+@pytest.mark.slow
 def test_a_drag_of_a_slider_is_one_gesture_and_ends_with_its_last_value(page, studio, first):
     studio.open(*first)
     ready(page)
@@ -251,6 +259,7 @@ def test_a_drag_of_a_slider_is_one_gesture_and_ends_with_its_last_value(page, st
     assert edits[-1]["value"][0] == pytest.approx(usual[0], rel=1e-3)  # sent to four digits
 
 
+@pytest.mark.slow
 def test_what_is_out_of_date_is_marked_until_its_plan_comes(page, studio, first, messages):
     studio.open(*first)
     ready(page)
@@ -267,6 +276,7 @@ def test_what_is_out_of_date_is_marked_until_its_plan_comes(page, studio, first,
     assert page.locator(".result.stale").count() == 0
 
 
+@pytest.mark.slow
 def test_undo_redo_and_save_by_keys(page, studio, first):
     studio.open(*first)
     ready(page)
@@ -313,6 +323,7 @@ def test_the_tool_turned_about_its_beam_stays_at_its_tip(modules, messages):
     assert modules.evaluate(MODULE, ["inverse", "turnedAbout", scene["robot"], q, 0]) == q
 
 
+@pytest.mark.slow
 def test_hovering_the_map_says_why_and_shows_a_ghost_without_the_server(
     page, studio, first, messages
 ):
@@ -339,6 +350,7 @@ def test_hovering_the_map_says_why_and_shows_a_ghost_without_the_server(
     assert page.locator("#map-tip").is_visible()
 
 
+@pytest.mark.slow
 def test_the_theme_is_the_systems_until_the_button_says_otherwise(page, studio, first):
     studio.open(*first)
     theme = "() => document.documentElement.dataset.theme"
@@ -350,6 +362,7 @@ def test_the_theme_is_the_systems_until_the_button_says_otherwise(page, studio, 
     assert page.evaluate(theme) == "dark"
 
 
+@pytest.mark.slow
 def test_the_line_above_the_map_is_moved_by_keys(page, studio, first):
     studio.open(*first)
     ready(page)
@@ -360,6 +373,7 @@ def test_the_line_above_the_map_is_moved_by_keys(page, studio, first):
     assert page.locator("#map").bounding_box()["height"] > before
 
 
+@pytest.mark.slow
 def test_a_scene_is_drawn_in_few_calls_and_only_when_something_changes(page, studio, first):
     studio.open(*first)
     ready(page)
