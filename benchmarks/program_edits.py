@@ -23,6 +23,7 @@ from kerfpath.post import (
     LanguageSettings,
     Program,
     ReadProgram,
+    build_program,
     languages,
     read_program,
 )
@@ -287,7 +288,7 @@ def subjects(
             assert outcome.passed, outcome
             plans[arm] = outcome.plans, () if outcome.part is None else outcome.part.moves
         made, moves = plans[arm]
-        program = options.program(made, moves)
+        program = build_program(made, options, moves=moves)
         settings = chosen.completed(options.settings)
         files = chosen.formatter(program, settings).files()
         yield Subject(audit=audit, language=chosen, settings=settings, program=program, files=files)

@@ -18,7 +18,7 @@ from kerfpath.errors import InputError, OptionConflict
 from kerfpath.limits import Limits
 from kerfpath.robots import Robot
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
-from kerfpath.setting import Settings, documented, setting, settings
+from kerfpath.setting import Settings, check, documented, setting
 from kerfpath.tilt import Tilt
 from kerfpath.windows import GammaWindow
 
@@ -291,9 +291,8 @@ class PlanOptions(Settings):
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        cast = {
-            name: each.checked(getattr(self, name)) for name, each in settings(PlanOptions).items()
-        }
+        check(self)
+        cast: dict[str, object] = {}
         if self.postures is not None:
             cast["postures"] = tuple(int(posture) for posture in self.postures)
         if self.weights is not None:

@@ -26,15 +26,16 @@ from typing import (
 
 import numpy as np
 
-from kerfpath.arrays import Array, require_one_of, scalar, short_repr
+from kerfpath.arrays import Array, not_negative, require_one_of, scalar, short_repr
 from kerfpath.errors import InputError
 
-__all__ = ["Setting", "Settings", "documented", "keys", "setting", "settings"]
+__all__ = ["Setting", "Settings", "check", "documented", "keys", "setting", "settings"]
 
 T = TypeVar("T")
 UNITS: Mapping[str, tuple[str, Callable[[Any], Any]]] = {
     "deg": ("rad", np.radians),
     "mm": ("m", lambda value: value / 1000),
+    "mm/s": ("m/s", lambda value: value / 1000),
     "%": ("", lambda value: value / 100),
     "1/deg": ("1/rad", np.degrees),
 }
@@ -144,6 +145,8 @@ class Setting:
         if get_origin(kind) is Literal:
             require_one_of(value, self.name, get_args(kind))
         elif kind is float:
+            if self.least == 0:
+                return not_negative(value, self.name, unit=self.si_unit)
             above = None if self.above is None else self.si(self.above)
             return scalar(value, self.name, unit=self.si_unit, above=above)
         elif kind is int and not (isinstance(value, int) and value >= (self.least or 0)):
@@ -197,8 +200,21 @@ def keys(kind: Any) -> dict[str, Setting]:
     return {key: one for each in settings(kind).values() for key, one in each.keys.items()}
 
 
+def check(made: Any) -> None:
+    """Check the settings of an object being made, and keep its numbers as floats.
+
+    Raises
+    ------
+    InputError
+        As `Setting.checked`.
+    """
+    for name, each in settings(type(made)).items():
+        object.__setattr__(made, name, each.checked(getattr(made, name)))
+
+
 def _suffix(unit: str) -> str:
-    return f"_{unit.replace('1/', 'per_').replace('%', 'percent')}" if unit else ""
+    said = unit.replace("1/", "per_").replace("/", "_").replace("%", "percent")
+    return f"_{said}" if unit else ""
 
 
 def documented(kind: type[T]) -> type[T]:

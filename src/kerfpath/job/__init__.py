@@ -23,14 +23,12 @@ from kerfpath.job.format import Job as Job
 from kerfpath.job.format import JobFile as JobFile
 from kerfpath.job.format import LayoutTable as LayoutTable
 from kerfpath.job.format import PreparedJob as PreparedJob
-from kerfpath.job.format import ProgramOptions as ProgramOptions
 from kerfpath.job.format import ProgramTable as ProgramTable
 from kerfpath.job.format import all_of as all_of
 from kerfpath.job.format import cell_of_job as cell_of_job
 from kerfpath.job.format import places_of as places_of
 from kerfpath.job.format import pose as pose
 from kerfpath.job.format import prepare as prepare
-from kerfpath.job.format import program_options as program_options
 from kerfpath.job.format import read_job as read_job
 from kerfpath.job.format import with_loops as with_loops
 from kerfpath.job.format import with_map as with_map

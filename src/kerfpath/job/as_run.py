@@ -24,7 +24,7 @@ from kerfpath.execution import (
 )
 from kerfpath.job.format import Job
 from kerfpath.plans import Plan
-from kerfpath.post import Controller, Program, language
+from kerfpath.post import Controller, Program, build_program, language
 
 __all__ = [
     "AsRun",
@@ -213,7 +213,7 @@ def keeps_between_nodes(job: Job) -> bool:
 
 
 def _program(job: Job) -> Callable[[Plan], Program]:
-    return lambda plan: job.program.program([plan])
+    return lambda plan: build_program([plan], job.program)
 
 
 def controller_of(job: Job) -> Controller:

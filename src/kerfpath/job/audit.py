@@ -56,7 +56,6 @@ from kerfpath.job.format import (
     PreparedJob,
     prepare,
     read_job,
-    tolerances_of,
 )
 from kerfpath.job.laser_and_gas import SAME_TIME, BeamProcess, check_laser_and_gas
 from kerfpath.job.plan_file import (
@@ -857,7 +856,7 @@ def _list_claims(file: PlanFile, tables: Mapping[str, Sequence[Check]]) -> str:
 
 def _by_itself(file: PlanFile) -> AuditReport:
     """Audit a plan.json without its job."""
-    tolerances = table_of(file, "audit", AuditTable, tolerances_of)
+    tolerances = table_of(file, "audit", AuditTable, AuditTable.resolve)
     tables = {}
     for p in file.plans:
         own, said = recompute(p), file.entries[p.name]

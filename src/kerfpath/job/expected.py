@@ -28,6 +28,7 @@ from kerfpath.post import (
     ReadProgram,
     Rules,
     Step,
+    build_program,
     read_as_written,
 )
 from kerfpath.retime import feed, retime
@@ -436,7 +437,7 @@ def expect_program(
     plans = [whole_cut(job, cut, requested, plan) for cut, requested, plan in cuts]
     moves = _moves(job, [cut for cut, _, _ in cuts], plans, home)
     # Arcs are added below, where they were read.
-    program = replace(options, arc_tolerance=None).program(plans, moves)
+    program = build_program(plans, options, moves=moves, arc_tolerance=None)
     sections = []
     for section, (cut, requested, _) in zip(program.sections, cuts, strict=True):
         steps = [

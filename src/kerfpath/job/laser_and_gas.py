@@ -17,8 +17,7 @@ import numpy as np
 
 from kerfpath.auditor import Check, Unit
 from kerfpath.job.audit_report import check
-from kerfpath.job.format import ProgramOptions
-from kerfpath.post import ReadMove, ReadProgram, ReadWait, Signal, groups_of
+from kerfpath.post import ProgramOptions, ReadMove, ReadProgram, ReadWait, Signal, groups_of
 from kerfpath.robots import Robot
 from kerfpath.transfer import least_time
 

@@ -22,21 +22,18 @@ from kerfpath.job.format import (
     Job,
     LayoutTable,
     PreparedJob,
-    ProgramOptions,
     ProgramTable,
     SequenceTable,
     Tolerances,
     home_of,
     prepare,
-    program_options,
     read_job,
-    tolerances_of,
 )
 from kerfpath.job.plan_file import PlanFile, read_plan_file, table_of
 from kerfpath.job.run import CutResult
 from kerfpath.placement import MeasuredFrame, place_moves, placed, planned_again
 from kerfpath.plans import Plan
-from kerfpath.post import dry_run, post_and_read
+from kerfpath.post import ProgramOptions, build_program, dry_run, post_and_read
 from kerfpath.post import language as find_language
 from kerfpath.transfer import TransferMove
 
@@ -111,7 +108,7 @@ def program_of(
     chosen = find_language(options.language)
     if refusal := chosen.refusal(plans[0].robot):
         raise InputError(f"no program: {refusal}")
-    program = options.program(plans, moves)
+    program = build_program(plans, options, moves=moves)
     written = post_and_read(program, options.language, options.settings, strict=strict)
     if written.read is not None:
         audit = replace(audit, job=replace(audit.job, program=options))
@@ -228,7 +225,7 @@ def program_from_file(
     if frame is not None:
         file, again = _at_measured(file, frame, options.retract)
         notes += [*again, MEASURED_NOTE, *([MEASURED_MOVES_NOTE] if file.moves else [])]
-    tolerances = table_of(file, "audit", AuditTable, tolerances_of)
+    tolerances = table_of(file, "audit", AuditTable, AuditTable.resolve)
     there = "" if frame is None else " at the measured placement"
     for p in file.plans:
         if (failed := _first_failed(tolerances.checks(p))) is not None:
@@ -280,7 +277,7 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
         home=home_of(sequence, external, first.robot),
         sequence=sequence,
         layout=LayoutTable(),
-        tolerances=table_of(file, "audit", AuditTable, tolerances_of),
+        tolerances=table_of(file, "audit", AuditTable, AuditTable.resolve),
         program=options,
         source=file.job,
     )
@@ -293,10 +290,8 @@ def _planned_requirements(prepared: PreparedJob, file: PlanFile) -> PreparedJob:
     with the current one of the job, and refused if the planned moves do not fit its retract.
     """
     stem = prepared.job.path.stem
-    allowed = table_of(file, "audit", AuditTable, tolerances_of)
-    then = table_of(
-        file, "program", ProgramTable, lambda table: program_options(table, stem, allowed)
-    )
+    allowed = table_of(file, "audit", AuditTable, AuditTable.resolve).path
+    then = table_of(file, "program", ProgramTable, lambda table: table.resolve(stem, allowed))
     return replace(prepared, job=replace(prepared.job, program=then))
 
 
@@ -315,7 +310,7 @@ def _at_measured(
 
     A contour that would fail its audit there is planned again; a note names it.
     """
-    tolerances, plans, notes = table_of(file, "audit", AuditTable, tolerances_of), [], []
+    tolerances, plans, notes = table_of(file, "audit", AuditTable, AuditTable.resolve), [], []
     for p in file.plans:
         moved, why = _moved(p, frame, tolerances)
         if why:
@@ -349,11 +344,11 @@ def _first_failed(table: Sequence[Check]) -> Check | None:
 
 def _options(file: PlanFile, language: str, stem: str) -> ProgramOptions:
     find_language(language)
-    allowed = table_of(file, "audit", AuditTable, tolerances_of)
+    allowed = table_of(file, "audit", AuditTable, AuditTable.resolve).path
     return table_of(
         file,
         "program",
         ProgramTable,
-        lambda table: program_options(table, stem, allowed),
+        lambda table: table.resolve(stem, allowed),
         language=language,
     )

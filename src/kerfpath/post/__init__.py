@@ -36,6 +36,8 @@ from kerfpath.post.languages import language as language
 from kerfpath.post.languages import languages as languages
 from kerfpath.post.languages import rename_sections as rename_sections
 from kerfpath.post.languages import setting as setting
+from kerfpath.post.options import ProgramKeywords as ProgramKeywords
+from kerfpath.post.options import ProgramOptions as ProgramOptions
 from kerfpath.post.places import Line as Line
 from kerfpath.post.places import ReadGroup as ReadGroup
 from kerfpath.post.places import TimedLine as TimedLine

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath.arrays import Array, floats, freeze, not_negative, scalar, short_repr
+from kerfpath.arrays import Array, floats, freeze, scalar, short_repr
 from kerfpath.cell import UNPROVED
 from kerfpath.errors import InputError
 from kerfpath.names import identifier, identifiers
 from kerfpath.plans import Plan
-from kerfpath.post.arcs import Zone, euler, from_euler, with_arcs, zones_at
+from kerfpath.post.arcs import euler, from_euler, with_arcs, zones_at
 from kerfpath.post.checks import LOWEST_SHARE
+from kerfpath.post.options import ProgramKeywords, ProgramOptions
 from kerfpath.post.program import (
     Await,
     Comment,
-    Handshake,
     JointMove,
     LinearMove,
     Program,
@@ -278,19 +279,10 @@ PLAN_AND_CONTOUR = 1e-5
 
 def build_program(
     plans: Sequence[Plan],
+    options: ProgramOptions | None = None,
     *,
     moves: Sequence[TransferMove] = (),
-    name: str | None = None,
-    retract: float = 0.05,
-    zone: Zone = "auto",
-    zone_error: float = 1e-4,
-    lead_time: float = 0.02,
-    gas_lead: float | None = None,
-    pierce_time: float = 0.0,
-    approach_speed: float = 0.1,
-    air_speed: float | None = None,
-    arc_tolerance: float | None = None,
-    handshakes: Sequence[Handshake] = (),
+    **keywords: Unpack[ProgramKeywords],
 ) -> Program:
     """Return the program that cuts the planned contours one after the other.
 
@@ -303,74 +295,39 @@ def build_program(
     ----------
     plans : sequence of Plan
         Plans in the order of cutting, for the same robot, tool and placement.
+    options : ProgramOptions, optional
+        Name and process values; default: `ProgramOptions()`.
     moves : sequence of TransferMove
         Transfer moves, as `kerfpath.sequence.plan_part` returns them: one less than plans, or one
         more from and to a home position. Default: joint moves directly to each start.
-    name : str, optional
-        Name of the program, made an identifier. Default: "cut" and the first contour.
-    retract : float m
-        How far the tool backs off before and after a contour.
-    zone : float m or "auto"
-        Radius within which the corners at the inner nodes may be rounded. It is halved where nodes
-        are close, until zones do not overlap. "auto": up to half way to the next node, which keeps
-        the limits between the nodes; see `kerfpath.execution`.
-    zone_error : float m
-        Largest distance by which the tip may miss a node with `zone` "auto".
-    lead_time : float s
-        Time by which the laser is switched before the tip arrives.
-    gas_lead : float s, optional
-        Time by which the gas is switched on before the tip arrives at the start. Default: the
-        program does not switch the gas.
-    pierce_time : float s
-        Time to wait at the start with the laser on until the beam is through.
-    approach_speed : float m/s
-        Speed along the tool axis before and after a contour.
-    air_speed : float, optional
-        Share of the full speed of joint moves: a move takes its least time within the limits,
-        divided by this share. Default: 1 with `moves`, else 0.25. The first move has 0.25 at most,
-        because its start is not known.
-    arc_tolerance : float m, optional
-        Arcs that stay within this distance of the planned path are written as circular moves; see
-        `with_arcs`. Default: no circular moves.
-    handshakes : sequence of Request or Await
-        Handshakes before each contour, in order, with the tool backed off. Requests are withdrawn
-        after the contour.
+    keywords : options of `ProgramOptions`
+        They replace those of `options`.
 
     Raises
     ------
     InputError
         There are no plans, plans or moves do not belong together, the joints do not lead the tool
-        along the contour, or the tool cannot back off by `retract`.
+        along the contour, or the tool cannot back off by `retract`. Also as `ProgramOptions`.
     """
     if not plans:
         raise InputError("build_program: expected at least one plan, got none")
-    first = plans[0]
-    if arc_tolerance is not None and first.robot.free.size:
+    first, options = plans[0], replace(options or ProgramOptions(), **keywords)
+    if options.arc_tolerance is not None and first.robot.free.size:
         raise InputError(
             f"program: controllers move {first.robot.free_names} along an arc in different ways; "
             "leave arcs_mm out"
         )
     for plan in plans[1:]:
         _require_same_cell(first, plan)
-    process = _Process(
-        retract=scalar(retract, "retract", unit="m", above=0.0),
-        zone=zone if zone == "auto" else not_negative(zone, "zone", unit="m"),
-        zone_error=scalar(zone_error, "zone_error", unit="m", above=0.0),
-        lead_time=lead_time,
-        gas_lead=gas_lead,
-        pierce_time=not_negative(pierce_time, "pierce_time", unit="s"),
-        approach_speed=scalar(approach_speed, "approach_speed", unit="m/s", above=0.0),
-        handshakes=tuple(handshakes),
-    )
-    title = identifier(f"cut {first.name}" if name is None else name)
+    title = identifier(options.name or f"cut {first.name}")
     names = identifiers((plan.name for plan in plans), taken=(title,))
-    *ways, home = _corners(plans, moves, process.retract)
-    air = _Air(first, air_speed or (PLANNED if moves else UNPLANNED))
+    *ways, home = _corners(plans, moves, options.retract)
+    air = _Air(first, options.air_speed or (PLANNED if moves else UNPLANNED))
     sections = []
     for plan, section_name, way in zip(plans, names, ways, strict=True):
-        steps = tuple(process.steps(plan, air.moves(way)))
+        steps = tuple(_steps(plan, air.moves(way), options))
         sections.append(Section(name=section_name, steps=steps))
-        air.here = back_off(plan, "end", process.retract)
+        air.here = back_off(plan, "end", options.retract)
     if home:
         back = tuple(air.moves(home))
         sections[-1] = replace(sections[-1], steps=sections[-1].steps + back)
@@ -383,83 +340,74 @@ def build_program(
         air_checked=len(moves) > 0 and all(move.clear for move in moves),
         caveats=(CAPSULES,) if any(UNPROVED in plan.proof.statement for plan in plans) else (),
     )
-    if arc_tolerance is None:
+    if options.arc_tolerance is None:
         return program
     eta_v = min(plan.settings.eta_v for plan in plans)
     eta_a = min(plan.settings.eta_a for plan in plans)
-    return with_arcs(program, arc_tolerance, eta_v=eta_v, eta_a=eta_a)
+    return with_arcs(program, options.arc_tolerance, eta_v=eta_v, eta_a=eta_a)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Process:
-    """The steps of a contour, with the parameters of `build_program`."""
+def _steps(plan: Plan, way: Iterable[JointMove], options: ProgramOptions) -> Iterator[Step]:
+    """Yield the steps of a contour; `way` leads to the pose where the tool is backed off."""
+    _require_on_contour(plan)
+    T = plan.T_part_tip
+    q = plan.unwrapped
+    starts: tuple[Switch, ...] = (_laser(options, on=True),)
+    if options.gas_lead is not None:
+        starts = (Switch(signal="gas", on=True, lead_time=options.gas_lead), *starts)
+    yield Comment(
+        f"{plan.name}: {len(q)} nodes, {plan.contour.length * 1e3:.1f} mm, "
+        f"posture {posture_name(int(plan.posture[0]))}"
+    )
+    yield from way
+    yield from options.handshakes
+    yield _straight(options, T[0], q[0], starts)
+    if options.pierce_time > 0:
+        yield Wait(time=options.pierce_time)
+    yield from _cut(plan, T, q, options)
+    T_out = T[-1].copy()
+    T_out[:3, 3] -= options.retract * T_out[:3, 2]
+    yield _straight(options, T_out, back_off(plan, "end", options.retract))
+    for step in reversed(options.handshakes):
+        if isinstance(step, Request) and step.on:
+            yield replace(step, on=False)
 
-    retract: float
-    zone: Zone
-    zone_error: float
-    lead_time: float
-    gas_lead: float | None
-    pierce_time: float
-    approach_speed: float
-    handshakes: tuple[Handshake, ...]
 
-    __repr__ = short_repr
+def _laser(options: ProgramOptions, *, on: bool) -> Switch:
+    return Switch(signal="laser", on=on, lead_time=options.lead_time)
 
-    def steps(self, plan: Plan, way: Iterable[JointMove]) -> Iterator[Step]:
-        """Yield the steps of a contour; `way` leads to the pose where the tool is backed off."""
-        _require_on_contour(plan)
-        T = plan.T_part_tip
-        q = plan.unwrapped
-        starts: tuple[Switch, ...] = (self._laser(on=True),)
-        if self.gas_lead is not None:
-            starts = (Switch(signal="gas", on=True, lead_time=self.gas_lead), *starts)
-        yield Comment(
-            f"{plan.name}: {len(q)} nodes, {plan.contour.length * 1e3:.1f} mm, "
-            f"posture {posture_name(int(plan.posture[0]))}"
+
+def _straight(
+    options: ProgramOptions, T: Array, q: Array, switches: tuple[Switch, ...] = ()
+) -> LinearMove:
+    """Return a move along the tool axis that ends with a stop."""
+    speed, duration = options.approach_speed, options.retract / options.approach_speed
+    return LinearMove(T_part_tip=T, q=q, speed=speed, duration=duration, switches=switches)
+
+
+def _cut(plan: Plan, T: Array, q: Array, options: ProgramOptions) -> Iterator[LinearMove]:
+    """Yield the moves from the second node of a contour on, laser off along micro joints."""
+    took = np.diff(plan.time)
+    speed = np.diff(plan.contour.s) / took
+    joint = [kind == "micro joint" for kind in plan.contour.kinds]
+    zones = zones_at(plan.contour.points, options.zone, options.zone_error)
+    for k, radius in enumerate(zones, 1):
+        switches: tuple[Switch, ...] = ()
+        if k == len(took):
+            # At the end of a micro joint the laser is off already.
+            switches = () if joint[k - 1] else (_laser(options, on=False),)
+            if options.gas_lead is not None:
+                switches = (*switches, Switch(signal="gas", on=False))
+        elif joint[k] != joint[k - 1]:
+            switches = (_laser(options, on=joint[k - 1]),)
+        yield LinearMove(
+            T_part_tip=T[k],
+            q=q[k],
+            speed=float(speed[k - 1]),
+            duration=float(took[k - 1]),
+            zone=radius,
+            switches=switches,
         )
-        yield from way
-        yield from self.handshakes
-        yield self._straight(T[0], q[0], starts)
-        if self.pierce_time > 0:
-            yield Wait(time=self.pierce_time)
-        yield from self._cut(plan, T, q)
-        T_out = T[-1].copy()
-        T_out[:3, 3] -= self.retract * T_out[:3, 2]
-        yield self._straight(T_out, back_off(plan, "end", self.retract))
-        for step in reversed(self.handshakes):
-            if isinstance(step, Request) and step.on:
-                yield replace(step, on=False)
-
-    def _laser(self, *, on: bool) -> Switch:
-        return Switch(signal="laser", on=on, lead_time=self.lead_time)
-
-    def _straight(self, T: Array, q: Array, switches: tuple[Switch, ...] = ()) -> LinearMove:
-        """Return a move along the tool axis that ends with a stop."""
-        speed, duration = self.approach_speed, self.retract / self.approach_speed
-        return LinearMove(T_part_tip=T, q=q, speed=speed, duration=duration, switches=switches)
-
-    def _cut(self, plan: Plan, T: Array, q: Array) -> Iterator[LinearMove]:
-        """Yield the moves from the second node of a contour on, laser off along micro joints."""
-        took = np.diff(plan.time)
-        speed = np.diff(plan.contour.s) / took
-        joint = [kind == "micro joint" for kind in plan.contour.kinds]
-        for k, radius in enumerate(zones_at(plan.contour.points, self.zone, self.zone_error), 1):
-            switches: tuple[Switch, ...] = ()
-            if k == len(took):
-                # At the end of a micro joint the laser is off already.
-                switches = () if joint[k - 1] else (self._laser(on=False),)
-                if self.gas_lead is not None:
-                    switches = (*switches, Switch(signal="gas", on=False))
-            elif joint[k] != joint[k - 1]:
-                switches = (self._laser(on=joint[k - 1]),)
-            yield LinearMove(
-                T_part_tip=T[k],
-                q=q[k],
-                speed=float(speed[k - 1]),
-                duration=float(took[k - 1]),
-                zone=radius,
-                switches=switches,
-            )
 
 
 class _Air:

@@ -12,13 +12,13 @@ import numpy as np
 
 from kerfpath.arrays import Array, short_repr
 from kerfpath.names import identifier, identifiers
-from kerfpath.post.arcs import Order, Zone, controller_frames, euler, timetable
+from kerfpath.post.arcs import Order, controller_frames, euler, timetable
 from kerfpath.post.checks import foresee
-from kerfpath.post.languages import Formatter, LanguageSettings, number, plain
+from kerfpath.post.languages import Formatter, number, plain
 from kerfpath.post.languages import language as find_language
+from kerfpath.post.options import ProgramOptions
 from kerfpath.post.program import (
     Await,
-    Handshake,
     JointMove,
     LinearMove,
     Program,
@@ -266,16 +266,7 @@ SOME_ZONE = 1.23456e-3
 def issues_before_planning(
     cuts: Sequence[tuple[str, float]],
     robot: Robot,
-    language: str,
-    settings: LanguageSettings | None = None,
-    *,
-    name: str,
-    zone: Zone,
-    lead_time: float,
-    approach_speed: float,
-    pierce_time: float = 0.0,
-    gas_lead: float | None = None,
-    handshakes: Sequence[Handshake] = (),
+    options: ProgramOptions,
 ) -> list[ProgramIssue]:
     """Return the errors that the program of some cuts will have, whatever its targets are.
 
@@ -283,31 +274,34 @@ def issues_before_planning(
     ----------
     cuts : sequence of (str, float m/s)
         Name and speed of each contour.
-    robot, language, settings
-        As in `preflight`.
-    name, zone, lead_time, approach_speed, pierce_time, gas_lead, handshakes
-        As in `build_program`.
+    robot : Robot
+    options : ProgramOptions
+        With a language and a name.
     """
-    chosen = find_language(language)
-    settings = chosen.settings() if settings is None else settings
-    title = identifier(name)
+    chosen = find_language(options.language)
+    settings = chosen.settings() if options.settings is None else options.settings
+    title = identifier(options.name)
     names = identifiers((cut for cut, _ in cuts), taken=(title,))
     here, q = np.eye(4), np.zeros(robot.joints)
-    radius = SOME_ZONE if zone == "auto" else zone
+    radius = SOME_ZONE if options.zone == "auto" else options.zone
     sections = []
     for section, (_, speed) in zip(names, cuts, strict=True):
-        on = [Switch(signal="laser", on=True, lead_time=lead_time)]
-        off = [Switch(signal="laser", on=False, lead_time=lead_time)]
-        if gas_lead is not None:
-            on.insert(0, Switch(signal="gas", on=True, lead_time=gas_lead))
+        on = [Switch(signal="laser", on=True, lead_time=options.lead_time)]
+        off = [Switch(signal="laser", on=False, lead_time=options.lead_time)]
+        if options.gas_lead is not None:
+            on.insert(0, Switch(signal="gas", on=True, lead_time=options.gas_lead))
             off.append(Switch(signal="gas", on=False))
         steps = (
             JointMove(q=q, speed=1.0),
-            *handshakes,
+            *options.handshakes,
             LinearMove(
-                T_part_tip=here, q=q, speed=approach_speed, duration=1.0, switches=tuple(on)
+                T_part_tip=here,
+                q=q,
+                speed=options.approach_speed,
+                duration=1.0,
+                switches=tuple(on),
             ),
-            *([Wait(time=pierce_time)] if pierce_time else []),
+            *([Wait(time=options.pierce_time)] if options.pierce_time else []),
             LinearMove(T_part_tip=here, q=q, speed=speed, duration=1.0, zone=radius),
             LinearMove(T_part_tip=here, q=q, speed=speed, duration=1.0, switches=tuple(off)),
         )

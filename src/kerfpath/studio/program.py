@@ -20,7 +20,6 @@ from kerfpath.job import (
     FileTexts,
     JobResult,
     ProgramTable,
-    program_options,
     program_places,
     script_refusal,
 )
@@ -33,6 +32,7 @@ from kerfpath.post import (
     ProgramIssue,
     TimedLine,
     Wait,
+    build_program,
     languages,
     timetable,
 )
@@ -114,8 +114,7 @@ def in_language(result: JobResult, language: str | None) -> JobResult:
         raise InputError(f"program in {language}: {said}; correct [program]") from None
     # Keep the name of the job: the file that was read may be a copy with another name.
     job = result.job
-    options = program_options(asked, job.program.name, job.tolerances)
-    options = replace(options, language=language)
+    options = asked.resolve(job.program.name, job.tolerances.path)
     return replace(result, job=replace(result.job, program=options))
 
 
@@ -244,7 +243,7 @@ def cycle_of(message: ProgramMessage) -> Cycle | None:
 def _clock(result: JobResult, revision: int) -> ProgramMessage:
     # Arcs pass the same points at the same times: show the nodes of the plans instead.
     options = replace(result.job.program, arc_tolerance=None)
-    program = options.program(result.plans, result.moves)
+    program = build_program(result.plans, options, moves=result.moves)
     segments = list(_segments(program, [cut for cut in result.cuts if cut.plan is not None]))
     notes = []
     if result.part is None:

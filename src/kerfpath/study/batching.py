@@ -20,7 +20,6 @@ from kerfpath.job import (
     FileTexts,
     Job,
     JobResult,
-    ProgramOptions,
     make_folder,
     read_job,
     require_folder,
@@ -29,7 +28,7 @@ from kerfpath.job import (
     run_job,
     stale_program,
 )
-from kerfpath.post import replace_program
+from kerfpath.post import ProgramOptions, replace_program
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import with_library, without_library
 from kerfpath.sweep import Result, Sweep, UnfitWorker

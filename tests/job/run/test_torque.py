@@ -13,6 +13,7 @@ from kerfpath import InputError
 from kerfpath.execution import longest_run
 from kerfpath.job import audit_file, audit_program, read_job, read_plan_file, run_job, write_result
 from kerfpath.limits import jerks_of, rates_of
+from kerfpath.post import build_program
 
 BEFORE, HOLE, _, AFTER = re.split(r"(?=\[\[contour\]\]|\[plan\])", SMALL)
 QUICK = BEFORE + HOLE + AFTER.replace("[plan]", "[plan]\ncertify = false")
@@ -44,7 +45,7 @@ def test_torques_of_the_motion_as_run_are_in_the_checks(planned, folder):
     assert row.ok
     assert "sampled, without friction and rotors" in row.title
     # By hand: central differences of the joints over the whole run, twenty times as dense.
-    course = longest_run(job.program.program([cut.plan])).course
+    course = longest_run(build_program([cut.plan], job.program)).course
     h, time = 1e-4, np.linspace(2e-4, course.time[-1] - 2e-4, 4000)
     nominal = np.stack([np.interp(time, course.time, q) for q in cut.plan.unwrapped.T], axis=1)
     q = [

@@ -13,10 +13,6 @@ from kerfpath.job.format.prepared import closer_nodes as closer_nodes
 from kerfpath.job.format.prepared import divide_nodes as divide_nodes
 from kerfpath.job.format.prepared import prepare as prepare
 from kerfpath.job.format.prepared import with_map as with_map
-from kerfpath.job.format.program import ProgramOptions as ProgramOptions
-from kerfpath.job.format.program import Tolerances as Tolerances
-from kerfpath.job.format.program import program_options as program_options
-from kerfpath.job.format.program import tolerances_of as tolerances_of
 from kerfpath.job.format.reading import Job as Job
 from kerfpath.job.format.reading import all_of as all_of
 from kerfpath.job.format.reading import home_of as home_of
@@ -32,4 +28,5 @@ from kerfpath.job.format.tables import JobFile as JobFile
 from kerfpath.job.format.tables import LayoutTable as LayoutTable
 from kerfpath.job.format.tables import ProgramTable as ProgramTable
 from kerfpath.job.format.tables import SequenceTable as SequenceTable
+from kerfpath.job.format.tolerances import Tolerances as Tolerances
 from kerfpath.job.format.values import pose as pose

@@ -35,9 +35,9 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.front import Subproblem
 from kerfpath.job.format.contour import ContourSpec
-from kerfpath.job.format.program import Tolerances
 from kerfpath.job.format.reading import Job, all_of, refusal_at
 from kerfpath.job.format.tables import CellTable, FixtureTable, given
+from kerfpath.job.format.tolerances import Tolerances
 from kerfpath.job.format.values import pose
 from kerfpath.operations import edge, nearest
 from kerfpath.options import PlanOptions

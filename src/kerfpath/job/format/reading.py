@@ -26,7 +26,6 @@ from kerfpath.errors import InputError
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format.contour import ContourSpec, contour_request, keys_of_closed_loops
 from kerfpath.job.format.drawing import Drawing
-from kerfpath.job.format.program import ProgramOptions, Tolerances, program_options, tolerances_of
 from kerfpath.job.format.tables import (
     LIMITS_MARGIN,
     REPEATED,
@@ -38,9 +37,11 @@ from kerfpath.job.format.tables import (
     SequenceTable,
 )
 from kerfpath.job.format.tables.plan import said_in_keys
+from kerfpath.job.format.tolerances import Tolerances
 from kerfpath.job.format.values import FAULT, LARGEST, SMALLEST, nearest
 from kerfpath.options import OptionConflict, PlanOptions
 from kerfpath.planner import coarse_places, external_course, layered_graph
+from kerfpath.post import ProgramOptions
 from kerfpath.robots import Robot
 from kerfpath.setup import Setup
 
@@ -512,8 +513,8 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         home=home_of(file.sequence, file.robot.external, robot),
         sequence=file.sequence,
         layout=file.layout,
-        tolerances=tolerances_of(file.audit),
-        program=program_options(file.program, (copy_of or path).stem, tolerances_of(file.audit)),
+        tolerances=file.audit.resolve(),
+        program=file.program.resolve((copy_of or path).stem, file.audit.resolve().path),
         source=source,
         text=text,
     )

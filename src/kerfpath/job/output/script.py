@@ -18,8 +18,9 @@ from kerfpath.job.format import ContourSpec, CutRequest, Job, PreparedJob, pose
 from kerfpath.job.format.tables import CellTable
 from kerfpath.operations import Side
 from kerfpath.options import PlanOptions
+from kerfpath.post import ProgramOptions
 from kerfpath.robots import robot as robot_of
-from kerfpath.setting import settings
+from kerfpath.setting import settings as settings_of
 from kerfpath.tilt import Tilt
 from kerfpath.tolerances import SAME_PLACE
 
@@ -99,7 +100,7 @@ def _head(table: CellTable) -> str:
 ANGLES = {"angle", "lower", "upper", "velocity", "acceleration"} | {
     name
     for kind in (PlanOptions, Tilt)
-    for name, each in settings(kind).items()
+    for name, each in settings_of(kind).items()
     if each.kind is float and each.unit == "deg"
 }
 """Arguments in rad, rad/s and rad/s^2, which are written in degrees if that loses no digit."""
@@ -390,13 +391,9 @@ def _operations(task: ContourSpec) -> Iterator[str]:
 
 def _program(job: Job) -> list[str]:
     options = job.program
-    named = {
-        "name": options.name, "retract": options.retract, "zone": options.zone,
-        "zone_error": options.zone_error,
-        "lead_time": options.lead_time, "gas_lead": options.gas_lead,
-        "pierce_time": options.pierce_time, "approach_speed": options.approach_speed,
-        "air_speed": options.air_speed, "arc_tolerance": options.arc_tolerance,
-    }  # fmt: skip
+    known = settings_of(ProgramOptions).items()
+    named = {name: getattr(options, name) for name, each in known if each.takes is not None}
+    del named["language"]
     said = {} if options.settings is None else options.settings.model_dump(exclude_defaults=True)
     settings = f"language({options.language!r}).settings({_arguments(said)})"
     made = _call("return build_program", named, "plans").replace("\n", "\n    ")

@@ -15,7 +15,7 @@ from kerfpath.arrays import Array, short_repr
 from kerfpath.cad import Departure
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job.audit_report import collision_note
-from kerfpath.job.format import Job, ProgramOptions, refusal_at
+from kerfpath.job.format import Job, refusal_at
 from kerfpath.job.plan_file import (
     ContourData,
     broken_entry,
@@ -29,7 +29,9 @@ from kerfpath.plans import Plan, joint_columns
 from kerfpath.post import (
     Line,
     ProgramIssue,
+    ProgramOptions,
     TimedLine,
+    build_program,
     issue_lines,
     language,
     preflight,
@@ -79,7 +81,7 @@ def program_places(outcome: JobResult, files: Mapping[str, str]) -> ProgramPlace
     if not outcome.plans or outcome.stuck is not None or options.language == "none":
         return ProgramPlaces()
     try:
-        program = options.program(outcome.plans, outcome.moves)
+        program = build_program(outcome.plans, options, moves=outcome.moves)
         issues = preflight(program, options.language, options.settings)
     except InputError:  # reported when the program is written
         return ProgramPlaces()

@@ -24,6 +24,7 @@ from kerfpath.job.format import (
     refusal_at,
 )
 from kerfpath.plans import has_room
+from kerfpath.post import issues_before_planning
 from kerfpath.sequence import best_order, distances_between
 from kerfpath.tolerances import SAME_PLACE
 
@@ -153,7 +154,7 @@ def _program_faults(prepared: PreparedJob) -> Iterator[InputError]:
         return
     said = set()
     cuts = [(request.task.name, request.task.speed) for request in prepared.contours]
-    for issue in p.issues(cuts, job.robot):
+    for issue in issues_before_planning(cuts, job.robot, p):
         words = issue.message
         if issue.code.startswith("name-") and issue.place == "a contour":
             words += " by name in [[contour]]"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
@@ -13,6 +13,7 @@ from kerfpath.dynamics import Load
 from kerfpath.errors import InputError
 from kerfpath.job.format.values import (
     Head,
+    JointsNotNegative,
     NotNegative,
     Number,
     Positive,
@@ -25,6 +26,7 @@ from kerfpath.job.format.values import (
     key,
     pose,
 )
+from kerfpath.setting import Setting, keys, settings
 
 # -----------------------------------------------------------------------------
 # The base class of all tables of a job file, and the rules that they share.
@@ -34,6 +36,41 @@ class Table(BaseModel):
     """A table: frozen, strict about the types of its values, without unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    def si(self, kind: type) -> dict[str, Any]:
+        """Return the settings of a class by their names, in SI; the table was made from them."""
+        known = settings(kind).items()
+        return {
+            name: each.si(getattr(self, each.key)) for name, each in known if each.takes is not None
+        }
+
+
+def fields_of(kind: type) -> dict[str, Any]:
+    """Return the keys of a table for the settings of a class: types with bounds, and defaults."""
+    return {name: _field(each) for name, each in keys(kind).items()}
+
+
+NOT_NEGATIVE: dict[Any, Any] = {
+    float: NotNegative,
+    tuple[float, ...]: JointsNotNegative,
+    float | Literal["auto"]: NotNegative | Literal["auto"],
+}
+"""What a key takes, if that is not negative; no number of a setting is."""
+
+
+def _field(setting: Setting) -> tuple[Any, Any]:
+    """Return the type of a key, with its bounds and the words of its messages, and its default."""
+    kind = NOT_NEGATIVE.get(setting.takes, setting.takes)
+    if setting.above == 0:
+        kind = Positive
+    if setting.in_jobs is None:
+        kind = kind | None
+    if setting.example:
+        limits = {"ge": setting.least, "le": setting.most, "lt": setting.below}
+        numbers = setting.takes in (float, int)
+        bounds = {name: limit for name, limit in limits.items() if numbers and limit is not None}
+        kind = Annotated[kind, key(setting.expected(), setting.example, **bounds)]
+    return kind, setting.in_jobs
 
 
 def given(table: Table, *keys: str) -> list[str]:

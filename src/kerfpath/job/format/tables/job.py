@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -13,6 +14,7 @@ from pydantic import (
     Field,
     ValidationError,
     ValidationInfo,
+    create_model,
     field_validator,
     model_validator,
 )
@@ -26,6 +28,7 @@ from kerfpath.job.format.tables.cell import (
     PairTable,
     Table,
     ToolTable,
+    fields_of,
     given,
     require_distinct,
 )
@@ -40,6 +43,7 @@ from kerfpath.job.format.tables.part import (
 )
 from kerfpath.job.format.tables.plan import PlanTable
 from kerfpath.job.format.tables.robot import ExternalTable, RobotTable
+from kerfpath.job.format.tolerances import Tolerances
 from kerfpath.job.format.values import (
     Identifier,
     Joints,
@@ -53,8 +57,17 @@ from kerfpath.job.format.values import (
     key,
     nearest,
 )
+from kerfpath.names import LONGEST_NAME
 from kerfpath.options import EXACT_OR_BETTER
-from kerfpath.post import PARTNERS, Await, Handshake, LanguageSettings, Partner, Request, languages
+from kerfpath.post import (
+    PARTNERS,
+    Await,
+    LanguageSettings,
+    Partner,
+    ProgramOptions,
+    Request,
+    languages,
+)
 from kerfpath.robots import postures_named
 
 # -----------------------------------------------------------------------------
@@ -219,7 +232,7 @@ class LayoutTable(Table):
 PARTNERS_SAID = f"a list of {', '.join(PARTNERS)}"
 
 
-class ProgramTable(Table):
+class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(ProgramOptions))):  # type: ignore[misc]  # made
     """[program]: the robot program, its language and process values.
 
     A table [program.LANGUAGE] in it holds the settings of that language.
@@ -227,22 +240,7 @@ class ProgramTable(Table):
 
     model_config = ConfigDict(extra="allow")
 
-    language: Annotated[str, key("a robot language, or none for no program", '"rapid"')] = "rapid"
     name: Identifier = None
-    retract_mm: Annotated[Positive, key("a number above 0, in mm", "50")] = 50.0
-    zone_mm: Annotated[
-        NotNegative | Literal["auto"], key('"auto" or a number not below 0, in mm', '"auto"')
-    ] = "auto"
-    zone_error_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.1")] = None
-    lead_time_s: Annotated[NotNegative, key("a number not below 0, in s", "0.02")] = 0.02
-    arcs_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.01")] = None
-    gas_lead_s: Annotated[NotNegative | None, key("a number not below 0, in s", "0.3")] = None
-    pierce_time_s: Annotated[NotNegative, key("a number from 0 to 60, in s", "0.3", le=60)] = 0.0
-    approach_mm_s: Annotated[Positive, key("a number above 0, in mm/s", "100")] = 100.0
-    air_speed: Annotated[
-        Positive | None, key("a share of the full speed, from 0.01 to 1", "0.25", ge=0.01, le=1)
-    ] = None
-
     request: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["shutter"]')] = None
     wait_for: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["ready"]')] = None
     wait_timeout_s: Annotated[Positive, key("a number from 0 to 600, in s", "5", le=600)] = 5.0
@@ -253,13 +251,6 @@ class ProgramTable(Table):
         if partners and len(set(partners)) < len(partners):
             raise fault("each partner once", repr(partners), "remove the second")
         return partners
-
-    def handshakes(self) -> tuple[Handshake, ...]:
-        """Return the handshakes before each contour."""
-        requests = (Request(partner=partner, on=True) for partner in self.request or ())
-        timeout = self.wait_timeout_s
-        waits = (Await(partner=partner, timeout=timeout) for partner in self.wait_for or ())
-        return *requests, *waits
 
     @field_validator("language")
     @classmethod
@@ -284,6 +275,27 @@ class ProgramTable(Table):
             return None
         return _settings(self.language, (self.model_extra or {}).get(self.language, {}))
 
+    def resolve(self, stem: str, path_tolerance: float) -> ProgramOptions:
+        """Return the options of the program, in SI.
+
+        Parameters
+        ----------
+        stem : str
+            Name of the job file, for a program without a name.
+        path_tolerance : float m
+            By which corners may be rounded without zone_error_mm.
+        """
+        stem = re.sub(r"[^A-Za-z0-9_]", "_", stem)
+        stem = stem if stem[:1].isascii() and stem[:1].isalpha() else f"job_{stem}"
+        requests = (Request(partner=partner, on=True) for partner in self.request or ())
+        timeout = self.wait_timeout_s
+        waits = (Await(partner=partner, timeout=timeout) for partner in self.wait_for or ())
+        values = self.si(ProgramOptions)
+        values["name"] = self.name or stem[:LONGEST_NAME]
+        if self.zone_error_mm is None:
+            values["zone_error"] = path_tolerance
+        return ProgramOptions(settings=self.settings(), handshakes=(*requests, *waits), **values)
+
 
 def _settings(name: str, table: Any) -> LanguageSettings:
     """Return the settings that a table [program.LANGUAGE] holds, or raise at its first fault."""
@@ -303,11 +315,12 @@ def _settings(name: str, table: Any) -> LanguageSettings:
     raise fault(field.description or "another value", got, remedy, (name, at))
 
 
-class AuditTable(Table):
+class AuditTable(create_model("AuditKeys", __base__=Table, **fields_of(Tolerances))):  # type: ignore[misc]  # made
     """[audit]: how far the tool may leave the path between the nodes."""
 
-    path_tolerance_mm: Annotated[Positive, key("a number above 0, in mm", "0.1")] = 0.1
-    axis_tolerance_deg: Annotated[Positive, key("a number above 0, in deg", "1")] = 1.0
+    def resolve(self) -> Tolerances:
+        """Return the tolerances, in SI."""
+        return Tolerances(**self.si(Tolerances))
 
 
 # -----------------------------------------------------------------------------

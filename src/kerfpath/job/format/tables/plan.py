@@ -2,42 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from pydantic import create_model, model_validator
 
 from kerfpath.certificate import Certify
-from kerfpath.job.format.tables.cell import Table
-from kerfpath.job.format.values import JointsNotNegative, NotNegative, Positive, fault, key
+from kerfpath.job.format.tables.cell import Table, fields_of
+from kerfpath.job.format.values import fault
 from kerfpath.options import CLEARANCE, EXACT_OR_BETTER, PENALTIES, OptionConflict, PlanOptions
 from kerfpath.robots import Robot, postures_named
-from kerfpath.setting import Setting, keys, settings
+from kerfpath.setting import keys, settings
 from kerfpath.tilt import Tilt
 
-NOT_NEGATIVE: dict[Any, Any] = {float: NotNegative, tuple[float, ...]: JointsNotNegative}
-"""What a key takes, if that is not negative; no number of a plan is."""
 
-
-def _field(setting: Setting) -> tuple[Any, Any]:
-    """Return the type of a key, with its bounds and the words of its messages, and its default."""
-    kind = NOT_NEGATIVE.get(setting.takes, setting.takes)
-    if setting.above == 0:
-        kind = Positive
-    if setting.in_jobs is None:
-        kind = kind | None
-    if setting.example:
-        limits = {"ge": setting.least, "le": setting.most, "lt": setting.below}
-        numbers = setting.takes in (float, int)
-        bounds = {name: limit for name, limit in limits.items() if numbers and limit is not None}
-        kind = Annotated[kind, key(setting.expected(), setting.example, **bounds)]
-    return kind, setting.in_jobs
-
-
-_FIELDS: dict[str, Any] = {name: _field(each) for name, each in keys(PlanOptions).items()}
-
-
-class PlanTable(create_model("PlanKeys", __base__=Table, **_FIELDS)):  # type: ignore[misc]  # made
+class PlanTable(create_model("PlanKeys", __base__=Table, **fields_of(PlanOptions))):  # type: ignore[misc]  # made
     """[plan]: the search, the objective and the limits of every plan."""
 
     @model_validator(mode="after")
@@ -62,23 +41,16 @@ class PlanTable(create_model("PlanKeys", __base__=Table, **_FIELDS)):  # type: i
         OptionConflict
             Two options conflict.
         """
-        values = self._values(PlanOptions) | others
+        values = self.si(PlanOptions) | others
         if self.posture is not None:
             values["postures"] = postures_named(self.posture, robot.kinematics)
         if self.rotation_deg is not None:
             values["rotation"] = np.where(robot.endless, values["rotation"], np.inf)
         if self.refine is None:
             values["refine"] = self.method in EXACT_OR_BETTER
-        values["tilt"] = None if self.tilt_deg is None else Tilt(**self._values(Tilt))
-        values["certify"] = Certify(**self._values(Certify)) if self.certify else None
+        values["tilt"] = None if self.tilt_deg is None else Tilt(**self.si(Tilt))
+        values["certify"] = Certify(**self.si(Certify)) if self.certify else None
         return PlanOptions(**values)
-
-    def _values(self, kind: type) -> dict[str, Any]:
-        """Return the settings of a class, by their names and in SI."""
-        known = settings(kind).items()
-        return {
-            name: each.si(getattr(self, each.key)) for name, each in known if each.takes is not None
-        }
 
 
 # -----------------------------------------------------------------------------

@@ -1,0 +1,148 @@
+"""Program options: one object with what a program needs beyond its plans, and its language."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypedDict
+
+from kerfpath.arrays import not_negative, short_repr
+from kerfpath.post.arcs import Zone
+from kerfpath.post.languages import LanguageSettings
+from kerfpath.post.program import Handshake
+from kerfpath.setting import check, documented, setting
+
+
+class ProgramKeywords(TypedDict, total=False):
+    """The options that `build_program` takes as keywords."""
+
+    name: str
+    retract: float
+    zone: Zone
+    zone_error: float
+    lead_time: float
+    gas_lead: float | None
+    pierce_time: float
+    approach_speed: float
+    air_speed: float | None
+    arc_tolerance: float | None
+    handshakes: Sequence[Handshake]
+
+
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramOptions:
+    """Options of a program: its language, its name, and the process values of its contours.
+
+    Raises
+    ------
+    InputError
+        A number below its bounds.
+    """
+
+    language: str = setting(
+        "rapid",
+        "robot language, see `languages`; in a job also none, for no program",
+        what="a robot language, or none for no program",
+        example='"rapid"',
+    )
+    settings: LanguageSettings | None = setting(
+        None,
+        "settings of the language; none: its defaults",
+        takes=None,
+    )
+    name: str = setting(
+        "",
+        "name of the program, made an identifier; empty: cut and the first contour, in a job the "
+        "name of its file",
+    )
+    retract: float = setting(
+        50.0,
+        "how far the tool backs off before and after a contour",
+        unit="mm",
+        above=0,
+        example="50",
+    )
+    zone: Zone = setting(
+        "auto",
+        "radius within which the corners at the inner nodes may be rounded. It is halved where "
+        "nodes are close, until zones do not overlap. auto: up to half way to the next node, "
+        "which keeps the limits between the nodes; see `kerfpath.execution`",
+        unit="mm",
+        what='"auto" or a number not below 0',
+        example='"auto"',
+    )
+    zone_error: float = setting(
+        0.1,
+        "largest distance by which the tip may miss a node with `zone` auto; in a job by default "
+        "the path tolerance of [audit]",
+        unit="mm",
+        above=0,
+        example="0.1",
+        in_jobs=None,
+    )
+    lead_time: float = setting(
+        0.02,
+        "time by which the laser is switched before the tip arrives",
+        unit="s",
+        least=0,
+        example="0.02",
+    )
+    gas_lead: float | None = setting(
+        None,
+        "time by which the gas is switched on before the tip arrives at the start; none: the "
+        "program does not switch the gas",
+        unit="s",
+        least=0,
+        example="0.3",
+    )
+    pierce_time: float = setting(
+        0.0,
+        "time to wait at the start with the laser on until the beam is through",
+        unit="s",
+        least=0,
+        most=60,
+        what="a number from 0 to 60",
+        example="0.3",
+    )
+    approach_speed: float = setting(
+        100.0,
+        "speed along the tool axis before and after a contour",
+        unit="mm/s",
+        above=0,
+        example="100",
+        key="approach_mm_s",
+    )
+    air_speed: float | None = setting(
+        None,
+        "share of the full speed of joint moves: a move takes its least time within the limits, "
+        "divided by this share. None: 1 with planned transfer moves, else 0.25. The first move "
+        "has 0.25 at most, because its start is not known",
+        least=0.01,
+        most=1,
+        what="a share of the full speed, from 0.01 to 1",
+        example="0.25",
+    )
+    arc_tolerance: float | None = setting(
+        None,
+        "arcs that stay within this distance of the planned path are written as circular moves, "
+        "see `with_arcs`; none: no circular moves",
+        unit="mm",
+        above=0,
+        example="0.01",
+        key="arcs_mm",
+    )
+    handshakes: Sequence[Handshake] = setting(
+        (),
+        "handshakes before each contour, in order, with the tool backed off. Requests are "
+        "withdrawn after the contour",
+        takes=None,
+    )
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.zone != "auto":
+            object.__setattr__(self, "zone", not_negative(self.zone, "zone", unit="m"))
+        object.__setattr__(self, "handshakes", tuple(self.handshakes))
