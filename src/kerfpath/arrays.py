@@ -1,4 +1,4 @@
-"""One line that describes a data object, as a notebook prints it."""
+"""Arrays and numbers of users: checks of their dtype and shape, and how they are printed."""
 
 from __future__ import annotations
 

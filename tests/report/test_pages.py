@@ -19,15 +19,10 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.planner import layered_graph, plan
 from kerfpath.plans import Feed
 from kerfpath.report import ContourSection, feasibility_map, render
-from kerfpath.report.maps import (
-    JOINT_COLOURS,
-    chosen_line,
-    hidden_postures,
-    reason_colours,
-    shown_postures,
-)
+from kerfpath.report.maps import chosen_line, hidden_postures, shown_postures
 from kerfpath.report.motion import cutting_speed, joint_positions, limit_shares, posture_runs
 from kerfpath.report.scene import scene
+from kerfpath.report.style import JOINT_COLOURS, reason_colours
 from kerfpath.robots import posture_name, robot
 
 NODES = 41

@@ -1,4 +1,15 @@
-"""Bound the joints between the samples of a straight move, by bisection."""
+"""Bound the joints between the samples of a straight move, by bisection.
+
+On a straight move J(q) q' = V, the tool's twist per interval. If s is the least singular value of J
+at a sample and J changes by at most L per radian of the joints, then within a step h of the
+interval the joints stay within r of the sample, where L r^2 - s r + |V| h = 0. The least singular
+value stays above s - L r, joint speeds stay below S = |V| / (s - L r), and their change per step
+below Q h with Q = (L S^2 + |V'|) / (s - L r). Of seven joints, one runs evenly by x per interval:
+then V is reduced by its share x J_x, J is the Jacobian of the others and also changes with this
+joint, by L x, so V' grows by at most L x (S + x), and (S + x)^2 replaces S^2. A step is divided
+until the excess that it can hide is negligible or cannot reach a limit. Lengths are in m, so 1 m
+weighs as much as 1 rad.
+"""
 
 from __future__ import annotations
 

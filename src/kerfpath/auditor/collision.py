@@ -241,6 +241,9 @@ def _reach(chain: JointChain, frame: int, corners: Array, most: Array) -> Array:
     return reach
 
 
+# -----------------------------------------------------------------------------
+# The collision checks: dense samples of the motion, placed by the second kinematics.
+
 TOUCHING = -1e-9
 """m: bodies that touch are not clear."""
 

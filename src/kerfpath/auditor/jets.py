@@ -166,6 +166,10 @@ HALF_TURN = _outward(np.array(np.pi), np.array(np.pi))
 """An interval that contains pi."""
 
 
+# -----------------------------------------------------------------------------
+# Functions of t in [-h, h], enclosed with their first and second derivatives.
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Jet:
     """A function of t, elementwise.

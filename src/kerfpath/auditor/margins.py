@@ -1,4 +1,9 @@
-"""The comfort margins at the nodes, computed only from the joint axes as lines."""
+"""The comfort margins at the nodes, computed only from the joint axes as lines.
+
+The arm's lengths and model angles are not used. The elbow measure is the angle, seen along axis 2,
+between points on axes 2 and 3 and the wrist; for a seven-axis arm it is the angle between axes 3
+and 5. The shoulder measure is the distance of the wrist from a plane.
+"""
 
 from __future__ import annotations
 

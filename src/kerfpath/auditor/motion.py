@@ -218,6 +218,9 @@ class _Axis:
         return turned[0], turned[1], turned[2]
 
 
+# -----------------------------------------------------------------------------
+# Proven bounds on joint velocities and accelerations along a course of the tool, at every instant.
+
 ENCLOSED = tuple(POSTURES_OF)
 """Families of arms whose rates can be bounded."""
 AT_ONCE = 1024

@@ -231,6 +231,9 @@ def _across(v: Array, n: Array) -> Array:
     return np.asarray(across / np.linalg.norm(across, axis=-1, keepdims=True))
 
 
+# -----------------------------------------------------------------------------
+# The checks of a plan: tool against contour, joints against limits, at and between the nodes.
+
 TIP_AT_NODES = 1e-6
 """m: two kinematics in double precision agree far better; a wrong tool or frame is far worse."""
 AXIS_AT_NODES = 1e-5

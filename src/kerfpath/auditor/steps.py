@@ -1,4 +1,11 @@
-"""Lower bounds on the reduced cost of a step of a motion between two places with a potential."""
+"""Lower bounds on the reduced cost of a step of a motion between two places with a potential.
+
+The cost of a step u of the joints is rho(u) + mu . u, with every |u_i| at most v_i. For any y it is
+at least y . u plus the minimum of rho(u) + (mu - y) . u. The step from one place to another is the
+difference D of their middles plus the offsets of the joints from the middles. The first part gives
+y . D; the offsets are weighted with y and the slopes of the potential at both ends, and each is
+bounded separately.
+"""
 
 from __future__ import annotations
 

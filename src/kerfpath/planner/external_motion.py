@@ -190,6 +190,9 @@ def _eased(low: Array, high: Array, nodes: Ints) -> Array:
     return np.asarray(np.clip(found.x, low, high))
 
 
+# -----------------------------------------------------------------------------
+# Plans with free courses: planned along the most promising courses; the best is taken.
+
 GAMMA_STEP = np.radians(3)
 """rad: step of gamma; few samples are enough, as the refinement moves gamma and axes together."""
 SAME_OPTIMUM = 1e-3

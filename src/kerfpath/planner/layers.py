@@ -276,6 +276,10 @@ def require_held(robot: Robot, options: PlanOptions) -> None:
         )
 
 
+# -----------------------------------------------------------------------------
+# Collision map: the clearance of each vertex of a layered graph in a cell.
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ClearanceMap:
     """Clearance of each vertex of a layered graph in a cell.

@@ -123,6 +123,10 @@ def with_bound(
     return replace(found.plan, settings=settings, proof=proof)
 
 
+# -----------------------------------------------------------------------------
+# plan(): the best joint motion of a robot along a contour.
+
+
 def plan(
     contour: Contour,
     robot: Robot,

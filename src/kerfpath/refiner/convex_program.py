@@ -1,4 +1,11 @@
-"""The convex program of one step: limits and ranges linear in the free variables, costs convex."""
+"""The convex program of one step: limits and ranges linear in the free variables, costs convex.
+
+The free variables of a node are gamma and its external axes, F numbers f_k. With
+q_k(f_k + delta_k) = q_k + J_k delta_k, the limits (5), (6) and on jerks and the ranges of the
+joints are linear in delta; the torques of arms without such axes are linearised. The distances of
+(14) and (15) are convex: a linear program for the Manhattan and Chebychev metrics, a second-order
+cone program for the Euclidean one. The unknowns are x = delta / radius, which lie in [-1, 1].
+"""
 
 from __future__ import annotations
 

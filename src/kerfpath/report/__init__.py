@@ -7,17 +7,12 @@ require_extra("report", "reports")
 from kerfpath.report.drawing import DrawnLoop, render_drawing
 from kerfpath.report.front import FrontAxis, FrontPlan, render_front
 from kerfpath.report.layout import LayoutEntry, render_layout
-from kerfpath.report.maps import (
-    ContourSection,
-    add_clearance,
-    feasibility_map,
-    hidden_postures,
-    reason_colours,
-    shown_postures,
-)
+from kerfpath.report.maps import feasibility_map, hidden_postures, shown_postures
 from kerfpath.report.motion import plot
 from kerfpath.report.page import render_table, with_library, without_library
 from kerfpath.report.plan import render
+from kerfpath.report.section import ContourSection, add_clearance
+from kerfpath.report.style import reason_colours
 
 __all__ = [
     "ContourSection",

@@ -11,9 +11,9 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from kerfpath.arrays import Array, floats, short_repr
-from kerfpath.report.maps import ACCENT, ALERT, FAINT, JOINT_COLOURS, base_layout
 from kerfpath.report.page import render_page
 from kerfpath.report.scene import add_part, checked, space_axis, xyz
+from kerfpath.report.style import ACCENT, ALERT, FAINT, JOINT_COLOURS, base_layout
 
 HEIGHT = 720
 LABELS = 80

@@ -15,7 +15,8 @@ from markupsafe import Markup
 
 from kerfpath.arrays import Array, floats, short_repr
 from kerfpath.errors import InputError
-from kerfpath.report.maps import (
+from kerfpath.report.page import number, render_page, shown_unit
+from kerfpath.report.style import (
     ACCENT,
     CHOSEN,
     FAINT,
@@ -26,7 +27,6 @@ from kerfpath.report.maps import (
     axis_title,
     base_layout,
 )
-from kerfpath.report.page import number, render_page, shown_unit
 
 # -----------------------------------------------------------------------------
 # The data on the page of a Pareto set: its criteria and its plans.

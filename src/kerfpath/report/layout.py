@@ -9,8 +9,8 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup
 
-from kerfpath.report.maps import ACCENT, ALERT, FAINT, INK, QUIET, axis, axis_title, base_layout
 from kerfpath.report.page import FAIL, PASS, WARN, number, render_page, with_minus
+from kerfpath.report.style import ACCENT, ALERT, FAINT, INK, QUIET, axis, axis_title, base_layout
 
 # -----------------------------------------------------------------------------
 # The data of layout.json: `kerfpath.study` writes them, the page and the command read them.

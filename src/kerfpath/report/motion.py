@@ -13,7 +13,7 @@ import plotly.graph_objects as go
 
 from kerfpath.arrays import Array, require_one_of
 from kerfpath.plans import Plan
-from kerfpath.report.maps import (
+from kerfpath.report.style import (
     FAINT,
     INK,
     QUIET,

@@ -15,9 +15,10 @@ from kerfpath.comfort import MEASURES
 from kerfpath.graph import LayeredGraph
 from kerfpath.plans import Plan
 from kerfpath.report import maps, motion
-from kerfpath.report.maps import ContourSection, joint_colours, reason_colours
 from kerfpath.report.page import FAIL, PASS, WARN, number, render_page
 from kerfpath.report.scene import scene
+from kerfpath.report.section import ContourSection
+from kerfpath.report.style import joint_colours, reason_colours
 from kerfpath.robots import posture_name
 
 MOST_STEPS = 5

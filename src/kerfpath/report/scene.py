@@ -14,17 +14,8 @@ from kerfpath.arrays import Array, floats, integers
 from kerfpath.cell import Cell, surface
 from kerfpath.errors import InputError
 from kerfpath.plans import Plan
-from kerfpath.report.maps import (
-    ACCENT,
-    ALERT,
-    CHOSEN,
-    FAINT,
-    GRID,
-    INK,
-    QUIET,
-    ContourSection,
-    base_layout,
-)
+from kerfpath.report.section import ContourSection
+from kerfpath.report.style import ACCENT, ALERT, CHOSEN, FAINT, GRID, INK, QUIET, base_layout
 
 HEIGHT = 560
 AXES_DRAWN = 6, 48

@@ -1,4 +1,8 @@
-"""Search problem: a layered graph, limits and objective, cast and checked once."""
+"""The search problem: a layered graph, limits and objective, cast and checked once.
+
+The graph is given in the order of its nodes and sorted for the kernels; limits on the rotation of
+endless joints from where a path begins (hoses and cables) are kept here, too.
+"""
 
 from __future__ import annotations
 
@@ -404,6 +408,9 @@ def _every_copy(shut: Ints, origin: Ints, vertices: int) -> Ints:
     there = (each < copies[shut][:, None]).all(axis=2)
     return np.asarray(by[(first[shut][:, None] + each)[there]])
 
+
+# -----------------------------------------------------------------------------
+# Search problem: a layered graph, limits and objective, cast and checked once.
 
 Metric = Literal["manhattan", "chebychev", "euclid"]
 ObjectiveKind = Literal["sum", "max"]

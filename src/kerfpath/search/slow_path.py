@@ -1,4 +1,8 @@
-"""A path for speeds far below the one asked for, by first-order recursions alone."""
+"""A path for speeds far below the one asked for, by first-order recursions alone.
+
+The exact search for the least interval remembers edges. If nodes must be far apart in time, the
+velocity limits leave nearly all edges and it takes minutes; a recursion over vertices does not.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A chain of revolute joints: the frames of its links for many joint vectors, and its reach."""
+"""The joints of a description that carry the arm or the part, and chains of revolute joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Read the chain of a description: joints from base to tip, with limits, bodies and masses."""
+"""Read descriptions (URDF, SRDF): the chain from base to tip, with limits, bodies and masses.
+
+A description also gives the pairs of links that may touch, if its SRDF is there.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parse the XML of a description, safely, into links and joints."""
+"""Read the XML of a description, safely, into links and joints; and write it."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ from kerfpath.job import (
     run_job,
 )
 from kerfpath.planner import ClearanceMap
-from kerfpath.report.maps import add_clearance
+from kerfpath.report.section import add_clearance
 
 DEMO = Path(str(files("kerfpath") / "demo"))
 SHIPPED = (DEMO / "b_pillar_cell.toml").read_text()
