@@ -15,9 +15,9 @@ import numpy as np
 from benchmarks._figures import Figure, Report
 from kerfpath.job import Goal, Job, warm_up
 from kerfpath.search import SearchProblem, find_least_interval
-from kerfpath.study import Layout, digest, layout
+from kerfpath.study import Layout, job_key, layout
 from kerfpath.study.evaluator import SampledContour
-from kerfpath.study.placing.evaluator import PlacementValue
+from kerfpath.study.placing.grid import PlacementValue
 from kerfpath.study.placing.place import middle_of, move_job, numbers_of
 from kerfpath.study.placing.search import HALF
 from kerfpath.study.placing.study import contours_of, evaluate_placements, nodes_of
@@ -82,7 +82,7 @@ def run(*, quick: bool = False) -> Report:
         cases = _cases(Path(folder), quick=quick)
         known = [_both(case, figures, findings) for case in cases]
         first = cases[0]
-        contours = contours_of(str(first.job), digest(first.job), first.goal)
+        contours = contours_of(**job_key(first.job), goal=first.goal)
         figures += _bounds(known[0], contours, 1 if quick else 4)
     return Report(title="Layout", how=HOW, figures=figures, findings=findings)
 
@@ -160,10 +160,10 @@ def _busy() -> float:
 def _planned(case: Case, placed: Layout) -> float:
     """Return the value of the best placement over continuous gamma, or of that of the job."""
     offsets = {} if placed.best is None else dict(placed.best.offsets)
+    job, digest = job_key(case.job).values()
     data = evaluate_placements(
-        job=str(case.job), digest=digest(case.job), goal=case.goal, places=[offsets],
-        stretches=[], exact=True,
-    )  # fmt: skip
+        job=job, digest=digest, goal=case.goal, places=[offsets], stretches=[], exact=True
+    )
     value = PlacementValue.from_data(data).value
     return float("nan") if value is None else value
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from conftest import ROOT
 from jobs import ENDLESS_AND_HEAD, ROBOT_AND_HEAD
-from kerfpath.study import digest
-from kerfpath.study.placing.evaluator import PlacementValue
+from kerfpath.study import job_key
+from kerfpath.study.placing.grid import PlacementValue
 from kerfpath.study.placing.study import evaluate_placements
 
 DEMO = ROOT / "src" / "kerfpath" / "demo"
@@ -102,8 +102,7 @@ def rings(folder, x, method="exact", small=41, large=61):
 
 def worth(job, *places, goal="speed", stretches=(), **options):
     data = evaluate_placements(
-        job=str(job),
-        digest=digest(job),
+        **job_key(job),
         goal=goal,
         places=list(places) or [{}],
         stretches=[list(s) for s in stretches],

@@ -17,7 +17,7 @@ from jobs import speeds_on_grid
 from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError
 from kerfpath.job import cell_of_job, pose, read_job
-from kerfpath.study import digest, layout, ranges_of
+from kerfpath.study import job_key, layout, ranges_of
 from kerfpath.study.evaluator import EVERY
 from kerfpath.study.placing.place import middle_of, move_job, numbers_of, placed_text
 from kerfpath.study.placing.study import contours_of, nodes_of
@@ -61,7 +61,7 @@ def in_cell(tmp_path_factory):
 
 
 def middle(path, goal="speed"):
-    return middle_of(read_job(path), nodes_of(contours_of(str(path), digest(path), goal)))
+    return middle_of(read_job(path), nodes_of(contours_of(**job_key(path), goal=goal)))
 
 
 @pytest.mark.slow
@@ -70,7 +70,7 @@ def middle(path, goal="speed"):
 def test_no_bound_is_below_what_the_exact_search_finds(which, goal, request):
     job = request.getfixturevalue(which)
     rng = np.random.default_rng(3)
-    sizes = [len(s.nodes) for s in contours_of(str(job), digest(job), goal)]
+    sizes = [len(s.nodes) for s in contours_of(**job_key(job), goal=goal)]
     decided = 0
     for offsets in SOME:
         stretches = []
@@ -104,7 +104,7 @@ def test_the_bounds_are_near_the_value_where_the_stretch_is_the_one_that_binds(p
 
 def test_what_is_called_unreachable_has_a_node_without_a_pose(plain):
     job, lost = read_job(plain), 0
-    subjects = {s.name: s for s in contours_of(str(plain), digest(plain), "speed")}
+    subjects = {s.name: s for s in contours_of(**job_key(plain), goal="speed")}
     for x in (300.0, 600.0, 800.0, 1000.0):
         answer = worth(plain, {"x_mm": x})
         if answer.status != "unreachable":

@@ -10,10 +10,10 @@ import pytest
 from commands import run
 from kerfpath.job import fastest_along, read_job
 from kerfpath.planner import plan
-from kerfpath.study import digest, layout
-from kerfpath.study.placing.evaluator import is_estimated
+from kerfpath.study import job_key, layout
+from kerfpath.study.placing.grid import is_estimated
+from kerfpath.study.placing.off_grid import leaves_grid
 from kerfpath.study.placing.place import middle_of, move_job, numbers_of
-from kerfpath.study.placing.search import leaves_grid
 from kerfpath.study.placing.study import contours_of, nodes_of
 from layouts import CELL, HEAD, contours, job_file, rings, worth
 
@@ -45,13 +45,13 @@ def coarse(tmp_path_factory):
 
 def moved(path, offsets, goal="speed"):
     """Return the job with a placement, and its contours."""
-    job, nodes = read_job(path), contours_of(str(path), digest(path), goal)
+    job, nodes = read_job(path), contours_of(**job_key(path), goal=goal)
     return move_job(job, numbers_of(job, offsets, middle_of(job, nodes_of(nodes)))), nodes
 
 
 def whole(path, goal="speed"):
     """Return the stretches that are all of each contour."""
-    sampled = contours_of(str(path), digest(path), goal)
+    sampled = contours_of(**job_key(path), goal=goal)
     return [(c, 0, len(contour.nodes) - 1) for c, contour in enumerate(sampled)]
 
 

@@ -19,7 +19,7 @@ from kerfpath.robots import robot
 from kerfpath.study import (
     NEAREST,
     contour_speeds,
-    digest,
+    job_key,
     robots_entry,
     which_robots,
     with_robot,
@@ -117,9 +117,7 @@ def test_accelerations_are_assumed_only_as_asked(folder, tmp_path):
     by_id = {e.robot.id: e for e in which_robots(path, acceleration_ratio=NEAREST, **given)}
     assumed = by_id[SILENT]
     assert assumed.robot.acceleration_source.startswith("assumed: ratio cybertech_8_to_20kg")
-    told = evaluate_robot(
-        path=str(path), digest_then=digest(path), name=SILENT, ratio="cybertech_8_to_20kg"
-    )
+    told = evaluate_robot(**job_key(path), name=SILENT, ratio="cybertech_8_to_20kg")
     assert [contour["fastest"] for contour in told] == [c.fastest for c in assumed.contours]
     assert "assumed" not in by_id[STATED].robot.acceleration_source
     with pytest.raises(InputError, match=r"expected one of nearest, .*, got 'heavy'"):

@@ -39,7 +39,7 @@ from kerfpath.studio.messages import (
     flat,
 )
 from kerfpath.studio.work import Newest, Seldom, Stop
-from kerfpath.study import digest, problem_of_job
+from kerfpath.study import job_key, problem_of_job
 from kerfpath.study.placing import (
     UNITS,
     Layout,
@@ -346,7 +346,7 @@ class Layouts:
             if ask.grid:
                 text = with_values(text, [(("plan", "method"), "exact")])
             job.write_text(text, encoding="utf-8")
-            nodes = nodes_of(contours_of(str(job), digest(job), ask.goal))
+            nodes = nodes_of(contours_of(**job_key(job), goal=ask.goal))
             at = Placement(
                 job=prepared.job,
                 requests=tuple(prepared.contours),

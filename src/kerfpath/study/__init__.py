@@ -1,10 +1,11 @@
 """Studies of a job, each of many tasks that run on the cores of this machine or on a cluster."""
 
 from kerfpath.study.batching import BatchResult as BatchResult
-from kerfpath.study.batching import LoadedJob as LoadedJob
 from kerfpath.study.batching import batch as batch
-from kerfpath.study.batching import digest as digest
-from kerfpath.study.batching import load_job as load_job
+from kerfpath.study.loaded_job import LoadedJob as LoadedJob
+from kerfpath.study.loaded_job import digest_of as digest_of
+from kerfpath.study.loaded_job import job_key as job_key
+from kerfpath.study.loaded_job import load_job as load_job
 from kerfpath.study.pareto import JobFront as JobFront
 from kerfpath.study.pareto import Pick as Pick
 from kerfpath.study.pareto import axes_of as axes_of

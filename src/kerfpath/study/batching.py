@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import json
 import os
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import TypedDict
 
 from kerfpath.arrays import short_repr
-from kerfpath.cad import Part
 from kerfpath.errors import InputError
 from kerfpath.job import (
     FileTexts,
-    Job,
     JobResult,
     make_folder,
     read_job,
@@ -31,91 +27,8 @@ from kerfpath.job import (
 from kerfpath.post import ProgramOptions, replace_program
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import with_library, without_library
-from kerfpath.sweep import Result, Sweep, UnfitWorker
-
-# -----------------------------------------------------------------------------
-# The job of a study: loaded by every worker, and checked to be the same everywhere.
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LoadedJob:
-    """A job and its part, read from the drawing."""
-
-    job: Job
-    part: Part
-
-    __repr__ = short_repr
-
-
-def digest(path: Path) -> str:
-    """Return the SHA-256 hash of a job file and of every file that it names.
-
-    Raises
-    ------
-    InputError
-        As `read_job`; also where a file cannot be read.
-    """
-    job = read_job(path)
-    whole = hashlib.sha256()
-    for file in _files(job):
-        try:
-            whole.update(hashlib.sha256(file.read_bytes()).digest())
-        except OSError as error:
-            raise InputError(f"{file}: cannot be read ({error.strerror})") from None
-    return whole.hexdigest()
-
-
-def _files(job: Job) -> Iterator[Path]:
-    yield job.path
-    for text in _texts(job.source):
-        if "\n" not in text and (file := job.path.parent / text).is_file():
-            yield file
-    meshes = {body.path for body in job.robot.bodies if body.path is not None}
-    yield from sorted(meshes)
-
-
-def _texts(value: object) -> Iterator[str]:
-    """Yield all texts in a tree of plain data, in order."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, list | dict):
-        for each in value.values() if isinstance(value, dict) else value:
-            yield from _texts(each)
-
-
-@lru_cache(maxsize=2)
-def load_job(path: str, digest_then: str) -> LoadedJob:
-    """Return a job and its part, cached for the next task of a worker.
-
-    Parameters
-    ----------
-    path : str
-        The job file, at the same path on every worker.
-    digest_then : str
-        The `digest` of the job where the study was started.
-
-    Raises
-    ------
-    UnfitWorker
-        The files on this worker differ or are missing.
-    """
-    try:
-        here = digest(Path(path))
-    except InputError as error:
-        raise UnfitWorker(
-            f"{error}; every worker needs the job and its files at the same path"
-        ) from None
-    if here != digest_then:
-        raise UnfitWorker(
-            f"{path}: this job or a file that it names has changed since the study began, or "
-            "differs on this worker; start the study again"
-        )
-    job = read_job(path)
-    return LoadedJob(job=job, part=job.read_part())
-
-
-# -----------------------------------------------------------------------------
-# A batch: plan, audit and write many jobs, each as a separate task.
+from kerfpath.study.loaded_job import job_key, load_job
+from kerfpath.sweep import Result, Sweep
 
 STORE = "batch.sqlite"
 """Name of the store file in the folder of a batch."""
@@ -242,7 +155,7 @@ def _folders(paths: Sequence[Path], out: Path) -> list[Path]:
 def _submit(tasks: Sweep, path: Path) -> tuple[ProgramOptions, str] | InputError:
     """Submit a job; return its program options and the key of its task, or the error in it."""
     try:
-        key = tasks.submit(path=str(path.resolve()), digest_then=digest(path))
+        key = tasks.submit(**job_key(path))
         return read_job(path).program, key
     except InputError as error:
         return error
@@ -261,7 +174,7 @@ class PlannedData(TypedDict):
     files: str
 
 
-def plan_job(*, path: str, digest_then: str) -> PlannedData:
+def plan_job(*, job: str, digest: str) -> PlannedData:
     """Plan and audit a job; this is the task of a batch.
 
     Raises
@@ -269,7 +182,7 @@ def plan_job(*, path: str, digest_then: str) -> PlannedData:
     InputError
         As `run_job`; also where the program's language does not fit the robot.
     """
-    found = load_job(path, digest_then)
+    found = load_job(job, digest)
     require_language(found.job)
     outcome = run_job(found.job, found.part)
     texts = result_texts(outcome)

@@ -1,4 +1,4 @@
-"""Write the Pareto front of a contour to pareto.json and pareto.html, and plan a picked run."""
+"""The Pareto front of a contour of a job: find it, write it, and plan one of its runs."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ from kerfpath.post import write_files
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import FrontAxis, FrontPlan, render_front
 from kerfpath.robots import Robot
-from kerfpath.study.batching import LoadedJob, digest, load_job
+from kerfpath.study.loaded_job import LoadedJob, digest_of, job_key, load_job
 from kerfpath.sweep import Result, Sweep
 
 # -----------------------------------------------------------------------------
-# The Pareto front of a contour of a job; every run is a task of a sweep.
+# Find the front; every run is a task of a sweep.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -106,11 +106,10 @@ def pareto_of_job(
         As `read_job`, `kerfpath.pareto` and `kerfpath.sweep.run`; also where the job has no such
         contour.
     """
-    whole = digest(job_file)
-    here = str(job_file.resolve())
-    known = load_job(here, whole)
+    key = job_key(job_file)
+    known = load_job(**key)
     name, others = _named_contour(known, contour)
-    problem = _problem(here, whole, name, tuple(criteria))
+    problem = _problem(**key, contour=name, criteria=tuple(criteria))
     front_search = FrontSearch(problem, runs=runs, search=search, seed=seed, ahead=ahead)
     with Sweep(
         solve,
@@ -122,18 +121,17 @@ def pareto_of_job(
     ) as sweep:
 
         def submit(number: int, run: Subproblem) -> Callable[[], Evaluation | str]:
-            key = sweep.submit(
-                job=here,
-                digest=whole,
+            task = sweep.submit(
+                **key,
                 contour=name,
                 criteria=list(criteria),
                 run=run.to_data(),
                 first=number == 0,
             )
-            return lambda: _evaluation(sweep.result(key))
+            return lambda: _evaluation(sweep.result(task))
 
         front = front_search.run(submit)
-    return JobFront(job=known.job, digest=whole, contour=name, others=others, front=front)
+    return JobFront(job=known.job, digest=key["digest"], contour=name, others=others, front=front)
 
 
 class SolvedData(TypedDict, total=False):
@@ -183,9 +181,9 @@ def _evaluation(result: Result) -> Evaluation | str:
 
 
 @lru_cache(maxsize=2)
-def _problem(path: str, digest_then: str, contour: str, criteria: tuple[str, ...]) -> ParetoProblem:
+def _problem(job: str, digest: str, contour: str, criteria: tuple[str, ...]) -> ParetoProblem:
     """Return the problem that the runs of a contour share, cached for the next task of a worker."""
-    known = load_job(path, digest_then)
+    known = load_job(job, digest)
     cell = cell_of_job(known.job, known.part)
     return problem_of_job(known.job, known.part, contour, criteria, cell)
 
@@ -254,7 +252,7 @@ def _named_contour(known: LoadedJob, contour: str | None) -> tuple[str, tuple[st
 
 
 # -----------------------------------------------------------------------------
-# Write the Pareto front of a contour to pareto.json and pareto.html, and plan a picked run.
+# Write the front to pareto.json and pareto.html, and plan a picked run.
 
 SCHEMA = 1
 """Version of the format of pareto.json."""
@@ -437,7 +435,7 @@ def read_pick(folder: Path, job_file: Path, which: str) -> Pick:
             f"{path}: written by kerfpath {version}, but this is {__version__}; {again}, with "
             "another folder"
         )
-    if whole != digest(job_file):
+    if whole != digest_of(job_file):
         raise InputError(
             f"{path}: the job or a file that it names has changed since this front; {again}"
         )
@@ -457,7 +455,7 @@ def plan_picked(
 
     With `refine`, the picked plan is refined off the grid of gamma; its criteria then differ.
     """
-    known = load_job(str(job_file.resolve()), digest(job_file))
+    known = load_job(**job_key(job_file))
     prepared = prepare(known.job, known.part)
     contours = [
         asked.picked(pick.run, refine=refine) if asked.task.name == pick.contour else asked

@@ -1,4 +1,4 @@
-"""Write the results of `which_robots` to robots.json and robots.html."""
+"""Which robots of the library can do a job, and how fast: find them, and write the list."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from kerfpath.post import write_files
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import render_table
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
-from kerfpath.study.batching import digest, load_job
 from kerfpath.study.evaluator import EVERY, Evaluator, SampledContour, out_of_reach, sample_contours
+from kerfpath.study.loaded_job import job_key, load_job
 from kerfpath.sweep import Sweep
 
 # -----------------------------------------------------------------------------
-# Find the robots of the library that can cut the part of a job where it is, and how fast.
+# Find the robots that can cut the part where it is.
 
 NEAREST = "nearest"
 """Value of `acceleration_ratio` that takes for each robot the ratio that the library recommends."""
@@ -151,7 +151,7 @@ def which_robots(
     ratio = acceleration_ratio or job.source["robot"].get("acceleration_ratio")
     names = [name for name in robots or robot_ids() if name != job.robot.id]
     asked = [(None, None), *((name, _ratio_of(robot(name), ratio)) for name in names)]
-    same = {"path": str(path.resolve()), "digest_then": digest(path)}
+    same = job_key(path)
     found = []
     with Sweep(
         evaluate_robot, store=store, scheduler=scheduler, processes=processes, progress=progress
@@ -198,17 +198,17 @@ def _order(found: RobotSpeed) -> tuple[float, float, str]:
 
 
 def evaluate_robot(
-    *, path: str, digest_then: str, name: str | None, ratio: str | None
+    *, job: str, digest: str, name: str | None, ratio: str | None
 ) -> list[dict[str, object]]:
     """Return the contour speeds of a library robot or the job's own; the task of the sweep."""
-    found = load_job(path, digest_then)
-    job = found.job
+    found = load_job(job, digest)
+    placed = found.job
     if name is not None:
         candidate = robot(name, acceleration_ratio=ratio)
         if candidate.limits_missing:
             raise InputError(f"joint limits are not known: {candidate.limits_missing}")
-        job = with_robot(job, candidate)
-    return [asdict(contour) for contour in contour_speeds(job, found.part)]
+        placed = with_robot(placed, candidate)
+    return [asdict(contour) for contour in contour_speeds(placed, found.part)]
 
 
 def with_robot(job: Job, candidate: Robot) -> Job:
@@ -359,7 +359,7 @@ def _reached(contour: SampledContour, empty: Ints, why: str) -> ContourSpeed:
 
 
 # -----------------------------------------------------------------------------
-# Write the results of `which_robots` to robots.json and robots.html.
+# Write robots.json and robots.html.
 
 ROBOT_COLUMNS = (
     ("Robot", ""),

@@ -1,10 +1,10 @@
 """Search for the best placement of the part, the robot base and the head."""
 
-from kerfpath.study.placing.evaluator import Placement as Placement
-from kerfpath.study.placing.evaluator import placement_of as placement_of
+from kerfpath.study.placing.place import Placement as Placement
 from kerfpath.study.placing.place import changes_of as changes_of
 from kerfpath.study.placing.place import middle_of as middle_of
 from kerfpath.study.placing.place import placed_text as placed_text
+from kerfpath.study.placing.place import placement_of as placement_of
 from kerfpath.study.placing.place import ranges_of as ranges_of
 from kerfpath.study.placing.search import PlacementTrial as PlacementTrial
 from kerfpath.study.placing.study import UNITS as UNITS

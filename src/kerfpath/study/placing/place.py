@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,13 @@ import numpy as np
 import tomlkit
 from scipy.spatial.transform import Rotation
 
-from kerfpath.arrays import Array
+from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.job import VARIABLES, Job, pose
+from kerfpath.job import VARIABLES, CutRequest, Job, PreparedJob, pose
 from kerfpath.placement import xyz_rpy
 from kerfpath.robots import ExternalAxis
+from kerfpath.study.evaluator import out_of_reach
 
 Numbers = dict[tuple[str | int, ...], list[float]]
 """Changes of a job file for a placement: new values by their path of keys."""
@@ -262,3 +263,57 @@ def _named_files(file: Any) -> list[tuple[Any, str]]:
     found = [(table, "file") for table in tables if "file" in table]
     found += [(robot, key) for key in ("urdf", "srdf") if key in robot]
     return found + [(packages, name) for name in packages]
+
+
+# -----------------------------------------------------------------------------
+# The nodes in reach at a placement, fast enough for interactive dragging.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Placement:
+    """Placements of a job's part, robot base and head, and the reach at them.
+
+    Parameters
+    ----------
+    job : Job
+    requests : tuple of CutRequest
+        The contours of the job.
+    middle : (3,) m
+        Centre of the rotations of the part, in the robot base.
+    """
+
+    job: Job
+    requests: tuple[CutRequest, ...]
+    middle: Array
+
+    __repr__ = short_repr
+
+    def numbers(self, offsets: Mapping[str, float]) -> Numbers:
+        """Return the changes of the job file, as `numbers_of`."""
+        return numbers_of(self.job, offsets, self.middle)
+
+    def motions(self, offsets: Mapping[str, float]) -> tuple[Array, Array]:
+        """Return the motions of the part and of the rest, as `motions_of`."""
+        return motions_of(offsets, self.middle)
+
+    def out_of_reach(self, offsets: Mapping[str, float]) -> list[Ints]:
+        """Return, for each contour, the nodes that the robot reaches at no gamma and posture.
+
+        Gamma is sampled as in the job, within its windows, and external axes on a coarse grid. The
+        job's postures and joint margins are kept. Collisions are not checked.
+        """
+        moved = move_job(self.job, self.numbers(offsets))
+        return [
+            out_of_reach(moved, request.candidates[0].nodes, request.options.without_penalties)
+            for request in self.requests
+        ]
+
+
+def placement_of(prepared: PreparedJob) -> Placement:
+    """Return the `Placement` object of a prepared job."""
+    nodes = [request.candidates[0].nodes for request in prepared.contours]
+    return Placement(
+        job=prepared.job,
+        requests=tuple(prepared.contours),
+        middle=middle_of(prepared.job, nodes),
+    )

@@ -1,4 +1,4 @@
-"""Find the best placement: a global search on bounds or estimates, then exact values."""
+"""The layout study: find the best placement of a job, and write it."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from kerfpath.planner import require_rates_alone
 from kerfpath.post import write_files
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import LayoutEntry, render_layout
-from kerfpath.study.batching import digest, load_job
 from kerfpath.study.evaluator import SampledContour, sample_contours
-from kerfpath.study.placing.evaluator import (
+from kerfpath.study.loaded_job import job_key, load_job
+from kerfpath.study.placing.grid import (
     ContourValue,
     PlacementEvaluator,
     PlacementValue,
@@ -34,6 +34,7 @@ from kerfpath.study.placing.evaluator import (
     is_estimated,
     worst_of,
 )
+from kerfpath.study.placing.off_grid import OffGridEvaluator, leaves_grid
 from kerfpath.study.placing.place import (
     DEFAULT_RANGES,
     Numbers,
@@ -45,16 +46,14 @@ from kerfpath.study.placing.place import (
 from kerfpath.study.placing.search import (
     LEAST_EXACT,
     MOST_EXACT,
-    OffGridEvaluator,
     PlacementMap,
     PlacementSearch,
     PlacementTrial,
-    leaves_grid,
 )
 from kerfpath.sweep import Sweep
 
 # -----------------------------------------------------------------------------
-# The task of the layout study: evaluate a placement together with its errors.
+# The task: evaluate a placement together with its errors.
 
 
 def evaluate_placements(
@@ -322,7 +321,6 @@ def layout(
     InputError
         As `read_job`, `cell_of_job` and `kerfpath.sweep.run`; also where a number is out of range.
     """
-    path = Path(job).resolve()
     given = _checked(
         goal=goal,
         evaluations=evaluations,
@@ -332,8 +330,8 @@ def layout(
         map_points=map_points,
     )
     return layout_as(
-        path,
-        load_job(str(path), digest(path)).job.layout.model_copy(update=given),
+        job,
+        load_job(**job_key(Path(job))).job.layout.model_copy(update=given),
         store=store,
         ranges=ranges,
         scheduler=scheduler,
@@ -369,8 +367,8 @@ def layout_as(
     InputError
         As `layout`.
     """
-    path, then = str(Path(job).resolve()), digest(Path(job).resolve())
-    at = load_job(path, then)
+    key = job_key(Path(job))
+    at = load_job(**key)
     require_rates_alone(at.job.robot, "a layout")
     at.job.robot.require_no_free_joint("a layout")
     if follows_courses(at.job.robot, at.job.options) and not leaves_grid(at.job):
@@ -386,7 +384,7 @@ def layout_as(
     with Sweep(evaluate_placements, store=store, scheduler=scheduler, processes=processes) as sweep:
         search = PlacementSearch(
             sweep=sweep,
-            task={"job": path, "digest": then, "goal": table.goal},
+            task={**key, "goal": table.goal},
             off_grid=leaves_grid(at.job),
             ranges=spans,
             tolerance=tolerance,
@@ -407,7 +405,7 @@ def layout_as(
         after = None if best is None else search.whole(best)
     numbers: Numbers = {}
     if best is not None:
-        middle = middle_of(at.job, nodes_of(contours_of(path, then, table.goal)))
+        middle = middle_of(at.job, nodes_of(contours_of(**key, goal=table.goal)))
         numbers = numbers_of(at.job, best.offsets, middle)
     return Layout(
         job=at.job,
@@ -440,7 +438,7 @@ def _checked(**given: float | str | None) -> dict[str, float | str]:
 
 
 # -----------------------------------------------------------------------------
-# Write the results of the layout study: layout.json, layout.html and the moved job placed.toml.
+# Write layout.json, layout.html and the moved job placed.toml.
 
 SCHEMA = 2
 """Version of the format of layout.json."""

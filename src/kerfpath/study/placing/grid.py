@@ -23,173 +23,17 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import TypeAdapter
 
-from kerfpath.arrays import Array, Bools, Ints, short_repr
-from kerfpath.cell import Cell, CollisionChecker
+from kerfpath.arrays import Bools, short_repr
+from kerfpath.cell import Cell
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
-from kerfpath.job import CutRequest, Job, PreparedJob, cell_of_job
-from kerfpath.kernels.metric import increments
-from kerfpath.limits import Limits, rates_of
+from kerfpath.job import cell_of_job
 from kerfpath.losses import Loss, Reason
-from kerfpath.planner import plan, samples_of
+from kerfpath.planner import plan
 from kerfpath.search import (
-    BeamWidth,
-    ContinuousPath,
-    ContinuousSearch,
-    SearchProblem,
     shortest_path,
 )
-from kerfpath.study.evaluator import EVERY, Evaluator, SampledContour, out_of_reach
-from kerfpath.study.placing.place import Numbers, middle_of, motions_of, move_job, numbers_of
-
-# -----------------------------------------------------------------------------
-# Estimate how fast nodes can be cut over continuous gamma, by beams without refinement.
-
-BEAM = BeamWidth(200, (0.5, 0.5))
-"""States kept in each layer. On nine placements of two contours of the demo, paths were 0 to 6 %
-slower than the fastest motion found, and eight times as many states did not improve that."""
-LONGER, CLOSE = 1.3, 1.01
-"""Factor between speeds tried until one is too high, and factor by which the answer may be off."""
-HELD = 1e-3
-"""Share by which a path may be slower than the speed asked for."""
-MOST_SEARCHES = 10
-"""Number of searches for a path that is clear at the samples next to it."""
-
-
-@dataclass(kw_only=True, eq=False)
-class Beams:
-    """A search for the fastest path by beams; in a cell it is clear at the samples next to it.
-
-    Parameters
-    ----------
-    graph : LayeredGraph
-        A graph without empty layers.
-    limits : Limits
-    endless : (n,) bool
-    checker : CollisionChecker or None
-        Checks the vertices of the graph.
-    """
-
-    graph: LayeredGraph
-    limits: Limits
-    endless: Bools
-    checker: CollisionChecker | None = None
-    cost: Array = field(init=False)
-
-    __repr__ = short_repr
-
-    def __post_init__(self) -> None:
-        self.cost = np.zeros(len(self.graph.q))
-
-    def least_interval(self, held: float, enough: float | None = None) -> float:
-        """Return an estimate of the least interval between the nodes, s.
-
-        Joints between two samples are interpolated and no other starts are tried, so true motions
-        may be faster or slower.
-
-        Parameters
-        ----------
-        held : float s
-            An interval for which there is a path.
-        enough : float s, optional
-            An interval that is short enough.
-        """
-        best = held
-        if enough is not None and enough < held:
-            best = min(best, self._interval(enough))
-            if best <= enough * (1 + HELD):
-                return best
-        missed = enough
-        while missed is None or best > CLOSE * missed:
-            tried = best / LONGER if missed is None else np.sqrt(best * missed)
-            found = self._interval(tried)
-            if found > tried * (1 + HELD):
-                missed = tried
-            best = min(best, found)
-        return best
-
-    def _interval(self, asked: float) -> float:
-        """Return the interval needed by a path searched for `asked`; infinite without a path."""
-        path = self._path(asked)
-        if path is None:
-            return np.inf
-        v, a = rates_of(increments(path.q, self.endless), np.ones(len(path.q) - 1))
-        fast = (np.abs(v) / self.limits.velocity.usable).max(initial=0.0)
-        sharp = (np.abs(a) / self.limits.acceleration.usable).max(initial=0.0)
-        return float(max(fast, np.sqrt(sharp)))
-
-    def _path(self, dt: float) -> ContinuousPath | None:
-        problem = SearchProblem(
-            q=self.graph.q, start=self.graph.start, dt=dt, limits=self.limits,
-            endless=self.endless, weights=1 / self.limits.velocity.bound, metric="manhattan",
-        )  # fmt: skip
-        samples = samples_of(self.graph)
-        for _ in range(MOST_SEARCHES):
-            search = ContinuousSearch(replace(problem, vertex_cost=self.cost.copy()), samples)
-            path = next(search.paths(BEAM), None)
-            if path is None or self.checker is None:
-                return path
-            ends = np.unique(np.concatenate([path.one, path.other]))
-            blocked = ends[~np.isfinite(self.checker.price(ends))]
-            if not blocked.size:
-                return path
-            self.cost[blocked] = np.inf
-        return None
-
-
-# -----------------------------------------------------------------------------
-# Compute the nodes in reach at a placement, fast enough for interactive dragging.
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Placement:
-    """Placements of a job's part, robot base and head, and the reach at them.
-
-    Parameters
-    ----------
-    job : Job
-    requests : tuple of CutRequest
-        The contours of the job.
-    middle : (3,) m
-        Centre of the rotations of the part, in the robot base.
-    """
-
-    job: Job
-    requests: tuple[CutRequest, ...]
-    middle: Array
-
-    __repr__ = short_repr
-
-    def numbers(self, offsets: Mapping[str, float]) -> Numbers:
-        """Return the changes of the job file, as `numbers_of`."""
-        return numbers_of(self.job, offsets, self.middle)
-
-    def motions(self, offsets: Mapping[str, float]) -> tuple[Array, Array]:
-        """Return the motions of the part and of the rest, as `motions_of`."""
-        return motions_of(offsets, self.middle)
-
-    def out_of_reach(self, offsets: Mapping[str, float]) -> list[Ints]:
-        """Return, for each contour, the nodes that the robot reaches at no gamma and posture.
-
-        Gamma is sampled as in the job, within its windows, and external axes on a coarse grid. The
-        job's postures and joint margins are kept. Collisions are not checked.
-        """
-        moved = move_job(self.job, self.numbers(offsets))
-        return [
-            out_of_reach(moved, request.candidates[0].nodes, request.options.without_penalties)
-            for request in self.requests
-        ]
-
-
-def placement_of(prepared: PreparedJob) -> Placement:
-    """Return the `Placement` object of a prepared job."""
-    nodes = [request.candidates[0].nodes for request in prepared.contours]
-    return Placement(
-        job=prepared.job,
-        requests=tuple(prepared.contours),
-        middle=middle_of(prepared.job, nodes),
-    )
-
+from kerfpath.study.evaluator import EVERY, Evaluator, SampledContour
 
 # -----------------------------------------------------------------------------
 # Values of placements, contour by contour, and their comparison.
@@ -339,7 +183,7 @@ _DATA = TypeAdapter(PlacementValue)
 
 
 # -----------------------------------------------------------------------------
-# Tests of a placement on the grid, the fast ones first; all except the last give a proved bound.
+# The tests of a placement.
 
 THIN = 4
 """Spacing, in steps of gamma, of the samples for a path that is good enough."""
