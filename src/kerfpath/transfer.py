@@ -1,4 +1,4 @@
-"""A move from one joint vector to another: its corners, and the time it takes."""
+"""Transfer moves: straight joint motions where they are clear, otherwise around obstacles."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def kind_of_points(trace: Points) -> Kind:
 
 
 # -----------------------------------------------------------------------------
-# Build named loops, and parts without faces, from the traces that the readers find.
+# Named loops, and parts without faces.
 
 STEMS: dict[Kind, str] = {"outer": "outer", "inner": "hole", "open": "line"}
 """Last part of the names of loops, before their number."""

@@ -191,7 +191,7 @@ def _ray_crossings(p: Array, q: Array) -> int:
 
 
 # -----------------------------------------------------------------------------
-# Build named, nested, consistently oriented loops from loose flat curves.
+# Chain the curves to loops.
 
 MOST_REPORTED = 3
 """Number of open lines whose ends are reported, those with the nearest next end."""

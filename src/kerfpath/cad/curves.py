@@ -1,4 +1,4 @@
-"""Traces of loops: a chain of curves, or given points; their measures and dense samples."""
+"""Curves of drawings, and traces of loops along them: their measures and dense samples."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def label_connected(pairs: NDArray[np.integer], count: int) -> Ints:
 
 
 # -----------------------------------------------------------------------------
-# Traces of loops: a chain of curves, or given points; their measures and dense samples.
+# Traces of loops: a chain of curves, or given points.
 
 FIRST_CELLS = 4
 """First number of cells per smooth stretch: one could hide an S with its middle on its chord."""

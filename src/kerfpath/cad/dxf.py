@@ -215,7 +215,7 @@ def _overheard() -> Iterator[list[str]]:
 
 
 # -----------------------------------------------------------------------------
-# Read DXF files: flat curves with layers and colours, chained to loops.
+# Read the drawing.
 
 INSUNITS = {
     1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 9: "mil", 13: "um", 14: "dm",

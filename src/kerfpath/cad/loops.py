@@ -1,4 +1,4 @@
-"""Loops of a face: its wires without seams, with each edge in the direction of travel."""
+"""Loops of a face, points and normals along them, and the healed surface around them."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _vector(at: gp_XYZ) -> Array:
 
 
 # -----------------------------------------------------------------------------
-# Loops of a face: its wires without seams, with each edge in the direction of travel.
+# The loops: wires without seams, with each edge in the direction of travel.
 
 FORWARD, REVERSED = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
 

@@ -97,7 +97,7 @@ def _distance(p0: Array, p1: Array, q0: Array, q1: Array) -> tuple[Array, Array]
 
 
 # -----------------------------------------------------------------------------
-# The part in a drawing: its loops, by name or by their properties, and contours along them.
+# Loops, and the part that has them.
 
 Kind = Literal["outer", "inner", "open"]
 Side = Literal["outer", "inner", "edge", ""]

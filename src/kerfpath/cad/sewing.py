@@ -202,7 +202,7 @@ def _lies_on(points: Array, edge: TopoDS_Edge, gap: float) -> bool:
 
 
 # -----------------------------------------------------------------------------
-# Sew loose faces together, body by body.
+# Sew the faces of each body.
 
 EDGE, FACE = TopAbs_ShapeEnum.TopAbs_EDGE, TopAbs_ShapeEnum.TopAbs_FACE
 

@@ -127,7 +127,7 @@ def _directions() -> Array:
 
 
 # -----------------------------------------------------------------------------
-# Skins: faces that join smoothly, their loops, and the two sides of a sheet.
+# Skins, their loops and their sides.
 
 SMOOTH = float(np.radians(2.0))
 """Faces whose normals differ by less (rad) along their whole shared edge belong to one skin."""

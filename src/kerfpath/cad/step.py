@@ -165,7 +165,7 @@ def _damaged(reason: str) -> InputError:
 
 
 # -----------------------------------------------------------------------------
-# Read STEP files: length units, placements, face names, and a clear error for every bad file.
+# Read the file.
 
 HEADER_UNITS = {
     "micrometre": "um",

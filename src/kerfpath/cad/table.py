@@ -133,7 +133,7 @@ def _number(cell: str, has_decimal_comma: bool) -> float:
 
 
 # -----------------------------------------------------------------------------
-# Read tables of points and axes (CSV, TSV and similar), with or without a header.
+# Points and axes in the columns of a table.
 
 POSITION = ("x", "y", "z")
 NORMAL = ("nx", "ny", "nz")

@@ -228,7 +228,7 @@ def _mounted(shapes: Mapping[str, Shape | None], chain: KinematicChain) -> tuple
 
 
 # -----------------------------------------------------------------------------
-# Build the cell of a robot: its links, head, part, fixtures and floor.
+# Build the cell.
 
 FLOOR_REACH, THICK = 2.0, 0.5
 """How far a floor reaches to each side, in lengths of the arm (farther with external axes), and its

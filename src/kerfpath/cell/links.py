@@ -109,7 +109,7 @@ def _centre_and_planes(hull: Hull) -> tuple[Array, Array, float]:
 
 
 # -----------------------------------------------------------------------------
-# Links of a robot as bodies: those of its description, or capsules along its joint chain.
+# The bodies of links.
 
 Pair = tuple[str, str]
 Line = tuple[str, int, tuple[float, ...], tuple[float, ...], float]

@@ -1,4 +1,4 @@
-"""Meshes of files and of other packages as solids; the caller gives their unit."""
+"""Closed triangle meshes as solids, read from files or taken from other packages."""
 
 from __future__ import annotations
 
@@ -384,7 +384,7 @@ def _require_closed(triangles: Ints, name: str) -> None:
 
 
 # -----------------------------------------------------------------------------
-# Meshes of files and of other packages as solids; the caller gives their unit.
+# Meshes of files and of other packages; the caller gives their unit.
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Metres in each unit."""

@@ -126,7 +126,7 @@ def _square_to_segment(w: Array, v: Array, vv: Array) -> Array:
 
 
 # -----------------------------------------------------------------------------
-# Distances between the bodies of a cell, by coal where cheap bounds are not enough.
+# Distances between bodies.
 
 coal = imported("coal", "cells", "cells and their distances")
 

@@ -1,4 +1,4 @@
-"""`kerfpath contours`: list the loops of a drawing by the names that jobs use."""
+"""Output about a drawing: its summary in one line, and the loops that `kerfpath contours` lists."""
 
 from __future__ import annotations
 

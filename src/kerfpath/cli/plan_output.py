@@ -1,4 +1,4 @@
-"""`kerfpath plan`: the run of a job, the result of each contour, and the files written."""
+"""Output of `kerfpath speed` and `kerfpath plan`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The output of the commands for programs: post, audit, compare, touch-up and script."""
+"""Output of the commands for programs: post, audit, compare, touch-up and script."""
 
 from __future__ import annotations
 

@@ -18,9 +18,6 @@ from kerfpath.extras import require_extra
 from kerfpath.files import write_whole
 from kerfpath.job import pose
 
-# -----------------------------------------------------------------------------
-# `kerfpath studio`: open a job in the browser.
-
 SHIPPED = ("b_pillar.toml", "b_pillar.step")
 """The demo job and its part; the studio copies them, so that they can be changed."""
 DRAWINGS = (

@@ -1,4 +1,4 @@
-"""`kerfpath layout`: find the best placement and its gain, or why no placement is feasible."""
+"""Output of the commands that plan many times: batch, pareto and layout."""
 
 from __future__ import annotations
 

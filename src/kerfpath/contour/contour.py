@@ -1,4 +1,4 @@
-"""Join contours end to end."""
+"""The contour: points, tool axes and kinds of stretches (the augmented line of section 2.1)."""
 
 from __future__ import annotations
 
@@ -16,9 +16,6 @@ from kerfpath.contour.sampling import unit
 from kerfpath.errors import InputError
 from kerfpath.kernels.frames import closing_twist, rotation_minimising_x, tangent_x
 from kerfpath.tolerances import SAME_PLACE
-
-# -----------------------------------------------------------------------------
-# The contour: points, tool axes and kinds of stretches (the augmented line of section 2.1).
 
 FrameKind = Literal["tangent", "rotation-minimising"]
 FRAME_KINDS: tuple[FrameKind, ...] = ("tangent", "rotation-minimising")

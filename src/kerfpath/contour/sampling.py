@@ -1,4 +1,4 @@
-"""Sample a path evenly between features, evenly in time, or with the fewest nodes."""
+"""The sampling of a path, and the unit vectors that it needs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Deviation of a run from the contour that it cuts, at its targets and in its zones."""
+"""A program as its controller runs it: the motion of the joints, its time, and its deviation."""
 
 from __future__ import annotations
 

@@ -368,7 +368,7 @@ def _widened(made: Plan, robot: Robot) -> Plan:
 
 
 # -----------------------------------------------------------------------------
-# The multi-objective problem: a contour on its graph, the criteria, and how runs are solved.
+# The problem and its criteria.
 
 DIGITS = 12
 """Significant digits of a criterion."""

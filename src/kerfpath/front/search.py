@@ -1,4 +1,4 @@
-"""pareto(): run the planner many times over one graph, and keep the plans that none dominates."""
+"""Search for the Pareto front: plan many times, and keep the plans that no other dominates."""
 
 from __future__ import annotations
 
@@ -506,7 +506,7 @@ def whole_number(value: int, name: str) -> int:
 
 
 # -----------------------------------------------------------------------------
-# pareto(): run the planner many times over one graph, and keep the plans that none dominates.
+# pareto(): the front of a contour, with its plans, by threads of this process.
 
 
 class ParetoKeywords(GraphKeywords, total=False):

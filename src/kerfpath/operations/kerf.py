@@ -1,4 +1,4 @@
-"""Lead-in and lead-out on the scrap side, laid on the healed surface."""
+"""Cuts: their start and direction, micro joints, kerf compensation, lead-in and lead-out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Move a path to poses taught by a person, with a gradual return to the original path."""
+"""The surface beside a contour, and the tool axes along it: smoothed, tilted or as taught."""
 
 from __future__ import annotations
 

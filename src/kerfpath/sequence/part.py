@@ -123,7 +123,7 @@ def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
 
 
 # -----------------------------------------------------------------------------
-# A whole part: a plan for every contour, their order, and the transfer moves between them.
+# Plan the whole part.
 
 T = TypeVar("T")
 

@@ -162,7 +162,7 @@ class Store:
 
 
 # -----------------------------------------------------------------------------
-# A sweep: do the tasks whose results are not in the store, and store their results.
+# The sweep.
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

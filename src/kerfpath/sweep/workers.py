@@ -1,4 +1,4 @@
-"""Run tasks on the workers of a Dask cluster."""
+"""Run the tasks of a sweep on processes of this machine, or on the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from kerfpath.progress import may_stop
 from kerfpath.sweep.task import Failure, Task, TaskOutcome, attempt
 
 # -----------------------------------------------------------------------------
-# Run tasks on processes of this machine.
+# Processes of this machine.
 
 AHEAD = 8
 """Tasks handed out per process: enough to keep it busy, few enough to lose little."""
@@ -173,7 +173,7 @@ def _leave_with(link: Connection) -> None:
 
 
 # -----------------------------------------------------------------------------
-# Run tasks on the workers of a Dask cluster.
+# Workers of a Dask cluster.
 
 AHEAD_CLUSTER = 4096
 """Number of tasks at the scheduler at a time: more than there are workers, but easy on memory."""
