@@ -183,7 +183,9 @@ class Skin:
             run
             for f in self.faces
             for k, (_, loop) in enumerate(found[f])
-            for run in _outside(loop.edges, [(f, k, e) in self.inside for e in _numbers(loop)])
+            for run in _outside(
+                loop.edges, [(f, k, e) in self.inside for e in range(len(loop.edges))]
+            )
         ]
         chains = [EdgeChain(edges=edges) for edges in join_runs(runs)]
         loops = [(_is_hole(chain), chain) for chain in chains]
@@ -239,10 +241,6 @@ def _uses(found: Sequence[list[FaceLoop]]) -> list[list[tuple[int, int, int]]]:
                     uses.append([])
                 uses[number - 1].append((f, k, e))
     return uses
-
-
-def _numbers(loop: EdgeChain[OrientedEdge]) -> range:
-    return range(len(loop.edges))
 
 
 def _is_smooth(a: OrientedEdge, b: OrientedEdge) -> bool:

@@ -20,7 +20,7 @@ from kerfpath.cell.mesh import mesh_of as mesh_of
 from kerfpath.cell.mesh import read_stl as read_stl
 from kerfpath.cell.mesh import thicken as thicken
 from kerfpath.cell.mesh import weld as weld
-from kerfpath.cell.pairs import MEANT as MEANT
+from kerfpath.cell.pairs import MAY_TOUCH as MAY_TOUCH
 from kerfpath.cell.scene import Body as Body
 from kerfpath.cell.shapes import Capsule as Capsule
 from kerfpath.cell.shapes import Hull as Hull

@@ -12,7 +12,7 @@ from kerfpath.arrays import as_pose, scalar, short_repr
 from kerfpath.cell.cell import Cell, Pair
 from kerfpath.cell.links import link_bodies
 from kerfpath.cell.mesh import Mesh
-from kerfpath.cell.pairs import BY_DESIGN, MEANT
+from kerfpath.cell.pairs import BY_DESIGN, MAY_TOUCH
 from kerfpath.cell.scene import Body
 from kerfpath.cell.shapes import Capsule, Hull, Shape, box_between, frustum
 from kerfpath.errors import InputError
@@ -47,10 +47,11 @@ def caveats(cell: Cell) -> tuple[str, ...]:
     left = {pair: why for pair, why in cell.unjudged.items() if why == BY_DESIGN}
     heads = [pair for pair in left if "head" in (kind[pair[0]], kind[pair[1]])]
     if heads:
-        said.append(f"Not judged, as they touch at every pose by design: {_pairs_in_words(heads)}.")
+        pairs = ", ".join(f"{a} - {b}" for a, b in heads)
+        said.append(f"Not judged, as they touch at every pose by design: {pairs}.")
     allowed = {frozenset(pair) for pair in cell.may_touch}
     if meant := [
-        f"{a} - {b}" + (f" ({why})" if why != MEANT else "")
+        f"{a} - {b}" + (f" ({why})" if why != MAY_TOUCH else "")
         for (a, b), why in cell.unjudged.items()
         if {a, b} in allowed
     ]:
@@ -84,10 +85,6 @@ def unlikely_sizes(cell: Cell) -> tuple[str, ...]:
                 "is its unit right?"
             )
     return tuple(said)
-
-
-def _pairs_in_words(pairs: list[tuple[str, str]]) -> str:
-    return ", ".join(f"{a} - {b}" for a, b in pairs)
 
 
 # -----------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from kerfpath.arrays import Array, Bools, Ints, bools, floats, freeze, not_negative
 from kerfpath.cell.pairs import (
     BY_DESIGN,
-    MEANT,
+    MAY_TOUCH,
     DesignClearance,
     MotionBounds,
     Places,
@@ -241,7 +241,7 @@ class Cell:
     ) -> tuple[dict[Places, str], dict[Places, tuple[float, DesignClearance]]]:
         """Return why pairs are not judged; for the others, the requested distance and design."""
         bodies, names, touching = self.bodies, self.names, self.may_touch
-        reasons = touching if isinstance(touching, Mapping) else dict.fromkeys(touching, MEANT)
+        reasons = touching if isinstance(touching, Mapping) else dict.fromkeys(touching, MAY_TOUCH)
         why = {self._pair(pair, "may_touch"): words for pair, words in reasons.items()}
         asked: dict[Places, float] = {}
         for a, b in combinations(range(len(bodies)), 2):

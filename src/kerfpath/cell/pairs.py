@@ -202,7 +202,7 @@ FAIR = 0.1
 """m beyond what is required: larger distances are not distinguished."""
 BY_DESIGN = "they touch at every pose tried, by design"
 """Why links, and a head that cannot be shaved enough, are not judged."""
-MEANT = "they may touch"
+MAY_TOUCH = "they may touch"
 """Why pairs that are listed without a reason are not judged."""
 
 

@@ -68,7 +68,7 @@ def _show_cell(cell: Cell) -> None:
             escape(cell.chain.moves_with(body.frame)),
             " x ".join(f"{edge * 1e3:.0f}" for edge in body.size),
             _shape(body) + ("" if body.holds else ", not the real shape"),
-            f"{len(_partners(cell, i))}",
+            str((cell.pairs == i).sum()),
         ]
         for i, body in enumerate(cell.bodies)
     ]
@@ -87,21 +87,11 @@ def _show_cell(cell: Cell) -> None:
                 rule += f" instead of {asked * 1e3:g} mm, as the design leaves hardly more"
             out.print(f"  {escape(a)} - {escape(b)}: {rule}")
     out.print("not judged:")
-    for why, pairs in _not_judged(cell).items():
-        names = ", ".join(f"{a} - {b}" for a, b in pairs)
-        out.print(f"  {escape(why)}: {escape(names)}")
-
-
-def _partners(cell: Cell, body: int) -> list[int]:
-    return [int(a + b - body) for a, b in cell.pairs.tolist() if body in (a, b)]
-
-
-def _not_judged(cell: Cell) -> dict[str, list[tuple[str, str]]]:
-    """Return the pairs that are not judged, by reason."""
-    found: dict[str, list[tuple[str, str]]] = {}
-    for pair, why in cell.unjudged.items():
-        found.setdefault(why, []).append(pair)
-    return found
+    by_reason: dict[str, list[str]] = {}
+    for (a, b), why in cell.unjudged.items():
+        by_reason.setdefault(why, []).append(f"{a} - {b}")
+    for why, pairs in by_reason.items():
+        out.print(f"  {escape(why)}: {escape(', '.join(pairs))}")
 
 
 def _shape(body: Body) -> str:

@@ -16,7 +16,7 @@ from kerfpath.auditor import Check
 from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import (
-    MEANT,
+    MAY_TOUCH,
     Cell,
     CuttingHead,
     Mesh,
@@ -102,7 +102,7 @@ def cell_of_job(job: Job, part: Part) -> Cell | None:
         _require_known(job, bare, names, ("cell", "may_touch", i))
     own = {_two(p.between): p.near_miss_mm / 1000 for p in table.pair if p.near_miss_mm is not None}
     touching = _described_as_touching(job, {frozenset(pair) for pair in own})
-    touching |= {_two(names): MEANT for names in table.may_touch}
+    touching |= {_two(names): MAY_TOUCH for names in table.may_touch}
     touching |= {_two(p.between): p.allowed for p in table.pair if p.allowed is not None}
     with _at(job, "cell"):
         return replace(bare, near_miss_of={**bare.near_miss_of, **own}, may_touch=touching)
