@@ -189,9 +189,9 @@ def _by_toppra(run: Executed, program: Program) -> float:
     from toppra.algorithm import TOPPRA
     from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
-    time = np.linspace(0.0, run.course.time[-1], len(run.course.T) * DENSER)
+    time = np.linspace(0.0, run.tool_motion.time[-1], len(run.tool_motion.T) * DENSER)
     near = np.stack([np.interp(time, run.time, joint) for joint in run.q.T], axis=1)
-    poses = program.T_base_part @ run.course.poses(time) @ np.linalg.inv(program.T_flange_tip)
+    poses = program.T_base_part @ run.tool_motion.poses(time) @ np.linalg.inv(program.T_flange_tip)
     path = SplineInterpolator(time, np.column_stack([program.robot.nearest(poses, near), time]))
     velocity, acceleration = program.robot.speed_limits()
     limits = [
@@ -244,13 +244,13 @@ def _program(error: float, made: Plan) -> Program:
 
 def _densest(run: Executed, program: Program) -> float:
     """Return the largest share of a limit found by dense sampling with inverse kinematics."""
-    robot, end = program.robot, float(run.course.time[-1])
-    step = end / (len(run.course.T) * DENSER)
+    robot, end = program.robot, float(run.tool_motion.time[-1])
+    step = end / (len(run.tool_motion.T) * DENSER)
     time, d = np.arange(step, end - step, step), step / 10
     near = np.stack([np.interp(time, run.time, joint) for joint in run.q.T], axis=1)
     flange = np.linalg.inv(program.T_flange_tip)
     before, here, after = (
-        robot.nearest(program.T_base_part @ run.course.poses(time + sign * d) @ flange, near)
+        robot.nearest(program.T_base_part @ run.tool_motion.poses(time + sign * d) @ flange, near)
         for sign in (-1, 0, 1)
     )
     velocity, acceleration = robot.speed_limits()

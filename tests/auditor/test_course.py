@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath import InputError, robot
 from kerfpath.auditor import rates_along
-from kerfpath.execution import ToolCourse
+from kerfpath.execution import ToolMotion
 from kerfpath.post import CircularMove, Controller, LinearMove
 from kerfpath.robots import ExternalAxis, base_in_part
 
@@ -42,7 +42,7 @@ def random_course(arm, seed, arcs, law="slerp"):
             moves.append(CircularMove(**said, T_part_via=via, q_via=q))
         else:
             moves.append(LinearMove(**said))
-    return ToolCourse.of(T[0], moves, Controller(orientation=law)), q
+    return ToolMotion.of(T[0], moves, Controller(orientation=law)), q
 
 
 def middles(arm, course, q):
@@ -111,7 +111,7 @@ def test_at_a_singularity_nothing_is_known():
         LinearMove(T_part_tip=pose, q=q, speed=0.1, duration=1.0, zone=zone)
         for pose, zone in zip(T[1:], (0.002, 0.0), strict=True)
     ]
-    course = ToolCourse.of(T[0], moves)
+    course = ToolMotion.of(T[0], moves)
     velocity, _ = rates_along(
         arm, course.pieces(), middles(arm, course, q), T_base_part=np.eye(4), T_flange_tip=TOOL,
         enough=(np.ones(6), np.ones(6)),

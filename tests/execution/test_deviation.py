@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kerfpath import Contour
-from kerfpath.execution import ToolCourse, deviation_of
+from kerfpath.execution import ToolMotion, deviation_of
 from kerfpath.execution.executed import Executed
 from kerfpath.post import LinearMove
 
@@ -20,11 +20,11 @@ def run_round_a_corner(zone, lean=0.0):
         LinearMove(T_part_tip=pose, q=np.zeros(6), speed=0.1, duration=0.2, zone=each)
         for pose, each in zip(T[1:], (zone, 0.0), strict=True)
     ]
-    course = ToolCourse.of(T[0], moves)
-    time = np.linspace(0, course.time[-1], 2001)
+    motion = ToolMotion.of(T[0], moves)
+    time = np.linspace(0, motion.time[-1], 2001)
     none = np.zeros((len(time), 6))
     run = Executed(
-        section="", course=course, time=time, planned=time, q=none, T=course.poses(time),
+        section="", tool_motion=motion, time=time, planned=time, q=none, T=motion.poses(time),
         velocity_share=none,
         acceleration_share=none, velocity_bound=0.0, acceleration_bound=0.0,
     )  # fmt: skip

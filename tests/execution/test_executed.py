@@ -22,13 +22,13 @@ def run_of(made, **options):
 
 def peaks_of(made, run, arm):
     """Return the peak shares by inverse kinematics of many more poses, all solutions looked at."""
-    course, step = run.course, 1e-4
-    time = np.arange(2 * step, course.time[-1] - 2 * step, 5e-4)
+    motion, step = run.tool_motion, 1e-4
+    time = np.arange(2 * step, motion.time[-1] - 2 * step, 5e-4)
     planned = made.unwrapped
     q = []
     for at in (time - step, time, time + step):
-        poses = made.T_base_part @ course.poses(at) @ np.linalg.inv(made.T_flange_tip)
-        near = np.stack([np.interp(at, course.time, joint) for joint in planned.T], axis=1)
+        poses = made.T_base_part @ motion.poses(at) @ np.linalg.inv(made.T_flange_tip)
+        near = np.stack([np.interp(at, motion.time, joint) for joint in planned.T], axis=1)
         solved, reach = arm.inverse_all(poses)
         solved += 2 * np.pi * np.round((near[:, None] - solved) / (2 * np.pi))
         apart = np.where(reach, np.abs(solved - near[:, None]).max(axis=2), np.inf)
@@ -63,7 +63,7 @@ def test_with_zones_that_meet_the_motion_keeps_what_the_nodes_keep(made):
 def test_between_zones_that_meet_rounding_is_not_taken_for_acceleration(made):
     # As long as there is room: stretches of 1e-9 s and less are left between zones.
     (run,) = executed(build_program([made]), controller=Controller(corner=1.0))
-    assert np.diff(run.course.borders).min() < 1e-6
+    assert np.diff(run.tool_motion.borders).min() < 1e-6
     at_nodes = made.criteria.peak_acceleration.max()
     assert run.peak_acceleration.share == pytest.approx(at_nodes, rel=0.05)
     assert run.acceleration_bound == pytest.approx(run.peak_acceleration.share, rel=0.03)
@@ -72,8 +72,8 @@ def test_between_zones_that_meet_rounding_is_not_taken_for_acceleration(made):
 def test_it_is_known_when_a_run_was_planned_to_be_where_it_is(made):
     run = run_of(made)
     # Chords of a circle are shorter than their arcs.
-    assert run.course.time[-1] < made.time[-1] * (1 - 1e-4)
-    at_targets = np.interp(run.course.time, run.time, run.planned)[1:-1]
+    assert run.tool_motion.time[-1] < made.time[-1] * (1 - 1e-4)
+    at_targets = np.interp(run.tool_motion.time, run.time, run.planned)[1:-1]
     # Interpolated over the corners that it has at the targets.
     np.testing.assert_allclose(at_targets, made.time[1:-1], rtol=0, atol=1e-4 * made.time[1])
 

@@ -55,7 +55,7 @@ def run_of(cell, zone="auto", orientation="slerp"):
 def joints_at(run, plan, time):
     """The joints (m, n) at times (m,) by the arm as it stands: one pose after the other."""
     x = values_at(run, plan, time)
-    poses = plan.T_base_part @ run.course.poses(time) @ np.linalg.inv(plan.T_flange_tip)
+    poses = plan.T_base_part @ run.tool_motion.poses(time) @ np.linalg.inv(plan.T_flange_tip)
     near = np.stack([np.interp(time, run.time, joint) for joint in run.q.T], axis=1)
     q = [
         plan.robot.held(at).nearest(T[None], q[None, :6])[0]
@@ -70,16 +70,16 @@ def values_at(run, plan, time):
     The average of a bent line over a window of its zone's length about the time is a parabola
     that is tangent to it at both ends.
     """
-    course, found = run.course, []
-    bend = np.abs(time[:, None] - course.time).argmin(axis=1)
-    corner, half = course.time[bend], course.half[bend]
+    motion, found = run.tool_motion, []
+    bend = np.abs(time[:, None] - motion.time).argmin(axis=1)
+    corner, half = motion.time[bend], motion.half[bend]
     inside = np.abs(time - corner) < half
     half = np.where(inside, half, 1.0)
     for values in plan.q[:, 6:].T:
-        start, end = (np.interp(time + by * half, course.time, values) for by in (-1, 1))
+        start, end = (np.interp(time + by * half, motion.time, values) for by in (-1, 1))
         first = (start + values[bend]) / 2 * (corner - time + half)
         second = (values[bend] + end) / 2 * (time + half - corner)
-        plain = np.interp(time, course.time, values)
+        plain = np.interp(time, motion.time, values)
         found.append(np.where(inside, (first + second) / (2 * half), plain))
     return np.stack(found, axis=1)
 
@@ -125,13 +125,13 @@ def test_axes_go_evenly_and_the_tip_straight_in_the_part_by_another_kinematics(c
     # The audit's chain of joint frames, axes and all, shares nothing with the inverse kinematics.
     seen = chain_of(plan.robot).forward(run.q) @ plan.T_flange_tip
     np.testing.assert_allclose(seen, plan.T_base_part @ run.T, rtol=0, atol=1e-9)
-    course = run.course
-    k = np.clip(np.searchsorted(course.time, run.time) - 1, 0, COUNT - 2)
-    own = np.minimum(run.time - course.time[k], course.time[k + 1] - run.time)
-    straight = own > np.maximum(course.half[k], course.half[k + 1])
+    motion = run.tool_motion
+    k = np.clip(np.searchsorted(motion.time, run.time) - 1, 0, COUNT - 2)
+    own = np.minimum(run.time - motion.time[k], motion.time[k + 1] - run.time)
+    straight = own > np.maximum(motion.half[k], motion.half[k + 1])
     assert straight.sum() >= COUNT
-    start, end = course.T[k, :3, 3], course.T[k + 1, :3, 3]
-    share = (run.time - course.time[k]) / course.duration[k]
+    start, end = motion.T[k, :3, 3], motion.T[k + 1, :3, 3]
+    share = (run.time - motion.time[k]) / motion.duration[k]
     on = start + share[:, None] * (end - start)
     np.testing.assert_allclose(run.T[straight, :3, 3], on[straight], rtol=0, atol=1e-12)
 
@@ -139,7 +139,7 @@ def test_axes_go_evenly_and_the_tip_straight_in_the_part_by_another_kinematics(c
 @pytest.mark.parametrize(("cell", "zone"), HOW)
 def test_the_joints_turn_smoothly_through_every_border_of_a_zone(cell, zone):
     plan, run = moving(cell), run_of(cell, zone)
-    d, inner = 1e-6, run.course.borders[1:-1]
+    d, inner = 1e-6, run.tool_motion.borders[1:-1]
     before, here, after = (joints_at(run, plan, inner + by) for by in (-d, 0.0, d))
     velocity, acceleration = plan.robot.speed_limits()
     most = run.acceleration_bound * acceleration
@@ -152,7 +152,7 @@ def test_the_joints_turn_smoothly_through_every_border_of_a_zone(cell, zone):
 @pytest.mark.parametrize(("cell", "zone"), HOW)
 def test_the_peaks_are_those_of_dense_differences_and_below_the_bounds(cell, zone):
     plan, run = moving(cell), run_of(cell, zone)
-    borders = run.course.borders
+    borders = run.tool_motion.borders
     long = np.diff(borders)
     shares = np.linspace(0.01, 0.99, 9)
     time = (borders[:-1, None] + long[:, None] * shares).ravel()
@@ -256,7 +256,7 @@ def test_a_program_read_back_runs_as_the_one_that_was_written(cell, language):
         for each in (program.sections[0].moves, moves)
     )  # fmt: skip
     # Speeds are said in um/s, positions to a tenth of a um: 0.2 um over an interval of 0.07 s.
-    assert again.course.time[-1] == pytest.approx(run.course.time[-1], rel=1e-4)
+    assert again.tool_motion.time[-1] == pytest.approx(run.tool_motion.time[-1], rel=1e-4)
     for name in ("peak_velocity", "peak_acceleration"):
         assert getattr(again, name).share == pytest.approx(getattr(run, name).share, rel=0.01)
     assert again.acceleration_bound == pytest.approx(run.acceleration_bound, rel=0.03)

@@ -29,14 +29,14 @@ def tight(circle, arm, tool, placement):
 
 def densely(run, program):
     """Return the largest shares of velocity and acceleration by many poses, all solutions."""
-    robot, end = program.robot, run.course.time[-1]
-    step = end / (len(run.course.T) * DENSER)
+    robot, end = program.robot, run.tool_motion.time[-1]
+    step = end / (len(run.tool_motion.T) * DENSER)
     time = np.arange(2 * step, end - 2 * step, step)
     flange = np.linalg.inv(program.T_flange_tip)
     d = step / 10
     near = np.stack([np.interp(time, run.time, joint) for joint in run.q.T], axis=1)
     q = [
-        robot.nearest(program.T_base_part @ run.course.poses(time + sign * d) @ flange, near)
+        robot.nearest(program.T_base_part @ run.tool_motion.poses(time + sign * d) @ flange, near)
         for sign in (-1, 0, 1)
     ]
     velocity, acceleration = robot.speed_limits()
@@ -109,7 +109,7 @@ def kept_of(name, number):
 
 def test_nodes_are_held_where_more_is_needed_though_a_run_is_ahead_of_its_plan():
     kept = kept_of("staubli_tx2_90xl", 1)
-    time, plan_time = kept.run.course.time, kept.plan.time - kept.plan.time[0]
+    time, plan_time = kept.run.tool_motion.time, kept.plan.time - kept.plan.time[0]
     # Chords are shorter than the path: by a tenth of an interval at its end.
     assert plan_time[-1] - time[-1] > 0.1 * plan_time[1]
     assert kept.done

@@ -37,9 +37,9 @@ def placed(made, arm, q, point):
 
 def test_the_wrist_goes_evenly_and_the_tip_stays_on_its_way(made, arm, run):
     planned = made.unwrapped
-    even = run.course.blended(planned, run.time)
+    even = run.tool_motion.blended(planned, run.time)
     np.testing.assert_array_equal(run.q[:, 3:], even[:, 3:])
-    tip = made.T_base_part @ run.course.poses(run.time)
+    tip = made.T_base_part @ run.tool_motion.poses(run.time)
     for k in range(0, len(run.time), 37):
         # mm in the residual leave 1e-12 m.
         expected = placed(made, arm, even[k], tip[k, :3, 3])
@@ -60,13 +60,13 @@ def test_between_the_nodes_the_tool_is_turned_otherwise_than_by_poses(made, run)
 
 def test_the_peaks_are_those_of_dense_sampling(made, arm, run):
     step = 1e-4
-    time = np.arange(2 * step, run.course.time[-1] - 2 * step, 0.02)
+    time = np.arange(2 * step, run.tool_motion.time[-1] - 2 * step, 0.02)
     q = [
         np.array([
             placed(made, arm, joints, T[:3, 3])
             for joints, T in zip(
-                run.course.blended(made.unwrapped, at),
-                made.T_base_part @ run.course.poses(at), strict=True,
+                run.tool_motion.blended(made.unwrapped, at),
+                made.T_base_part @ run.tool_motion.poses(at), strict=True,
             )
         ])
         for at in (time - step, time, time + step)

@@ -8,7 +8,7 @@ from kerfpath.auditor.certificate import certified_bound as certified_bound
 from kerfpath.auditor.chain import JointChain as JointChain
 from kerfpath.auditor.chain import chain_of as chain_of
 from kerfpath.auditor.motion import ENCLOSED as ENCLOSED
-from kerfpath.auditor.motion import CoursePieces as CoursePieces
+from kerfpath.auditor.motion import MotionPieces as MotionPieces
 from kerfpath.auditor.motion import rates_along as rates_along
 from kerfpath.auditor.nodes import audit as audit
 from kerfpath.auditor.nodes import checks as checks

@@ -1,6 +1,6 @@
-"""Proven bounds on joint velocities and accelerations along a course of the tool, at every instant.
+"""Proven bounds on joint velocities and accelerations along a motion of the tool, at every instant.
 
-The course consists of smooth pieces, each a closed formula of time. The joints and their first two
+The motion consists of smooth pieces, each a closed formula of time. The joints and their first two
 derivatives are enclosed over short spans of time, rounding included, and spans are divided until
 the bounds suffice. No code is shared with the kinematics used for planning.
 """
@@ -232,7 +232,7 @@ CUT_OFF = 1e-15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class CoursePieces:
+class MotionPieces:
     """The pose of the tip over time, in P smooth pieces.
 
     At time t (s) from the zero of the piece, the tip is at point + velocity t + acceleration
@@ -276,7 +276,7 @@ class CoursePieces:
 
 def rates_along(
     robot: Robot,
-    pieces: CoursePieces,
+    pieces: MotionPieces,
     q: Array,
     *,
     T_base_part: Array,
@@ -290,7 +290,7 @@ def rates_along(
     ----------
     robot : Robot
         A robot of family "opw" or "ur", with or without external axes.
-    pieces : CoursePieces
+    pieces : MotionPieces
     q : (P, n) rad
         Joints in the middle of each piece, which select the posture.
     T_base_part, T_flange_tip : (4, 4) m
@@ -337,10 +337,10 @@ def rates_along(
 
 
 class _Task:
-    """The course of a robot, and the fixed poses before and after it."""
+    """The motion of a robot, and the fixed poses before and after it."""
 
     def __init__(
-        self, robot: Robot, pieces: CoursePieces, T_base_part: Array, T_flange_tip: Array
+        self, robot: Robot, pieces: MotionPieces, T_base_part: Array, T_flange_tip: Array
     ) -> None:
         self._robot, self._pieces = robot, pieces
         self._before, self._after = fixed_poses(robot, T_base_part[None], T_flange_tip)

@@ -1,6 +1,5 @@
 """The motion as a controller runs it: straight and circular moves, with rounded corners."""
 
-from kerfpath.execution.course import ToolCourse as ToolCourse
 from kerfpath.execution.executed import AT_SPEED as AT_SPEED
 from kerfpath.execution.executed import Deviation as Deviation
 from kerfpath.execution.executed import Executed as Executed
@@ -14,3 +13,4 @@ from kerfpath.execution.executed import timing_of as timing_of
 from kerfpath.execution.keep import Kept as Kept
 from kerfpath.execution.keep import keep_limits as keep_limits
 from kerfpath.execution.keep import longest_run as longest_run
+from kerfpath.execution.tool_motion import ToolMotion as ToolMotion

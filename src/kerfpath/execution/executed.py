@@ -14,7 +14,7 @@ from kerfpath.auditor import ENCLOSED, rates_along
 from kerfpath.comfort import jacobian
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.execution.course import ToolCourse
+from kerfpath.execution.tool_motion import ToolMotion
 from kerfpath.post import PLAIN, Controller, JointMove, LinearMove, Program
 from kerfpath.robots import Robot, base_in_part
 
@@ -97,7 +97,7 @@ class Executed:
     ----------
     section : str
         Name of the section of the program.
-    course : ToolCourse
+    tool_motion : ToolMotion
     time : (m,) s
         Times of the samples, from the start of the run.
     planned : (m,) s
@@ -123,7 +123,7 @@ class Executed:
     """
 
     section: str
-    course: ToolCourse
+    tool_motion: ToolMotion
     time: Array
     planned: Array
     q: Array
@@ -161,8 +161,8 @@ class Executed:
     @property
     def missed(self) -> float:
         """The largest distance, m, by which the tip misses a target."""
-        poses = self.course.poses(self.course.time)
-        return float(np.linalg.norm(poses[:, :3, 3] - self.course.T[:, :3, 3], axis=1).max())
+        poses = self.tool_motion.poses(self.tool_motion.time)
+        return float(np.linalg.norm(poses[:, :3, 3] - self.tool_motion.T[:, :3, 3], axis=1).max())
 
     def _peak(self, shares: Array) -> Peak:
         size = np.abs(shares)
@@ -174,7 +174,7 @@ class Executed:
 def executed(program: Program, *, controller: Controller = PLAIN) -> tuple[Executed, ...]:
     """Return every run of straight and circular moves of a program, as it is executed.
 
-    The motion is that of `ToolCourse`, at the programmed speeds throughout: neither speeding up
+    The motion is that of `ToolMotion`, at the programmed speeds throughout: neither speeding up
     from the stop nor slowing down for a limit is modelled. The joints follow it exactly; external
     axes move evenly from target to target, in zones like the tip. Velocities and accelerations are
     sampled three times in each smooth stretch, together with bounds that hold everywhere; see
@@ -247,8 +247,8 @@ def run_along(
         As `executed`.
     """
     robot.require_no_free_joint("the motion between the nodes")
-    course = ToolCourse.of(moves[0].T_part_tip, moves[1:], controller)
-    borders = course.borders
+    motion = ToolMotion.of(moves[0].T_part_tip, moves[1:], controller)
+    borders = motion.borders
     long = np.diff(borders)
     seen = long > min(RESOLVED, long.max() / 2)
     begin, long = borders[:-1][seen], long[seen]
@@ -258,10 +258,10 @@ def run_along(
     wrist = controller.orientation == "wrist"
     joints = _by_wrist if wrist else _by_pose
     before, q, after = (
-        joints(robot, course, time + sign * step, targets, T_base_part, T_flange_tip)
+        joints(robot, motion, time + sign * step, targets, T_base_part, T_flange_tip)
         for sign in (-1, 0, 1)
     )
-    T = course.poses(time)
+    T = motion.poses(time)
     if wrist:
         reached = ~np.isnan(q).any(axis=1)
         T[reached] = np.linalg.inv(T_base_part) @ robot.forward(q[reached]) @ T_flange_tip
@@ -269,9 +269,9 @@ def run_along(
     v, a = (after - before) / (2 * step[:, None]), (after - 2 * q + before) / step[:, None] ** 2
     run = Executed(
         section=section,
-        course=course,
+        tool_motion=motion,
         time=time,
-        planned=np.interp(time, course.time, np.cumsum([0.0, *(m.duration for m in moves[1:])])),
+        planned=np.interp(time, motion.time, np.cumsum([0.0, *(m.duration for m in moves[1:])])),
         q=q,
         T=T,
         velocity_share=v / velocity,
@@ -288,7 +288,7 @@ def run_along(
     middles = (borders[1:] + borders[:-1]) / 2
     bounds = rates_along(
         robot,
-        course.pieces(targets[:, robot.family.joints :]),
+        motion.pieces(targets[:, robot.family.joints :]),
         np.stack([np.interp(middles, time, joint) for joint in q.T], axis=1),
         T_base_part=T_base_part,
         T_flange_tip=T_flange_tip,
@@ -303,39 +303,39 @@ def run_along(
 
 
 def _by_pose(
-    robot: Robot, course: ToolCourse, time: Array, targets: Array, T_base_part: Array,
+    robot: Robot, motion: ToolMotion, time: Array, targets: Array, T_base_part: Array,
     T_flange_tip: Array,
 ) -> Array:  # fmt: skip
     """Return the joints (m, n) at times (m,) that are close to those at the targets (K, n)."""
-    arm, x, seen = _alone(robot, course, time, targets, T_base_part)
-    near = np.stack([np.interp(time, course.time, joint) for joint in targets.T], axis=1)
+    arm, x, seen = _alone(robot, motion, time, targets, T_base_part)
+    near = np.stack([np.interp(time, motion.time, joint) for joint in targets.T], axis=1)
     q = arm.nearest(seen @ np.linalg.inv(T_flange_tip), near[:, : arm.joints])
     return np.concatenate([q, x], axis=1)
 
 
 def _by_wrist(
-    robot: Robot, course: ToolCourse, time: Array, targets: Array, T_base_part: Array,
+    robot: Robot, motion: ToolMotion, time: Array, targets: Array, T_base_part: Array,
     T_flange_tip: Array,
 ) -> Array:  # fmt: skip
     """Return the joints (m, n) at times (m,), with even motion of the wrist between targets."""
-    arm, x, seen = _alone(robot, course, time, targets, T_base_part)
+    arm, x, seen = _alone(robot, motion, time, targets, T_base_part)
     require_wrist(arm)
-    near = course.blended(targets[:, : arm.joints], time)
+    near = motion.blended(targets[:, : arm.joints], time)
     q = joints_with_wrist(arm, seen[:, :3, 3], near, T_flange_tip)
     return np.concatenate([q, x], axis=1)
 
 
 def _alone(
-    robot: Robot, course: ToolCourse, time: Array, targets: Array, T_base_part: Array
+    robot: Robot, motion: ToolMotion, time: Array, targets: Array, T_base_part: Array
 ) -> tuple[Robot, Array, Array]:
     """Return the arm, its external axes (m, E) at times, and the poses of the tip that it sees.
 
     The poses are in the robot base, wherever external axes carry it.
     """
     arm = robot.alone()
-    x = course.blended(targets[:, arm.joints :], time)
+    x = motion.blended(targets[:, arm.joints :], time)
     base = base_in_part(robot.externals, x)
-    return arm, x, np.linalg.inv(base) @ T_base_part @ course.poses(time)
+    return arm, x, np.linalg.inv(base) @ T_base_part @ motion.poses(time)
 
 
 def _sampled(robot: Robot, controller: Controller) -> str:
@@ -456,7 +456,7 @@ def timing_of(run: Executed, robot: Robot, *, eta_v: float = 1.0, eta_a: float =
     rate = np.sqrt(x)
     pace = np.maximum((rate[1:] + rate[:-1]) / 2, 1e-9)
     gone = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(run.T[:, :3, 3], axis=0), axis=1)))
-    whole = float(run.course.time[-1])
+    whole = float(run.tool_motion.time[-1])
     return Timing(
         seconds=float((steps / pace).sum()),
         programmed=whole,
@@ -539,7 +539,7 @@ def deviation_of(run: Executed, path: Contour) -> Deviation:
         The contour as drawn, in the part.
     """
     tip, axis = run.T[:, :3, 3], run.T[:, :3, 2]
-    even = np.linspace(path.s[0], path.s[-1], SAMPLES * max(len(path), len(run.course.T)))
+    even = np.linspace(path.s[0], path.s[-1], SAMPLES * max(len(path), len(run.tool_motion.T)))
     at = np.unique(np.concatenate([path.s, even]))
     points = path.at(at)[0]
     near = np.asarray(cKDTree(points).query(tip)[1])

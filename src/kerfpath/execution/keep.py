@@ -116,7 +116,7 @@ def keep_limits(
 def longest_run(program: Program, controller: Controller = PLAIN) -> Executed | None:
     """Return the run with the most targets in a program of one plan, its cut; None without one."""
     runs = executed(program, controller=controller)
-    return max(runs, key=lambda each: len(each.course.T), default=None)
+    return max(runs, key=lambda each: len(each.tool_motion.T), default=None)
 
 
 def _held(plan: Plan, run: Executed, kept: KeptShares, aim: float) -> KeptShares:
@@ -145,9 +145,9 @@ def _in_zones(run: Executed) -> Array:
 
     What a straight stretch needs does not depend on the corners at its ends.
     """
-    course = run.course
-    after = np.searchsorted(course.time, run.time).clip(1, len(course.time) - 1)
-    zone = [np.abs(run.time - course.time[k]) < course.half[k] for k in (after - 1, after)]
+    motion = run.tool_motion
+    after = np.searchsorted(motion.time, run.time).clip(1, len(motion.time) - 1)
+    zone = [np.abs(run.time - motion.time[k]) < motion.half[k] for k in (after - 1, after)]
     return np.asarray(np.where((zone[0] | zone[1])[:, None], run.acceleration_share, 0.0))
 
 
@@ -182,12 +182,12 @@ def _need(plan: Plan, run: Executed, why: str) -> str:
 
 def _wider(run: Executed, peak: Peak) -> str:
     """Return the spacing of nodes, or the zone error, with which zones would meet."""
-    course = run.course
-    k = int(np.clip(np.abs(course.time - peak.time).argmin(), 1, len(course.time) - 2))
-    share = 2 * course.half[k] / min(course.duration[k - 1], course.duration[k])
+    motion = run.tool_motion
+    k = int(np.clip(np.abs(motion.time - peak.time).argmin(), 1, len(motion.time) - 2))
+    share = 2 * motion.half[k] / min(motion.duration[k - 1], motion.duration[k])
     if share > 0.9:
         return ""
-    steps = np.diff(course.T[k - 1 : k + 2, :3, 3], axis=0)
+    steps = np.diff(motion.T[k - 1 : k + 2, :3, 3], axis=0)
     gaps = np.linalg.norm(steps, axis=1)
     passed = float(np.linalg.norm(np.diff(steps / gaps[:, None], axis=0)) * gaps.min() / 8)
     return (

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
-from kerfpath.auditor import CoursePieces
+from kerfpath.auditor import MotionPieces
 from kerfpath.post import (
     PLAIN,
     CircularMove,
@@ -24,7 +24,7 @@ SHORTEST = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ToolCourse:
+class ToolMotion:
     """The pose of the tool over time, at the programmed speeds.
 
     Between the zones the tip moves straight or along an arc at the programmed speed, and the tool
@@ -84,8 +84,8 @@ class ToolCourse:
     @classmethod
     def of(
         cls, start: Array, moves: Sequence[LinearMove], controller: Controller = PLAIN
-    ) -> ToolCourse:
-        """Return the course of moves from a pose, (4, 4) m, to a stop.
+    ) -> ToolMotion:
+        """Return the motion along moves from a pose, (4, 4) m, to a stop.
 
         Parameters
         ----------
@@ -93,7 +93,7 @@ class ToolCourse:
             T_part_tip where the first move begins.
         moves : sequence of LinearMove
         controller : Controller
-            With orientation "wrist" the course gives the tip's place, not the tool's orientation.
+            With orientation "wrist" the motion gives the tip's place, not the tool's orientation.
         """
         T = np.array([start, *(move.T_part_tip for move in moves)])
         via = [move.T_part_via if isinstance(move, CircularMove) else None for move in moves]
@@ -115,8 +115,8 @@ class ToolCourse:
     @classmethod
     def through(
         cls, T: Array, via: Sequence[Array | None], orientation: Orientation = "slerp"
-    ) -> ToolCourse:
-        """Return the course through poses, (K, 4, 4) m, without zones: each move takes a second.
+    ) -> ToolMotion:
+        """Return the motion through poses, (K, 4, 4) m, without zones: each move takes a second.
 
         A move is an arc where its pose in `via`, of K-1 poses (4, 4) m or None, is not None.
         """
@@ -172,8 +172,8 @@ class ToolCourse:
         even = values[k] + (time - self.time[k])[:, None] * slope[k]
         return np.asarray(even + blend[:, None] * (slope[right] - slope[left]))
 
-    def pieces(self, external: Array | None = None) -> CoursePieces:
-        """Return the course as closed formulas of the time, one between each two borders.
+    def pieces(self, external: Array | None = None) -> MotionPieces:
+        """Return the motion as closed formulas of the time, one between each two borders.
 
         External axes follow `blended` between values (K, E) at the targets; default: none.
         """
@@ -202,7 +202,7 @@ class ToolCourse:
         x = np.where(arc[:, None], self.T[near, :3, 3] - self.centre[move], 0.0)
         even = parts(slope[move], slope[right] - slope[left])
         even[:, 0] += values[near]
-        return CoursePieces(
+        return MotionPieces(
             begin=borders[:-1] - zero,
             end=borders[1:] - zero,
             R=self.T[near, :3, :3],

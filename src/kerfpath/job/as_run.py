@@ -187,7 +187,7 @@ def _narrower(controller: Controller) -> str:
 
 def _node(run: Executed, plan: Plan, time: float) -> int:
     """Return the node nearest to the tip at a time, s."""
-    (there,) = run.course.poses(np.array([time]))[:, :3, 3]
+    (there,) = run.tool_motion.poses(np.array([time]))[:, :3, 3]
     return int(np.argmin(np.linalg.norm(plan.T_part_tip[:, :3, 3] - there, axis=1)))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.auditor import Check, chain_of, retract_checks, window_checks
 from kerfpath.contour import Contour
-from kerfpath.execution import ToolCourse
+from kerfpath.execution import ToolMotion
 from kerfpath.job.audit_report import check, count
 from kerfpath.job.format import Candidate, Job, PreparedJob, divide_nodes
 from kerfpath.job.plan_file import PlanFile
@@ -467,7 +467,7 @@ def whole_cut(job: Job, cut: ReadCut, requested: TargetNodes, plan: Plan) -> Pla
             inner = slice(first + 1, last)
             s = requested.nodes.s[first : last + 1]
             parts = ((s - s[0]) / (s[-1] - s[0]))[1:-1]
-            T[inner] = ToolCourse.through(T[[first, last]], [move.T_part_via]).poses(parts)
+            T[inner] = ToolMotion.through(T[[first, last]], [move.T_part_via]).poses(parts)
             q[inner] = follow_poses(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
     time = requested.time
     if job.options.feed != "constant":  # it may be slower, which is checked separately

@@ -10,7 +10,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.errors import InputError
-from kerfpath.execution import ToolCourse
+from kerfpath.execution import ToolMotion
 from kerfpath.job.format import Job, ProgramTable, read_job
 from kerfpath.post import (
     Difference,
@@ -280,7 +280,7 @@ def _arc(
 
     They are `ARC_STEP` apart, or as far as the robot moves in an interval (s), at most `COARSEST`.
     """
-    arc = ToolCourse.through(np.array([start, end]), [via])
+    arc = ToolMotion.through(np.array([start, end]), [via])
     sweep = float(arc.sweep[0])
     if sweep == 0:
         return [via, end]  # on one line
