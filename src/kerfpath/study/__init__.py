@@ -2,7 +2,6 @@
 
 from kerfpath.study.batching import BatchResult as BatchResult
 from kerfpath.study.batching import batch as batch
-from kerfpath.study.loaded_job import LoadedJob as LoadedJob
 from kerfpath.study.loaded_job import digest_of as digest_of
 from kerfpath.study.loaded_job import job_key as job_key
 from kerfpath.study.loaded_job import load_job as load_job
@@ -23,7 +22,7 @@ from kerfpath.study.robots import NEAREST as NEAREST
 from kerfpath.study.robots import ROBOT_COLUMNS as ROBOT_COLUMNS
 from kerfpath.study.robots import ROBOT_NOTES as ROBOT_NOTES
 from kerfpath.study.robots import ROBOT_WORDS as ROBOT_WORDS
-from kerfpath.study.robots import ContourSpeed as ContourSpeed
+from kerfpath.study.robots import ContourReach as ContourReach
 from kerfpath.study.robots import RobotSpeed as RobotSpeed
 from kerfpath.study.robots import contour_speeds as contour_speeds
 from kerfpath.study.robots import robot_rows as robot_rows

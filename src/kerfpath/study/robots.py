@@ -34,7 +34,7 @@ NEAREST = "nearest"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ContourSpeed:
+class ContourReach:
     """Reach and fastest speed of a robot on one contour.
 
     Parameters
@@ -82,7 +82,7 @@ class RobotSpeed:
         The robot with the limits that were used.
     own : bool
         Whether it is the job's own robot, with the limits that the job gives.
-    contours : tuple of ContourSpeed
+    contours : tuple of ContourReach
         All contours of the job; empty where the robot was refused.
     reason : str
         Why not every contour has a speed; empty otherwise.
@@ -90,13 +90,13 @@ class RobotSpeed:
 
     robot: Robot
     own: bool
-    contours: tuple[ContourSpeed, ...] = ()
+    contours: tuple[ContourReach, ...] = ()
     reason: str = ""
 
     __repr__ = short_repr
 
     @property
-    def binding(self) -> ContourSpeed | None:
+    def binding(self) -> ContourReach | None:
         """The contour with the least margin; None unless every contour has a speed."""
         if self.reason or not self.contours:
             return None
@@ -161,7 +161,7 @@ def which_robots(
             result = tasks.result(key)
             arm = job.robot if name is None else robot(name, acceleration_ratio=used)
             if result.failure is None:
-                contours = tuple(ContourSpeed(**data) for data in result.value)
+                contours = tuple(ContourReach(**data) for data in result.value)
                 why = _reason(contours)
             else:
                 contours, why = (), result.failure.message
@@ -169,7 +169,7 @@ def which_robots(
     return sorted(found, key=_order)
 
 
-def _reason(contours: Sequence[ContourSpeed]) -> str:
+def _reason(contours: Sequence[ContourReach]) -> str:
     """Return why not every contour has a speed: the worst contour's reason, and how many fail."""
     bad = [contour for contour in contours if contour.reason]
     if not bad:
@@ -269,7 +269,7 @@ def _on_axes_of(own: Robot, candidate: Robot) -> Robot:
     return candidate
 
 
-def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
+def contour_speeds(job: Job, part: Part) -> list[ContourReach]:
     """Return reach and fastest speed of the job's robot on each contour, placed as in the job.
 
     Reach counts all poses on the job's grid that keep the margins of [comfort]. Speeds are searched
@@ -309,7 +309,7 @@ def contour_speeds(job: Job, part: Part) -> list[ContourSpeed]:
     return found
 
 
-def _along_courses(evaluator: Evaluator, contours: Sequence[SampledContour]) -> list[ContourSpeed]:
+def _along_courses(evaluator: Evaluator, contours: Sequence[SampledContour]) -> list[ContourReach]:
     """Return reach and speed on each contour along the gentlest course of the external axes."""
     job = evaluator.job
     names = ", ".join(axis.name for axis in job.robot.externals)
@@ -330,8 +330,8 @@ def _along_courses(evaluator: Evaluator, contours: Sequence[SampledContour]) -> 
 
 
 def _with_speed(
-    evaluator: Evaluator, contour: SampledContour, graph: LayeredGraph | None, known: ContourSpeed
-) -> ContourSpeed:
+    evaluator: Evaluator, contour: SampledContour, graph: LayeredGraph | None, known: ContourReach
+) -> ContourReach:
     """Return a contour's result completed by its fastest speed, or by why there is none."""
     try:
         best = evaluator.fastest(contour.nodes, graph)
@@ -340,17 +340,17 @@ def _with_speed(
     return replace(known, fastest=best.speed, joint=best.joint + 1, limit=best.limit)
 
 
-def _share_reached(contour: SampledContour, graph: LayeredGraph) -> ContourSpeed:
+def _share_reached(contour: SampledContour, graph: LayeredGraph) -> ContourReach:
     """Return the share of nodes that have a pose, and what rules out the first that has none."""
     empty = np.flatnonzero(np.diff(graph.start) == 0)
     first = f"at node {empty[0]} mostly: {graph.main_loss(int(empty[0]))}" if empty.size else ""
     return _reached(contour, empty, first)
 
 
-def _reached(contour: SampledContour, empty: Ints, why: str) -> ContourSpeed:
+def _reached(contour: SampledContour, empty: Ints, why: str) -> ContourReach:
     """Return the share of nodes that have a pose, given the ones that have none and why."""
     nodes = len(contour.nodes)
-    return ContourSpeed(
+    return ContourReach(
         name=contour.name,
         asked=contour.speed,
         reached=1 - empty.size / nodes,
@@ -406,7 +406,7 @@ def _entry(each: RobotSpeed) -> dict[str, object]:
     }
 
 
-def _contour_entry(contour: ContourSpeed) -> dict[str, object]:
+def _contour_entry(contour: ContourReach) -> dict[str, object]:
     return {
         "name": contour.name,
         "asked_m_min": contour.asked * 60,
