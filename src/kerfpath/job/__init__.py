@@ -13,6 +13,7 @@ from kerfpath.job.audit import audit_file as audit_file
 from kerfpath.job.audit import audit_program as audit_program
 from kerfpath.job.audit_report import AuditReport as AuditReport
 from kerfpath.job.audit_report import collision_note as collision_note
+from kerfpath.job.format import TABLES as TABLES
 from kerfpath.job.format import VARIABLES as VARIABLES
 from kerfpath.job.format import Candidate as Candidate
 from kerfpath.job.format import ContourSpec as ContourSpec

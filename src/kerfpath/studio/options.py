@@ -10,11 +10,10 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any, get_args, get_origin
 
-from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from kerfpath.front import CRITERIA
-from kerfpath.job import JobFile
+from kerfpath.job import TABLES, JobFile
 from kerfpath.options import PlanOptions
 from kerfpath.post import languages
 from kerfpath.robots import Robot
@@ -203,7 +202,7 @@ def _field(key: str, label: str, **more: Any) -> OptionField:
         **{
             "key": key,
             "label": label,
-            "kind": "choice" if key == POSTURE else _kind(declared.annotation),
+            "kind": _kind(key, declared.annotation),
             "unit": _unit(key),
             "choices": _words(declared.annotation),
             "default": default if isinstance(default, bool | int | float | str) else None,
@@ -217,19 +216,13 @@ def _field(key: str, label: str, **more: Any) -> OptionField:
 
 def _declaration(key: str) -> FieldInfo:
     """Return the declaration of a dotted key in the tables of a job."""
-    table: type[BaseModel] = JobFile
-    *way, last = [part for part in key.split(".") if not part.isdecimal()]
-    for name in way:
-        table = next(_tables(table.model_fields[name].annotation))
-    return table.model_fields[last]
+    table, _, name = _named(key).rpartition(".")
+    return (TABLES[table] if table else JobFile).model_fields[name]
 
 
-def _tables(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Yield the tables in a type."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for part in get_args(annotation):
-        yield from _tables(part)
+def _named(key: str) -> str:
+    """Return a dotted key without the numbers of repeated tables."""
+    return ".".join(part for part in key.split(".") if not part.isdecimal())
 
 
 def _words(annotation: Any) -> list[str]:
@@ -239,11 +232,11 @@ def _words(annotation: Any) -> list[str]:
     return [word for part in get_args(annotation) for word in _words(part)]
 
 
-def _kind(annotation: Any) -> str:
-    """Return the kind of control for a type."""
-    if next(_tables(annotation), None):
+def _kind(key: str, annotation: Any) -> str:
+    """Return the kind of control for a key and its type."""
+    if _named(key) in TABLES:
         return "table"
-    if _words(annotation):
+    if key == POSTURE or _words(annotation):
         return "choice"
     types = set(_types(annotation))
     if tuple in types or list in types:

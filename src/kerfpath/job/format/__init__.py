@@ -19,6 +19,7 @@ from kerfpath.job.format.reading import home_of as home_of
 from kerfpath.job.format.reading import places_of as places_of
 from kerfpath.job.format.reading import read_job as read_job
 from kerfpath.job.format.reading import refusal_at as refusal_at
+from kerfpath.job.format.tables import TABLES as TABLES
 from kerfpath.job.format.tables import VARIABLES as VARIABLES
 from kerfpath.job.format.tables import AuditTable as AuditTable
 from kerfpath.job.format.tables import ContourTable as ContourTable

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import (
@@ -23,9 +23,6 @@ from kerfpath.comfort import Band, Comfort
 from kerfpath.errors import InputError
 from kerfpath.job.format.tables.cell import (
     CellTable,
-    FixtureTable,
-    HeadTable,
-    PairTable,
     Table,
     ToolTable,
     fields_of,
@@ -34,15 +31,10 @@ from kerfpath.job.format.tables.cell import (
 )
 from kerfpath.job.format.tables.part import (
     ContourTable,
-    CornersTable,
-    LeadTable,
-    MicroJointsTable,
     PartTable,
-    PickTable,
-    SmoothAxesTable,
 )
 from kerfpath.job.format.tables.plan import PlanTable
-from kerfpath.job.format.tables.robot import ExternalTable, RobotTable
+from kerfpath.job.format.tables.robot import RobotTable
 from kerfpath.job.format.tolerances import Tolerances
 from kerfpath.job.format.values import (
     Identifier,
@@ -462,29 +454,17 @@ class JobFile(Table):
         return self
 
 
-TABLES: dict[str, type[BaseModel]] = {
-    "robot": RobotTable,
-    "tool": ToolTable,
-    "part": PartTable,
-    "contour": ContourTable,
-    "contour.pick_all": PickTable,
-    "contour.lead_in": LeadTable,
-    "contour.lead_out": LeadTable,
-    "contour.micro_joints": MicroJointsTable,
-    "contour.corners": CornersTable,
-    "contour.smooth_axes": SmoothAxesTable,
-    "plan": PlanTable,
-    "cell": CellTable,
-    "cell.head": HeadTable,
-    "cell.fixture": FixtureTable,
-    "robot.external": ExternalTable,
-    "cell.pair": PairTable,
-    "sequence": SequenceTable,
-    "comfort": ComfortTable,
-    "layout": LayoutTable,
-    "audit": AuditTable,
-    "program": ProgramTable,
-}
+def _tables(kind: Any, name: str = "") -> Iterator[tuple[str, type[BaseModel]]]:
+    """Yield the tables in the type of a key, and those in them, with their dotted names."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        yield name, kind
+        for key, field in kind.model_fields.items():
+            yield from _tables(field.annotation, f"{name}.{key}".strip("."))
+    for part in get_args(kind):
+        yield from _tables(part, name)
+
+
+TABLES = {name: table for name, table in _tables(JobFile) if name}
 """The model of each table of the file."""
 REPEATED = ("contour", "cell.fixture", "cell.pair", "robot.external")
 """Tables that a file may have several of."""
