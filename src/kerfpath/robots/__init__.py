@@ -12,6 +12,7 @@ from kerfpath.robots.chains import external_axes as external_axes
 from kerfpath.robots.chains import external_ids as external_ids
 from kerfpath.robots.chains import model_chain as model_chain
 from kerfpath.robots.chains import require_axes as require_axes
+from kerfpath.robots.described import SNAPS as SNAPS
 from kerfpath.robots.described import acceleration_ratios as acceleration_ratios
 from kerfpath.robots.described import level as level
 from kerfpath.robots.described import robot_ids as robot_ids

@@ -38,6 +38,7 @@ from kerfpath.job.format.values import (
 )
 from kerfpath.robots import (
     FAMILIES,
+    SNAPS,
     ExternalAxis,
     KnownAxis,
     Robot,
@@ -58,11 +59,7 @@ IN_KEYS = {
     "lower= and upper=": "lower_deg and upper_deg",
     "velocity=": "velocity_deg_s",
     "(rad, rad/s)": "(deg, deg/s)",
-    "snap=5e-06": "snap_deg = 0.0003",
-    "snap=5e-05": "snap_deg = 0.003",
-    "snap=0.0005": "snap_deg = 0.03",
-    "snap=0.005": "snap_deg = 0.3",
-    "snap=0": "snap_deg = 0",
+    **{f"snap={snap:g}": f"snap_deg = {np.degrees(snap):.1g}" for snap in (*SNAPS, 0.0)},
     'packages={"NAME": "FOLDER"}, or read only the kinematics with meshes=False': (
         'packages = { NAME = "FOLDER" }'
     ),
