@@ -145,13 +145,13 @@ def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, 
     is_binary = content.startswith(BINARY)
     if not (is_binary or b"SECTION" in content[:4096]):
         raise DXFError(f"expected SECTION at its start, got {content[:32]!r}")
-    with _overheard() as said:
+    with _overheard() as logged:
         if is_binary:
             document = Drawing.load(binary_tags_loader(content))
             auditor: Auditor = document.audit()
         else:
             document, auditor = recover.read(BytesIO(MARKED.sub(_with_markers, content)))
-    faults = [*said, *(fault.message for fault in (*auditor.fixes, *auditor.errors))]
+    faults = [*logged, *(fault.message for fault in (*auditor.fixes, *auditor.errors))]
     faults = [" ".join(fault.split())[:200] for fault in faults]
     return document, faults, _lost(document, content, faults)
 
@@ -194,11 +194,11 @@ class _Listener(logging.Handler):
 
     def __init__(self, level: int) -> None:
         super().__init__(level)
-        self.said: list[str] = []
+        self.messages: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
         """Keep a message."""
-        self.said.append(record.getMessage())
+        self.messages.append(record.getMessage())
 
 
 @contextmanager
@@ -208,7 +208,7 @@ def _overheard() -> Iterator[list[str]]:
     propagates, logger.propagate = logger.propagate, False
     logger.addHandler(handler)
     try:
-        yield handler.said
+        yield handler.messages
     finally:
         logger.removeHandler(handler)
         logger.propagate = propagates

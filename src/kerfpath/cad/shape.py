@@ -91,8 +91,8 @@ class NamedShape:
         stream = BytesIO()
         BinTools.Write_s(both, stream)
         names = [(n.name, n.component, n.layer, n.colour) for n in self.faces]
-        said = tuple(self.notes), tuple(self.left_out), dict(self.frames)
-        return _copy_with_names, (self.unit, stream.getvalue(), names, *said)
+        rest = tuple(self.notes), tuple(self.left_out), dict(self.frames)
+        return _copy_with_names, (self.unit, stream.getvalue(), names, *rest)
 
 
 def _copy_with_names(

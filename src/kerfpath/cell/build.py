@@ -35,9 +35,9 @@ def caveats(cell: Cell) -> tuple[str, ...]:
     These are bodies that need not hold the real ones, pairs of the head or listed pairs that are
     not judged, pairs that may overlap by design, and pairs that cannot keep the requested distance.
     """
-    said = []
+    sentences = []
     if cell.unproved:
-        said.append(
+        sentences.append(
             f"Not proved for the real links: {', '.join(cell.unproved)} are capsules of typical "
             "sizes, which need not hold the real ones. Check in a simulation that the links are "
             "clear of each other and of head, part and fixtures, or plan with the meshes of the "
@@ -48,14 +48,14 @@ def caveats(cell: Cell) -> tuple[str, ...]:
     heads = [pair for pair in left if "head" in (kind[pair[0]], kind[pair[1]])]
     if heads:
         pairs = ", ".join(f"{a} - {b}" for a, b in heads)
-        said.append(f"Not judged, as they touch at every pose by design: {pairs}.")
+        sentences.append(f"Not judged, as they touch at every pose by design: {pairs}.")
     allowed = {frozenset(pair) for pair in cell.may_touch}
     if meant := [
         f"{a} - {b}" + (f" ({why})" if why != MAY_TOUCH else "")
         for (a, b), why in cell.unjudged.items()
         if {a, b} in allowed
     ]:
-        said.append(f"Not judged, as they may touch: {', '.join(meant)}.")
+        sentences.append(f"Not judged, as they may touch: {', '.join(meant)}.")
     rows = zip(cell.pair_names, cell.asked, cell.required, cell.depth, strict=True)
     deep, less = [], []
     for (a, b), asked, required, depth in rows:
@@ -64,27 +64,27 @@ def caveats(cell: Cell) -> tuple[str, ...]:
         elif required < asked:
             less.append(f"{a} - {b} {required * 1e3:.3g} of {asked * 1e3:g} mm")
     if deep:
-        said.append(
+        sentences.append(
             f"Judged only for overlaps deeper than by design, which are: {', '.join(deep)}."
         )
     if less:
-        said.append(f"Closer than requested by design, so these keep only: {', '.join(less)}.")
-    return tuple(said)
+        sentences.append(f"Closer than requested by design, so these keep only: {', '.join(less)}.")
+    return tuple(sentences)
 
 
 def unlikely_sizes(cell: Cell) -> tuple[str, ...]:
     """Return a sentence for each body whose size is unlikely, given the arm's length."""
     arm = cell.chain.length
-    said = []
+    sentences = []
     for body in (body for body in cell.bodies if body.kind != "floor"):
         size = float(body.size.max())
         most = LARGE[body.kind] * arm
         if not SMALL * arm <= size <= most:
-            said.append(
+            sentences.append(
                 f"{body.name!r} is {size * 1e3:.4g} mm long, and the arm {arm * 1e3:.4g} mm: "
                 "is its unit right?"
             )
-    return tuple(said)
+    return tuple(sentences)
 
 
 # -----------------------------------------------------------------------------
@@ -297,8 +297,8 @@ def cell_of(
             raise InputError("cell: a part needs its placement, T_base_part (4, 4)")
         placed = part.moved(as_pose(placement, "placement"))
         parts = (Body(name="part", shape=placed, frame=0, kind="part"),)
-        said = {frozenset(pair) for pair in (*own, *may_touch)}
-        if not isinstance(head, Sequence) and {"nozzle", "part"} not in said:
+        listed = {frozenset(pair) for pair in (*own, *may_touch)}
+        if not isinstance(head, Sequence) and {"nozzle", "part"} not in listed:
             own["nozzle", "part"] = head.keeps
     stands = _fixture_frames(chain, fixtures or {}, on or {})
     things = tuple(

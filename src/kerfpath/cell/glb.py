@@ -163,19 +163,19 @@ class _File:
         """Add rows (K, c) in single precision, and return the number of their accessor."""
         kept = np.ascontiguousarray(rows, "<f4")
         ends = {"min": kept.min(axis=0).tolist(), "max": kept.max(axis=0).tolist()}
-        said = {"componentType": FLOAT, "count": len(kept), "type": kind}
-        return self._add(kept.tobytes(), said | (ends if bounds else {}), target)
+        accessor = {"componentType": FLOAT, "count": len(kept), "type": kind}
+        return self._add(kept.tobytes(), accessor | (ends if bounds else {}), target)
 
     def add_indices(self, triangles: Ints) -> int:
         """Add triangles (F, 3), and return the number of their accessor."""
         kept = np.ascontiguousarray(triangles, "<u4")
-        said = {"componentType": UNSIGNED, "count": kept.size, "type": "SCALAR"}
-        return self._add(kept.tobytes(), said, INDICES)
+        accessor = {"componentType": UNSIGNED, "count": kept.size, "type": "SCALAR"}
+        return self._add(kept.tobytes(), accessor, INDICES)
 
-    def _add(self, content: bytes, said: dict[str, object], target: int) -> int:
+    def _add(self, content: bytes, accessor: dict[str, object], target: int) -> int:
         view = {"buffer": 0, "byteOffset": len(self._data), "byteLength": len(content)}
         self._views.append(view | ({"target": target} if target else {}))
-        self._accessors.append({"bufferView": len(self._views) - 1, **said})
+        self._accessors.append({"bufferView": len(self._views) - 1, **accessor})
         self._data += content
         return len(self._accessors) - 1
 

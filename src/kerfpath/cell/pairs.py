@@ -301,13 +301,11 @@ def clearance_at_every_angle(
     sweep = MotionBounds(chain, two, np.array([[0, 1]]))
     if not sweep.clear(q[:-1], q[1:], needed, scene.distances).all():
         return ""
-    said = (
-        ""
-        if not design.depth
-        else f", except for {design.depth * 1e3:g} mm that they overlap by design"
-    )
     less = "" if needed[0] >= asked or design.depth else f" of {asked * 1e3:g} mm"
-    return f"they keep {needed[0] * 1e3:.3g} mm{less} at every angle of {chain.say(a)}{said}"
+    words = f"they keep {needed[0] * 1e3:.3g} mm{less} at every angle of {chain.say(a)}"
+    if not design.depth:
+        return words
+    return f"{words}, except for {design.depth * 1e3:g} mm that they overlap by design"
 
 
 def shaved_pair(bodies: Sequence[Body], pair: Places, design: DesignClearance) -> tuple[Body, Body]:

@@ -219,10 +219,10 @@ def show_audit(file: Path, job: Path | None) -> bool:
         )
         for c in checks:
             if not c.ok:
-                said = f"{name}: {c.issue()}"
+                text = f"{name}: {c.issue()}"
                 if name in found.places:
-                    said = found.sentence(name, c)
-                out.print(escape(said), soft_wrap=True)
+                    text = found.sentence(name, c)
+                out.print(escape(text), soft_wrap=True)
     for name in found.missing:
         out.print(f"{escape(name)}: {'not cut' if found.places else 'no plan'}")
     out.print(f"note: {escape(found.note)}")

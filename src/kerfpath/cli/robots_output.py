@@ -64,7 +64,7 @@ def list_robots() -> None:
             escape(f"{product.manufacturer} {product.model}"),
             f"{product.payload:g}",
             _range(each),
-            *(_said(each, limit) for limit in ("velocity", "acceleration")),
+            *(_limit_text(each, limit) for limit in ("velocity", "acceleration")),
         ]
         for product in products
         for axis, each in zip(product.axis_ids, product.axes, strict=True)
@@ -88,7 +88,7 @@ def show_external(name: str) -> None:
             axis,
             f"the {each.axis.carries}",
             _range(each),
-            *(_said(each, limit) for limit in ("velocity", "acceleration")),
+            *(_limit_text(each, limit) for limit in ("velocity", "acceleration")),
             _numbers(each.axis.axis),
             _numbers(1000 * each.axis.point) if each.axis.kind == "rotary" else "",
         ]
@@ -109,7 +109,7 @@ def _in_unit(each: KnownAxis, limit: str) -> tuple[float | None, str]:
     return None if value is None else round(factor * value, 9), unit + UNITS[limit]
 
 
-def _said(each: KnownAxis, limit: str) -> str:
+def _limit_text(each: KnownAxis, limit: str) -> str:
     value, unit = _in_unit(each, limit)
     return "set in job" if value is None else f"{value:g} {unit}"
 
@@ -117,7 +117,7 @@ def _said(each: KnownAxis, limit: str) -> str:
 def _range(each: KnownAxis) -> str:
     if each.endless:
         return "endless"
-    ends = [_said(each, limit) for limit in ("lower", "upper")]
+    ends = [_limit_text(each, limit) for limit in ("lower", "upper")]
     return ends[0] if ends[0] == ends[1] else f"{ends[0].split()[0]} to {ends[1]}"
 
 
@@ -238,9 +238,9 @@ def write_urdf(name: str | None, path: Path) -> None:
     print_json({"id": name, "files": [str(path)]})
 
 
-def _key(said: str) -> str:
+def _key(text: str) -> str:
     """Return a limit and its unit as a key: "velocity_deg_s"."""
-    return said.replace(" ", "_").replace("/", "_").replace("^", "")
+    return text.replace(" ", "_").replace("/", "_").replace("^", "")
 
 
 def _degrees(values: Array | None) -> list[float] | None:

@@ -353,9 +353,9 @@ def _show_best(entry: LayoutEntry) -> None:
     gain = "" if best["gain"] is None else f", {100 * best['gain']:+.1f} %"
     out.print(f"{entry['goal']}: {best['value']:.3f}{unit}, as placed in the job {was}{gain}")
     count = entry["statuses"].get("feasible", 0)
-    said = f"{tried} placements tried, {count} feasible, {solved}"
+    counts = f"{tried} placements tried, {count} feasible, {solved}"
     if entry["off_grid"]:
-        out.print(f"{said} planned over continuous rotation; this one is the best of them")
+        out.print(f"{counts} planned over continuous rotation; this one is the best of them")
         out.print(_claim(entry, unit))
         return
     others = (
@@ -363,19 +363,19 @@ def _show_best(entry: LayoutEntry) -> None:
     )
     proved = "it is proved that no other of them is better there"
     still = f"others of them may {others}"
-    out.print(f"{said} solved exactly; {proved if entry['proved'] else still}")
+    out.print(f"{counts} solved exactly; {proved if entry['proved'] else still}")
     out.print(f"speeds and displacements are those {ON_THIS_GRID}; {FINER}: see kerfpath speed")
 
 
 def _claim(entry: LayoutEntry, unit: str) -> str:
     """Return what is proved about the placements that were not planned."""
-    said = []
+    parts = []
     if count := entry["stages"].get("proved", 0):
-        said.append(f"{count} proved to be no faster at any rotation")
+        parts.append(f"{count} proved to be no faster at any rotation")
     if count := entry["estimated"]:
         best = "" if entry["open_bound"] is None else f" (at best {entry['open_bound']:.3f}{unit})"
-        said.append(f"{count} judged by an estimate alone{best}, which proves nothing")
-    return f"of the others: {'; '.join(said)}" if said else "no other placement can be better"
+        parts.append(f"{count} judged by an estimate alone{best}, which proves nothing")
+    return f"of the others: {'; '.join(parts)}" if parts else "no other placement can be better"
 
 
 def _show_why(entry: LayoutEntry) -> None:

@@ -90,8 +90,8 @@ def keep_limits(
     made, aim, why = plan, AIM, "lower limits at the nodes do not reduce it"
     for count in range(ROUNDS + 1):
         if max(run.velocity_bound, run.acceleration_bound) <= 1:
-            said = "it keeps the limits between the nodes, too"
-            return Kept(plan=made, done=True, rounds=count, run=run, statement=said)
+            statement = "it keeps the limits between the nodes, too"
+            return Kept(plan=made, done=True, rounds=count, run=run, statement=statement)
         if count == ROUNDS:
             break
         worst = run.most
@@ -109,8 +109,8 @@ def keep_limits(
             break
         made = refined.plan
         run = longest_run(program(made), controller) or run
-    said = _need(plan, first, why)
-    return Kept(plan=plan, done=False, rounds=count, run=first, statement=said)
+    statement = _need(plan, first, why)
+    return Kept(plan=plan, done=False, rounds=count, run=first, statement=statement)
 
 
 def longest_run(program: Program, controller: Controller = PLAIN) -> Executed | None:
@@ -167,17 +167,17 @@ def _need(plan: Plan, run: Executed, why: str) -> str:
     joint = plan.robot.joint_names[peak.joint]
     at = np.interp(peak.time, run.time, run.planned)
     s = np.interp(at, plan.time - plan.time[0], plan.contour.s)
-    said = (
+    sentence = (
         f"between the nodes {joint} needs {peak.share:.3g} of its {what} limit at "
         f"s = {s * 1000:.1f} mm, and {why}"
     )
     if not np.isfinite(peak.share):
-        return said
+        return sentence
     if peak.share > 1:
         slower = max(velocity.share, np.sqrt(acceleration.share))
         share = np.floor(99 / slower) / 100
-        said += f"; at {share:.0%} of the speed the plan keeps the limits as it is"
-    return said if fast else said + _wider(run, peak)
+        sentence += f"; at {share:.0%} of the speed the plan keeps the limits as it is"
+    return sentence if fast else sentence + _wider(run, peak)
 
 
 def _wider(run: Executed, peak: Peak) -> str:

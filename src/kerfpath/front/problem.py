@@ -125,8 +125,8 @@ class Subproblem:
     def windowed(self, endless: Bools) -> list[int]:
         """Return the joints with an effective window: finite, and below a turn where endless."""
         width = np.diff(self.window)[:, 0]
-        said = np.isfinite(width) & ~(endless & (width >= 2 * np.pi))
-        return [int(joint) for joint in np.flatnonzero(said)]
+        narrow = np.isfinite(width) & ~(endless & (width >= 2 * np.pi))
+        return [int(joint) for joint in np.flatnonzero(narrow)]
 
     def cell(self, cell: Cell | None) -> Cell | None:
         """Return the cell in which the clearance is kept beyond its near-miss distance."""
@@ -590,12 +590,12 @@ class ParetoProblem:
             )
         except NoFeasiblePath as broken:
             if first:
-                said = (
+                message = (
                     f"{broken}; this run had the full limits, so no run can have a plan. Runs use "
                     "the grid of the rotation: if kerfpath plan finds a motion by refinement, "
                     "choose a finer gamma_step_deg or a lower speed here"
                 )
-                raise broken.with_message(said) from None
+                raise broken.with_message(message) from None
             counts = broken.counts
             if run.continuous and not counts:
                 return "no motion found off the grid"
