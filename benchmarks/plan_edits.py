@@ -12,7 +12,7 @@ from benchmarks._figures import Report, Sheet
 from benchmarks._plan_grammar import edits
 from benchmarks._plan_jobs import JOBS, planned
 from kerfpath.errors import InputError
-from kerfpath.job import PlanAudit
+from kerfpath.job import Audit
 
 __all__ = [
     "JOB_EDITS",
@@ -112,12 +112,12 @@ class Tally:
 Judge = Callable[[Path], bool]
 
 
-def _passes(audit: PlanAudit, plan: Path) -> bool:
+def _passes(audit: Audit, plan: Path) -> bool:
     return audit.audited(plan).passed
 
 
 def _passes_of(job: Path, plan: Path) -> bool:
-    return PlanAudit.of(job).audited(plan).passed
+    return Audit.of(job).audited(plan).passed
 
 
 def judged(judge: Judge, plan: Path) -> str:
@@ -158,7 +158,7 @@ def judged_all(made: Iterable[tuple[Path, Path]], count: int, seed: int) -> Tall
     tally = Tally()
     for job, plan in made:
         name = job.stem
-        audit = PlanAudit.of(job)
+        audit = Audit.of(job)
         assert audit.audited(plan).passed, f"{name}: the plan as it is does not pass"
         edited_plans(tally, partial(_passes, audit), plan, count, seed)
         for what, other in edited_jobs(job):

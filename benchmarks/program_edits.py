@@ -17,7 +17,7 @@ from benchmarks._program_edits import edits
 from benchmarks._program_faults import faults
 from benchmarks._program_oracle import verdict
 from kerfpath.errors import InputError
-from kerfpath.job import ProgramAudit, run_job
+from kerfpath.job import Audit, run_job
 from kerfpath.post import (
     Language,
     LanguageSettings,
@@ -138,7 +138,7 @@ class Subject:
 
     Parameters
     ----------
-    audit : ProgramAudit
+    audit : Audit
     language : Language
     settings : LanguageSettings
     program : Program
@@ -146,7 +146,7 @@ class Subject:
     files : mapping of str to str
     """
 
-    audit: ProgramAudit
+    audit: Audit
     language: Language
     settings: LanguageSettings
     program: Program
@@ -163,7 +163,7 @@ class Subject:
     def outcome(self, files: Mapping[str, str]) -> tuple[Outcome, str]:
         """Return the outcome of the audit of files, and the first finding."""
         try:
-            found = self.audit.audited(self.read(files), self.language, self.settings, "job")
+            found = self.audit.program(self.read(files), self.language, self.settings, "job")
         except InputError as error:
             return "refused", str(error)
         if found.passed:
@@ -281,10 +281,10 @@ def subjects(
                 external=EXTERNAL.format(reach=reach) if external else "",
             )
         )  # fmt: skip
-        audit = ProgramAudit.of(path)
-        options = audit.job.program
+        audit = Audit.of(path)
+        options = audit.expected.job.program
         if arm not in plans:
-            outcome = run_job(audit.job)
+            outcome = run_job(audit.expected.job)
             assert outcome.passed, outcome
             plans[arm] = outcome.plans, () if outcome.part is None else outcome.part.moves
         made, moves = plans[arm]

@@ -3,7 +3,7 @@
 import pytest
 
 from jobs import DEMO, SMALL
-from kerfpath.job import audit_program, read_job, run_job, write_result
+from kerfpath.job import audit_file, read_job, run_job, write_result
 
 PINNED = "[[0, 10, 20, 20.5]]"
 
@@ -25,13 +25,13 @@ def test_a_program_that_leaves_its_windows_fails(tmp_path):
     path = job_in(tmp_path, PINNED)
     written = write_result(run_job(read_job(path)), tmp_path / "out")
     (program,) = (file for file in written.files if file.suffix == ".mod")
-    found = audit_program(program, path)
+    found = audit_file(program, path)
     assert found.passed
     rows = [row for table in found.tables.values() for row in table if row.code == "gamma-window"]
     assert len(rows) == 1  # of the contour that is pinned
     # The same text by a job that pins gamma elsewhere, and by one that pins nothing.
-    assert failed(audit_program(program, job_in(tmp_path, "[[0, 10, 40, 60]]"))) == {"gamma-window"}
-    free = audit_program(program, job_in(tmp_path, None))
+    assert failed(audit_file(program, job_in(tmp_path, "[[0, 10, 40, 60]]"))) == {"gamma-window"}
+    free = audit_file(program, job_in(tmp_path, None))
     assert free.passed
     assert "gamma-window" not in {row.code for t in free.tables.values() for row in t}
 
@@ -42,4 +42,4 @@ def test_digits_of_a_text_leave_no_window(tmp_path, window):
     path = job_in(tmp_path, window)
     written = write_result(run_job(read_job(path)), tmp_path / "out")
     (program,) = (file for file in written.files if file.suffix == ".mod")
-    assert audit_program(program, path).passed
+    assert audit_file(program, path).passed

@@ -11,7 +11,7 @@ from benchmarks import _plan_jobs, plan_edits
 import kerfpath
 from commands import run
 from kerfpath.errors import InputError
-from kerfpath.job import PlanAudit, audit_file, prepare, read_job, read_plan_file
+from kerfpath.job import Audit, audit_file, prepare, read_job, read_plan_file
 
 EDITS = 25
 """Of each of four jobs: what a few seconds allow. `python -m benchmarks plan_edits` does 3000."""
@@ -32,7 +32,7 @@ def made(folder):
 def test_no_harmful_edit_of_a_plan_passes(made):
     tally = plan_edits.Tally()
     for job, plan in map(made, _plan_jobs.JOBS):
-        audit = PlanAudit.of(job)
+        audit = Audit.of(job)
         plan_edits.edited_plans(tally, lambda p, a=audit: a.audited(p).passed, plan, EDITS, seed=1)
     assert tally.passed == []
     assert tally.broke == []

@@ -28,7 +28,6 @@ from kerfpath.errors import InputError, KerfpathError, about
 from kerfpath.job import (
     AuditReport,
     audit_file,
-    audit_program,
     compare_programs,
     prepare,
     program_from_file,
@@ -237,7 +236,7 @@ def _run_audit(file: Path, job: Path | None) -> AuditReport:
     if job is None:
         raise InputError(f"{file}: a program is compared with its job; give it with --job JOB.toml")
     with about(file), busy("auditing the program"):
-        return audit_program(file, job)
+        return audit_file(file, job)
 
 
 # -----------------------------------------------------------------------------

@@ -40,11 +40,14 @@ from kerfpath.job.audit_report import (
 )
 from kerfpath.job.expected import (
     SAME_VALUE,
+    Expected,
+    ExpectedContour,
     ExpectedPlan,
     TargetNodes,
     check_pins,
     expect_plans,
     expect_program,
+    expect_sequence,
     nodes_at_targets,
     recompute,
 )
@@ -53,7 +56,6 @@ from kerfpath.job.format import (
     Candidate,
     Job,
     JobFile,
-    PreparedJob,
     prepare,
     read_job,
 )
@@ -87,35 +89,33 @@ from kerfpath.post import (
     Rules,
     differences,
 )
-from kerfpath.sequence import Order, PartPlan
 from kerfpath.transfer import End, TransferMove, back_off, least_time
-from kerfpath.windows import GammaWindow
 
 # -----------------------------------------------------------------------------
 # Check the order of cutting against the job.
 
 
 def check_sequence(
-    prepared: PreparedJob, done: Sequence[int], paths: Sequence[Contour]
+    expected: Expected, done: Sequence[int], paths: Sequence[Contour]
 ) -> list[Check]:
     """Return the checks of an order of cutting; their node is the number of the cut.
 
     Parameters
     ----------
-    prepared : PreparedJob
+    expected : Expected
     done : sequence of int
         Number of the contour of each cut in the job, in the order of cutting; pieces of one
         contour follow each other with the same number.
     paths : sequence of Contour
         The nodes of each cut.
     """
-    sequence = prepared.job.sequence
-    rows = check_order(sequence, prepared.inner_first, done)
+    sequence = expected.job.sequence
+    rows = check_order(sequence, expected.inner_first, done)
     rows.append(
         count_at("pieces", "pieces cut after a later piece of their contour", _early(done, paths))
     )
     if sequence is not None and sequence.heat_spacing_mm > 0:
-        warm = _too_warm(prepared, done, paths, sequence.heat_spacing_mm / 1000)
+        warm = _too_warm(expected, done, paths, sequence.heat_spacing_mm / 1000)
         rows.append(count_at("heat-spacing", "contours cut right after one that is too near", warm))
     return rows
 
@@ -130,11 +130,11 @@ def _early(done: Sequence[int], paths: Sequence[Contour]) -> list[int]:
 
 
 def _too_warm(
-    prepared: PreparedJob, done: Sequence[int], paths: Sequence[Contour], spacing: float
+    expected: Expected, done: Sequence[int], paths: Sequence[Contour], spacing: float
 ) -> list[int]:
     """Return the cuts that follow one nearer than `spacing` (m), by the first candidate of each."""
     whole = {i for i in done if list(done).count(i) == 1}
-    first = {i: prepared.contours[i].candidates[0].nodes for i in whole}
+    first = {i: expected.contours[i].candidates[0].nodes for i in whole}
     shapes = [first.get(i, path) for i, path in zip(done, paths, strict=True)]
     found = []
     for k, (one, two) in enumerate(pairwise(shapes)):
@@ -156,17 +156,17 @@ SHARES = np.linspace(0.0, 1.0, 9)
 
 
 def check_moves(
-    prepared: PreparedJob, plans: Sequence[Plan], moves: Sequence[TransferMove]
+    expected: Expected, plans: Sequence[Plan], moves: Sequence[TransferMove]
 ) -> list[Check]:
     """Return the worst of each check over all moves; its node is the number of the move.
 
     Each must lead from the retract of one cut to the approach of the next, or home, within the
     limits, not faster than the robot can, and free of collisions, as must approach and retract.
     """
-    sequence, robot = prepared.job.sequence, prepared.job.robot
+    sequence, robot = expected.job.sequence, expected.job.robot
     if sequence is None:
         return [count("moves", "moves that the job does not ask for", len(moves))] if moves else []
-    homes = 2 if prepared.job.home is not None else 0
+    homes = 2 if expected.job.home is not None else 0
     wanted = len(plans) - 1 + homes
     rows = [count("moves", "missing or surplus moves", abs(len(moves) - wanted))]
     odd = [m for m in moves if m.q.shape[1] != robot.joints or len(m.q) < 2]
@@ -176,15 +176,15 @@ def check_moves(
     if len(moves) != wanted or odd or far:
         return rows
     try:
-        ways = [(_approach(prepared, p, "start"), _approach(prepared, p, "end")) for p in plans]
+        ways = [(_approach(expected, p, "start"), _approach(expected, p, "end")) for p in plans]
     except InputError as error:
         return [*rows, count("retract", f"ends of cuts without a possible retract: {error}", 1)]
-    o, cell = prepared.job.options, prepared.cell
+    o, cell = expected.job.options, expected.cell
     tables = [
         transfer_checks(robot, m.q, m.time, cell=cell, eta_v=o.eta_v, eta_a=o.eta_a) for m in moves
     ]
-    for table, move, ends in zip(tables, moves, _ends(prepared, ways), strict=True):
-        table += _fits(prepared, move, ends)
+    for table, move, ends in zip(tables, moves, _ends(expected, ways), strict=True):
+        table += _fits(expected, move, ends)
     rows += worst_of(tables)
     if cell is not None:
         ups = [
@@ -196,50 +196,15 @@ def check_moves(
     return rows
 
 
-def expect_sequence(
-    prepared: PreparedJob, plans: Sequence[Plan], moves: Sequence[TransferMove], at_least: float
-) -> PartPlan | None:
-    """Return the plans and moves as the job asks for them, in the times that the moves need.
-
-    The claim about other orders (`at_least` s) is not checked.
-    """
-    if prepared.job.sequence is None:
-        return None
-    program = prepared.job.program
-    candidates = np.arange(len(plans))
-    part = PartPlan(
-        plans=tuple(plans),
-        moves=tuple(
-            TransferMove(q=m.q, time=_times(plans[0], m.q), clear=prepared.cell is not None)
-            for m in moves
-        ),
-        order=Order(candidates=candidates, duration=0.0, at_least=at_least),
-        chosen=(),
-        retract=program.retract,
-        approach_speed=program.approach_speed,
-        pierce_time=program.pierce_time,
-    )
-    order = Order(candidates=candidates, duration=part.cycle_time, at_least=at_least)
-    return replace(part, order=order)
-
-
-def _times(first: Plan, q: Array) -> Array:
-    """Return when the corners of a planned move are reached in the least time, s."""
-    velocity, acceleration = first.robot.speed_limits()
-    eta_v, eta_a = first.settings.eta_v, first.settings.eta_a
-    took = least_time(np.diff(q, axis=0), eta_v * velocity, eta_a * acceleration)
-    return np.concatenate([[0.0], np.cumsum(np.maximum(took, 1e-9))])
-
-
-def _approach(prepared: PreparedJob, plan: Plan, end: End) -> Array:
+def _approach(expected: Expected, plan: Plan, end: End) -> Array:
     """Return joints (9, n) rad along the approach or the retract of a cut, from the cut on."""
-    retract = prepared.job.program.retract
+    retract = expected.job.program.retract
     return np.array([back_off(plan, end, float(share) * retract) for share in SHARES])
 
 
-def _ends(prepared: PreparedJob, ways: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+def _ends(expected: Expected, ways: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
     """Return where each move begins and ends, (n,) rad each."""
-    home = prepared.job.home
+    home = expected.job.home
     starts, ends = [way[0][-1] for way in ways], [way[1][-1] for way in ways]
     if home is not None:
         starts, ends = [*starts, home], [home, *ends]
@@ -247,16 +212,16 @@ def _ends(prepared: PreparedJob, ways: Sequence[tuple[Array, Array]]) -> list[tu
     return list(zip(ends[:-1], starts[1:], strict=True))
 
 
-def _fits(prepared: PreparedJob, move: TransferMove, ends: tuple[Array, Array]) -> list[Check]:
+def _fits(expected: Expected, move: TransferMove, ends: tuple[Array, Array]) -> list[Check]:
     """Compare the ends of a move with those of the cuts and home, and its start time with zero.
 
     In the last move, endless joints may be at home on another turn.
     """
     first, last = np.abs(move.q[0] - ends[0]), np.abs(move.q[-1] - ends[1])
-    home = prepared.job.home
+    home = expected.job.home
     if home is not None and np.array_equal(ends[1], home):
         whole = 2 * np.pi * np.round(last / (2 * np.pi))
-        last = np.where(prepared.job.robot.endless, np.abs(last - whole), last)
+        last = np.where(expected.job.robot.endless, np.abs(last - whole), last)
     off = max(float(first.max()), float(last.max()))
     begins = abs(float(move.time[0]))
     return [
@@ -697,66 +662,85 @@ AIR = "air"
 """Name of the table of the moves."""
 
 
-def audit_file(plan_file: Path, job_file: Path | None = None) -> AuditReport:
-    """Audit every contour of a plan.json.
+def audit_file(file: Path, job_file: Path | None = None) -> AuditReport:
+    """Audit every contour of a plan.json, or every cut of a program.
 
-    With a job, only the job defines what is required and allowed; values that the plan repeats, or
-    that follow from its joints, must agree. Without one, limits, tool, placement and speed are
-    those of the plan, and only values that follow from its joints are compared.
+    With a job, only the job defines what is required and allowed; values that the file repeats, or
+    that follow from its joints, must agree. The joints of a program follow from the robot's
+    kinematics, and are audited like those of a plan. Without a job, limits, tool, placement and
+    speed are those of the plan.json, and only values that follow from its joints are compared.
 
     Parameters
     ----------
-    plan_file : Path
+    file : Path
+        The plan.json, or the main file of the program.
     job_file : Path, optional
+        The job that it was made for.
 
     Raises
     ------
     InputError
-        A file cannot be read.
+        A file cannot be read, a line of a program was not written by kerfpath, or programs of such
+        a job cannot be audited.
     """
     if job_file is not None:
-        return PlanAudit.of(job_file).audited(plan_file)
-    return _by_itself(read_plan_file(plan_file))
+        return Audit.of(job_file).audited(file)
+    return _by_itself(read_plan_file(file))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PlanAudit:
-    """The audit of plan.json files of one job, whose drawing and cell are read once.
+class Audit:
+    """The audit of plan.json files and programs of one job, whose drawing and cell are read once.
 
     Parameters
     ----------
-    prepared : PreparedJob
+    expected : Expected
     """
 
-    prepared: PreparedJob
+    expected: Expected
 
     __repr__ = short_repr
 
     @classmethod
-    def of(cls, job_file: Path) -> PlanAudit:
-        """Return the audit of a job's plans.
+    def of(cls, job_file: Path) -> Audit:
+        """Return the audit of a job's files.
 
         Raises
         ------
         InputError
             The job, its drawing or its cell cannot be read.
         """
-        return cls(prepared=prepare(read_job(job_file)))
+        return cls(expected=Expected.by(prepare(read_job(job_file))))
 
-    def audited(self, plan_file: Path) -> AuditReport:
-        """Audit every contour of a plan.json against the job.
+    def audited(self, file: Path) -> AuditReport:
+        """Audit a plan.json, or the program whose main file this is.
 
         Raises
         ------
         InputError
-            The file cannot be read.
+            As `audit_file`.
         """
-        prepared, file = self.prepared, read_plan_file(plan_file)
-        job, cell, entries = prepared.job, prepared.cell, file.entries
-        expected, rows = expect_plans(prepared, file)
+        if file.suffix.lower() == ".json":
+            return self.plan_file(file)
+        job = self.expected.job
+        if job.options.interruptions != "none":
+            raise InputError(
+                f"{job.path}: programs of jobs with interruptions cannot be compared with the "
+                "drawing yet; audit the plan.json"
+            )
+        chosen, settings = language_of(file, job)
+        return self.program(
+            program_on_disk(file, chosen, settings, job.robot), chosen, settings, file.name
+        )
+
+    def plan_file(self, path: Path) -> AuditReport:
+        """Audit every contour of a plan.json."""
+        expected, file = self.expected, read_plan_file(path)
+        job, cell, entries = expected.job, expected.cell, file.entries
+        planned, rows = expect_plans(expected, file)
         tables: dict[str, list[Check]] = {file.path.name: rows}
         judged: list[PlanData] = []
-        for each in expected:
+        for each in planned:
             table = tables.setdefault(each.name, [])
             table += each.checks
             if each.plan is None:
@@ -771,11 +755,11 @@ class PlanAudit:
             table += compare_values(entry, entries[each.name], JOB)
         rows += compare_jobs(job, file.job)
         paths = [p.contour for p in file.plans]
-        rows += check_sequence(prepared, [each.number for each in expected], paths)
-        rows += self._whole(file, judged, expected)
-        plans = [each.plan for each in expected if each.plan is not None]
-        if len(plans) == len(expected) and plans:
-            tables.setdefault(AIR, []).extend(check_moves(prepared, plans, file.moves))
+        rows += check_sequence(expected, [each.number for each in planned], paths)
+        rows += self._whole(file, judged, planned)
+        plans = [each.plan for each in planned if each.plan is not None]
+        if len(plans) == len(planned) and plans:
+            tables.setdefault(AIR, []).extend(check_moves(expected, plans, file.moves))
         note = collision_note(cell, moves_too=job.sequence is not None)
         return AuditReport(
             tables={name: table for name, table in tables.items() if table},
@@ -783,22 +767,75 @@ class PlanAudit:
             note=f"{note} {_list_claims(file, tables)}".strip(),
         )
 
+    def program(
+        self, read: ReadProgram, chosen: Language, settings: LanguageSettings, name: str
+    ) -> AuditReport:
+        """Audit every cut of a program that was read."""
+        job, contours, cell = self.expected.job, self.expected.contours, self.expected.cell
+        names = self.expected.names
+        read = add_tips(read, job)
+        cuts, home = read_cuts(read, job)
+        tables: dict[str, list[Check]] = {}
+        places: dict[str, tuple[str, ...]] = {name: tuple(step.place for step in read.steps)}
+        tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
+        placed = job.placement if read.T_base_part is None else read.T_base_part
+        off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
+        process = BeamProcess.of(job.program, ahead=chosen.ahead)
+        tables[name] = [
+            check("frames", "distance of tool and part from the job's", off, SAME_FRAME, "m"),
+            *check_laser_and_gas(read, job.robot, process),
+        ]
+        done: list[int] = []
+        starts: list[str] = []
+        followed: list[tuple[ReadCut, TargetNodes, Plan]] = []
+        for cut in cuts:
+            apart, which, c = _closest(cut, contours)
+            title = _new_title(f"{cut.name} ({names[which]})" if apart < NEAR else cut.name, tables)
+            places[title] = tuple(move.place for move in cut.moves)
+            if apart >= NEAR:
+                said = "distance from the nearest contour of the job"
+                tables[title] = [check("contour", said, apart, NEAR, "m")]
+                continue
+            candidate = contours[which].candidates[c]
+            cut = divide_arcs(cut, candidate.dt, job)
+            places[title] = tuple(move.place for move in (*cut.moves, cut.group.path[-1]))
+            tables[title], along = check_cut(job, candidate, cut, cell, chosen, settings)
+            tables[title].append(count("once", "earlier cuts of this contour", done.count(which)))
+            done.append(which)
+            starts.append(cut.moves[0].place)
+            if along is not None:
+                followed.append((cut, *along))
+                windows, rules = contours[which].options.gamma_windows, chosen.rules(settings)
+                tables[title] += check_pins(job, cut, *along, windows, rules)
+        steps = [places[name].index(start) for start in starts]
+        tables[name] += [
+            row if row.ok else replace(row, node=steps[row.node])
+            for row in check_order(job.sequence, self.expected.inner_first, done)
+        ]
+        tables[name] += _compared(job, followed, home, read, chosen, settings)
+        tables[_new_title("air", tables)] = _air(
+            job, cuts, home, cell if job.sequence is not None else None
+        )
+        missing = tuple(name for i, name in enumerate(names) if i not in done)
+        note = collision_note(cell, moves_too=job.sequence is not None)
+        return AuditReport(tables=tables, missing=missing, note=note, places=places)
+
     def _whole(
-        self, file: PlanFile, judged: Sequence[PlanData], expected: Sequence[ExpectedPlan]
+        self, file: PlanFile, judged: Sequence[PlanData], planned: Sequence[ExpectedPlan]
     ) -> list[Check]:
         """Compare the parts of the file beside its contours: robot, limits, cell, sequence."""
-        prepared, job, data = self.prepared, self.prepared.job, file.data
-        plans = [each.plan for each in expected if each.plan is not None]
+        expected, job, data = self.expected, self.expected.job, file.data
+        plans = [each.plan for each in planned if each.plan is not None]
         part = None
         if job.sequence is not None and data["sequence"] is not None and plans:
-            part = expect_sequence(prepared, plans, file.moves, data["sequence"]["at_least_s"])
+            part = expect_sequence(expected, plans, file.moves, data["sequence"]["at_least_s"])
         own: Mapping[str, object] = data
         whole: Mapping[str, object] = plan_document(
-            job.robot, job.tool, job.placement, judged, {}, prepared.cell, part
+            job.robot, job.tool, job.placement, judged, {}, expected.cell, part
         )
         rows = []
         for key in whole.keys() - {"job", "contours", "kerfpath", "schema"}:
-            if key == "sequence" and len(plans) < len(expected):
+            if key == "sequence" and len(plans) < len(planned):
                 continue  # a contour is refused already, and its times are not known
             rows += [row for row in compare_values(whole[key], own[key], JOB, (key,)) if not row.ok]
         if job.sequence is not None and data["sequence"] is None:
@@ -907,144 +944,6 @@ WHAT = {
 """What differs, by the code of the difference."""
 
 
-def audit_program(path: Path, job_file: Path) -> AuditReport:
-    """Audit every cut of a program against its job.
-
-    The joints of its targets follow from the robot's kinematics and are audited like those of a
-    plan: against the drawing, the limits and the cell of the job. Frames, speeds, switches and
-    waits are compared with those of the job.
-
-    Parameters
-    ----------
-    path : Path
-        The main file of the program.
-    job_file : Path
-        The job that the program was made for.
-
-    Raises
-    ------
-    InputError
-        A file cannot be read, a line was not written by kerfpath, or programs of such a job cannot
-        be audited.
-    """
-    audit = ProgramAudit.of(job_file)
-    chosen, settings = language_of(path, audit.job)
-    read = program_on_disk(path, chosen, settings, audit.job.robot)
-    return audit.audited(read, chosen, settings, path.name)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ProgramAudit:
-    """The audit of programs of one job, whose drawing and cell are read once.
-
-    Parameters
-    ----------
-    job : Job
-    contours : tuple of tuples of Candidate
-        The ways to cut each contour; their nodes have its name.
-    windows : tuple of tuples of GammaWindow
-        The windows of gamma of each contour.
-    cell : Cell or None
-    inner_first : tuple of (int, int)
-        Pairs of contours (from 0) of which the first is to be cut before the second.
-    """
-
-    job: Job
-    contours: tuple[tuple[Candidate, ...], ...]
-    windows: tuple[tuple[GammaWindow, ...], ...]
-    cell: Cell | None
-    inner_first: tuple[tuple[int, int], ...] = ()
-
-    __repr__ = short_repr
-
-    @classmethod
-    def of(cls, job_file: Path) -> ProgramAudit:
-        """Return the audit of a job's programs.
-
-        Raises
-        ------
-        InputError
-            A file cannot be read, or programs of such a job cannot be audited.
-        """
-        return cls.by(prepare(read_job(job_file)))
-
-    @classmethod
-    def by(cls, prepared: PreparedJob) -> ProgramAudit:
-        """Return the audit of a prepared job's programs.
-
-        Raises
-        ------
-        InputError
-            The job has interruptions.
-        """
-        job = prepared.job
-        if job.options.interruptions != "none":
-            raise InputError(
-                f"{job.path}: programs of jobs with interruptions cannot be compared with the "
-                "drawing yet; audit the plan.json"
-            )
-        return cls(
-            job=job,
-            contours=tuple(contour.candidates for contour in prepared.contours),
-            windows=tuple(contour.options.gamma_windows for contour in prepared.contours),
-            cell=prepared.cell,
-            inner_first=prepared.inner_first,
-        )
-
-    def audited(
-        self, read: ReadProgram, chosen: Language, settings: LanguageSettings, name: str
-    ) -> AuditReport:
-        """Audit every cut of a program that was read."""
-        job, contours, cell = self.job, self.contours, self.cell
-        names = [candidates[0].nodes.name for candidates in contours]
-        read = add_tips(read, job)
-        cuts, home = read_cuts(read, job)
-        tables: dict[str, list[Check]] = {}
-        places: dict[str, tuple[str, ...]] = {name: tuple(step.place for step in read.steps)}
-        tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
-        placed = job.placement if read.T_base_part is None else read.T_base_part
-        off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
-        process = BeamProcess.of(job.program, ahead=chosen.ahead)
-        tables[name] = [
-            check("frames", "distance of tool and part from the job's", off, SAME_FRAME, "m"),
-            *check_laser_and_gas(read, job.robot, process),
-        ]
-        done: list[int] = []
-        starts: list[str] = []
-        followed: list[tuple[ReadCut, TargetNodes, Plan]] = []
-        for cut in cuts:
-            apart, which, c = _closest(cut, contours)
-            title = _new_title(f"{cut.name} ({names[which]})" if apart < NEAR else cut.name, tables)
-            places[title] = tuple(move.place for move in cut.moves)
-            if apart >= NEAR:
-                said = "distance from the nearest contour of the job"
-                tables[title] = [check("contour", said, apart, NEAR, "m")]
-                continue
-            candidate = contours[which][c]
-            cut = divide_arcs(cut, candidate.dt, job)
-            places[title] = tuple(move.place for move in (*cut.moves, cut.group.path[-1]))
-            tables[title], along = check_cut(job, candidate, cut, cell, chosen, settings)
-            tables[title].append(count("once", "earlier cuts of this contour", done.count(which)))
-            done.append(which)
-            starts.append(cut.moves[0].place)
-            if along is not None:
-                followed.append((cut, *along))
-                pins, rules = self.windows[which], chosen.rules(settings)
-                tables[title] += check_pins(job, cut, *along, pins, rules)
-        steps = [places[name].index(start) for start in starts]
-        tables[name] += [
-            row if row.ok else replace(row, node=steps[row.node])
-            for row in check_order(job.sequence, self.inner_first, done)
-        ]
-        tables[name] += _compared(job, followed, home, read, chosen, settings)
-        tables[_new_title("air", tables)] = _air(
-            job, cuts, home, cell if job.sequence is not None else None
-        )
-        missing = tuple(name for i, name in enumerate(names) if i not in done)
-        note = collision_note(cell, moves_too=job.sequence is not None)
-        return AuditReport(tables=tables, missing=missing, note=note, places=places)
-
-
 def _new_title(title: str, tables: Mapping[str, object]) -> str:
     """Return a title that no table has yet, so that a repeated cut does not hide the first."""
     return title if title not in tables else _new_title(f"{title}, again", tables)
@@ -1083,7 +982,7 @@ def _compared(
     return rows or [count("asked", "differences from the job", 0)]
 
 
-def _closest(cut: ReadCut, contours: Sequence[Sequence[Candidate]]) -> tuple[float, int, int]:
+def _closest(cut: ReadCut, contours: Sequence[ExpectedContour]) -> tuple[float, int, int]:
     """Return the distance (m) of a cut from the contour that it follows best, and the candidate.
 
     Points at the same share of the length are compared.
@@ -1092,8 +991,8 @@ def _closest(cut: ReadCut, contours: Sequence[Sequence[Candidate]]) -> tuple[flo
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     some = np.unique(np.linspace(0, len(points) - 1, 100).round().astype(int))
     found = []
-    for i, candidates in enumerate(contours):
-        for c, path in enumerate(candidate.path for candidate in candidates):
+    for i, contour in enumerate(contours):
+        for c, path in enumerate(candidate.path for candidate in contour.candidates):
             s = path.s[0] + way[some] / way[-1] * path.length
             apart = np.linalg.norm(path.at(s)[0] - points[some], axis=1)
             found.append((float(np.median(apart)), i, c))

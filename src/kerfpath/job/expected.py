@@ -9,6 +9,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.auditor import Check, chain_of, retract_checks, window_checks
+from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.execution import ToolMotion
 from kerfpath.job.audit_report import check, count
@@ -33,8 +34,9 @@ from kerfpath.post import (
 )
 from kerfpath.retime import feed, retime
 from kerfpath.robots import Robot
+from kerfpath.sequence import Order, PartPlan
 from kerfpath.tolerances import SAME_PLACE
-from kerfpath.transfer import TransferMove, back_off
+from kerfpath.transfer import TransferMove, back_off, least_time
 from kerfpath.windows import GammaWindow
 
 # -----------------------------------------------------------------------------
@@ -127,6 +129,71 @@ def _cost(plan: Plan) -> float:
 
 
 # -----------------------------------------------------------------------------
+# What a job expects in a file of either kind.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ExpectedContour:
+    """A contour that a job expects to be cut.
+
+    Parameters
+    ----------
+    name : str
+    candidates : tuple of Candidate
+        The ways to cut it.
+    options : PlanOptions
+        Options of its plan, with its windows of gamma.
+    """
+
+    name: str
+    candidates: tuple[Candidate, ...]
+    options: PlanOptions
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Expected:
+    """What a job expects in a plan.json or a program.
+
+    Parameters
+    ----------
+    job : Job
+        Robot, tool, placement, options, [program], [sequence] and tolerances.
+    contours : tuple of ExpectedContour
+        In the order of the job.
+    cell : Cell or None
+    inner_first : tuple of (int, int)
+        Pairs of contours (from 0) of which the first is to be cut before the second.
+    """
+
+    job: Job
+    contours: tuple[ExpectedContour, ...]
+    cell: Cell | None = None
+    inner_first: tuple[tuple[int, int], ...] = ()
+
+    __repr__ = short_repr
+
+    @classmethod
+    def by(cls, prepared: PreparedJob) -> Expected:
+        """Return what a prepared job expects."""
+        return cls(
+            job=prepared.job,
+            contours=tuple(
+                ExpectedContour(name=c.task.name, candidates=c.candidates, options=c.options)
+                for c in prepared.contours
+            ),
+            cell=prepared.cell,
+            inner_first=prepared.inner_first,
+        )
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the contours."""
+        return [contour.name for contour in self.contours]
+
+
+# -----------------------------------------------------------------------------
 # The plans that a plan.json should have: its joints, with all else from the job.
 
 RETIMED = 1e-3
@@ -161,13 +228,13 @@ class ExpectedPlan:
     drawing: tuple[Check, ...] = ()
 
 
-def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[ExpectedPlan], list[Check]]:
+def expect_plans(expected: Expected, file: PlanFile) -> tuple[list[ExpectedPlan], list[Check]]:
     """Return the expected plan for each plan of a file, and the checks of its contours."""
-    names = prepared.names
+    names = expected.names
     members = [[p for p in file.plans if file.contours[p.name] == name] for name in names]
     found: dict[str, ExpectedPlan] = {}
     for number, plans in enumerate(members):
-        for each in _of_contour(prepared, number, plans, file.picked):
+        for each in _of_contour(expected, number, plans, file.picked):
             found[each.name] = each
     foreign = [p.name for p in file.plans if p.name not in found]
     for name in foreign:
@@ -187,33 +254,33 @@ def expect_plans(prepared: PreparedJob, file: PlanFile) -> tuple[list[ExpectedPl
 
 
 def _of_contour(
-    prepared: PreparedJob, number: int, plans: Sequence[Plan], picked: frozenset[str]
+    expected: Expected, number: int, plans: Sequence[Plan], picked: frozenset[str]
 ) -> list[ExpectedPlan]:
     """Return the expected plans of one contour: a single one, or its pieces."""
     if not plans:
         return []
-    name, job = prepared.names[number], prepared.job
+    name, job = expected.names[number], expected.job
     if len(plans) == 1 and plans[0].name == name:
         (made,) = plans
-        candidate = _nearest(prepared.contours[number].candidates, made, job.options.refine_parts)
+        candidate = _nearest(expected.contours[number].candidates, made, job.options.refine_parts)
         if candidate is None:
-            counts = sorted({len(c.nodes) for c in prepared.contours[number].candidates})
+            counts = sorted({len(c.nodes) for c in expected.contours[number].candidates})
             row = _node_count(made, " or ".join(map(str, counts)))
             return [ExpectedPlan(name=name, number=number, checks=(row,))]
         own, parts = _divided(candidate, made, job.options.refine_parts)
         shown = made.name in picked
-        return [_expected(prepared, number, made, own, candidate.dt, parts, picked=shown)]
+        return [_expected(expected, number, made, own, candidate.dt, parts, picked=shown)]
     words = [f"{name}, piece {k + 1} of {len(plans)}" for k in range(len(plans))]
     by_name = {p.name: p for p in plans}
     if len(plans) == 1 or job.options.interruptions == "none" or set(by_name) != set(words):
         row = count("once", "plans of a contour that is cut once", len(plans))
         return [ExpectedPlan(name=p.name, number=number, checks=(row,)) for p in plans]
-    return _pieces(prepared, number, [by_name[word] for word in words])
+    return _pieces(expected, number, [by_name[word] for word in words])
 
 
-def _pieces(prepared: PreparedJob, number: int, plans: Sequence[Plan]) -> list[ExpectedPlan]:
+def _pieces(expected: Expected, number: int, plans: Sequence[Plan]) -> list[ExpectedPlan]:
     """Return the expected plans of the pieces of a contour, in the order along it."""
-    job = prepared.job
+    job = expected.job
 
     def off(candidate: Candidate) -> float:
         ends = [candidate.path.at(p.contour.s[[0, -1]])[0] for p in plans]
@@ -222,7 +289,7 @@ def _pieces(prepared: PreparedJob, number: int, plans: Sequence[Plan]) -> list[E
             for p, end in zip(plans, ends, strict=True)
         )
 
-    candidate = min(prepared.contours[number].candidates, key=off)
+    candidate = min(expected.contours[number].candidates, key=off)
     whole, found, at = candidate.nodes, [], 0
     for p in plans:
         last = int(np.argmin(np.abs(whole.s - p.contour.s[-1])))
@@ -234,7 +301,7 @@ def _pieces(prepared: PreparedJob, number: int, plans: Sequence[Plan]) -> list[E
         part = replace(whole.part(at, last, job.options.frames), name=p.name)
         path = candidate.path.between(float(whole.s[at]), float(whole.s[last]))
         own, parts = _divided(Candidate(path=path, nodes=part), p, job.options.refine_parts)
-        found.append(_expected(prepared, number, p, own, candidate.dt, parts, picked=False))
+        found.append(_expected(expected, number, p, own, candidate.dt, parts, picked=False))
         at = last
     return found
 
@@ -259,7 +326,7 @@ def _divided(candidate: Candidate, made: Plan, parts: int) -> tuple[Candidate, i
 
 
 def _expected(
-    prepared: PreparedJob, number: int, made: Plan, own: Candidate, dt: float, parts: int,
+    expected: Expected, number: int, made: Plan, own: Candidate, dt: float, parts: int,
     *, picked: bool,
 ) -> ExpectedPlan:  # fmt: skip
     """Return the plan that has the joints of a plan and all else of the job.
@@ -267,7 +334,7 @@ def _expected(
     Its nodes are those of its `own` candidate, which may be a piece, or divide each interval of
     `dt` (s) into `parts`.
     """
-    job, nodes = prepared.job, own.nodes
+    job, nodes = expected.job, own.nodes
     if len(nodes) != len(made.contour):
         row = _node_count(made, str(len(nodes)))
         return ExpectedPlan(name=made.name, number=number, checks=(row,))
@@ -285,7 +352,7 @@ def _expected(
         T_flange_tip=job.tool,
         T_base_part=job.placement,
         time=dt / parts * np.arange(len(nodes), dtype=float),
-        settings=_options(prepared, number, dt, made.settings, picked=picked),
+        settings=_options(expected, number, dt, made.settings, picked=picked),
         feed=None,
     )
     if job.options.feed == "dip" and made.feed is not None and not picked:
@@ -294,19 +361,19 @@ def _expected(
     requested = job.options.retract
     room = retract_checks(plan, None if requested == made.settings.retract else requested)
     rows = (place, *_postures(job, plan), *room)
-    drawing = prepared.contours[number].drawing_checks(own, plan.contour, job.tolerances.path)
+    drawing = own.drawing_checks(plan.contour, job.tolerances.path)
     return ExpectedPlan(
         name=made.name, number=number, plan=plan, path=own.path, checks=rows, drawing=(*drawing,)
     )
 
 
 def _options(
-    prepared: PreparedJob, number: int, dt: float, said: PlanOptions, *, picked: bool
+    expected: Expected, number: int, dt: float, said: PlanOptions, *, picked: bool
 ) -> PlanOptions:
     """Return the plan options of the job; a picked plan may have lower shares of the limits."""
-    job, task = prepared.job, prepared.contours[number].task
+    job, requested = expected.job, expected.contours[number].options
     # [program] may have been edited since: the current retract is checked separately.
-    options = replace(task.asked(job.options).resolve(job.robot, dt), retract=said.retract)
+    options = replace(requested.resolve(job.robot, dt), retract=said.retract)
     if not picked:
         return options
     return replace(
@@ -345,6 +412,41 @@ def _postures(job: Job, made: Plan) -> list[Check]:
 def _node_count(made: Plan, expected: str) -> Check:
     said = f"wrong number of nodes: expected {expected}, found {len(made.contour)}"
     return count("nodes", said, 1)
+
+
+def expect_sequence(
+    expected: Expected, plans: Sequence[Plan], moves: Sequence[TransferMove], at_least: float
+) -> PartPlan | None:
+    """Return the plans and moves as the job asks for them, in the times that the moves need.
+
+    The claim about other orders (`at_least` s) is not checked.
+    """
+    if expected.job.sequence is None:
+        return None
+    program = expected.job.program
+    candidates = np.arange(len(plans))
+    part = PartPlan(
+        plans=tuple(plans),
+        moves=tuple(
+            TransferMove(q=m.q, time=_times(plans[0], m.q), clear=expected.cell is not None)
+            for m in moves
+        ),
+        order=Order(candidates=candidates, duration=0.0, at_least=at_least),
+        chosen=(),
+        retract=program.retract,
+        approach_speed=program.approach_speed,
+        pierce_time=program.pierce_time,
+    )
+    order = Order(candidates=candidates, duration=part.cycle_time, at_least=at_least)
+    return replace(part, order=order)
+
+
+def _times(first: Plan, q: Array) -> Array:
+    """Return when the corners of a planned move are reached in the least time, s."""
+    velocity, acceleration = first.robot.speed_limits()
+    eta_v, eta_a = first.settings.eta_v, first.settings.eta_a
+    took = least_time(np.diff(q, axis=0), eta_v * velocity, eta_a * acceleration)
+    return np.concatenate([[0.0], np.cumsum(np.maximum(took, 1e-9))])
 
 
 # -----------------------------------------------------------------------------

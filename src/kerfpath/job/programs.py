@@ -12,8 +12,9 @@ import numpy as np
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
-from kerfpath.job.audit import PlanAudit, ProgramAudit
+from kerfpath.job.audit import Audit
 from kerfpath.job.audit_report import AuditReport
+from kerfpath.job.expected import Expected, ExpectedContour
 from kerfpath.job.format import (
     AuditTable,
     Candidate,
@@ -56,26 +57,27 @@ REMEDIES = {
 OTHERWISE = "change the job and plan it again"
 
 
-def audit_of_cuts(job: Job, cuts: Sequence[CutResult], cell: Cell | None) -> ProgramAudit:
-    """Return the audit for the program of a job's cuts, with their paths, nodes and speeds."""
-    planned = [cut for cut in cuts if cut.plan is not None]
-    return ProgramAudit(
-        job=job,
-        contours=tuple((cut.candidate,) for cut in planned),
-        windows=tuple(cut.request.options.gamma_windows for cut in planned),
-        cell=cell,
+def expected_of_cuts(job: Job, cuts: Sequence[CutResult], cell: Cell | None) -> Expected:
+    """Return what the program of a job's cuts should have: their paths, nodes and speeds."""
+    contours = tuple(
+        ExpectedContour(name=cut.name, candidates=(cut.candidate,), options=cut.request.options)
+        for cut in cuts
+        if cut.plan is not None
     )
+    return Expected(job=job, contours=contours, cell=cell)
 
 
-def audit_of_plans(job: Job, plans: Sequence[Plan]) -> ProgramAudit:
-    """Return the audit for the program of plans, without the drawing and the cell of their job."""
+def expected_of_plans(job: Job, plans: Sequence[Plan]) -> Expected:
+    """Return what the program of plans should have, without drawing and cell of their job."""
     contours = []
     for made in plans:
         dt = float(np.diff(made.time).min())  # where the feed is reduced it is longer
         nodes = replace(made.contour, time=dt * np.arange(len(made.contour), dtype=float))
-        contours.append((Candidate(path=made.contour, nodes=nodes),))
-    windows = tuple(made.settings.gamma_windows for made in plans)
-    return ProgramAudit(job=job, contours=tuple(contours), windows=windows, cell=None)
+        candidate = Candidate(path=made.contour, nodes=nodes)
+        contours.append(
+            ExpectedContour(name=made.name, candidates=(candidate,), options=made.settings)
+        )
+    return Expected(job=job, contours=tuple(contours))
 
 
 def program_of(
@@ -83,7 +85,7 @@ def program_of(
     options: ProgramOptions,
     moves: Sequence[TransferMove] = (),
     *,
-    audit: ProgramAudit,
+    expected: Expected,
     strict: bool = False,
     dry_share: float | None = None,
 ) -> tuple[dict[str, str], list[str]]:
@@ -111,9 +113,9 @@ def program_of(
     program = build_program(plans, options, moves=moves)
     written = post_and_read(program, options.language, options.settings, strict=strict)
     if written.read is not None:
-        audit = replace(audit, job=replace(audit.job, program=options))
+        audit = Audit(expected=replace(expected, job=replace(expected.job, program=options)))
         settings = chosen.completed(options.settings)
-        found = audit.audited(written.read, chosen, settings, next(iter(written.files)))
+        found = audit.program(written.read, chosen, settings, next(iter(written.files)))
         _require_passed(found, chosen.title)
     if dry_share is not None:
         dry = dry_run(program, dry_share)
@@ -212,9 +214,10 @@ def program_from_file(
                 "is not known at a measured placement; remove one"
             )
         prepared = _planned_requirements(prepare(read_job(job_file)), file)
-        _require_plans_passed(PlanAudit(prepared=prepared).audited(plan_file))
+        required = Expected.by(prepared)
+        _require_plans_passed(Audit(expected=required).plan_file(plan_file))
         if prepared.job.options.interruptions == "none":
-            by_job = ProgramAudit.by(prepared)
+            by_job = required
         file = replace(file, job=prepared.job.source)
     options = _options(
         file,
@@ -236,7 +239,7 @@ def program_from_file(
         file.plans,
         options,
         file.moves,
-        audit=by_job or audit_of_plans(_job_of(file, options), file.plans),
+        expected=by_job or expected_of_plans(_job_of(file, options), file.plans),
         strict=strict,
         dry_share=dry_share,
     )

@@ -15,7 +15,7 @@ from kerfpath.errors import InputError
 from kerfpath.job.format import Candidate, CutRequest, Job, prepare, read_job
 from kerfpath.job.plan_file import PlanFile, read_plan_file
 from kerfpath.job.program_file import add_tips, language_of, program_on_disk
-from kerfpath.job.programs import audit_of_plans, program_of
+from kerfpath.job.programs import expected_of_plans, program_of
 from kerfpath.job.run import JobResult, run_prepared
 from kerfpath.operations import touched_up
 from kerfpath.plans import Plan
@@ -180,7 +180,9 @@ def _read_edits(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup
     """Return the steps of an edited program, a group for each plan, and its other changes."""
     chosen, settings = language_of(program, job)
     options = replace(job.program, language=chosen.name, settings=settings)
-    texts, _ = program_of(file.plans, options, file.moves, audit=audit_of_plans(job, file.plans))
+    texts, _ = program_of(
+        file.plans, options, file.moves, expected=expected_of_plans(job, file.plans)
+    )
     planned, edited = (
         add_tips(read, job)
         for read in (

@@ -11,7 +11,7 @@ import pytest
 from commands import assert_refused, run
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job import plan_file_text, program_from_file, read_job, read_plan_file, run_job
-from kerfpath.job.audit import audit_program
+from kerfpath.job.audit import audit_file
 from kerfpath.job.program_file import language_of
 from kerfpath.post import MANIFEST, groups_of, read_program, write_files
 from kerfpath.post import language as find_language
@@ -195,7 +195,7 @@ def test_what_is_written_passes_its_audit_or_is_not_written(
         return
     files, _ = program_from_file(folder / "plan.json", language, job_file=job)
     paths = write_files(tmp_path, files)
-    found = audit_program(paths[0], job)
+    found = audit_file(paths[0], job)
     assert found.passed, [c for t in found.tables.values() for c in t if not c.ok][:1]
 
 

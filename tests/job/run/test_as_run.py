@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jobs import DEMO, SMALL
-from kerfpath.job import AsRun, audit_program, read_job, run_job, write_result
+from kerfpath.job import AsRun, audit_file, read_job, run_job, write_result
 
 QUICK = SMALL.replace("[plan]", "[plan]\ncertify = false")
 
@@ -122,7 +122,7 @@ def test_a_program_is_judged_by_the_zones_of_its_text(tmp_path):
     (program,) = (tmp_path / "out").glob("*.mod")
 
     def rows():
-        tables = audit_program(program, tmp_path / "job.toml").tables
+        tables = audit_file(program, tmp_path / "job.toml").tables
         return [row for table in tables.values() for row in table if row.code.endswith("as-run")]
 
     planned = [row for cut in result.cuts for row in cut.as_run.checks]
@@ -158,7 +158,7 @@ def test_where_the_wrist_goes_by_its_joints_samples_are_said_to_be_samples(tmp_p
     write_result(wrist, tmp_path / "out")
     (program,) = (tmp_path / "out").glob("*.mod")
     assert r"SingArea\Wrist;" in program.read_text()
-    audited = audit_program(program, tmp_path / "job.toml")
+    audited = audit_file(program, tmp_path / "job.toml")
     assert audited.passed
     titles = [row.title for table in audited.tables.values() for row in table]
     assert "joint acceleration share as run, sampled" in titles

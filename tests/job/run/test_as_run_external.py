@@ -7,7 +7,7 @@ import pytest
 from benchmarks import program_edits
 
 from conftest import ROOT
-from kerfpath.job import audit_program, fastest_speeds, read_job, run_job, write_result
+from kerfpath.job import audit_file, fastest_speeds, read_job, run_job, write_result
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_a_chuck_that_turns_while_it_is_cut_is_guaranteed_and_so_is_the_text(tmp
     assert cut.as_run.timing.seconds < before.as_run.timing.seconds
     write_result(result, tmp_path / "out")
     (program,) = (tmp_path / "out").glob("*.mod")
-    audited = audit_program(program, tmp_path / "job.toml")
+    audited = audit_file(program, tmp_path / "job.toml")
     assert audited.passed
     read = {row.code: row for table in audited.tables.values() for row in table}
     for what in ("velocity", "acceleration"):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kerfpath.job import audit_program, read_job, run_job, write_result
+from kerfpath.job import audit_file, read_job, run_job, write_result
 
 JOB = """\
 [robot]
@@ -65,7 +65,7 @@ def test_what_is_assumed_is_judged_by_and_said(tmp_path, language):
     assert 0 < rows["tip-as-run"].value < 1e-4
     write_result(result, tmp_path / "out")
     (program,) = (tmp_path / "out").glob("[jJ][oO][bB].[lLjJ]*")
-    audited = audit_program(program, tmp_path / "job.toml")
+    audited = audit_file(program, tmp_path / "job.toml")
     own = {row.code: row for table in audited.tables.values() for row in table}
     # Targets have their digits.
     for code in ("velocity-as-run", "acceleration-as-run", "tip-as-run"):

@@ -11,7 +11,7 @@ from commands import assert_refused, run
 from jobs import DEMO, SMALL
 from kerfpath import InputError
 from kerfpath.execution import longest_run
-from kerfpath.job import audit_file, audit_program, read_job, read_plan_file, run_job, write_result
+from kerfpath.job import audit_file, read_job, read_plan_file, run_job, write_result
 from kerfpath.limits import jerks_of, rates_of
 from kerfpath.post import build_program
 
@@ -176,7 +176,7 @@ def test_jobs_hold_torque_and_jerk_limits_at_the_nodes(folder, planned):
         assert codes["jerk"].value == pytest.approx(rows["jerk"].value, rel=1e-6)
     # So does the program, its digits allowed for.
     (program,) = out.glob("*.mod")
-    tables = audit_program(program, folder / "job.toml").tables
+    tables = audit_file(program, folder / "job.toml").tables
     (table,) = (t for t in tables.values() if any(row.code == "torque" for row in t))
     codes = {row.code: row for row in table}
     assert codes["torque"].value == pytest.approx(rows["torque"].value, rel=0.02)

@@ -7,7 +7,7 @@ import pytest
 
 from jobs import DEMO, SMALL
 from kerfpath import InputError
-from kerfpath.job import PlanAudit, advised, prepare, read_job, run_job
+from kerfpath.job import Audit, advised, prepare, read_job, run_job
 from kerfpath.job.output import plan_file_text
 from kerfpath.progress import no_progress
 
@@ -38,10 +38,10 @@ def test_a_job_keeps_its_windows_and_another_job_does_not_pass_its_audit(job, tm
     assert result.passed
     plan = tmp_path / "plan.json"
     plan.write_text(plan_file_text(result))
-    assert PlanAudit.of(path).audited(plan).passed
+    assert Audit.of(path).audited(plan).passed
     # The same plan by a job that pins gamma elsewhere.
     job("[[0, 10, 40, 60]]")
-    found = PlanAudit.of(path).audited(plan)
+    found = Audit.of(path).audited(plan)
     assert not found.passed
     broken = {c.code for table in found.tables.values() for c in table if not c.ok}
     assert "gamma-window" in broken
@@ -50,7 +50,7 @@ def test_a_job_keeps_its_windows_and_another_job_does_not_pass_its_audit(job, tm
     data["contours"][0]["gamma_windows"][0] |= {"low_rad": 1.0, "high_rad": 1.2}
     plan.write_text(json.dumps(data))
     job("[[0, 10, 20, 20.5]]")
-    assert not PlanAudit.of(path).audited(plan).passed
+    assert not Audit.of(path).audited(plan).passed
 
 
 def test_a_way_that_a_window_closes_is_said_to_be_open_without(job):

@@ -349,12 +349,15 @@ class Candidate:
         Speed along the path; None if the nodes carry their own times.
     unrounded : Contour, optional
         The path before its corners were rounded; None without rounding.
+    rounded : float m, optional
+        Distance of the rounded corners from the drawn ones.
     """
 
     path: Contour
     nodes: Contour
     speed: float | None = None
     unrounded: Contour | None = None
+    rounded: float | None = None
 
     __repr__ = short_repr
 
@@ -367,6 +370,37 @@ class Candidate:
     def dt(self) -> float:
         """Time from node to node at the requested speed, s."""
         return node_interval(self.nodes, self.speed)
+
+    def drawing_checks(self, nodes: Contour, path: float) -> list[Check]:
+        """Return the check of rounded corners against the drawing; empty without such corners.
+
+        Parameters
+        ----------
+        nodes : Contour
+            The nodes that are cut; nothing is checked unless they sample the complete path.
+        path : float m
+            Tolerance of the chords between nodes from the path.
+        """
+        rounded, sharp = self.rounded, self.unrounded
+        whole = abs(nodes.length - self.path.length) <= SHORTER * self.path.length
+        if rounded is None or sharp is None or not whole:
+            return []
+        drawn = edge(sharp).points
+        where, k = nearest(edge(nodes), drawn)
+        off = np.linalg.norm(where - drawn, axis=1)
+        worst = int(np.argmax(off))
+        return [
+            Check(
+                code="drawing",
+                title=f"distance of the drawing from the chords of the nodes, corners rounded by "
+                f"{rounded * 1e3:g} mm",
+                value=float(off[worst]),
+                limit=max(rounded, path) + SAME_PLACE,
+                unit="m",
+                node=int(k[worst]),
+                advice="lower round_mm in [contour.corners], or sample the contour more finely",
+            )
+        ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -405,39 +439,6 @@ class CutRequest:
     def leaves_the_loop(self) -> bool:
         """Whether points or tool axes of the cut differ from the drawn loop."""
         return self.touched_up or self.task.table.moves_the_path
-
-    def drawing_checks(self, candidate: Candidate, nodes: Contour, path: float) -> list[Check]:
-        """Return the check of rounded corners against the drawing; empty without such corners.
-
-        Parameters
-        ----------
-        candidate : Candidate
-            The candidate that is cut.
-        nodes : Contour
-            Its nodes; nothing is checked unless they sample the complete path.
-        path : float m
-            Tolerance of the chords between nodes from the path.
-        """
-        rounded, sharp = self.task.rounded, candidate.unrounded
-        whole = abs(nodes.length - candidate.path.length) <= SHORTER * candidate.path.length
-        if rounded is None or sharp is None or not whole:
-            return []
-        drawn = edge(sharp).points
-        where, k = nearest(edge(nodes), drawn)
-        off = np.linalg.norm(where - drawn, axis=1)
-        worst = int(np.argmax(off))
-        return [
-            Check(
-                code="drawing",
-                title=f"distance of the drawing from the chords of the nodes, corners rounded by "
-                f"{rounded * 1e3:g} mm",
-                value=float(off[worst]),
-                limit=max(rounded, path) + SAME_PLACE,
-                unit="m",
-                node=int(k[worst]),
-                advice="lower round_mm in [contour.corners], or sample the contour more finely",
-            )
-        ]
 
     def picked(self, run: Subproblem, *, refine: bool) -> CutRequest:
         """Return the request for the first candidate, planned as a run of a Pareto set."""
@@ -526,7 +527,7 @@ def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
     candidates = tuple(Candidate.at(task.speed, path, task.sample(path)) for path in paths)
     if task.rounded is not None:
         candidates = tuple(
-            replace(each, unrounded=sharp)
+            replace(each, unrounded=sharp, rounded=task.rounded)
             for each, sharp in zip(candidates, task.unrounded(part, loop), strict=True)
         )
     return CutRequest(

@@ -23,7 +23,7 @@ from kerfpath.job.plan_file import (
     plan_entry,
     plan_text,
 )
-from kerfpath.job.programs import audit_of_cuts, program_of
+from kerfpath.job.programs import expected_of_cuts, program_of
 from kerfpath.job.run import JobResult
 from kerfpath.plans import Plan, joint_columns
 from kerfpath.post import (
@@ -336,9 +336,9 @@ def program_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if outcome.passed and job.program.language != "none":
         try:
-            audit = audit_of_cuts(job, outcome.cuts, outcome.cell)
+            expected = expected_of_cuts(job, outcome.cuts, outcome.cell)
             program, warnings = program_of(
-                outcome.plans, job.program, moves, audit=audit, strict=strict
+                outcome.plans, job.program, moves, expected=expected, strict=strict
             )
             notes += warnings
         except (InputError, AuditFailed) as error:

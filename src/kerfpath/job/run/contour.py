@@ -405,7 +405,7 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
     kept = None if whole.picked else kept_between_nodes(job, made)
     made = made if kept is None else kept.plan
     checks = job.tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
-    checks += whole.request.drawing_checks(candidate, made.contour, job.tolerances.path)
+    checks += candidate.drawing_checks(made.contour, job.tolerances.path)
     cut = replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))
     return replace(cut, as_run=as_run(job, made, candidate.path, kept))
 
