@@ -48,6 +48,7 @@ from kerfpath.job.expected import (
     expect_plans,
     expect_program,
     expect_sequence,
+    least_times,
     nodes_at_targets,
     recompute,
 )
@@ -89,7 +90,7 @@ from kerfpath.post import (
     Rules,
     differences,
 )
-from kerfpath.transfer import End, TransferMove, back_off, least_time
+from kerfpath.transfer import End, TransferMove, back_off
 
 # -----------------------------------------------------------------------------
 # Check the order of cutting against the job.
@@ -710,7 +711,7 @@ class Audit:
         InputError
             The job, its drawing or its cell cannot be read.
         """
-        return cls(expected=Expected.by(prepare(read_job(job_file))))
+        return cls(expected=Expected.of(prepare(read_job(job_file))))
 
     def audited(self, file: Path) -> AuditReport:
         """Audit a plan.json, or the program whose main file this is.
@@ -834,7 +835,9 @@ class Audit:
             job.robot, job.tool, job.placement, judged, {}, expected.cell, part
         )
         rows = []
-        for key in whole.keys() - {"job", "contours", "kerfpath", "schema"}:
+        for key in whole:  # in the order of the file, so that a report is always the same
+            if key in ("job", "contours", "kerfpath", "schema"):
+                continue  # compared elsewhere, or not at all
             if key == "sequence" and len(plans) < len(planned):
                 continue  # a contour is refused already, and its times are not known
             rows += [row for row in compare_values(whole[key], own[key], JOB, (key,)) if not row.ok]
@@ -1014,6 +1017,5 @@ def _way_checks(job: Job, q: Array, cell: Cell | None) -> list[Check]:
     """Check straight joint motions between corners (m, n) rad in the least time that they need."""
     if len(q) < 2:
         return []
-    took = np.maximum(least_time(np.diff(q, axis=0), *job.robot.speed_limits()), 1e-9)
-    time = np.append(0.0, np.cumsum(took))
-    return [row for row in transfer_checks(job.robot, q, time, cell=cell) if row.code != "air-time"]
+    rows = transfer_checks(job.robot, q, least_times(job.robot, q), cell=cell)
+    return [row for row in rows if row.code != "air-time"]

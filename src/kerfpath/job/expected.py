@@ -175,7 +175,7 @@ class Expected:
     __repr__ = short_repr
 
     @classmethod
-    def by(cls, prepared: PreparedJob) -> Expected:
+    def of(cls, prepared: PreparedJob) -> Expected:
         """Return what a prepared job expects."""
         return cls(
             job=prepared.job,
@@ -269,7 +269,7 @@ def _of_contour(
             return [ExpectedPlan(name=name, number=number, checks=(row,))]
         own, parts = _divided(candidate, made, job.options.refine_parts)
         shown = made.name in picked
-        return [_expected(expected, number, made, own, candidate.dt, parts, picked=shown)]
+        return [_expected_plan(expected, number, made, own, candidate.dt, parts, picked=shown)]
     words = [f"{name}, piece {k + 1} of {len(plans)}" for k in range(len(plans))]
     by_name = {p.name: p for p in plans}
     if len(plans) == 1 or job.options.interruptions == "none" or set(by_name) != set(words):
@@ -301,7 +301,7 @@ def _pieces(expected: Expected, number: int, plans: Sequence[Plan]) -> list[Expe
         part = replace(whole.part(at, last, job.options.frames), name=p.name)
         path = candidate.path.between(float(whole.s[at]), float(whole.s[last]))
         own, parts = _divided(Candidate(path=path, nodes=part), p, job.options.refine_parts)
-        found.append(_expected(expected, number, p, own, candidate.dt, parts, picked=False))
+        found.append(_expected_plan(expected, number, p, own, candidate.dt, parts, picked=False))
         at = last
     return found
 
@@ -325,7 +325,7 @@ def _divided(candidate: Candidate, made: Plan, parts: int) -> tuple[Candidate, i
     return replace(candidate, nodes=divide_nodes(candidate.path, candidate.nodes, parts)), parts
 
 
-def _expected(
+def _expected_plan(
     expected: Expected, number: int, made: Plan, own: Candidate, dt: float, parts: int,
     *, picked: bool,
 ) -> ExpectedPlan:  # fmt: skip
@@ -423,12 +423,16 @@ def expect_sequence(
     """
     if expected.job.sequence is None:
         return None
-    program = expected.job.program
+    program, limits = expected.job.program, plans[0].settings
     candidates = np.arange(len(plans))
     part = PartPlan(
         plans=tuple(plans),
         moves=tuple(
-            TransferMove(q=m.q, time=_times(plans[0], m.q), clear=expected.cell is not None)
+            TransferMove(
+                q=m.q,
+                time=least_times(plans[0].robot, m.q, limits.eta_v, limits.eta_a),
+                clear=expected.cell is not None,
+            )
             for m in moves
         ),
         order=Order(candidates=candidates, duration=0.0, at_least=at_least),
@@ -441,10 +445,9 @@ def expect_sequence(
     return replace(part, order=order)
 
 
-def _times(first: Plan, q: Array) -> Array:
-    """Return when the corners of a planned move are reached in the least time, s."""
-    velocity, acceleration = first.robot.speed_limits()
-    eta_v, eta_a = first.settings.eta_v, first.settings.eta_a
+def least_times(robot: Robot, q: Array, eta_v: float = 1.0, eta_a: float = 1.0) -> Array:
+    """Return when (m,) s the corners q (m, n) rad of a move can be reached at the earliest."""
+    velocity, acceleration = robot.speed_limits()
     took = least_time(np.diff(q, axis=0), eta_v * velocity, eta_a * acceleration)
     return np.concatenate([[0.0], np.cumsum(np.maximum(took, 1e-9))])
 

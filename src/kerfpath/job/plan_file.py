@@ -10,7 +10,7 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import UnionType
 from typing import (
@@ -466,6 +466,31 @@ def _shown(value: object) -> str:
 
 
 # -----------------------------------------------------------------------------
+# Objects and their entries: a key is the name of an attribute, with its unit.
+
+UNIT = re.compile(r"_(m|rad|rad_s|rad_s2|s)$")
+
+
+def _attributes(kind: Any) -> dict[str, str]:
+    """Return the attribute for each key that an entry must have, `kind` its TypedDict."""
+    hints = get_type_hints(kind, include_extras=True).items()
+    return {key: UNIT.sub("", key) for key, hint in hints if get_origin(hint) is not NotRequired}
+
+
+def _written(kind: Any, one: Any) -> Any:
+    """Return the entry of an object; None of None."""
+    if one is None:
+        return None
+    values = {key: getattr(one, name) for key, name in _attributes(kind).items()}
+    return {key: x.tolist() if isinstance(x, np.ndarray) else x for key, x in values.items()}
+
+
+def _read(kind: Any, entry: Any) -> dict[str, Any]:
+    """Return the attributes of an object from its entry."""
+    return {name: entry[key] for key, name in _attributes(kind).items()}
+
+
+# -----------------------------------------------------------------------------
 # Certificates in plan.json: their arrays, packed.
 
 TYPES: Mapping[str, str] = {
@@ -696,7 +721,13 @@ def sequence_entry(part: PartPlan) -> SequenceData:
         "air_s": part.air_time,
         "piercing_s": part.piercing_time,
         "retract_m": part.retract,
-        "moves": [_move_entry(move, robot) for move in part.moves],
+        "moves": [
+            cast(
+                MoveData,
+                {"clear": move.clear, "time_s": move.time.tolist(), **apart("q", move.q, robot)},
+            )
+            for move in part.moves
+        ],
     }
 
 
@@ -718,18 +749,6 @@ def read_moves(entry: SequenceData | None, robot: Robot) -> tuple[TransferMove, 
         )
         for move in entry["moves"]
     )
-
-
-def _move_entry(move: TransferMove, robot: Robot) -> MoveData:
-    n = robot.family.joints
-    entry: MoveData = {
-        "clear": move.clear,
-        "time_s": move.time.tolist(),
-        "q_rad": move.q[:, :n].tolist(),
-    }
-    if robot.externals:
-        entry["external_q"] = move.q[:, n:].tolist()
-    return entry
 
 
 # -----------------------------------------------------------------------------
@@ -851,33 +870,12 @@ def table_of(
         raise InputError(f"{file.path}: its [{name}] table is not valid ({said})") from None
 
 
-def _read_robot(robot: Mapping[str, Any], limits: LimitsData) -> Robot:
+def _read_robot(robot: RobotData, limits: LimitsData) -> Robot:
     """Return the arm, which casts and checks its arrays itself."""
-    said: Mapping[str, Any] = limits
-    arm = Robot(
-        id=robot["id"],
-        manufacturer=robot["manufacturer"],
-        model=robot["model"],
-        kinematics=robot["kinematics"],
-        geometry=robot["geometry_m"],
-        sign=robot["sign"],
-        offset=robot["offset_rad"],
-        axis_3=robot["axis_3"],
-        T_base_foot=robot["T_base_foot"],
-        T_end_flange=robot["T_end_flange"],
-        chain=KinematicChain(**robot["chain"]) if robot["chain"] else None,
-        lower=said["lower_rad"],
-        upper=said["upper_rad"],
-        endless=said["endless"],
-        velocity=said["velocity_rad_s"],
-        acceleration=said["acceleration_rad_s2"],
-        acceleration_source=said["acceleration_source"],
-        couplings=tuple(
-            Coupling(row=c["row"], lower=c["lower_rad"], upper=c["upper_rad"], note=c["note"])
-            for c in said["couplings"]
-        ),
-    )
-    return with_dynamics(limits, arm)
+    own = _read(RobotData, robot) | _read(LimitsData, limits)
+    own["chain"] = KinematicChain(**_read(ChainData, robot["chain"])) if robot["chain"] else None
+    own["couplings"] = tuple(Coupling(**_read(CouplingData, c)) for c in limits["couplings"])
+    return with_dynamics(limits, Robot(**own))
 
 
 def _read_plan(entry: PlanData, robot: Robot, tool: Any, placement: Any) -> Plan:
@@ -1018,11 +1016,11 @@ def plan_entry(
                 for name, (least, node) in criteria.nearest.items()
             },
         },
-        "feed": None if plan.feed is None else asdict(plan.feed),
+        "feed": _written(FeedData, plan.feed),
         "counts": dict(plan.counts),
         "audit": {
             "passed": all(c.ok or c.level == "warning" for c in checks),
-            "checks": [asdict(c) | {"ok": c.ok} for c in checks],
+            "checks": [_written(CheckData, each) for each in checks],
         },
         "nodes": {
             "s_m": plan.contour.s.tolist(),
@@ -1044,23 +1042,14 @@ def plan_entry(
 
 def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None) -> BrokenData:
     """Return the plan.json entry of a contour without a feasible path."""
-    closed, needed = broken.closed, broken.relaxation
     return {
         "name": name,
         "feasible": False,
         "reason": str(broken),
         "proved": broken.proved,
         "proved_for": broken.scope,
-        "closed": None
-        if closed is None
-        else {"node": closed.node, "joint": closed.joint, "limit": closed.limit},
-        "relaxation": None
-        if needed is None
-        else {
-            "speed": needed.speed,
-            "velocity": needed.velocity,
-            "acceleration": needed.acceleration,
-        },
+        "closed": _written(ClosedData, broken.closed),
+        "relaxation": _written(RelaxationData, broken.relaxation),
         "last_node_reached": broken.node,
         "counts": broken.counts,
         "fastest_speed_m_s": None if fastest is None else fastest.speed,
@@ -1068,44 +1057,16 @@ def broken_entry(name: str, broken: NoFeasiblePath, fastest: FastestSpeed | None
 
 
 def _robot_entry(robot: Robot) -> RobotData:
-    return {
-        "id": robot.id,
-        "manufacturer": robot.manufacturer,
-        "model": robot.model,
-        "kinematics": robot.kinematics,
-        "geometry_m": dict(robot.geometry),
-        "sign": robot.sign.tolist(),
-        "offset_rad": robot.offset.tolist(),
-        "axis_3": robot.axis_3,
-        "T_base_foot": robot.T_base_foot.tolist(),
-        "T_end_flange": robot.T_end_flange.tolist(),
-        "chain": None
-        if (chain := robot.chain) is None
-        else {
-            "origins": chain.origins.tolist(),
-            "axes": chain.axes.tolist(),
-            "end": chain.end.tolist(),
-        },
-    }
+    entry = _written(RobotData, robot)
+    chain = _written(ChainData, robot.chain)
+    return cast(RobotData, entry | {"geometry_m": dict(robot.geometry), "chain": chain})
 
 
 def _limits_entry(robot: Robot) -> LimitsData:
-    robot = robot.alone()
-    limits = robot.joint_limits()
-    velocity, acceleration = robot.speed_limits()
-    return {
-        "lower_rad": limits.lower.tolist(),
-        "upper_rad": limits.upper.tolist(),
-        "endless": robot.endless.tolist(),
-        "velocity_rad_s": velocity.tolist(),
-        "acceleration_rad_s2": acceleration.tolist(),
-        "acceleration_source": robot.acceleration_source,
-        "couplings": [
-            {"row": c.row.tolist(), "lower_rad": c.lower, "upper_rad": c.upper, "note": c.note}
-            for c in robot.couplings
-        ],
-        **dynamics_entry(robot),
-    }
+    arm = robot.alone()
+    couplings = [_written(CouplingData, each) for each in arm.couplings]
+    entry = _written(LimitsData, arm) | {"couplings": couplings} | dynamics_entry(arm)
+    return cast(LimitsData, entry)
 
 
 def _cell_entry(cell: Cell) -> dict[str, object]:

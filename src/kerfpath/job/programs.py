@@ -214,7 +214,7 @@ def program_from_file(
                 "is not known at a measured placement; remove one"
             )
         prepared = _planned_requirements(prepare(read_job(job_file)), file)
-        required = Expected.by(prepared)
+        required = Expected.of(prepared)
         _require_plans_passed(Audit(expected=required).plan_file(plan_file))
         if prepared.job.options.interruptions == "none":
             by_job = required
