@@ -19,6 +19,7 @@ from typing import (
     Self,
     TypedDict,
     TypeVar,
+    Union,
     get_args,
     get_origin,
     get_type_hints,
@@ -221,16 +222,23 @@ def documented(kind: type[T]) -> type[T]:
     """Add the settings of a class to its docstring, as parameters."""
     lines = ["Parameters", "----------"]
     for name, each in settings(kind).items():
-        words = "{" + ", ".join(map(repr, get_args(each.kind))) + "}"
-        what = words if get_origin(each.kind) is Literal else getattr(each.kind, "__name__", "")
-        what = " ".join([what, each.si_unit]).strip() + ", optional" * each.optional
+        what = " ".join([_type_in_words(each.kind), each.si_unit]).strip()
+        what += ", optional" * each.optional
         lines += [
             f"{name} : {what}",
             *wrap(each.help, 92, initial_indent="    ", subsequent_indent="    "),
         ]
     head, mark, tail = cleandoc(kind.__doc__ or "").partition("\nRaises\n")
-    kind.__doc__ = "\n".join([head, *lines, "", mark.strip(), tail]).strip()
+    kind.__doc__ = "\n".join([head.rstrip(), "", *lines, "", mark.strip(), tail]).strip()
     return kind
+
+
+def _type_in_words(kind: Any) -> str:
+    if get_origin(kind) is Literal:
+        return "{" + ", ".join(map(repr, get_args(kind))) + "}"
+    if get_origin(kind) is Union:
+        return " or ".join(map(_type_in_words, get_args(kind)))
+    return getattr(kind, "__name__", "")
 
 
 # -----------------------------------------------------------------------------

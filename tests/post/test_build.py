@@ -9,10 +9,13 @@ from tests.post.cases import CASES, kinds_of
 from kerfpath import InputError
 from kerfpath.post import (
     LinearMove,
+    ProgramKeywords,
+    ProgramOptions,
     ReadWait,
     build_program,
     post,
 )
+from kerfpath.setting import settings
 from programs import arc, codes, hand_plan, read_text, text_of
 
 CASE = CASES["rapid"]
@@ -57,6 +60,21 @@ def test_a_retract_out_of_reach_says_to_lower_it(small):
         build_program([small], retract=5.0)
     with pytest.raises(InputError, match="retract: expected a number above 0 m"):
         build_program([small], retract=0.0)
+
+
+def test_keywords_replace_the_options_of_a_program(small):
+    options = ProgramOptions(name="one", pierce_time=0.4)
+    program = build_program([small], options, name="two")
+    assert program.name == "two"
+    assert post(program) == post(build_program([small], name="two", pierce_time=0.4))
+    known = settings(ProgramOptions)
+    assert set(ProgramKeywords.__annotations__) == set(known) - {"language", "settings"}
+
+
+@pytest.mark.parametrize("name", ["retract", "zone", "zone_error", "lead_time", "gas_lead"])
+def test_process_values_below_their_bounds_are_refused(name):
+    with pytest.raises(InputError, match=f"^{name}: .* got -1"):
+        ProgramOptions(**{name: -1.0})
 
 
 def test_the_laser_is_off_along_micro_joints_and_waits_at_the_pierce(cell):
