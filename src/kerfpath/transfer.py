@@ -16,6 +16,16 @@ from kerfpath.extras import require_extra
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot, posture_name, require_axes
 
+__all__ = [
+    "End",
+    "TransferMove",
+    "back_off",
+    "explain_collision",
+    "least_time",
+    "speed_share",
+    "transfer_move",
+]
+
 # -----------------------------------------------------------------------------
 # Explain a collision: which bodies a motion brings too close together, where and by how much.
 
