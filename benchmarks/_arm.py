@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from kerfpath import Contour, Robot, robot
@@ -24,8 +22,7 @@ def arm_of_one_turn() -> Robot:
     plain = robot("abb_irb2400_155")
     assert plain.lower is not None
     assert plain.upper is not None
-    return replace(
-        plain,
+    return plain.with_limits(
         lower=np.maximum(plain.lower, -np.pi),
         upper=np.minimum(plain.upper, np.pi),
         couplings=(),

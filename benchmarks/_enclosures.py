@@ -35,11 +35,11 @@ def run(*, quick: bool) -> Report:
         for degrees in HALVES:
             half = np.full(cells, np.radians(degrees))
             label = f"{r.id}, cells +- {degrees:g} deg"
-            call = {label: lambda r=r, f=frames, h=half: r.enclose(f, node, gamma, h, T_tool)}
+            call = {label: lambda r=r, f=frames, h=half: r.arm.enclose(f, node, gamma, h, T_tool)}
             for what, taken in in_turn(call, runs).items():
                 each = [s / (cells * r.postures) * 1e6 for s in taken]
                 figures.append(Figure(what=what, values=each, unit="us"))
-            e = r.enclose(frames, node, gamma, half, T_tool)
+            e = r.arm.enclose(frames, node, gamma, half, T_tool)
             smooth = e.status == SMOOTH
             size = np.maximum(1.0, np.maximum(np.abs(e.low), np.abs(e.high)))[smooth]
             tight = np.quantile((e.high - e.low)[smooth] / size, [0.5, 0.9])

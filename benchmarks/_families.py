@@ -9,8 +9,9 @@ import ur_analytic_ik
 from eaik.IK_DH import DhRobot
 
 from benchmarks._figures import Figure, Report, in_turn
-from kerfpath import Robot, robot
+from kerfpath import robot
 from kerfpath.arrays import Array
+from kerfpath.robots import Arm
 from kerfpath.urdf import KinematicChain
 
 __all__ = ["run"]
@@ -45,7 +46,7 @@ def run(*, quick: bool) -> Report:
     eaik_ur = DhRobot(np.array([half, 0, 0, half, -half, 0]), a, d)
     eaik_general = DhRobot(*map(np.array, GENERAL))
     calls: dict[str, Callable[[], int]] = {
-        "UR10e: kerfpath inverse_all": lambda: int(ur.inverse_all(T_ur)[1].sum()),
+        "UR10e: kerfpath inverse_all": lambda: int(ur.arm.inverse_all(T_ur)[1].sum()),
         "UR10e: ur-analytic-ik": lambda: _looped(T_ur),
         "UR10e: EAIK IK_batched": lambda: _batched(eaik_ur, T_ur),
         "five axes: kerfpath inverse_all": lambda: int(five.inverse_all(T_five)[1].sum()),
@@ -65,7 +66,7 @@ def run(*, quick: bool) -> Report:
     )
 
 
-def _general() -> Robot:
+def _general() -> Arm:
     links = np.tile(np.eye(4), (6, 1, 1))
     for link, alpha, a, d in zip(links, *GENERAL, strict=True):
         c, s = np.cos(alpha), np.sin(alpha)
@@ -73,12 +74,12 @@ def _general() -> Robot:
     origins = np.concatenate([np.eye(4)[None], links[:5]])
     axes = np.tile([0.0, 0.0, 1.0], (6, 1))
     chain = KinematicChain(origins=origins, axes=axes, end=links[5])
-    return Robot(id="general", kinematics="general", geometry={}, chain=chain)
+    return Arm(kinematics="general", geometry={}, chain=chain)
 
 
-def _five() -> Robot:
+def _five() -> Arm:
     geometry = {"a1": 0.3, "a2": -0.1, "b": 0.0, "c1": 0.7, "c2": 0.9, "c3": 0.8, "c4": 0.12}
-    return Robot(id="five", kinematics="five", geometry=geometry)
+    return Arm(kinematics="five", geometry=geometry)
 
 
 def _looped(T: Array) -> int:

@@ -192,7 +192,7 @@ class Follower:
     def __init__(self, cut: Cut) -> None:
         velocity, acceleration = cut.robot.speed_limits()
         self.task = Task(
-            arm=cut.robot.arm(),
+            arm=cut.robot.arm.model(),
             limits=cut.robot.joint_limits(),
             H=np.ascontiguousarray(cut.frames),
             T_tip_flange=np.asarray(np.linalg.inv(cut.tool), dtype=np.float64),

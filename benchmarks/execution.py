@@ -192,7 +192,7 @@ def _by_toppra(run: Executed, program: Program) -> float:
     time = np.linspace(0.0, run.tool_motion.time[-1], len(run.tool_motion.T) * DENSER)
     near = np.stack([np.interp(time, run.time, joint) for joint in run.q.T], axis=1)
     poses = program.T_base_part @ run.tool_motion.poses(time) @ np.linalg.inv(program.T_flange_tip)
-    path = SplineInterpolator(time, np.column_stack([program.robot.nearest(poses, near), time]))
+    path = SplineInterpolator(time, np.column_stack([program.robot.arm.nearest(poses, near), time]))
     velocity, acceleration = program.robot.speed_limits()
     limits = [
         JointVelocityConstraint(np.append(velocity, 1.0)[:, None] * [-1.0, 1.0]),
@@ -250,7 +250,9 @@ def _densest(run: Executed, program: Program) -> float:
     near = np.stack([np.interp(time, run.time, joint) for joint in run.q.T], axis=1)
     flange = np.linalg.inv(program.T_flange_tip)
     before, here, after = (
-        robot.nearest(program.T_base_part @ run.tool_motion.poses(time + sign * d) @ flange, near)
+        robot.arm.nearest(
+            program.T_base_part @ run.tool_motion.poses(time + sign * d) @ flange, near
+        )
         for sign in (-1, 0, 1)
     )
     velocity, acceleration = robot.speed_limits()

@@ -48,12 +48,14 @@ def run(*, quick: bool) -> Report:
 
     def in_halves(pool: ThreadPoolExecutor) -> None:
         parts = [slice(0, poses // 2), slice(poses // 2, poses)]
-        model = robot.arm()
+        model = robot.arm.model()
         list(pool.map(lambda p: inverse_all(model, T[p], ours_q[p], ours_reach[p]), parts))
 
     with ThreadPoolExecutor(2) as pool:
         calls: dict[str, Callable[[], object]] = {
-            "kerfpath inverse_all, 1 core": lambda: inverse_all(robot.arm(), T, ours_q, ours_reach),
+            "kerfpath inverse_all, 1 core": lambda: inverse_all(
+                robot.arm.model(), T, ours_q, ours_reach
+            ),
             "kerfpath inverse_all, 2 cores": lambda: in_halves(pool),
             "kerfpath Robot.inverse, 1 core": lambda: robot.inverse(T, within_limits=False),
             "py-opw reach, 1 core": lambda: opw.reach(rigid, threads=1),

@@ -18,7 +18,6 @@ from kerfpath.auditor.dynamics import LagrangeArm
 from kerfpath.dynamics import Load
 from kerfpath.limits import TorqueLimit
 from kerfpath.planner import layered_graph, node_interval
-from kerfpath.robots.chains import model_chain
 from kerfpath.urdf import ChainInertia
 
 __all__ = ["run"]
@@ -73,8 +72,9 @@ def _arm_with_masses() -> Robot:
         centre=SIZE * away / np.linalg.norm(away, axis=1)[:, None],
         tensor=MASSES[:, None, None] * SIZE**2 * np.eye(3),
     )
-    loaded = replace(plain, chain=model_chain(plain), inertia=inertia, torque=np.full(6, 1e6))
-    return loaded.with_load(LOAD)
+    arm = replace(plain.arm, chain=plain.arm.model_chain())
+    massive = replace(plain, arm=arm, dynamics=replace(plain.dynamics, inertia=inertia))
+    return massive.with_limits(torque=np.full(6, 1e6)).with_load(LOAD)
 
 
 def _against_brute(robot: Robot, count: int) -> Report:

@@ -18,7 +18,9 @@ def every_cell(plan, level=0):
     index = np.tile(np.arange(count), K)
     width = TURN / count
     half = np.full(len(node), width / 2 + 4e-15)
-    found = arm.enclose(plan.frames, node, -np.pi + width * (index + 0.5), half, plan.T_flange_tip)
+    found = arm.arm.enclose(
+        plan.frames, node, -np.pi + width * (index + 0.5), half, plan.T_flange_tip
+    )
     cell, posture = np.nonzero(found.status)
     q, slope, low, high, radius = (
         getattr(found, name)[cell, posture] for name in ("center", "slope", "low", "high", "radius")

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +77,11 @@ def pytest_collection_modifyitems(items):
     while 0 < half < len(others) and others[half].path == others[half - 1].path:
         half -= 1
     items[:] = [*others[:half], *light, *others[half:]]
+
+
+def rebuilt(robot, **changes):
+    """The robot with another geometry, convention or frames of its arm."""
+    return replace(robot, arm=replace(robot.arm, **changes))
 
 
 @pytest.fixture

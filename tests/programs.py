@@ -18,7 +18,7 @@ from kerfpath.post import (
     preflight,
     read_program,
 )
-from kerfpath.robots import Robot
+from kerfpath.robots import Arm, Robot, RobotLimits
 
 STEEP = np.radians(20.0)
 
@@ -129,13 +129,17 @@ def five_axis_program():
     """A program of an arm of five axes, straight from stop to stop and through three nodes."""
     five = Robot(
         id="five",
-        kinematics="five",
-        geometry={"a1": 0.3, "a2": -0.1, "b": 0.0, "c1": 0.7, "c2": 0.9, "c3": 0.8, "c4": 0.12},
-        lower=np.radians([-170, -90, -60, -180, -180]),
-        upper=np.radians([170, 120, 170, 180, 180]),
-        velocity=np.radians([120, 110, 130, 300, 300]),
-        acceleration=np.radians([400, 300, 500, 1500, 1500]),
-        endless=[0, 0, 0, 1, 1],
+        arm=Arm(
+            kinematics="five",
+            geometry={"a1": 0.3, "a2": -0.1, "b": 0.0, "c1": 0.7, "c2": 0.9, "c3": 0.8, "c4": 0.12},
+        ),
+        limits=RobotLimits(
+            lower=np.radians([-170, -90, -60, -180, -180]),
+            upper=np.radians([170, 120, 170, 180, 180]),
+            velocity=np.radians([120, 110, 130, 300, 300]),
+            acceleration=np.radians([400, 300, 500, 1500, 1500]),
+            endless=[0, 0, 0, 1, 1],
+        ),
     )
     tool, placement = np.eye(4), np.eye(4)
     tool[:3, 3] = 0.06, 0.02, 0.2

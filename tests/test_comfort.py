@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import naive
-from conftest import ROOT, pose
+from conftest import ROOT, pose, rebuilt
 from kerfpath import (
     Band,
     Comfort,
@@ -31,17 +31,21 @@ from kerfpath.comfort import MEASURES, jacobian, measure, measures
 from kerfpath.job import read_plan_file
 from kerfpath.job.plan_file import plan_document, plan_entry, plan_text
 from kerfpath.planner import layered_graph
-from kerfpath.robots import Robot
+from kerfpath.robots import Arm, Robot, RobotLimits
 from kerfpath.tilt import Tilt
 
 STEP = np.radians(30)
 on_grid = partial(plan, method="exact")
 FIVE = Robot(
     id="five",
-    kinematics="five",
-    geometry={"a1": 0.3, "a2": -0.1, "b": 0.05, "c1": 0.7, "c2": 0.9, "c3": 0.8, "c4": 0.12},
-    lower=np.radians([-170, -90, -60, -180, -180]),
-    upper=np.radians([170, 120, 170, 180, 180]),
+    arm=Arm(
+        kinematics="five",
+        geometry={"a1": 0.3, "a2": -0.1, "b": 0.05, "c1": 0.7, "c2": 0.9, "c3": 0.8, "c4": 0.12},
+    ),
+    limits=RobotLimits(
+        lower=np.radians([-170, -90, -60, -180, -180]),
+        upper=np.radians([170, 120, 170, 180, 180]),
+    ),
 )
 
 
@@ -53,7 +57,7 @@ def placed(arm):
     geometry = arm.geometry | ({"b": 0.04} if "b" in arm.geometry else {})
     sign, offset = rng.choice([-1.0, 1.0], n), rng.uniform(-3, 3, n)
     changes = {"geometry": geometry, "sign": sign, "offset": offset}
-    return replace(arm, T_base_foot=foot, T_end_flange=end, **changes)
+    return rebuilt(arm, T_base_foot=foot, T_end_flange=end, **changes)
 
 
 ARMS = {
@@ -90,7 +94,7 @@ def test_the_determinant_is_the_product_of_the_singularities(name):
 
 
 def test_elbow_and_shoulder_are_what_the_wrist_centre_shows():
-    arm = replace(ARMS["opw"], geometry=ARMS["opw"].geometry | {"b": 0.07})
+    arm = rebuilt(ARMS["opw"], geometry=ARMS["opw"].geometry | {"b": 0.07})
     g, q = arm.geometry, some(arm)
     T, found = arm.forward(q), measures(arm, q)
     centre = T[:, :3, 3] - g["c4"] * T[:, :3, 2]
@@ -116,7 +120,7 @@ def test_singular_poses_by_hand():
 
 
 def test_the_nearest_limit_is_that_of_any_joint_or_coupling():
-    arm = replace(ARMS["opw, coupled"], endless=[0, 0, 0, 1, 0, 1])
+    arm = ARMS["opw, coupled"].with_limits(endless=[0, 0, 0, 1, 0, 1])
     q = np.random.default_rng(2).uniform(arm.lower, arm.upper, (50, 6))
     want = []
     for row in q:
@@ -126,7 +130,7 @@ def test_the_nearest_limit_is_that_of_any_joint_or_coupling():
     found = measure("limits", arm, q)
     np.testing.assert_allclose(found, want, atol=1e-15)
     assert (found < 0).any()
-    endless = replace(arm, endless=np.ones(6, bool), couplings=())
+    endless = arm.with_limits(endless=np.ones(6, bool), couplings=())
     assert np.isinf(measure("limits", endless, q)).all()
 
 

@@ -48,7 +48,7 @@ def _compile_cells(kinematics: str) -> None:
     """Compile the kernels that enclose the joints on cells of gamma."""
     arm, contour = _example(kinematics)
     node, gamma = np.zeros(1, np.int64), np.zeros(1)
-    arm.enclose(contour.frames(), node, gamma, np.full(1, 0.1), np.eye(4))
+    arm.arm.enclose(contour.frames(), node, gamma, np.full(1, 0.1), np.eye(4))
 
 
 STAGES: dict[str, Callable[[str], None]] = {

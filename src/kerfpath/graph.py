@@ -231,7 +231,7 @@ def build(
             H = np.linalg.inv(base_in_part(robot.externals, x[..., inner:]))[:, None] @ H
         H = np.ascontiguousarray(np.broadcast_to(H, (*H.shape[:2], places, 4, 4)))
         given = np.broadcast_to(x[:, None, :, 0], H.shape[:3]).ravel() if inner else None
-        q, reach = arm.inverse_nodes(H.reshape(-1, 4, 4), gamma, T_flange_tip, given)
+        q, reach = arm.arm.inverse_nodes(H.reshape(-1, 4, 4), gamma, T_flange_tip, given)
         q = q.reshape(last - first, samples, *q.shape[2:])
         piece = _admitted(q, reach.reshape(q.shape[:3]), wanted, limits, reason[first:last])
         if robot.externals:

@@ -1,10 +1,11 @@
-"""Identifiers made from the names of contours."""
+"""Identifiers made from the names of contours, and the known names nearest to a wrong one."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
 from collections.abc import Iterable
+from difflib import get_close_matches
 
 LONGEST_NAME = 32
 """Most characters of an identifier made from a contour's name; ABB's limit."""
@@ -35,3 +36,9 @@ def identifier(text: str) -> str:
     if not name or name[0].isdigit():
         name = f"c_{name}".rstrip("_")
     return name[:LONGEST_NAME]
+
+
+def nearest(name: str, known: tuple[str, ...]) -> str:
+    """Return the known names most similar to `name`, in words for messages."""
+    near = get_close_matches(name, known, n=3, cutoff=0.4)
+    return f"nearest: {', '.join(near)}" if near else "no id there is similar"

@@ -147,7 +147,7 @@ def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
     arm, axes = plan.robot.family.joints, plan.robot.externals
     x = plan.q[:, arm:]
     T_arm_flange = np.asarray(np.linalg.inv(base_in_part(axes, x)) @ T_base_flange, np.float64)
-    q = plan.robot.alone().follow(T_arm_flange, plan.q[:, :arm], plan.posture)
+    q = plan.robot.arm.follow(T_arm_flange, plan.q[:, :arm], plan.posture)
     q = np.column_stack([q, x])
     lost = np.flatnonzero(np.isnan(q).any(axis=1))
     if lost.size:

@@ -94,7 +94,7 @@ def back_off(plan: Plan, end: End, retract: float) -> Array:
     arm, n = plan.robot.alone(), plan.robot.family.joints
     T = arm.forward(q[:n]) @ plan.T_flange_tip
     T[:3, 3] -= retract * T[:3, 2]
-    given = arm.given_of(q[None])
+    given = arm.arm.given_of(q[None])
     found = arm.inverse(T @ np.linalg.inv(plan.T_flange_tip), given=given)
     q_found = found.q[found.posture == plan.posture[node]]
     q_found = np.hstack([q_found, np.tile(q[n:], (len(q_found), 1))])

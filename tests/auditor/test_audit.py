@@ -92,7 +92,7 @@ def test_finer_nodes_are_no_advice_for_a_target_that_was_moved(good, drawn):
     points = good.contour.points.copy()
     points[40, 0] += 5e-4
     moved = replace(good, contour=replace(good.contour, points=points))
-    q = good.robot.follow(
+    q = good.robot.arm.follow(
         moved.T_base_part @ moved.T_part_tip @ np.linalg.inv(moved.T_flange_tip), good.q,
         good.posture,
     )  # fmt: skip
@@ -133,7 +133,7 @@ def test_joint_limits_are_checked_at_and_between_the_nodes(good):
     upper[1] = highest + 1e-3
     assert "joint-limits" not in spoilt(good, robot=good.robot.with_limits(upper=upper))
     rod = Coupling(row=[0, 1, 1, 0, 0, 0], lower=-9.0, upper=good.q[:, 1:3].sum(1).max() - 1e-6)
-    assert "coupled-limits" in spoilt(good, robot=replace(good.robot, couplings=(rod,)))
+    assert "coupled-limits" in spoilt(good, robot=good.robot.with_limits(couplings=(rod,)))
 
 
 def test_velocity_and_acceleration_are_checked(good):

@@ -118,7 +118,7 @@ def test_no_step_costs_less_than_is_claimed(which, metric, request):
             turn[:, 0, 0] = turn[:, 1, 1] = np.cos(g)
             turn[:, 1, 0], turn[:, 0, 1] = np.sin(g), -np.sin(g)
             T = of.frames[at.node[c]] @ turn @ np.linalg.inv(of.T_flange_tip)
-            joints, reach = of.robot.inverse_all(np.ascontiguousarray(T))
+            joints, reach = of.robot.arm.inverse_all(np.ascontiguousarray(T))
             rows = np.arange(len(c))
             off = joints[rows, at.posture[c]] - at.q[c]
             off -= 2 * np.pi * np.round(off / (2 * np.pi))
@@ -211,7 +211,7 @@ def test_one_step_is_bounded_by_the_nearest_pair_of_poses(arm, tool, placement):
         turn = np.tile(np.eye(4), (len(grid), 1, 1))
         turn[:, 0, 0] = turn[:, 1, 1] = np.cos(grid)
         turn[:, 1, 0], turn[:, 0, 1] = np.sin(grid), -np.sin(grid)
-        q, reach = arm.inverse_all(frame @ turn @ np.linalg.inv(tool))
+        q, reach = arm.arm.inverse_all(frame @ turn @ np.linalg.inv(tool))
         inside = (q[:, 0] >= arm.lower - 1e-9) & (q[:, 0] <= arm.upper + 1e-9) | arm.endless
         ends.append(q[reach[:, 0] & inside.all(1), 0])
     u = increments(of, *ends)

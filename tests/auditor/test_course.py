@@ -1,11 +1,10 @@
 """Bounds of joint rates along a course: above every sample, near the largest, or infinite."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from conftest import rebuilt
 from kerfpath import InputError, robot
 from kerfpath.auditor import rates_along
 from kerfpath.execution import ToolMotion
@@ -47,7 +46,7 @@ def random_course(arm, seed, arcs, law="slerp"):
 
 def middles(arm, course, q):
     time = (course.borders[1:] + course.borders[:-1]) / 2
-    return arm.nearest(course.poses(time), np.tile(q, (len(time), 1)))
+    return arm.arm.nearest(course.poses(time), np.tile(q, (len(time), 1)))
 
 
 @pytest.mark.slow
@@ -68,7 +67,7 @@ def test_no_sample_is_above_the_bounds_and_some_are_near(name, seed, arcs, law):
         time = borders[:-1] + share * np.diff(borders)
         d = 1e-2 * np.diff(borders)[:, None]
         before, here, after = (
-            arm.nearest(course.poses(time + sign * d[:, 0]), near) for sign in (-1, 0, 1)
+            arm.arm.nearest(course.poses(time + sign * d[:, 0]), near) for sign in (-1, 0, 1)
         )
         seen[0] = np.maximum(seen[0], np.abs(after - before) / (2 * d))
         seen[1] = np.maximum(seen[1], np.abs(after - 2 * here + before) / d**2)
@@ -127,7 +126,7 @@ def test_bounds_hold_while_external_axes_move(name, law, seed):
     """A gantry of a rail and a column under the arm, a table on a shuttle under the part."""
     rng = np.random.default_rng(seed)
     arm = robot(name).with_limits(acceleration=np.ones(6))
-    arm = replace(arm, T_base_foot=turned(rng) @ arm.T_base_foot)
+    arm = rebuilt(arm, T_base_foot=turned(rng) @ arm.T_base_foot)
     course, q = random_course(arm, seed, False, law)
     axes = [("rail", "linear", "robot"), ("column", "rotary", "robot"), ("table", "rotary", "part")]
     picked = [axes[i] for i in rng.permutation(3)]
@@ -147,7 +146,7 @@ def test_bounds_hold_while_external_axes_move(name, law, seed):
         x = course.blended(values, time)
         # The arm stands at the first target where it would stand with all axes at zero.
         seen = np.linalg.inv(base_in_part(moved.externals, x)) @ base @ course.poses(time)
-        return np.hstack([arm.nearest(seen, near[:, :6]), x])
+        return np.hstack([arm.arm.nearest(seen, near[:, :6]), x])
 
     borders = course.borders
     near = np.hstack([q, start[0]])

@@ -56,7 +56,7 @@ def test_every_sampled_solution_is_inside(name):
     none, smooth = found.status == Status.NONE, found.status == Status.SMOOTH
     reached = np.zeros(none.shape, bool)
     for share in np.linspace(-1, 1, 21):
-        q, reach = arm.inverse_all(spun(frames[node], gamma + share * half))
+        q, reach = arm.arm.inverse_all(spun(frames[node], gamma + share * half))
         reached |= reach
         assert (over(found, share * half, q)[reach] <= ROUNDING).all()
         assert reach[smooth].all()
@@ -78,7 +78,7 @@ def test_a_base_and_a_flange_elsewhere_and_other_zeros_are_followed(name):
     )  # fmt: skip
     frames, gamma, half, _, t = random_cells(arm, rng, 100)
     found = enclose(arm, frames, np.arange(100), gamma, half, TOOL)
-    q, reach = arm.inverse_all(spun(frames, gamma + t))
+    q, reach = arm.arm.inverse_all(spun(frames, gamma + t))
     assert reach.sum() > 200
     assert not (reach & (found.status == Status.NONE)).any()
     assert (over(found, t, q)[reach] <= ROUNDING).all()
@@ -142,7 +142,7 @@ def test_the_radius_covers_all_rounding(name):
     back = np.eye(4, dtype=LONG)
     back[:3, :3], back[:3, 3] = tool[:3, :3].T, -tool[:3, :3].T @ tool[:3, 3]
     target = (near @ long_spin(2, gamma.astype(LONG) + t) @ back)[cell]
-    q, reach = arm.inverse_all(target.astype(float))
+    q, reach = arm.arm.inverse_all(target.astype(float))
     assert reach[np.arange(len(cell)), mu].all()
     q = q[np.arange(len(cell)), mu].astype(LONG)
     J = np.linalg.inv(chain.jacobian(q.astype(float))[1])
@@ -253,7 +253,7 @@ def test_a_matrix_that_is_not_quite_a_rotation_holds_the_nearest_one():
     nearest = spoilt.copy()
     nearest[:, :3, :3] = U @ V
     found = enclose(arm, spoilt, np.arange(100), gamma, half, TOOL)
-    solved, reach = arm.inverse_all(spun(nearest, gamma + t))
+    solved, reach = arm.arm.inverse_all(spun(nearest, gamma + t))
     assert (over(found, t, solved)[reach] <= 1e-13).all()
     assert np.median(found.radius[found.status == Status.SMOOTH]) > 1e-8
 
@@ -312,7 +312,7 @@ def test_beside_a_singularity_a_joint_goes_hardly_farther_than_its_box(name):
     reach = np.abs(found.slope) * half + wide + found.radius
     off = np.zeros(reach.shape)
     for share in np.linspace(-1, 1, parts):
-        q, reached = arm.inverse_all(spun(frames, gamma + share * half))
+        q, reached = arm.arm.inverse_all(spun(frames, gamma + share * half))
         away = np.abs(np.remainder(q - found.center + np.pi, 2 * np.pi) - np.pi)
         off = np.maximum(off, np.where(reached[..., None], away, 0.0))
     swings = (found.status == Status.SMOOTH)[..., None] & (off > 0.2)

@@ -28,7 +28,7 @@ def test_the_arm_stays_within_what_digits_leave_of_it(cell):
         # The digits are those of the tip; the flange is that far off at least.
         moved[:, :3, 3] += rng.choice([-1, 1], (6, 3)) * POINT
         seen = np.linalg.inv(base_in_part(robot.externals, x)) @ moved
-        q = arm.follow(seen, plan.q[:, :6], plan.posture)
+        q = arm.arm.follow(seen, plan.q[:, :6], plan.posture)
         most = np.maximum(most, np.abs(q - plan.q[:, :6]))
     # Of first order: what is left out is of the square of the digits.
     assert (most <= left.q[:, :6] * 1.01 + 1e-9).all()

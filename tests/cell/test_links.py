@@ -11,7 +11,7 @@ from tests.robots.test_five_axes import ARM as FIVE
 from tests.robots.test_general import random_arm
 from tests.urdf.test_urdf import described
 
-from conftest import ROOT
+from conftest import ROOT, rebuilt
 from kerfpath import InputError, Robot, auditor, robot
 from kerfpath.cell import (
     Capsule,
@@ -27,7 +27,8 @@ from kerfpath.cell import (
     link_capsules,
 )
 from kerfpath.cell import links as links_module
-from kerfpath.robots import chain_of, chains, robot_ids
+from kerfpath.robots import arm as arm_module
+from kerfpath.robots import chain_of, robot_ids
 from kerfpath.urdf import LinkBody as Described
 
 LIBRARY = [robot(name) for name in robot_ids()]
@@ -40,7 +41,7 @@ def placed(arm, rng):
     foot, end = np.eye(4), np.eye(4)
     foot[:3, :3], end[:3, :3] = Rotation.random(2, rng=rng).as_matrix()
     foot[:3, 3], end[:3, 3] = rng.uniform(-1, 1, (2, 3))
-    return replace(
+    return rebuilt(
         arm, T_base_foot=foot, T_end_flange=end,
         sign=rng.choice([-1.0, 1.0], n), offset=rng.uniform(-3, 3, n),
     )  # fmt: skip
@@ -116,7 +117,7 @@ def test_an_arm_of_no_known_family_is_drawn_along_its_chain(monkeypatch):
     monkeypatch.delitem(links_module._LINES, "opw")
     wrist = [body.frame for body in link_capsules(robot("abb_irb4600_60_205"))]
     assert wrist == [0, 1, 2, 3, 6]  # joints 4 to 6 are in one place
-    monkeypatch.delitem(chains._MODELS, "ur")
+    monkeypatch.delitem(arm_module._MODELS, "ur")
     with pytest.raises(InputError, match="are known only from a robot description"):
         chain_of(arm)
 
@@ -124,7 +125,7 @@ def test_an_arm_of_no_known_family_is_drawn_along_its_chain(monkeypatch):
 def test_an_arm_without_length_is_refused():
     arm = robot("abb_irb4600_60_205")
     with pytest.raises(InputError, match="its links have no length"):
-        link_capsules(replace(arm, geometry=arm.geometry | {"c2": 0.0, "c3": 0.0}))
+        link_capsules(rebuilt(arm, geometry=arm.geometry | {"c2": 0.0, "c3": 0.0}))
 
 
 def bracket():

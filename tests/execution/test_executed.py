@@ -29,7 +29,7 @@ def peaks_of(made, run, arm):
     for at in (time - step, time, time + step):
         poses = made.T_base_part @ motion.poses(at) @ np.linalg.inv(made.T_flange_tip)
         near = np.stack([np.interp(at, motion.time, joint) for joint in planned.T], axis=1)
-        solved, reach = arm.inverse_all(poses)
+        solved, reach = arm.arm.inverse_all(poses)
         solved += 2 * np.pi * np.round((near[:, None] - solved) / (2 * np.pi))
         apart = np.where(reach, np.abs(solved - near[:, None]).max(axis=2), np.inf)
         q.append(solved[np.arange(len(at)), apart.argmin(axis=1)])

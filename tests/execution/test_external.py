@@ -58,7 +58,7 @@ def joints_at(run, plan, time):
     poses = plan.T_base_part @ run.tool_motion.poses(time) @ np.linalg.inv(plan.T_flange_tip)
     near = np.stack([np.interp(time, run.time, joint) for joint in run.q.T], axis=1)
     q = [
-        plan.robot.held(at).nearest(T[None], q[None, :6])[0]
+        plan.robot.held(at).arm.nearest(T[None], q[None, :6])[0]
         for at, T, q in zip(x, poses, near, strict=True)
     ]
     return np.hstack([q, x])
@@ -197,7 +197,7 @@ def test_what_axes_need_between_the_nodes_is_brought_within_the_limits():
     nodes = np.abs(plan.acceleration_share).max(axis=0)
     assert (sharp > nodes)[6:].all()
     # A robot that can just do at the nodes what each joint has to do there.
-    tight = replace(plan, robot=replace(plan.robot, acceleration=acceleration * nodes * 1.0001))
+    tight = replace(plan, robot=plan.robot.with_limits(acceleration=acceleration * nodes * 1.0001))
     before = executed(build_program([tight]))[0]
     assert before.peak_acceleration.share > 1.001
     kept = keep_limits(tight)
@@ -215,7 +215,7 @@ def test_an_axis_that_needs_too_much_is_named(monkeypatch):
     needed = acceleration * np.abs(plan.acceleration_share).max(axis=0)
     # The arm has room to spare, the axes have none; zones are next to nothing.
     room = np.append(np.full(6, 3.0), [1.01, 1.02])
-    tight = replace(plan, robot=replace(plan.robot, acceleration=needed * room))
+    tight = replace(plan, robot=plan.robot.with_limits(acceleration=needed * room))
     kept = keep_limits(tight, lambda one: build_program([one], zone_error=1e-7))
     assert not kept.done
     worst = max(("rail", "turn"), key=lambda name: peak_of(kept.run, name, plan.robot))

@@ -24,7 +24,7 @@ def tight(circle, arm, tool, placement):
     share = made.criteria.peak_acceleration.max()
     # The same motion on a robot that can just do it at the nodes.
     _, acceleration = arm.speed_limits()
-    return replace(made, robot=replace(arm, acceleration=acceleration * share * 1.0001))
+    return replace(made, robot=arm.with_limits(acceleration=acceleration * share * 1.0001))
 
 
 def densely(run, program):
@@ -36,7 +36,9 @@ def densely(run, program):
     d = step / 10
     near = np.stack([np.interp(time, run.time, joint) for joint in run.q.T], axis=1)
     q = [
-        robot.nearest(program.T_base_part @ run.tool_motion.poses(time + sign * d) @ flange, near)
+        robot.arm.nearest(
+            program.T_base_part @ run.tool_motion.poses(time + sign * d) @ flange, near
+        )
         for sign in (-1, 0, 1)
     ]
     velocity, acceleration = robot.speed_limits()

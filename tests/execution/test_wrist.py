@@ -7,7 +7,7 @@ from scipy.optimize import least_squares
 from kerfpath import InputError, plan
 from kerfpath.execution import executed, from_stop_to_stop, run_along
 from kerfpath.post import Controller, build_program
-from kerfpath.robots import Robot
+from kerfpath.robots import Arm, Robot, RobotLimits
 
 WRIST = Controller(orientation="wrist")
 
@@ -87,12 +87,16 @@ def test_it_is_said_to_be_sampled(run):
 def test_an_arm_without_a_wrist_of_three_joints_is_refused(made):
     five = Robot(
         id="five",
-        kinematics="five",
-        geometry={"a1": 0.3, "a2": -0.1, "b": 0.0, "c1": 0.7, "c2": 0.9, "c3": 0.8, "c4": 0.12},
-        lower=np.full(5, -3.0),
-        upper=np.full(5, 3.0),
-        velocity=np.full(5, 2.0),
-        acceleration=np.full(5, 8.0),
+        arm=Arm(
+            kinematics="five",
+            geometry={"a1": 0.3, "a2": -0.1, "b": 0.0, "c1": 0.7, "c2": 0.9, "c3": 0.8, "c4": 0.12},
+        ),
+        limits=RobotLimits(
+            lower=np.full(5, -3.0),
+            upper=np.full(5, 3.0),
+            velocity=np.full(5, 2.0),
+            acceleration=np.full(5, 8.0),
+        ),
     )
     moves = from_stop_to_stop(build_program([made]).sections[0].moves)[0]
     with pytest.raises(InputError, match="'wrist' is modelled for six joints, got 5"):

@@ -85,7 +85,7 @@ def test_tilts_of_one_gamma_are_poses_of_their_own(dome, circle, arm, tool, plac
 
 
 def test_the_map_is_that_of_measuring_each_vertex(dome, circle, arm, tool, placement):
-    turning = replace(arm, endless=np.zeros(6, bool))
+    turning = arm.with_limits(endless=np.zeros(6, bool))
     graph = layered_graph(
         circle.resample(count=21), turning, tool=tool, placement=placement,
         gamma_step=np.radians(5),

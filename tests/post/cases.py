@@ -202,7 +202,7 @@ class Case:
         placement = np.eye(4)
         placement[:3, 3] = self.posture_place
         wide = arm.with_limits(lower=-reach, upper=reach, velocity=np.full(6, 50.0))
-        free = replace(wide, couplings=())
+        free = wide.with_limits(couplings=())
         return hand_plan(arc(count=20, radius=0.03), free, tool, placement, posture=number)
 
 

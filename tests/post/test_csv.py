@@ -102,7 +102,8 @@ def test_what_concerns_the_whole_program_is_refused(program, change, code):
 
 
 def test_a_table_without_times_is_refused(program):
-    unknown = replace(program, robot=replace(program.robot, acceleration=None))
+    limits = replace(program.robot.limits, acceleration=None)
+    unknown = replace(program, robot=replace(program.robot, limits=limits))
     assert codes(unknown, "error", "csv") == ["joint-speed"]
     headless = with_steps(program, program.sections[0].steps[2:])
     assert codes(headless, "error", "csv") == ["start"]

@@ -42,7 +42,7 @@ def program(*lengths, arm="abb_irb4600_60_205"):
     def move(x, zone=0.0, switches=()):
         T = tip.copy()
         T[:3, 3] += [0.0, x, 0.0]
-        q = arm.follow(T[None] @ np.linalg.inv(tool), start[None], branch(arm, start))[0]
+        q = arm.arm.follow(T[None] @ np.linalg.inv(tool), start[None], branch(arm, start))[0]
         return LinearMove(T_part_tip=T, q=q, speed=0.1, duration=0.01, zone=zone, switches=switches)
 
     def contour(number, nodes):
@@ -66,7 +66,7 @@ def program(*lengths, arm="abb_irb4600_60_205"):
 
 def branch(arm, q):
     """The posture of a joint vector, as `follow` wants it."""
-    solved, _ = arm.inverse_all(arm.forward(q)[None])
+    solved, _ = arm.arm.inverse_all(arm.forward(q)[None])
     apart = np.abs((solved[0] - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
     return np.array([int(np.nanargmin(apart))])
 

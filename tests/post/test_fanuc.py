@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from tests.post.cases import CASES
 
+from conftest import rebuilt
 from kerfpath import InputError, robot
 from kerfpath.contour import KINDS
 from kerfpath.post import (
@@ -195,7 +196,7 @@ def test_frames_are_given_in_the_controllers_world(program):
     foot, flange = np.eye(4), np.eye(4)
     foot[:3, :3] = Rotation.from_euler("z", 90, degrees=True).as_matrix()
     foot[:3, 3], flange[:3, 3] = (1, 2, 3), (0, 0, 0.01)
-    arm = replace(program.robot, T_base_foot=foot, T_end_flange=flange, chain=None)
+    arm = rebuilt(program.robot, T_base_foot=foot, T_end_flange=flange, chain=None)
     moved = replace(program, robot=arm, T_base_part=foot @ program.T_base_part)
     tool = np.linalg.inv(flange) @ program.T_flange_tip
     moved = replace(moved, T_flange_tip=tool)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from tests.post.cases import CASES
 
+from conftest import rebuilt
 from kerfpath import Contour, InputError, plan, robot
 from kerfpath.post import (
     build_program,
@@ -212,7 +213,7 @@ def test_preflight_refuses_a_speed_beyond_that_of_the_machine_data(program):
 def test_preflight_refuses_frames_that_are_not_the_controllers(program, arm):
     turned = np.eye(4)
     turned[:3, :3] = Rotation.from_euler("z", 90, degrees=True).as_matrix()
-    for other in (replace(arm, T_end_flange=turned), replace(arm, T_base_foot=turned)):
+    for other in (rebuilt(arm, T_end_flange=turned), rebuilt(arm, T_base_foot=turned)):
         issues = list(CASE.language.check(replace(program, robot=other), OUTPUTS))
         assert [(i.level, i.code) for i in issues] == [("error", "frames")]
         assert "[1173.0, 0.0, 1650.0] mm" in issues[0].message

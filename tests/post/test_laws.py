@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 from tests.post.cases import CASES, kinds_of
 
+from conftest import rebuilt
 from kerfpath import InputError, robot
 from kerfpath.post import Comment, JointMove, ReadMove, ReadWait, build_program, post
 from programs import arc, arced, hand_plan, with_steps
@@ -176,7 +177,7 @@ def test_an_arm_described_otherwise_has_the_same_axes(case):
     turned = np.eye(4)
     turned[:3, :3] = Rotation.from_euler("z", 40, degrees=True).as_matrix()
     zeros = arm.offset + np.radians([10, 20, 30, 40, 50, 60])
-    other = replace(arm, sign=-arm.sign, offset=zeros, T_end_flange=arm.T_end_flange @ turned)
+    other = rebuilt(arm, sign=-arm.sign, offset=zeros, T_end_flange=arm.T_end_flange @ turned)
     q = np.random.default_rng(5).uniform(-1, 1, (20, 6))
     axes = module.axes_from_joints(arm, q)
     same = module.joints_from_axes(other, axes)

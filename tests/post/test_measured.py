@@ -4,6 +4,8 @@ FANUC's are in test_post_fanuc.py, Staubli's in test_post_val3.py. No pair of a 
 Robots controller, with joints, pose and words of one stand, was found in public.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -13,6 +15,7 @@ from kerfpath.post.arcs import faceplate, world
 from kerfpath.post.inform import joints_from_axes, manipulator_type
 from kerfpath.post.inform.controller import joints_at
 from kerfpath.post.rapid import confdata
+from kerfpath.robots import RobotLimits
 
 PULSES = """
     208  -75312    1200       1 -127658     -69
@@ -153,10 +156,8 @@ def test_a_virtual_abb_controller_says_the_same_pose_and_configuration(row):
     numbers = np.array(row.split(), float)
     lengths = {"a1": 0.32, "a2": -0.2, "b": 0.0, "c1": 0.78, "c2": 1.125, "c3": 1.3925, "c4": 0.35}
     like = robot("abb_irb6700_200_260")
-    arm = Robot(
-        id="probe", kinematics="opw", geometry=lengths, sign=like.sign, offset=like.offset,
-        lower=np.full(6, -7.0), upper=np.full(6, 7.0),
-    )  # fmt: skip
+    limits = RobotLimits(lower=np.full(6, -7.0), upper=np.full(6, 7.0))
+    arm = Robot(id="probe", arm=replace(like.arm, geometry=lengths), limits=limits)
     q = np.radians(numbers[:6])
     T = arm.forward(q)
     np.testing.assert_allclose(T[:3, 3] * 1e3, numbers[10:13], atol=6e-4)

@@ -1,7 +1,6 @@
 """ABB RAPID: what is written, how it reads back, and what is refused."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from tests.post.cases import CASES
 
+from conftest import rebuilt
 from kerfpath import InputError, plan, robot
 from kerfpath.post import (
     LinearMove,
@@ -162,7 +162,7 @@ def test_configuration_bits_agree_with_a_construction_from_points(q):
 def test_the_elbow_bit_turns_over_at_the_stretched_arm():
     """IRB 6700 with 1392.5 mm and 200 mm: the elbow is singular at axis 3 = -81.83 deg."""
     arm = robot("abb_irb6700_200_260")
-    arm = replace(arm, geometry={**arm.geometry, "c3": 1.3925, "a2": -0.2})
+    arm = rebuilt(arm, geometry={**arm.geometry, "c3": 1.3925, "a2": -0.2})
     axis_3 = np.array([60, 0, -60, -81.5, -82.2, -90, -150])
     q = np.zeros((len(axis_3), 6))
     q[:, 2], q[:, 4] = np.radians(axis_3), np.radians(90)

@@ -214,7 +214,8 @@ def test_what_a_trajectory_cannot_say_is_refused(program):
         zone=0.0003,
     )
     assert codes(with_steps(program, [*steps[:4], bent, *steps[6:]]), "error", "ros") == ["arc"]
-    unknown = replace(program, robot=replace(program.robot, acceleration=None))
+    limits = replace(program.robot.limits, acceleration=None)
+    unknown = replace(program, robot=replace(program.robot, limits=limits))
     assert codes(unknown, "error", "ros") == ["joint-speed"]
 
 

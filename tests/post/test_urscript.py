@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from tests.post.cases import CASES
 
+from conftest import rebuilt
 from kerfpath import InputError
 from kerfpath.post import (
     Comment,
@@ -81,7 +82,7 @@ def test_a_description_with_another_base_and_flange_gives_the_same_joints_and_po
     flange[:3, :3] = Rotation.from_euler("xyz", [90, 0, 90], degrees=True).as_matrix()
     turned = replace(
         program,
-        robot=replace(arm, T_base_foot=half, T_end_flange=flange),
+        robot=rebuilt(arm, T_base_foot=half, T_end_flange=flange),
         T_base_part=half @ program.T_base_part,
         T_flange_tip=flange.T @ program.T_flange_tip,
     )

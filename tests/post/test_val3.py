@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 from tests.post.cases import CASES
 
+from conftest import rebuilt
 from kerfpath import InputError, robot
 from kerfpath.post import (
     build_program,
@@ -206,7 +207,7 @@ def test_an_arm_described_otherwise_reads_back(cell):
     arm = cell[0]
     turned = np.eye(4)
     turned[:3, :3] = Rotation.from_euler("z", 40, degrees=True).as_matrix()
-    other = replace(arm, sign=-arm.sign, offset=arm.offset + 0.3, T_end_flange=turned)
+    other = rebuilt(arm, sign=-arm.sign, offset=arm.offset + 0.3, T_end_flange=turned)
     free = other.with_limits(lower=np.full(6, -7.0), upper=np.full(6, 7.0))
     reads_back(build_program([hand_plan(arc(), free, *cell[1:])], lead_time=0.0))
 

@@ -215,7 +215,7 @@ def test_a_closed_contour_keeps_them_across_its_seam(circle, arm, tool, placemen
     tau, q = np.diff(found.plan.time), found.plan.unwrapped
     assert np.abs(robot.torque_limit().shares(q, tau, periodic=True)).max() <= 1 + 1e-9
     _, a = rates_of(np.diff(q, axis=0), tau, periodic=True)
-    assert (np.abs(jerks_of(a, tau, periodic=True)) <= robot.jerk * (1 + 1e-9)).all()
+    assert (np.abs(jerks_of(a, tau, periodic=True)) <= robot.limits.jerk * (1 + 1e-9)).all()
 
 
 @pytest.mark.slow

@@ -1,16 +1,15 @@
 """What axis 3 of a controller measures: told of every arm, or no program that says it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from tests.urdf.test_urdf import frames_of, joint, urdf
 
+from conftest import rebuilt
 from kerfpath import InputError, Robot, robot
 from kerfpath.post import fanuc, inform, krl, rapid, val3
 from kerfpath.post.languages import language
-from kerfpath.robots import robot_ids
+from kerfpath.robots import Arm, robot_ids
 
 SAYS = {"ABB": rapid, "FANUC": fanuc, "KUKA": krl, "Staubli": val3, "Yaskawa": inform}
 OPW = [name for name in robot_ids() if robot(name).kinematics == "opw"]
@@ -67,7 +66,7 @@ def test_a_described_robot_has_the_axes_and_limits_of_the_library(tmp_path, name
             says.joints_from_axes(back, says.axes_from_joints(back, p)), p, atol=1e-9
         )
     if r.lower is not None:
-        ours, theirs = admits(replace(r, endless=np.zeros(6, bool)), q), admits(back, p)
+        ours, theirs = admits(r.with_limits(endless=np.zeros(6, bool)), q), admits(back, p)
         assert not (theirs & ~ours).any()
         alike = [t for t in OPW if t in " ".join(back.notes)]
         if len(alike) == 1:
@@ -77,7 +76,7 @@ def test_a_described_robot_has_the_axes_and_limits_of_the_library(tmp_path, name
 def stretched(tmp_path, name, **options):
     """A robot of the library with another forearm: an arm that the library does not have."""
     r = robot(name)
-    longer = replace(r, geometry={**r.geometry, "c3": r.geometry["c3"] + 0.05})
+    longer = rebuilt(r, geometry={**r.geometry, "c3": r.geometry["c3"] + 0.05})
     path = counted_otherwise(tmp_path, longer, np.ones(6), np.zeros(6))
     return Robot.from_urdf(path, manufacturer=r.manufacturer, **options)
 
@@ -145,11 +144,7 @@ def test_no_two_robots_of_a_maker_with_the_same_lengths_count_axis_3_otherwise()
         r = robot(name)
         arm = Robot(
             id="arm",
-            geometry=r.geometry,
-            sign=r.sign,
-            offset=r.offset,
+            arm=Arm(geometry=r.geometry, sign=r.sign, offset=r.offset),
             manufacturer=r.manufacturer,
         )
-        from kerfpath.robots import with_axis_3
-
-        assert with_axis_3(arm).axis_3 == r.axis_3
+        assert arm.with_axis_3().axis_3 == r.axis_3

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from conftest import rebuilt
 from kerfpath import InputError, robot
 from kerfpath.kernels.enclosure import BOX, NONE, SMOOTH
-from kerfpath.robots import FAMILIES, robot_ids
+from kerfpath.robots import FAMILIES, Arm, RobotLimits, robot_ids
 
 IDS = [name for name in robot_ids() if robot(name).encloses]
 SAMPLES = 15_000  # of each of the 68 robots: 10^6 in all
@@ -40,7 +41,7 @@ def tasks(r, rng, count):
 
 
 def solutions(r, frames, gamma, tool):
-    return r.inverse_all(np.ascontiguousarray(turned(frames, gamma) @ np.linalg.inv(tool)))
+    return r.arm.inverse_all(np.ascontiguousarray(turned(frames, gamma) @ np.linalg.inv(tool)))
 
 
 def outside(e, q, t):
@@ -66,7 +67,7 @@ def test_every_solution_on_a_cell_is_in_the_enclosure_of_its_posture(name):
     gamma = rng.uniform(-np.pi, np.pi, SAMPLES)
     half = 10.0 ** rng.uniform(-6, np.log10(0.2), SAMPLES)
     t = rng.choice([-1.0, 1.0, 0.0, rng.uniform(-1, 1)], SAMPLES) * half
-    e = r.enclose(frames, node, gamma, half, tool)
+    e = r.arm.enclose(frames, node, gamma, half, tool)
     q, reach = solutions(r, frames[node], gamma + t, tool)
     assert (outside(e, q, t)[reach] <= FLOAT_KINEMATICS).all()
     # Smooth means that a solution is there, all over the cell.
@@ -82,7 +83,7 @@ def test_every_solution_on_a_cell_is_in_the_enclosure_of_its_posture(name):
 
 def singular(r, rng, count):
     """Joints (count, 6) of the model at singularities of every kind, or near them."""
-    a, q = r.arm(), rng.uniform(-np.pi, np.pi, (count, 6))
+    a, q = r.arm.model(), rng.uniform(-np.pi, np.pi, (count, 6))
     straight = rng.choice([0.0, np.pi], count)
     kind = rng.integers(0, 4, count)
     wrist, elbow, shoulder = kind % 3 == 0, kind % 3 == 1, kind == 2
@@ -106,7 +107,7 @@ def test_joints_at_a_singularity_are_held_whatever_is_free_there(name):
     tool, q = pose(rng), singular(r, rng, 600)
     half = 10.0 ** rng.uniform(-9, -1, len(q))
     t = rng.choice([0.0, 0.5, 1.0], len(q)) * half
-    e = r.enclose(r.forward(q) @ tool, np.arange(len(q)), -t, half, tool)
+    e = r.arm.enclose(r.forward(q) @ tool, np.arange(len(q)), -t, half, tool)
     # The pose of q has errors of 1e-15 m and rad, as the radii have that stand for them.
     assert (outside(e, q[:, None], t).min(axis=1) <= 1e-12).all()
 
@@ -114,7 +115,7 @@ def test_joints_at_a_singularity_are_held_whatever_is_free_there(name):
 @pytest.mark.parametrize("name", ["abb_irb2400_155", "staubli_tx2_90"])
 def test_at_a_wrist_singularity_axes_4_and_6_are_free(name):
     r, rng = robot(name), np.random.default_rng(3)
-    a, tool = r.arm(), pose(rng)
+    a, tool = r.arm.model(), pose(rng)
     q = np.tile(rng.uniform(-1, 1, 6), (50, 1))
     q[:, 4] = a.sign[4] * a.offset[4]
     q[:, 3] = np.linspace(-np.pi, np.pi, 50)
@@ -122,7 +123,7 @@ def test_at_a_wrist_singularity_axes_4_and_6_are_free(name):
     T = r.forward(q)
     # One pose for all of them, to rounding.
     np.testing.assert_allclose(T, np.broadcast_to(T[:1], T.shape), atol=1e-14)
-    e = r.enclose(T[:1] @ tool, np.zeros(50, int), np.zeros(50), np.full(50, 1e-9), tool)
+    e = r.arm.enclose(T[:1] @ tool, np.zeros(50, int), np.zeros(50), np.full(50, 1e-9), tool)
     assert (outside(e, q[:, None], np.zeros(50)).min(axis=1) <= 0).all()
 
 
@@ -132,7 +133,7 @@ def test_no_solution_is_proved_only_where_none_is_found(name):
     frames, tool = tasks(r, rng, 300)
     node = rng.integers(0, 300, 300)
     gamma, half = rng.uniform(-np.pi, np.pi, 300), rng.uniform(0, 0.1, 300)
-    e = r.enclose(frames, node, gamma, half, tool)
+    e = r.arm.enclose(frames, node, gamma, half, tool)
     none = e.status == NONE
     for share in np.linspace(-1, 1, 41):
         _, reach = solutions(r, frames[node], gamma + share * half, tool)
@@ -154,7 +155,7 @@ def test_curvature_is_the_true_one_to_what_the_cell_leaves(name):
     true = (q[2] - 2 * q[1] + q[0]) / step**2
     widths, at = [], np.all(reach, axis=0)
     for half in np.radians([0.5, 0.25, 0.125]):
-        e = r.enclose(frames, node, gamma, np.full(2000, half), tool)
+        e = r.arm.enclose(frames, node, gamma, np.full(2000, half), tool)
         smooth = at & (e.status == SMOOTH)
         # Differences of second order over 0.001 rad, of joints known to 1e-13 or so.
         tame = smooth[..., None] & (np.abs(true) < 5)
@@ -235,7 +236,7 @@ def test_solutions_in_forty_digits_are_inside_without_any_tolerance(name):
     frames, tool = tasks(r, rng, 20)
     gamma = rng.uniform(-np.pi, np.pi, 20)
     half = 10.0 ** rng.uniform(-12, -2, 20)
-    e = r.enclose(frames, np.arange(20), gamma, half, tool)
+    e = r.arm.enclose(frames, np.arange(20), gamma, half, tool)
     t = rng.choice([-1.0, 0.0, 0.7, 1.0], 20) * half
     q, reach = solutions(r, frames, gamma + t, tool)
     end = nearest_pose(tool) ** -1
@@ -254,11 +255,11 @@ def test_solutions_in_forty_digits_are_inside_without_any_tolerance(name):
 
 def test_a_robot_that_stands_elsewhere_is_enclosed_there():
     rng = np.random.default_rng(7)
-    r = replace(robot("kuka_kr70_r2100"), T_base_foot=pose(rng), T_end_flange=pose(rng))
+    r = rebuilt(robot("kuka_kr70_r2100"), T_base_foot=pose(rng), T_end_flange=pose(rng))
     frames, tool = tasks(r, rng, 500)
     half, zero = np.full(500, 1e-3), np.zeros(500)
-    e = r.enclose(frames, np.arange(500), zero, half, tool)
-    q, reach = r.inverse_nodes(frames, np.array([0.0005]), tool)
+    e = r.arm.enclose(frames, np.arange(500), zero, half, tool)
+    q, reach = r.arm.inverse_nodes(frames, np.array([0.0005]), tool)
     assert (outside(e, q[:, 0], zero + 0.0005)[reach[:, 0]] <= FLOAT_KINEMATICS).all()
     assert reach.any()
 
@@ -269,8 +270,8 @@ def test_a_tool_of_seven_decimals_widens_the_radii_by_its_error():
     frames, tool = tasks(r, rng, 500)
     rounded = np.round(tool, 7)
     cells = np.arange(500), np.zeros(500), np.zeros(500)
-    q, reach = r.inverse_nodes(frames, np.zeros(1), rounded)
-    e, sharp = (r.enclose(frames, *cells, T) for T in (rounded, tool))
+    q, reach = r.arm.inverse_nodes(frames, np.zeros(1), rounded)
+    e, sharp = (r.arm.enclose(frames, *cells, T) for T in (rounded, tool))
     assert (outside(e, q[:, 0], np.zeros(500))[reach[:, 0]] <= 0).all()
     both = (e.status == SMOOTH) & (sharp.status == SMOOTH)
     assert np.median(sharp.radius[both]) < 1e-12
@@ -283,18 +284,12 @@ def test_what_has_no_proven_bounds_says_so():
     assert r.encloses
     railed = r.on_rail([1, 0, 0], lower=0, upper=1, velocity=1, acceleration=1, step=0.1)
     assert not railed.encloses
-    with pytest.raises(InputError, match="rail"):
-        railed.enclose(np.eye(4)[None], *cell, np.eye(4))
-    five = replace(r, kinematics="five", sign=np.ones(5), offset=np.zeros(5), **five_joints(r))
+    arm = Arm(kinematics="five", geometry=r.geometry)
+    five = replace(r, arm=arm, limits=RobotLimits())
     assert not five.encloses
     with pytest.raises(InputError, match=r"its family \(five-axis arm: .* has no proven bounds"):
-        five.enclose(np.eye(4)[None], *cell, np.eye(4))
+        five.arm.enclose(np.eye(4)[None], *cell, np.eye(4))
     assert {name for name, f in FAMILIES.items() if f.enclose_all} == {"opw", "ur"}
-
-
-def five_joints(r):
-    names = ("lower", "upper", "velocity", "acceleration", "endless")
-    return {"couplings": ()} | {name: getattr(r, name)[:5] for name in names}
 
 
 @pytest.mark.parametrize(
@@ -309,4 +304,4 @@ def five_joints(r):
 def test_a_bad_cell_is_refused(node, gamma, half, words):
     r = robot("abb_irb2400_155")
     with pytest.raises(InputError, match=words):
-        r.enclose(np.eye(4)[None], np.array(node), np.array(gamma), np.array(half), np.eye(4))
+        r.arm.enclose(np.eye(4)[None], np.array(node), np.array(gamma), np.array(half), np.eye(4))

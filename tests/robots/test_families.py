@@ -1,15 +1,13 @@
 """Kinematic families beyond the ortho-parallel arm, and arms that stand or end elsewhere."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from conftest import pose
+from conftest import pose, rebuilt
 from kerfpath import Contour, InputError, audit, fastest_speed, plan, robot
 from kerfpath.auditor import chain_of
 from kerfpath.graph import build, gamma_grid
-from kerfpath.robots import Robot
+from kerfpath.robots import Arm, Robot
 
 UR = robot("ur_ur10e")
 
@@ -95,7 +93,8 @@ def test_an_arm_may_stand_and_end_elsewhere(name):
     rng = np.random.default_rng(25)
     foot, flange = robot(name).forward(rng.uniform(-3, 3, (2, 6)))
     own = robot(name)
-    r = replace(own, T_base_foot=foot, T_end_flange=flange, endless=np.ones(6, bool))
+    r = rebuilt(own, T_base_foot=foot, T_end_flange=flange)
+    r = r.with_limits(endless=np.ones(6, bool))
     q = rng.uniform(-np.pi, np.pi, (50, 6))
     np.testing.assert_allclose(r.forward(q), foot @ own.forward(q) @ flange, atol=1e-14)
     np.testing.assert_allclose(chain_of(r).forward(q), r.forward(q), atol=1e-12)
@@ -112,10 +111,12 @@ def test_signs_and_offsets_of_a_ur_are_kept():
     rng = np.random.default_rng(26)
     r = Robot(
         id="other",
-        kinematics="ur",
-        geometry={"d1": 0.2, "a2": 0.5, "a3": 0.4, "d4": -0.1, "d5": 0.0, "d6": 0.1},
-        sign=[1, -1, -1, 1, -1, 1],
-        offset=rng.uniform(-np.pi, np.pi, 6),
+        arm=Arm(
+            kinematics="ur",
+            geometry={"d1": 0.2, "a2": 0.5, "a3": 0.4, "d4": -0.1, "d5": 0.0, "d6": 0.1},
+            sign=[1, -1, -1, 1, -1, 1],
+            offset=rng.uniform(-np.pi, np.pi, 6),
+        ),
     )
     q = rng.uniform(-np.pi, np.pi, (500, 6))
     found = solved(r, q)
@@ -144,8 +145,8 @@ def test_a_ur_is_planned_and_audited_like_any_other():
 
 def test_unknown_families_and_lengths_are_refused():
     with pytest.raises(InputError, match=r"kinematics: expected one of opw, ur, .*, got 'scara'"):
-        Robot(id="x", kinematics="scara", geometry={})
+        Arm(kinematics="scara", geometry={})
     with pytest.raises(InputError, match=r"geometry lacks d1, a3 \(m\)"):
-        Robot(id="x", kinematics="ur", geometry={"a2": 1, "d4": 0, "d5": 0, "d6": 0})
+        Arm(kinematics="ur", geometry={"a2": 1, "d4": 0, "d5": 0, "d6": 0})
     with pytest.raises(InputError, match=r"T_base_foot: the last row"):
-        replace(UR, T_base_foot=np.ones((4, 4)))
+        rebuilt(UR, T_base_foot=np.ones((4, 4)))

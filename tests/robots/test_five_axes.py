@@ -1,27 +1,29 @@
 """Five-axis arms: no rotation is free, the graph holds postures and turns, the rest is the same."""
 
-from dataclasses import replace
-
 import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from conftest import pose
+from conftest import pose, rebuilt
 from kerfpath import Contour, audit, fastest_speed, plan
 from kerfpath.auditor import chain_of
 from kerfpath.graph import build, gamma_grid
-from kerfpath.robots import Robot
+from kerfpath.robots import Arm, Robot, RobotLimits
 
 ARM = Robot(
     id="five",
-    kinematics="five",
-    geometry={"a1": 0.3, "a2": -0.1, "b": 0.0, "c1": 0.7, "c2": 0.9, "c3": 0.8, "c4": 0.12},
-    lower=np.radians([-170, -90, -60, -180, -180]),
-    upper=np.radians([170, 120, 170, 180, 180]),
-    velocity=np.radians([120, 110, 130, 300, 300]),
-    acceleration=np.radians([400, 300, 500, 1500, 1500]),
-    endless=[0, 0, 0, 1, 1],
+    arm=Arm(
+        kinematics="five",
+        geometry={"a1": 0.3, "a2": -0.1, "b": 0.0, "c1": 0.7, "c2": 0.9, "c3": 0.8, "c4": 0.12},
+    ),
+    limits=RobotLimits(
+        lower=np.radians([-170, -90, -60, -180, -180]),
+        upper=np.radians([170, 120, 170, 180, 180]),
+        velocity=np.radians([120, 110, 130, 300, 300]),
+        acceleration=np.radians([400, 300, 500, 1500, 1500]),
+        endless=[0, 0, 0, 1, 1],
+    ),
 )
 
 
@@ -53,7 +55,7 @@ def test_tip_and_axis_are_met_and_the_joints_are_found(name, placed):
         foot, end = pose([0.1, 0.2, 0.3]), pose([0, 0.02, 0.05])
         foot[:3, :3], end[:3, :3] = Rotation.random(2, rng=rng).as_matrix()
         sign, offset = np.array([1, -1, 1, -1, -1]), rng.uniform(-3, 3, 5)
-        arm = replace(ARM, T_base_foot=foot, T_end_flange=end, sign=sign, offset=offset)
+        arm = rebuilt(ARM, T_base_foot=foot, T_end_flange=end, sign=sign, offset=offset)
         tool = np.linalg.inv(end) @ tool
     q = rng.uniform(-np.pi, np.pi, (3000, 5))
     np.testing.assert_allclose(chain_of(arm).forward(q), arm.forward(q), atol=1e-12)
@@ -61,7 +63,7 @@ def test_tip_and_axis_are_met_and_the_joints_are_found(name, placed):
     # The rotation about the tool axis is none of the task's.
     spin = rng.uniform(-np.pi, np.pi, (len(q), 1)) * [0, 0, 1]
     H[:, :3, :3] = H[:, :3, :3] @ Rotation.from_rotvec(spin).as_matrix()
-    found, reach = arm.inverse_nodes(H, np.zeros(1), tool)
+    found, reach = arm.arm.inverse_nodes(H, np.zeros(1), tool)
     node, _, _ = np.nonzero(reach)
     found = found[reach]
     tip = arm.forward(found) @ tool
@@ -86,7 +88,7 @@ def test_tip_and_axis_are_met_and_the_joints_are_found(name, placed):
 
 def test_the_wrist_posture_is_the_side_of_the_forearm():
     q = np.random.default_rng(41).uniform(-np.pi, np.pi, (200, 5))
-    found, reach = ARM.inverse_nodes(
+    found, reach = ARM.arm.inverse_nodes(
         ARM.forward(q) @ TOOLS["straight"], np.zeros(1), TOOLS["straight"]
     )
     _, _, mu = np.nonzero(reach)
@@ -101,7 +103,7 @@ def test_the_stretched_wrist_is_solved():
     q = np.random.default_rng(42).uniform(-1, 1, (50, 5))
     q[:, 4] = 0
     H = ARM.forward(q) @ tool
-    found, reach = ARM.inverse_nodes(H, np.zeros(1), tool)
+    found, reach = ARM.arm.inverse_nodes(H, np.zeros(1), tool)
     assert np.isfinite(found).all()
     assert reach.any(axis=(1, 2)).all()
     node, _, _ = np.nonzero(reach)

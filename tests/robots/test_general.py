@@ -9,13 +9,13 @@ import pytest
 import ssik._native
 from tests.urdf.test_urdf import LIMIT, joint, urdf
 
-from conftest import pose
+from conftest import pose, rebuilt
 from kerfpath import Contour, InputError, Robot, audit, plan
 from kerfpath.auditor import chain_of, checks
 from kerfpath.graph import build, gamma_grid
 from kerfpath.job import read_plan_file
 from kerfpath.job.plan_file import plan_document, plan_entry, plan_text
-from kerfpath.robots import general, ssik_interface
+from kerfpath.robots import Arm, RobotLimits, general, ssik_interface
 from kerfpath.urdf import KinematicChain
 
 HALF = np.pi / 2
@@ -33,9 +33,8 @@ def chain_from(alpha, a, d):
 
 def arm_from(*parameters, **limits):
     given = {"lower": -2 * np.ones(6), "upper": 3.1 * np.ones(6), **limits}
-    return Robot(
-        id="any", kinematics="general", geometry={}, chain=chain_from(*parameters), **given
-    )
+    arm = Arm(kinematics="general", geometry={}, chain=chain_from(*parameters))
+    return Robot(id="any", arm=arm, limits=RobotLimits(**given))
 
 
 def random_arm(kind, seed):
@@ -144,9 +143,9 @@ def test_searching_from_many_starts_finds_the_same_solutions(offset_wrist):
 
 def test_many_poses_go_to_a_process_and_come_back_the_same(offset_wrist, monkeypatch):
     T = offset_wrist.forward(np.random.default_rng(45).uniform(-3, 3, (60, 6)))
-    q, reach = offset_wrist.inverse_all(T)
+    q, reach = offset_wrist.arm.inverse_all(T)
     monkeypatch.setattr(ssik_interface, "A_PROCESS", 50)
-    again, reached = offset_wrist.inverse_all(T)
+    again, reached = offset_wrist.arm.inverse_all(T)
     np.testing.assert_array_equal(reach, reached)
     np.testing.assert_array_equal(q, again)
 
@@ -155,11 +154,11 @@ def test_a_branch_is_followed_where_its_posture_changes(offset_wrist):
     q = np.random.default_rng(46).uniform(-3, 3, (50, 6))
     step = np.random.default_rng(47).uniform(-1e-3, 1e-3, (50, 6))
     T = offset_wrist.forward(q + step)
-    followed = offset_wrist.follow(T, q, np.zeros(50, int))
+    followed = offset_wrist.arm.follow(T, q, np.zeros(50, int))
     np.testing.assert_allclose(offset_wrist.forward(followed), T, atol=1e-9)
     assert np.abs(followed - q).max() < 2e-3
     far = offset_wrist.forward(q[:1]) + pose([5, 0, 0]) - np.eye(4)
-    assert np.isnan(offset_wrist.follow(far, q[:1], np.zeros(1, int))).all()
+    assert np.isnan(offset_wrist.arm.follow(far, q[:1], np.zeros(1, int))).all()
 
 
 def test_the_turns_within_the_limits_are_all_there(offset_wrist):
@@ -265,9 +264,9 @@ def test_an_arm_that_the_solver_does_not_solve_is_refused(monkeypatch):
 
 def test_a_general_robot_is_its_chain():
     with pytest.raises(InputError, match="needs the chain of its six joints"):
-        Robot(id="x", kinematics="general", geometry={}).forward(np.zeros(6))
+        Arm(kinematics="general", geometry={}).forward(np.zeros(6))
     with pytest.raises(InputError, match="remove sign= and offset="):
-        arm_from(*OFFSET_WRIST, offset=np.ones(6)).forward(np.zeros(6))
+        rebuilt(arm_from(*OFFSET_WRIST), offset=np.ones(6)).forward(np.zeros(6))
 
 
 def test_the_solver_is_not_loaded_for_other_robots():

@@ -10,8 +10,10 @@ from kerfpath.kernels import turns
 from kerfpath.kernels.frames import location
 from kerfpath.robots import (
     FAMILIES,
+    Arm,
     Coupling,
     Robot,
+    RobotLimits,
     acceleration_ratios,
     posture_name,
     postures_named,
@@ -83,10 +85,10 @@ def test_the_library_has_all_robots_with_sources():
 def test_a_wrist_turned_over_brings_the_flange_to_the_same_pose(name):
     """All joints but one by a constant, that one mirrored, from one posture to its neighbour."""
     r = robot(name)
-    if r.flip is None:
+    if r.arm.flip is None:
         assert r.kinematics != "opw"
         return
-    joint, middle = r.flip
+    joint, middle = r.arm.flip
     q = random_joints(np.random.default_rng(5), 50)
     found = r.inverse(r.forward(q), within_limits=False)
     one, other = (found.q[found.posture % 2 == over] for over in (0, 1))
@@ -248,11 +250,13 @@ def test_turns_agree_with_trying_them_all():
         rows = np.round(rng.normal(0, 1, (2, 6)))
         r = Robot(
             id="any",
-            geometry=robot("staubli_tx60").geometry,
-            lower=lower,
-            upper=lower + rng.uniform(4, 14, 6),
-            endless=rng.random(6) < 0.3,
-            couplings=tuple(Coupling(row=row, lower=-6.0, upper=8.0) for row in rows),
+            arm=Arm(geometry=robot("staubli_tx60").geometry),
+            limits=RobotLimits(
+                lower=lower,
+                upper=lower + rng.uniform(4, 14, 6),
+                endless=rng.random(6) < 0.3,
+                couplings=tuple(Coupling(row=row, lower=-6.0, upper=8.0) for row in rows),
+            ),
         )
         q = rng.uniform(-np.pi, np.pi, 6)
         full = q + 2 * np.pi * every
@@ -329,7 +333,7 @@ def test_a_robot_without_limits_is_refused_until_they_are_given():
             "must be positive",
         ),
         (lambda: robot("staubli_tx60").with_limits(endless=[2] * 6), "true or false"),
-        (lambda: Robot(id="x", geometry={"a1": 0.1}), "lacks a2, b, c1"),
+        (lambda: Arm(geometry={"a1": 0.1}), "lacks a2, b, c1"),
         (lambda: robot("staubli_tx60").forward([1, 2, 3]), r"expected shape \(any, 6\)"),
         (lambda: robot("staubli_tx60").inverse(np.eye(3)), r"expected shape \(any, 4, 4\)"),
         (lambda: Coupling(row=np.ones(6), lower=1.0, upper=0.0), "must be below the upper bound"),

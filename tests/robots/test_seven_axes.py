@@ -7,12 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tests.urdf.test_urdf import described
 
-from conftest import pose
+from conftest import pose, rebuilt
 from kerfpath import InputError, Robot, robot
 from kerfpath.comfort import jacobian, measure
 from kerfpath.dynamics import Load
-from kerfpath.robots import chain_of
-from kerfpath.robots.described import recognise
+from kerfpath.robots import Arm, chain_of
+from kerfpath.robots.recognition import recognise
 from kerfpath.urdf import KinematicChain
 
 LBR = "kuka_lbr_iiwa14_r820"
@@ -28,7 +28,7 @@ def placed(arm, rng):
     """The arm on another foot, with another flange, other signs and offsets."""
     foot, end = (pose(rng.uniform(-1, 1, 3), Rotation.random(rng=rng).as_matrix()) for _ in "ab")
     sign, offset = rng.choice([-1.0, 1.0], 7), rng.uniform(-3, 3, 7)
-    return replace(arm, T_base_foot=foot, T_end_flange=end, sign=sign, offset=offset)
+    return rebuilt(arm, T_base_foot=foot, T_end_flange=end, sign=sign, offset=offset)
 
 
 def off(a, b):
@@ -54,8 +54,8 @@ def test_every_posture_brings_the_flange_there_and_one_is_the_seed(lbr):
 
 def test_with_joint_3_at_zero_it_is_an_ortho_parallel_arm_posture_by_posture(lbr):
     g = lbr.geometry
-    six = Robot(id="six", geometry={"a1": 0.0, "a2": 0.0, "b": 0.0} | g)
-    upright = replace(lbr, sign=np.ones(7))
+    six = Arm(geometry={"a1": 0.0, "a2": 0.0, "b": 0.0} | g)
+    upright = replace(lbr.arm, sign=np.ones(7))
     q = np.random.default_rng(2).uniform(-3, 3, (500, 6))
     T = six.forward(q)
     seven, (want, reach) = upright.inverse_all(T, np.zeros(len(T)))[0], six.inverse_all(T)

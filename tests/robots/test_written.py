@@ -21,7 +21,7 @@ SAME = 1e-9
 
 def whole(name):
     """A library robot without couplings, and with limits where none are known."""
-    known = replace(robot(name), couplings=())
+    known = robot(name).with_limits(couplings=())
     if known.lower is None:
         known = known.with_limits(
             lower=-3.0 * np.ones(6), upper=3.0 * np.ones(6), velocity=np.ones(6)
@@ -102,9 +102,9 @@ def test_jerks_and_torques_are_written_where_they_are_known(tmp_path):
     jerk = [1e3, 2e3, np.inf, 4e3, 5e3, 6e3]
     known = robot("abb_irb4600_60_205").with_limits(jerk=jerk, torque=100.0 + np.arange(6))
     again = read_back(tmp_path, known)
-    np.testing.assert_array_equal(again.jerk, jerk)
-    np.testing.assert_array_equal(again.torque, known.torque)
-    assert read_back(tmp_path, robot("abb_irb4600_60_205")).torque is None
+    np.testing.assert_array_equal(again.limits.jerk, jerk)
+    np.testing.assert_array_equal(again.limits.torque, known.limits.torque)
+    assert read_back(tmp_path, robot("abb_irb4600_60_205")).limits.torque is None
 
 
 def placed(arm):
@@ -161,7 +161,8 @@ def test_what_a_urdf_cannot_say_is_refused_in_one_line():
             robot(name).to_urdf()
     with pytest.raises(InputError, match=r"joint limits are not known .*with_limits\(lower="):
         robot("kuka_kr120_r2500_pro").to_urdf()
-    unknown = replace(robot("abb_irb4600_60_205"), velocity=None)
+    unknown = robot("abb_irb4600_60_205")
+    unknown = replace(unknown, limits=replace(unknown.limits, velocity=None))
     with pytest.raises(InputError, match="joint velocities are not known"):
         unknown.to_urdf()
 

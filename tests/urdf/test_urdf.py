@@ -97,7 +97,7 @@ def test_a_library_robot_comes_back_from_its_description(tmp_path, name):
     q = np.random.default_rng(30).uniform(-np.pi, np.pi, (50, r.joints))
     np.testing.assert_allclose(back.forward(q), r.forward(q), atol=1e-9)
     np.testing.assert_allclose(chain_of(back).forward(q), r.forward(q), atol=1e-9)
-    given = r.given_of(q)
+    given = r.arm.given_of(q)
     assert len(back.inverse(r.forward(q), given=given, within_limits=False)) == len(
         r.inverse(r.forward(q), given=given, within_limits=False)
     )

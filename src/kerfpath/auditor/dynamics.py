@@ -56,7 +56,7 @@ class LagrangeArm:
         """
         if robot.torque_limit() is None:
             return None
-        chain, own, load = chain_of(robot), robot.inertia, robot.load
+        chain, own, load = chain_of(robot), robot.dynamics.inertia, robot.dynamics.load
         assert own is not None
         assert load is not None
         n, T = len(own.mass), chain.tip
@@ -68,7 +68,7 @@ class LagrangeArm:
             mass=np.append(own.mass, load.mass),
             centre=np.vstack([own.centre, T[:3, :3] @ centre + T[:3, 3]]),
             tensor=np.concatenate([own.tensor, [T[:3, :3] @ tensor @ T[:3, :3].T]]),
-            gravity=robot.gravity,
+            gravity=robot.dynamics.gravity,
         )
 
     def torque(self, q: Array, v: Array, a: Array) -> Array:

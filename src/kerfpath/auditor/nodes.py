@@ -97,12 +97,14 @@ def _torques(
     if arm is None:
         return
     velocity, q = dq / dt[:, None], plan.q[1:-1]
-    share = np.abs(arm.torque(q, (velocity[1:] + velocity[:-1]) / 2, change)) / plan.robot.torque
+    share = (
+        np.abs(arm.torque(q, (velocity[1:] + velocity[:-1]) / 2, change)) / plan.robot.limits.torque
+    )
     left = None
     if rounding is not None:
         M, _ = arm.inertia(q)
         left = np.einsum("bij,bj->bi", np.abs(M), rounding.of_acceleration(dq, dt))
-        left = left / plan.robot.torque
+        left = left / plan.robot.limits.torque
     title = "joint torque at the nodes, without friction and rotors"
     yield _per_joint(plan, "torque", title, share, 1.0, left)
 

@@ -15,7 +15,7 @@ from kerfpath.cell.mesh import Mesh, close_surface, read_surface, size_of
 from kerfpath.cell.scene import Body
 from kerfpath.cell.shapes import Capsule, Hull, Shape, box, frustum
 from kerfpath.errors import InputError
-from kerfpath.robots import CarriedChain, Robot, chain_of, model_chain
+from kerfpath.robots import CarriedChain, Robot, chain_of
 from kerfpath.urdf import LinkBody as Described
 
 # -----------------------------------------------------------------------------
@@ -202,7 +202,7 @@ def link_capsules(robot: Robot) -> tuple[Body, ...]:
     if robot.kinematics in _LINES:
         lines = _LINES[robot.kinematics](robot.geometry)
         # Model and description have frames of different pose for the same links.
-        model = model_chain(robot).frames(zero)[0]
+        model = robot.arm.model_chain().frames(zero)[0]
         places = np.linalg.inv(chain.frames(zero)[0]) @ model
         places[0] = robot.T_base_foot
     else:

@@ -74,7 +74,7 @@ class CellSet:
         return np.rint(self.center * (LIFTS / np.pi)).astype(np.int8)
 
     def flipped(self, joint: int, middle: float) -> CellSet:
-        """Return the cells with the wrist flipped (`Robot.flip`), up to constant turns."""
+        """Return the cells with the wrist flipped (`Arm.flip`), up to constant turns."""
         center, slope, bend = self.center.copy(), self.slope.copy(), self.bend.copy()
         center[:, joint] = 2 * middle - center[:, joint]
         slope[:, joint] *= -1
@@ -112,7 +112,7 @@ class CellMaker:
     ----------
     endless : (n,) bool
     flip : tuple, optional
-        As `Robot.flip`.
+        As `Arm.flip`.
     """
 
     def __init__(
@@ -134,7 +134,7 @@ class CellMaker:
         )
         used = range(robot.postures) if postures is None else sorted(postures)
         self._postures, self._width = np.array(used, np.int8), width
-        self.endless, self.flip = robot.endless, robot.flip
+        self.endless, self.flip = robot.endless, robot.arm.flip
 
     def coarsest(self, nodes: Ints) -> CellSet:
         """Return the cells of level 0 at some nodes, in postures and turns within the ranges."""
@@ -153,7 +153,7 @@ class CellMaker:
         Both are (K, n), rad and rad/rad; None if the posture does not reach some node.
         """
         node, half = np.arange(len(gamma)), np.full(len(gamma), SLIGHT)
-        found = self._robot.enclose(self._frames, node, gamma, half, self._tool)
+        found = self._robot.arm.enclose(self._frames, node, gamma, half, self._tool)
         if not (found.status[:, posture] > 0).all():
             return None
         return found.center[:, posture], found.slope[:, posture]
@@ -213,7 +213,9 @@ class CellMaker:
             index.astype(np.int32),
         )
         gamma, half = cell_bounds(level, index)
-        found = self._robot.enclose(self._frames, node.astype(np.int64), gamma, half, self._tool)
+        found = self._robot.arm.enclose(
+            self._frames, node.astype(np.int64), gamma, half, self._tool
+        )
         wanted = np.zeros(found.status.shape[1], np.bool_)
         wanted[self._postures] = True
         cell, posture = np.nonzero((found.status > 0) & wanted)

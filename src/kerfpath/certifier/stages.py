@@ -396,7 +396,7 @@ def distinct_groups(result: StageResult, kept: Bools, maker: CellMaker) -> list[
     """Return the groups of kept cells that no step joins, (C,) bool each.
 
     A group is left out if another one contains it up to whole turns of the joints or a flipped
-    wrist (`Robot.flip`): each motion through it then has a counterpart through the other one at the
+    wrist (`Arm.flip`): each motion through it then has a counterpart through the other one at the
     same cost, as (5), (6) and the cost depend only on the sizes of increments.
     """
     labels, count = _joined(result, kept)

@@ -309,7 +309,7 @@ def _by_pose(
     """Return the joints (m, n) at times (m,) that are close to those at the targets (K, n)."""
     arm, x, seen = _alone(robot, motion, time, targets, T_base_part)
     near = np.stack([np.interp(time, motion.time, joint) for joint in targets.T], axis=1)
-    q = arm.nearest(seen @ np.linalg.inv(T_flange_tip), near[:, : arm.joints])
+    q = arm.arm.nearest(seen @ np.linalg.inv(T_flange_tip), near[:, : arm.joints])
     return np.concatenate([q, x], axis=1)
 
 

@@ -10,7 +10,7 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from types import UnionType
 from typing import (
@@ -44,7 +44,7 @@ from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.options import PlanOptions
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof
-from kerfpath.robots import Coupling, ExternalAxis, Robot
+from kerfpath.robots import Arm, Coupling, ExternalAxis, Robot, RobotLimits
 from kerfpath.sequence import PartPlan
 from kerfpath.setting import settings
 from kerfpath.transfer import TransferMove
@@ -580,14 +580,14 @@ def _unpacked(data: ArrayData, kind: str, where: str) -> NDArray[np.generic]:
 def dynamics_entry(robot: Robot) -> LimitsData:
     """Return the keys that limits on torque and jerk add to those of the arm's joints."""
     entry: LimitsData = {}  # type: ignore[typeddict-item]  # some keys of it, to be added
-    if robot.jerk is not None:
-        entry["jerk_rad_s3"] = [float(x) if np.isfinite(x) else None for x in robot.jerk]
-    load, own = robot.load, robot.inertia
-    if load is None or own is None or robot.torque is None:
+    if robot.limits.jerk is not None:
+        entry["jerk_rad_s3"] = [float(x) if np.isfinite(x) else None for x in robot.limits.jerk]
+    load, own = robot.dynamics.load, robot.dynamics.inertia
+    if load is None or own is None or robot.limits.torque is None:
         return entry
     entry["dynamics"] = {
-        "torque_nm": robot.torque.tolist(),
-        "gravity_m_s2": robot.gravity.tolist(),
+        "torque_nm": robot.limits.torque.tolist(),
+        "gravity_m_s2": robot.dynamics.gravity.tolist(),
         "mass_kg": own.mass.tolist(),
         "centre_m": own.centre.tolist(),
         "inertia_kg_m2": own.tensor.tolist(),
@@ -622,7 +622,8 @@ def with_dynamics(entry: LimitsData, robot: Robot) -> Robot:
         centre=said["load_centre_m"],  # type: ignore[arg-type]  # cast by __post_init__
         tensor=said["load_inertia_kg_m2"],  # type: ignore[arg-type]  # cast by __post_init__
     )
-    limited = replace(robot, inertia=own).with_limits(torque=said["torque_nm"])
+    known = replace(robot, dynamics=replace(robot.dynamics, inertia=own))
+    limited = known.with_limits(torque=said["torque_nm"])
     return limited.with_load(load, gravity=said["gravity_m_s2"])
 
 
@@ -875,7 +876,9 @@ def _read_robot(robot: RobotData, limits: LimitsData) -> Robot:
     own = _read(RobotData, robot) | _read(LimitsData, limits)
     own["chain"] = KinematicChain(**_read(ChainData, robot["chain"])) if robot["chain"] else None
     own["couplings"] = tuple(Coupling(**_read(CouplingData, c)) for c in limits["couplings"])
-    return with_dynamics(limits, Robot(**own))
+    arm = Arm(**{each.name: own.pop(each.name) for each in fields(Arm)})
+    within = {each.name: own.pop(each.name) for each in fields(RobotLimits) if each.name in own}
+    return with_dynamics(limits, Robot(arm=arm, limits=RobotLimits(**within), **own))
 
 
 def _read_plan(entry: PlanData, robot: Robot, tool: Any, placement: Any) -> Plan:

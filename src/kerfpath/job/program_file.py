@@ -297,7 +297,7 @@ def _arc(
 def branch_of(robot: Robot, q: Array) -> int:
     """Return the posture of joints (n,); external axes have no effect on it."""
     robot, q = robot.alone(), q[: robot.family.joints]
-    solved, reach = robot.inverse_all(robot.forward(q)[None], robot.given_of(q[None]))
+    solved, reach = robot.arm.inverse_all(robot.forward(q)[None], robot.arm.given_of(q[None]))
     apart = np.abs((solved[0] - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
     return int(np.argmin(np.where(reach[0], apart, np.inf)))
 
@@ -319,14 +319,14 @@ def follow_poses(robot: Robot, T: Array, q0: Array, free: Array | None = None) -
         near = np.tile(q0, (len(T), 1))
         if free is not None:
             near[:, robot.free] = free
-        q = robot.follow(T, near, np.full(len(T), posture))
+        q = robot.arm.follow(T, near, np.full(len(T), posture))
         good = ~np.isnan(q).any(axis=1)
         q[good] = np.unwrap(np.vstack([q0, q[good]]), axis=0)[1:]
         return q
     q, branch = np.empty((len(T), robot.joints)), np.array([posture])
     before = q0
     for k, pose in enumerate(T):
-        q[k] = robot.follow(pose[None], before[None], branch)[0]
+        q[k] = robot.arm.follow(pose[None], before[None], branch)[0]
         before = before if np.isnan(q[k]).any() else q[k]
     return q
 

@@ -329,7 +329,7 @@ class ArcLimits:
         """
         program, planned = self.program, stretch.q
         T = program.T_base_part @ poses @ np.linalg.inv(program.T_flange_tip)
-        found = program.robot.nearest(T, planned[1:])
+        found = program.robot.arm.nearest(T, planned[1:])
         if not np.abs(found - planned[1:]).max() < NEAR:  # also catches NaN
             return None
         q = np.vstack([planned[:1], found])

@@ -205,7 +205,7 @@ def wrist_in_plane(robot: Robot, q: Array) -> tuple[Array, Array]:
     the second value is negative, where w turns from u towards the back: u_x w_z > u_z w_x, that is
     c3 sin q3 + a2 cos q3 < 0.
     """
-    arm = robot.arm()
+    arm = robot.arm.model()
     _, q2, q3, *_ = (arm.sign * arm_joints(robot, q) - arm.offset).T
     ahead = arm.a1 + arm.c2 * np.sin(q2) + arm.c3 * np.sin(q2 + q3) + arm.a2 * np.cos(q2 + q3)
     bend = arm.c3 * np.sin(q3) + arm.a2 * np.cos(q3)

@@ -57,7 +57,7 @@ class JointCurves:
         spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
         spin[:, 1, 0] = np.sin(gamma)
         spin[:, 0, 1] = -spin[:, 1, 0]
-        return self._robot.follow(H @ spin @ self._T_tip_flange, near, self._posture)
+        return self._robot.arm.follow(H @ spin @ self._T_tip_flange, near, self._posture)
 
     def slope(self, free: Array, q: Array) -> Array:
         """Return dq/dfree (K, n, F) at joints `q` (K, n); NaN at the edge of reach."""

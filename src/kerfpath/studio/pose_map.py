@@ -182,7 +182,7 @@ def pose_message(
     x = _external(graph, cuts, nodes, node, sample, posture)
     arm = job.robot if x is None else job.robot.held(x)
     H = job.placement @ nodes.frames(job.options.frames)[node : node + 1]
-    solved, reach = arm.inverse_nodes(
+    solved, reach = arm.arm.inverse_nodes(
         np.ascontiguousarray(H), np.ascontiguousarray(graph.gamma[[sample]]), job.tool
     )
     q = solved[0, 0, posture] if reach[0, 0, posture] else None
@@ -428,7 +428,9 @@ def technique_message(
     """Return the course of a technique along a contour, on the layered graph of its plan."""
     asked, notes = _without(cut.request.options, prepared, method)
     job, first = prepared.job, float(nodes.s[0])
-    robot = replace(job.robot, load=None, jerk=None)
+    plain, own = job.robot, job.robot.dynamics
+    limits = replace(plain.limits, jerk=None)
+    robot = replace(plain, limits=limits, dynamics=replace(own, load=None))
     base = TechniqueMessage(
         revision=revision, contour=cut.contour, method=method, s=[], gamma=[], posture=[],
         cost=None, peak_velocity=[], peak_acceleration=[], statement="", notes=notes,
@@ -470,8 +472,8 @@ def _without(
         "feed reductions": options.feed == "constant",
         "interruptions": options.interruptions == "none",
         "limits between the nodes": options.between_nodes != "guaranteed",
-        "limits on torque": prepared.job.robot.load is None,
-        "limits on jerk": prepared.job.robot.jerk is None,
+        "limits on torque": prepared.job.robot.dynamics.load is None,
+        "limits on jerk": prepared.job.robot.limits.jerk is None,
         "collisions in the cell": prepared.cell is None,
     }
     left = [words for words, none in kept.items() if not none]

@@ -324,4 +324,4 @@ def _straight(made: Plan, one: Array, two: Array, end: int) -> Array:
     poses = np.repeat(T[:1], STRAIGHT, axis=0)
     poses[:, :3, 3] = np.linspace(T[0, :3, 3], T[1, :3, 3], STRAIGHT)
     posture = np.full(STRAIGHT, made.posture[end])
-    return np.column_stack([arm.follow(poses, guess[:, :n], posture), guess[:, n:]])
+    return np.column_stack([arm.arm.follow(poses, guess[:, :n], posture), guess[:, n:]])

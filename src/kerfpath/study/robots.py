@@ -224,7 +224,7 @@ def with_robot(job: Job, candidate: Robot) -> Job:
     """
     for each in (job.robot, candidate):
         each.require_no_free_joint("a list of robots")
-    if job.robot.load is not None or job.robot.jerk is not None:
+    if job.robot.dynamics.load is not None or job.robot.limits.jerk is not None:
         raise InputError(
             "its torque and jerk limits are not known: remove mass_kg and jerk_deg_s3 to compare "
             "robots without them"

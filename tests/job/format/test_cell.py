@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from tests.robots.test_five_axes import ARM
 from tests.urdf.test_urdf import described
 
 from commands import assert_refused, run
+from conftest import rebuilt
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import Mesh, box, edges_of, thicken
 from kerfpath.comfort import Band
@@ -416,7 +416,7 @@ def test_a_posture_in_words_is_one_of_the_robot_s_family(folder):
 @pytest.mark.slow
 @pytest.mark.parametrize("cell", [False, True])
 def test_a_described_robot_plans_what_the_library_s_own_does(folder, arm, cell):
-    described(folder, replace(arm, T_base_foot=np.eye(4)))  # writes arm.urdf
+    described(folder, rebuilt(arm, T_base_foot=np.eye(4)))  # writes arm.urdf
     table = '[robot]\nurdf = "arm.urdf"\ntip = "tool0"\nendless = [4, 6]\n'
     table += "acceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]\n"
     limits = "lower_deg = [-172, -172, -172, -172, -172, -172]\n"
@@ -512,7 +512,7 @@ def test_a_language_that_the_robot_does_not_speak_is_refused_before_planning(fol
 def test_an_arm_whose_axis_3_is_not_known_is_asked_for_it_before_planning(folder, arm):
     # The arm with a longer forearm is none of the library; by its description or by its lengths.
     lengths = {**arm.geometry, "c3": arm.geometry["c3"] + 0.03}
-    described(folder, replace(arm, geometry=lengths, T_base_foot=np.eye(4)))
+    described(folder, rebuilt(arm, geometry=lengths, T_base_foot=np.eye(4)))
     rest = 'manufacturer = "ABB"\nacceleration_deg_s2 = [320, 270, 420, 1300, 1400, 2000]\n'
     geometry = ", ".join(f"{name} = {1000 * value}" for name, value in lengths.items())
     limits = "lower_deg = [-172, -172, -172, -172, -172, -172]\n"

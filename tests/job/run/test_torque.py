@@ -49,7 +49,7 @@ def test_torques_of_the_motion_as_run_are_in_the_checks(planned, folder):
     h, time = 1e-4, np.linspace(2e-4, course.time[-1] - 2e-4, 4000)
     nominal = np.stack([np.interp(time, course.time, q) for q in cut.plan.unwrapped.T], axis=1)
     q = [
-        job.robot.nearest(
+        job.robot.arm.nearest(
             job.placement @ course.poses(time + sign * h) @ np.linalg.inv(job.tool), nominal
         )
         for sign in (-1, 0, 1)
@@ -68,7 +68,7 @@ def test_they_are_in_json_and_above_1_they_are_warned_of(folder, planned):
     job, result = planned
     (peak,) = (r.value for r in result.cuts[0].as_run.checks if r.code == "torque-as-run")
     # The plan keeps them at its nodes; corners that are sharper than they need more.
-    torque = (job.robot.torque * peak * 1.02).round(3).tolist()
+    torque = (job.robot.limits.torque * peak * 1.02).round(3).tolist()
     sharp = QUICK.replace("[program]\n", "[program]\nzone_mm = 0.05\n")
     path = job_at(folder, sharp, robot_keys=f"torque_nm = {torque}")
     found = run("plan", path, "--out", folder / "other", "--json")
@@ -148,7 +148,7 @@ def test_jobs_hold_torque_and_jerk_limits_at_the_nodes(folder, planned):
     job, result = planned
     (cut,) = result.cuts
     tau, q = np.diff(cut.plan.time), cut.plan.unwrapped
-    torque = np.abs(job.robot.torque_limit().shares(q, tau)).max(axis=0) * job.robot.torque
+    torque = np.abs(job.robot.torque_limit().shares(q, tau)).max(axis=0) * job.robot.limits.torque
     torque = 1.2 * torque + 1.0
     _, a = rates_of(np.diff(q, axis=0), tau)
     jerk = np.degrees(np.abs(jerks_of(a, tau)).max(axis=0)) * 1.02 + 100.0
@@ -166,8 +166,8 @@ def test_jobs_hold_torque_and_jerk_limits_at_the_nodes(folder, planned):
     assert "load 25 kg, without friction and rotors" in page
     # plan.json carries them, to the bit, and is judged by them with the job and without.
     (again,) = read_plan_file(out / "plan.json").plans
-    assert again.robot.load.mass == 25.0
-    np.testing.assert_array_equal(again.robot.jerk, kept.plan.robot.jerk)
+    assert again.robot.dynamics.load.mass == 25.0
+    np.testing.assert_array_equal(again.robot.limits.jerk, kept.plan.robot.limits.jerk)
     for job_file in (None, folder / "job.toml"):
         table = audit_file(out / "plan.json", job_file).tables[kept.name]
         assert all(row.ok for row in table)

@@ -68,7 +68,7 @@ def moved(plan):
     x = np.linspace([0.0, 0.0], [0.06, 0.15], K)
     arm = np.array(plan["q"]).reshape(K, ARM)
     seen = np.linalg.inv(base_in_part(CARRIED.externals, x)) @ CARRIED.alone().forward(arm)
-    q = CARRIED.alone().nearest(seen, arm)
+    q = CARRIED.alone().arm.nearest(seen, arm)
     assert np.isfinite(q).all()
     plan["q"] = np.column_stack([q, x]).ravel().tolist()
     for key, rows in (("velocity_share", K - 1), ("acceleration_share", K - 2)):

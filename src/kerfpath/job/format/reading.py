@@ -562,7 +562,7 @@ def _loaded(path: Path, file: JobFile, robot: Robot) -> Robot:
     try:
         return robot.with_load(load, gravity=table.gravity_m_s2 or STANDARD_GRAVITY)
     except InputError as error:
-        if robot.torque is None and robot.inertia is not None:
+        if robot.limits.torque is None and robot.dynamics.inertia is not None:
             said = (
                 f"expected torque limits, as {table.urdf} does not state that of every joint, got "
                 f"none; add torque_nm = [{robot.joints} numbers, N m]"

@@ -246,7 +246,7 @@ def _robot(job: Job) -> str:
         ("upper", limits.upper, before.upper),
         ("velocity", own.velocity, known["velocity"]),
         ("acceleration", own.acceleration, known["acceleration"]),
-        ("jerk", own.jerk, plain.jerk),
+        ("jerk", own.limits.jerk, plain.limits.jerk),
         ("endless", own.endless, plain.endless),
     ):
         if new is None:

@@ -159,11 +159,11 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
 
 def _more_limits(robot: Robot) -> Iterator[tuple[str, str]]:
     """Yield the limits on jerk and torque, where there are any."""
-    if robot.jerk is not None:
-        yield "Joint jerk limits", f"{_row(np.degrees(robot.jerk).round(1))} deg/s^3"
-    if robot.load is not None:
-        load = f"load {robot.load.mass:g} kg, without friction and rotors"
-        yield "Joint torque limits", f"{_row(robot.torque)} N m ({load})"
+    if robot.limits.jerk is not None:
+        yield "Joint jerk limits", f"{_row(np.degrees(robot.limits.jerk).round(1))} deg/s^3"
+    if robot.dynamics.load is not None:
+        load = f"load {robot.dynamics.load.mass:g} kg, without friction and rotors"
+        yield "Joint torque limits", f"{_row(robot.limits.torque)} N m ({load})"
 
 
 def _external_facts(robot: Robot) -> list[tuple[str, str]]:

@@ -66,7 +66,7 @@ def status_and_turn(robot: Robot, q: ArrayLike) -> Ints:
     An endless axis is taken modulo 360 deg, from -180 deg on.
     """
     q = floats(q, "q", (None, robot.joints))
-    arm = robot.arm()
+    arm = robot.arm.model()
     ahead, _ = wrist_in_plane(robot, q)
     axes_deg = np.degrees(axes_from_joints(robot, q))
     stretched_deg = np.degrees(np.arctan2(-arm.a2, arm.c3))

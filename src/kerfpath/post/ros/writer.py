@@ -151,8 +151,8 @@ def _straight(
     seen = np.linalg.inv(base_in_part(robot.externals, evenly[:, n:])) @ program.T_base_part @ T
     # The tool's rotation about its axis counts only for arms that can choose it.
     arm = robot.alone()
-    given = arm.given_of(evenly)
-    solved, reach = arm.inverse_nodes(seen, np.zeros(1), program.T_flange_tip, given)
+    given = arm.arm.given_of(evenly)
+    solved, reach = arm.arm.inverse_nodes(seen, np.zeros(1), program.T_flange_tip, given)
     apart = solved[:, 0] - evenly[:, None, :n]
     apart -= 2 * np.pi * np.round(apart / (2 * np.pi))
     off = np.where(reach[:, 0], np.abs(apart).max(axis=2), np.inf)

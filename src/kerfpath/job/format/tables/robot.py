@@ -39,6 +39,7 @@ from kerfpath.job.format.values import (
 from kerfpath.robots import (
     FAMILIES,
     SNAPS,
+    Arm,
     ExternalAxis,
     KnownAxis,
     Robot,
@@ -48,7 +49,6 @@ from kerfpath.robots import (
     external_axes,
     robot,
     robot_ids,
-    with_axis_3,
 )
 from kerfpath.urdf import Description, read_urdf
 
@@ -633,14 +633,7 @@ class RobotTable(Table):
         changed = self._known(folder, bodies=bodies)
         changed = changed.with_limits(**self._limits(changed.joints))
         if self.acceleration_ratio is not None:
-            assert changed.velocity is not None
-            changed = replace(
-                changed,
-                acceleration=np.multiply(
-                    acceleration_ratios()[self.acceleration_ratio], changed.velocity
-                ),
-                acceleration_source=f"assumed: ratio {self.acceleration_ratio} times the speeds",
-            )
+            changed = changed.with_acceleration_ratio(self.acceleration_ratio)
         if self.elbow_step_deg is not None:
             changed = changed.with_elbow_step(float(np.radians(self.elbow_step_deg)))
         return changed
@@ -670,18 +663,14 @@ class RobotTable(Table):
             raise InputError(
                 f"expected lengths {', '.join(family.lengths)}, got {unknown[0]}; remove it"
             )
-        return with_axis_3(
-            Robot(
-                id=f"{self.kinematics} arm by its lengths",
-                manufacturer=maker,
-                kinematics=self.kinematics,
-                geometry={name: mm / 1000 for name, mm in self.geometry_mm.items()},
-                sign=np.array(self.sign or 1.0, dtype=float),
-                offset=np.radians(self.offset_deg or 0.0),
-            ),
-            self.axis_3 or "",
-            limits,
+        arm = Arm(
+            kinematics=self.kinematics,
+            geometry={name: mm / 1000 for name, mm in self.geometry_mm.items()},
+            sign=np.array(self.sign or 1.0, dtype=float),
+            offset=np.radians(self.offset_deg or 0.0),
         )
+        made = Robot(id=f"{self.kinematics} arm by its lengths", manufacturer=maker, arm=arm)
+        return made.with_axis_3(self.axis_3 or "", limits)
 
     def joints(self, folder: Path) -> int:
         """Return the number of joints without external axes."""
