@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Literal, get_args
+from dataclasses import dataclass, replace
+from typing import Literal, TypedDict, Unpack, get_args
 
 import numpy as np
 
-from kerfpath.arrays import Array, Ints, floats, scalar
+from kerfpath.arrays import Array, Ints, floats, scalar, short_repr
 from kerfpath.contour import CORNER, KINDS, Contour, angle_between, join, slerp, unit
 from kerfpath.errors import InputError
 from kerfpath.operations.surface import (
@@ -460,26 +460,24 @@ STEP = 2e-4
 """Distance (m) between the nodes of a lead."""
 
 
-def lead_in(
-    contour: Contour,
-    length: float,
-    *,
-    shape: LeadShape = "line",
-    angle: float = np.pi / 4,
-    side: Side = "right",
-    surface: Surface | None = None,
-    fan: float | None = None,
-    speed_share: float = 1.0,
-    clearance: float = 2e-4,
-) -> Contour:
-    """Return the contour with a lead-in from a pierce in the scrap to its first node.
+class LeadKeywords(TypedDict, total=False):
+    """The keywords of `lead_in` and `lead_out`: fields of `Lead`."""
 
-    The tool axis is normal to the surface at the pierce and fans to the axis of the cut. A closed
-    contour becomes an open one that ends where its cut began.
+    shape: LeadShape
+    angle: float
+    side: Side
+    surface: Surface | None
+    fan: float | None
+    speed_share: float
+    clearance: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Lead:
+    """A lead: its shape, and the surface that it is laid on.
 
     Parameters
     ----------
-    contour : Contour
     length : float m
         Length of the lead.
     shape : {"line", "arc"}
@@ -496,7 +494,34 @@ def lead_in(
     speed_share : float
         Share of the speed at the outer end of the lead; it changes evenly along the lead.
     clearance : float m
-        Distance that the pierce must keep from the contour.
+        Distance that the outer end of the lead must keep from the contour.
+    """
+
+    length: float
+    shape: LeadShape = "line"
+    angle: float = np.pi / 4
+    side: Side = "right"
+    surface: Surface | None = None
+    fan: float | None = None
+    speed_share: float = 1.0
+    clearance: float = 0.0
+
+    __repr__ = short_repr
+
+
+def lead_in(contour: Contour, length: float, **keywords: Unpack[LeadKeywords]) -> Contour:
+    """Return the contour with a lead-in from a pierce in the scrap to its first node.
+
+    The tool axis is normal to the surface at the pierce and fans to the axis of the cut. A closed
+    contour becomes an open one that ends where its cut began.
+
+    Parameters
+    ----------
+    contour : Contour
+    length : float m
+        Length of the lead.
+    **keywords
+        Other fields of `Lead`; the default clearance of the pierce is 2e-4 m.
 
     Raises
     ------
@@ -506,44 +531,33 @@ def lead_in(
     """
     if contour.kind[0] == KINDS.index("pierce"):
         raise InputError(f"lead_in: contour {contour.name!r} already has a pierce")
-    points, axes = _lay_lead(
-        contour, length, shape, angle, side, surface or Ribbon(contour), fan, clearance, "lead-in"
-    )
+    keywords.setdefault("clearance", 2e-4)
+    lead = Lead(length=length, **keywords)
+    points, axes = _lay_lead(contour, lead, lead.surface or Ribbon(contour), "lead-in")
     kind = np.full(len(points), KINDS.index("lead-in"))
     kind[0] = KINDS.index("pierce")
-    share = _share(points, speed_share, float(contour.speed_share[0]))
-    lead = Contour(points, axes, kind=kind, speed_share=share, name=contour.name)
-    return join([lead, replace(contour, closed=False, x=None, time=None)], name=contour.name)
+    share = _share(points, lead.speed_share, float(contour.speed_share[0]))
+    before = Contour(points, axes, kind=kind, speed_share=share, name=contour.name)
+    return join([before, replace(contour, closed=False, x=None, time=None)], name=contour.name)
 
 
-def lead_out(
-    contour: Contour,
-    length: float,
-    *,
-    shape: LeadShape = "line",
-    angle: float = np.pi / 4,
-    side: Side = "right",
-    surface: Surface | None = None,
-    fan: float | None = None,
-    speed_share: float = 1.0,
-    clearance: float = 0.0,
-) -> Contour:
+def lead_out(contour: Contour, length: float, **keywords: Unpack[LeadKeywords]) -> Contour:
     """Return the contour with a lead-out from its last node into the scrap.
 
-    Parameters and exceptions are those of `lead_in`, except that the contour may have a pierce.
+    Parameters and exceptions are those of `lead_in`, except that the contour may have a pierce and
+    that the default clearance is 0.
     """
+    lead = Lead(length=length, **keywords)
     pierced = contour.kind == KINDS.index("pierce")
     kinds = np.where(pierced, KINDS.index("lead-in"), contour.kind)  # for `reverse`
     plain = replace(contour, closed=False, kind=kinds, x=None, time=None)
-    backwards: Side = "left" if side == "right" else "right"
-    points, axes = _lay_lead(
-        reverse(plain), length, shape, angle, backwards, surface or Ribbon(contour), fan,
-        clearance, "lead-out",
-    )  # fmt: skip
+    backwards = replace(lead, side="left" if lead.side == "right" else "right")
+    surface = lead.surface or Ribbon(contour)
+    points, axes = _lay_lead(reverse(plain), backwards, surface, "lead-out")
     kind = np.full(len(points), KINDS.index("lead-out"))
-    share = _share(points, speed_share, float(contour.speed_share[-1]))[::-1]
-    lead = Contour(points[::-1], axes[::-1], kind=kind, speed_share=share, name=contour.name)
-    return join([replace(contour, closed=False, x=None, time=None), lead], name=contour.name)
+    share = _share(points, lead.speed_share, float(contour.speed_share[-1]))[::-1]
+    after = Contour(points[::-1], axes[::-1], kind=kind, speed_share=share, name=contour.name)
+    return join([replace(contour, closed=False, x=None, time=None), after], name=contour.name)
 
 
 def _share(points: Array, far: float, near: float) -> Array:
@@ -552,13 +566,11 @@ def _share(points: Array, far: float, near: float) -> Array:
     return np.asarray(far + (near - far) * s / s[-1])
 
 
-def _lay_lead(
-    contour: Contour, length: float, shape: LeadShape, angle: float, side: Side, surface: Surface,
-    fan: float | None, clearance: float, what: str,
-) -> tuple[Array, Array]:  # fmt: skip
+def _lay_lead(contour: Contour, lead: Lead, surface: Surface, what: str) -> tuple[Array, Array]:
     """Return points (m, 3) m and axes (m, 3) of a lead that ends in the contour's first node."""
-    length = scalar(length, f"{what} length", unit="m", above=0.0)
-    fan = length if fan is None else min(scalar(fan, "fan", unit="m", above=0.0), length)
+    shape, angle, side = lead.shape, lead.angle, lead.side
+    length = scalar(lead.length, f"{what} length", unit="m", above=0.0)
+    fan = length if lead.fan is None else min(scalar(lead.fan, "fan", unit="m", above=0.0), length)
     if shape not in get_args(LeadShape):
         raise InputError(f"{what} shape: expected line or arc, got {shape!r}")
     most = np.pi / 2 if shape == "line" else np.pi
@@ -584,7 +596,7 @@ def _lay_lead(
     # The tilt of the cut's axis from the surface normal increases along the lead.
     leaning = lean_axes(normals, normal[0], contour.axes[0])
     axes = slerp(-normals, leaning, 1 - np.minimum(back / fan, 1)[:, None])
-    _require_clearance(contour, points, side, clearance, what)
+    _require_clearance(contour, points, side, lead.clearance, what)
     return points, axes
 
 
