@@ -8,6 +8,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import Unpack
 
 import numpy as np
 import plotly.graph_objects as go
@@ -15,7 +16,7 @@ from markupsafe import Markup
 
 from kerfpath.arrays import Array, floats, short_repr
 from kerfpath.errors import InputError
-from kerfpath.report.page import number, render_page, shown_unit
+from kerfpath.report.page import PageKeywords, number, render_page, shown_unit
 from kerfpath.report.style import (
     ACCENT,
     CHOSEN,
@@ -228,10 +229,8 @@ def render_front(
     plans: Sequence[FrontPlan],
     dominated: Sequence[Sequence[float]],
     marks: Mapping[str, int],
-    facts: Sequence[tuple[str, str]],
-    notes: Sequence[str],
     command: str,
-    job_text: str = "",
+    **page: Unpack[PageKeywords],
 ) -> str:
     """Return a Pareto set as one self-contained HTML page; the same input gives the same text.
 
@@ -247,12 +246,10 @@ def render_front(
         Criteria of feasible plans that others dominate.
     marks : mapping of str to int
         Numbers of remarkable plans by their labels, such as "least displacement".
-    facts : sequence of (what, value)
-    notes : sequence of str
     command : str
         Command that writes a plan, with "{number}" in place of its number.
-    job_text : str
-        The job file as read.
+    **page
+        As in `PageKeywords`.
 
     Raises
     ------
@@ -266,9 +263,6 @@ def render_front(
         "front.html",
         kind="Pareto set",
         title=title,
-        facts=facts,
-        notes=notes,
-        job_text=job_text,
         axes=axes,
         values=values,
         dominated=beaten,
@@ -280,6 +274,7 @@ def render_front(
         scatter=scatter,
         parallel=parallel,
         data=_data(axes, plans, values, beaten, marks, command),
+        **page,
     )
 
 

@@ -14,6 +14,7 @@ import zlib
 from collections.abc import Collection, Sequence
 from importlib.metadata import version
 from importlib.resources import files
+from typing import TypedDict, Unpack
 
 import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -56,6 +57,14 @@ class Figures:
         ).format(kind, number, figure.layout.height)
 
 
+class PageKeywords(TypedDict, total=False):
+    """What every page may have: rows of (what, value), warnings, and the job file as read."""
+
+    facts: Sequence[tuple[str, str]]
+    notes: Sequence[str]
+    job_text: str
+
+
 def render_page(template: str, /, **data: object) -> str:
     """Return a page: a template filled with data; all texts among them are escaped.
 
@@ -74,9 +83,7 @@ def render_table(
     rows: Sequence[Sequence[str]],
     text_columns: Collection[int] = (0,),
     caption: str = "",
-    facts: Sequence[tuple[str, str]] = (),
-    notes: Sequence[str] = (),
-    job_text: str = "",
+    **page: Unpack[PageKeywords],
 ) -> str:
     """Return a self-contained HTML page with a table; the same input gives the same text.
 
@@ -91,14 +98,12 @@ def render_table(
         Columns that are aligned left; the others are aligned right.
     caption : str
         Text above the table.
-    facts : sequence of (what, value)
-    notes : sequence of str
-    job_text : str
-        The job file as read.
+    **page
+        As in `PageKeywords`.
     """
     return render_page(
         "table.html", title=title, kind=kind, heads=heads, rows=rows, text_columns=text_columns,
-        caption=caption, facts=facts, notes=notes, job_text=job_text,
+        caption=caption, **page,
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from importlib.metadata import version
+from typing import Unpack
 
 import numpy as np
 import plotly.graph_objects as go
@@ -15,7 +16,7 @@ from kerfpath.comfort import MEASURES
 from kerfpath.graph import LayeredGraph
 from kerfpath.plans import Plan
 from kerfpath.report import maps, motion
-from kerfpath.report.page import FAIL, PASS, WARN, number, render_page
+from kerfpath.report.page import FAIL, PASS, WARN, PageKeywords, number, render_page
 from kerfpath.report.scene import scene
 from kerfpath.report.section import ContourSection
 from kerfpath.report.style import joint_colours, reason_colours
@@ -32,10 +33,8 @@ def render(
     mesh: tuple[ArrayLike, ArrayLike] | None = None,
     cell: Cell | None = None,
     moves: Sequence[ArrayLike] = (),
-    facts: Sequence[tuple[str, str]] = (),
     faults: Sequence[str] = (),
-    notes: Sequence[str] = (),
-    job_text: str = "",
+    **page: Unpack[PageKeywords],
 ) -> str:
     """Return the report as one self-contained HTML page; the same input gives the same text.
 
@@ -51,14 +50,10 @@ def render(
         Fixtures, robot and head; robot and head are drawn at a few poses.
     moves : sequence of (m, 3) m
         Paths of the tool tip on the transfer moves, in the part frame.
-    facts : sequence of (what, value)
-        Rows such as ("Robot", "ABB IRB 4600-60/2.05").
     faults : sequence of str
         Reasons not to cut the job although its contours are planned, and what to do.
-    notes : sequence of str
-        Warnings, shown at the top.
-    job_text : str
-        The job file as read.
+    **page
+        As in `PageKeywords`; facts such as ("Robot", "ABB IRB 4600-60/2.05").
     """
     failed = [(i, section) for i, section in enumerate(sections, 1) if section.failed]
     state, verdict = _verdict(sections, faults)
@@ -66,9 +61,6 @@ def render(
         "plan.html",
         kind="Cutting plan",
         title=title,
-        facts=facts,
-        notes=notes,
-        job_text=job_text,
         state=state,
         verdict=verdict,
         first_steps=[(i, section, _remedy(section)) for i, section in failed[:MOST_STEPS]],
@@ -92,6 +84,7 @@ def render(
         objective_of=_objective,
         postures_of=_postures,
         proof_of=_proof,
+        **page,
     )
 
 
