@@ -196,6 +196,61 @@ class OrderKeywords(TypedDict, total=False):
     seconds: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OrderOptions:
+    """How contours are ordered, and how the tool moves between them.
+
+    Parameters
+    ----------
+    home : (n,) rad, optional
+        Where the robot comes from and goes back to.
+    cell : Cell, optional
+        Cell in which moves, approaches and retracts are clear.
+    before : sequence of (i, j)
+        Contour i is cut before contour j; see `inner_first`.
+    heat_spacing : float m
+        Contours nearer to each other than this are not cut directly one after the other.
+    given_order : bool
+        Keep the order of the candidates.
+    retract, approach_speed : float m, m/s
+        How far and how fast the tool backs off along its axis.
+    air_speed : float
+        Share of the full speed of transfer moves; their least time is divided by it.
+    pierce_time : float s
+        Time to pierce at each contour.
+    seconds : float s
+        Time limit of the order solver, and of each search for a way around; searches without a
+        result end after `longest_search(seconds)` in total.
+
+    Raises
+    ------
+    InputError
+        A length, speed or time is out of range.
+    """
+
+    home: ArrayLike | None = None
+    cell: Cell | None = None
+    before: Sequence[tuple[int, int]] = ()
+    heat_spacing: float = 0.0
+    given_order: bool = False
+    retract: float = 0.05
+    approach_speed: float = 0.1
+    air_speed: float = 1.0
+    pierce_time: float = 0.0
+    seconds: float = 10.0
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        _set = object.__setattr__
+        _set(self, "retract", scalar(self.retract, "retract", unit="m", above=0.0))
+        speed = scalar(self.approach_speed, "approach_speed", unit="m/s", above=0.0)
+        _set(self, "approach_speed", speed)
+        _set(self, "heat_spacing", not_negative(self.heat_spacing, "heat_spacing", unit="m"))
+        _set(self, "pierce_time", not_negative(self.pierce_time, "pierce_time", unit="s"))
+        _set(self, "air_speed", scalar(self.air_speed, "air_speed", above=0.0))
+
+
 class PartKeywords(OrderKeywords, PlanKeywords, total=False):
     """The keywords of `plan_part`."""
 
@@ -332,17 +387,8 @@ def order_candidates(
 def order_plans(
     candidates: Sequence[Sequence[Plan]],
     *,
-    home: ArrayLike | None = None,
-    cell: Cell | None = None,
-    before: Sequence[tuple[int, int]] = (),
-    heat_spacing: float = 0.0,
-    given_order: bool = False,
-    retract: float = 0.05,
-    approach_speed: float = 0.1,
-    air_speed: float = 1.0,
-    pierce_time: float = 0.0,
-    seconds: float = 10.0,
     more: Callable[[int], Sequence[Plan]] = lambda contour: (),
+    **keywords: Unpack[OrderKeywords],
 ) -> PartPlan:
     """Return one plan for each contour, chosen from its candidates, in the order of least time.
 
@@ -355,28 +401,11 @@ def order_plans(
     ----------
     candidates : sequence of sequences of Plan
         Candidates of each contour, all of one robot.
-    home : (n,) rad, optional
-        Where the robot comes from and goes back to.
-    cell : Cell, optional
-        Cell in which moves, approaches and retracts are clear.
-    before : sequence of (i, j)
-        Contour i is cut before contour j; see `inner_first`.
-    heat_spacing : float m
-        Contours nearer to each other than this are not cut directly one after the other.
-    given_order : bool
-        Keep the order of `candidates`; `before` must agree with it.
-    retract, approach_speed : float m, m/s
-        How far and how fast the tool backs off along its axis.
-    air_speed : float
-        Share of the full speed of transfer moves; their least time is divided by it.
-    pierce_time : float s
-        Time to pierce at each contour.
-    seconds : float s
-        Time limit of the order solver, and of each search for a way around; searches without a
-        result end after `longest_search(seconds)` in total.
     more : callable, optional
         Returns further plans of a contour, given its number, in other postures. They become
         candidates of the contour and are numbered after the others.
+    **keywords
+        As in `OrderOptions`; `before` must agree with `given_order`.
 
     Raises
     ------
@@ -386,23 +415,20 @@ def order_plans(
     InputError
         A length, speed or time is out of range.
     """
-    retract = scalar(retract, "retract", unit="m", above=0.0)
-    approach_speed = scalar(approach_speed, "approach_speed", unit="m/s", above=0.0)
-    heat_spacing = not_negative(heat_spacing, "heat_spacing", unit="m")
-    pierce_time = not_negative(pierce_time, "pierce_time", unit="s")
-    air_speed = scalar(air_speed, "air_speed", above=0.0)
+    o = OrderOptions(**keywords)
+    cell, home, before, seconds = o.cell, o.home, o.before, o.seconds
     every = [list(made) for made in candidates]
     further = MorePlans(every, more)
-    places = reachable(every, cell, retract, further)
-    if given_order:
+    places = reachable(every, cell, o.retract, further)
+    if o.given_order:
         before = [*before, *((i, i + 1) for i in range(len(every) - 1))]
-    warm = _too_warm([c[0].contour for c in every], heat_spacing)
+    warm = _too_warm([c[0].contour for c in every], o.heat_spacing)
     air: MoveTimes | None = None
     while True:
         plans = [every[i][c] for i, c in places]
         group = np.array([i for i, _ in places])
         air = (
-            MoveTimes(plans, group, cell, retract, seconds, air_speed)
+            MoveTimes(plans, group, cell, o.retract, seconds, o.air_speed)
             if air is None
             else air.extended(plans, group)
         )
@@ -410,13 +436,13 @@ def order_plans(
         if home is not None and air.home is None:
             air.home = floats(home, "home", (plans[0].robot.joints,))
         own = np.array([p.time[-1] - p.time[0] for p in plans])
-        own += pierce_time + 2 * retract / approach_speed
+        own += o.pierce_time + 2 * o.retract / o.approach_speed
         found = _settle_order(air, group, own, before, seconds)
         if not isinstance(found, NoFeasiblePath):
             order = found
             break
         contours = sorted({int(group[c]) for leg in air.failed for c in leg if c != HOME})
-        fresh = more_reachable(every, cell, retract, further, contours) if air.failed else []
+        fresh = more_reachable(every, cell, o.retract, further, contours) if air.failed else []
         if not fresh:
             raise further.mentioned_in(found)
         places += fresh
@@ -426,9 +452,9 @@ def order_plans(
         moves=moves,
         order=order,
         chosen=tuple(places[k] for k in order.candidates.tolist()),
-        retract=retract,
-        approach_speed=approach_speed,
-        pierce_time=pierce_time,
+        retract=o.retract,
+        approach_speed=o.approach_speed,
+        pierce_time=o.pierce_time,
     )
 
 
