@@ -65,6 +65,7 @@ class PlanKeywords(GraphKeywords, total=False):
     rotation: ArrayLike | None
     feed: FeedKind
     refine: bool
+    restarts: int
     certify: Certify | None
 
 
@@ -214,6 +215,17 @@ class PlanOptions(Settings):
         in_jobs=None,
         group="Search",
         label="Refined off the grid",
+        concerns="search",
+    )
+    restarts: int = setting(
+        4,
+        "random starts from which a motion over continuous gamma is refined again where few starts "
+        "lead to it; more take longer and may find a better one",
+        least=0,
+        most=1000,
+        example="40",
+        group="Search",
+        label="Random starts",
         concerns="search",
     )
     refine_parts: int = setting(

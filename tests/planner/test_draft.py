@@ -1,6 +1,7 @@
 """warm_start(): a motion near the one before, within what is asked for now."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from kerfpath import audit, plan
 from kerfpath.options import PlanOptions
 from kerfpath.planner import layered_graph, warm_start
+from kerfpath.planner.refinements import refine_from_random_starts
 
 OPTIONS = PlanOptions(gamma_step=np.radians(4), postures=(0, 1))
 SPEED = 0.1
@@ -52,6 +54,20 @@ def test_a_draft_keeps_the_limits_and_is_between_the_motion_before_and_the_plan(
     assert best.cost * (1 - 1e-3) <= made.cost <= start * (1 + 1e-9)
     assert made.cost == pytest.approx(draft_cost(made))
     np.testing.assert_array_equal(made.posture, before.posture)
+
+
+def test_more_random_starts_never_cost_more(before):
+    options = replace(OPTIONS, weights=[3, 1, 1, 1, 1, 1])
+    made = warm_start(before, options, dt=before.dt)
+    free = SimpleNamespace(is_clear=lambda plan: True)
+    found = [
+        refine_from_random_starts(replace(made, settings=replace(made.settings, restarts=n)), free)
+        for n in (0, 2, 6)
+    ]
+    assert np.array_equal(found[0].q, made.q)
+    assert found[2].cost <= found[1].cost <= found[0].cost == made.cost
+    assert found[2].cost < made.cost
+    assert audit(found[2]) == []
 
 
 def draft_cost(made):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import cycle, islice
 
 import numpy as np
 
@@ -112,7 +113,7 @@ def plan_first_order(task: Task, finder: CollisionFreeSearch) -> Plan | None:
 # Refine again from random starts, to leave a local optimum.
 
 CHANGES = (0.05, 0.1, 0.2, 0.4)
-"""Largest change of gamma of each start, rad, in this order."""
+"""Largest change of gamma of each start, rad, in this order and again from the first one."""
 WAVES = 4
 """Number of cosines in a change; the slower ones are larger."""
 SEED = 16
@@ -126,7 +127,7 @@ def refine_from_random_starts(begun: Plan, finder: CollisionFreeSearch) -> Plan:
     motion so far. The result keeps every limit and is clear.
     """
     rng, best = np.random.default_rng(SEED), begun
-    for size in CHANGES:
+    for size in islice(cycle(CHANGES), begun.settings.restarts):
         change = _smooth(rng, len(best.q), size)
         if best.settings.closure == "periodic":
             change -= np.linspace(change[0], change[-1], len(change))
