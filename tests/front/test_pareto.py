@@ -467,6 +467,17 @@ def test_the_page_on_pareto_sets_has_a_row_for_every_criterion_and_its_unit():
     assert all(units[name] == CRITERIA[name].unit for name in set(CRITERIA) - set(MEASURES))
 
 
+def test_the_rotation_is_that_of_the_head_on_all_its_turns(task):
+    made = pareto(**task, criteria=["displacement", "rotation"], runs=8)
+    assert made.units == ("s", "rad")
+    turned = [np.ptp(np.unwrap(plan.gamma)) for plan in made.plans]
+    assert made.values[:, 1] == pytest.approx(turned)
+    assert (np.diff(made.values[:, 1]) < 0).all()
+    closest = made.plans[int(np.argmin(turned))]
+    whole = replace(closest, gamma=np.linspace(0, 3 * np.pi, len(closest.gamma)))
+    assert CRITERIA["rotation"].value(whole, None) == pytest.approx(3 * np.pi)
+
+
 def test_a_new_criterion_is_one_object(task, monkeypatch):
     class Turning(Criterion):
         more_is_better = True

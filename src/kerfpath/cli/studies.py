@@ -62,11 +62,11 @@ def pareto(
     """Find plans of a contour with different trade-offs, none better than another in all criteria.
 
     The criteria are displacement, range, velocity, acceleration, speed, time (from home_deg in
-    [sequence]), clearance (in the cell), wrist, elbow, shoulder, limits, manipulability,
-    and displacement_J, increment_J, range_J of joint J. Every second run is over continuous
-    rotation; the others find the proved optimum on its grid, as all runs do with method = "exact".
-    Every plan is audited. pareto.json and pareto.html go to the folder JOB-pareto unless --out
-    names another. After a stop, even kill -9, the same command continues.
+    [sequence]), rotation (about the beam), clearance (in the cell), wrist, elbow, shoulder, limits,
+    manipulability, and displacement_J, increment_J, range_J of joint J. Every second run is over
+    continuous rotation; the others find the proved optimum on its grid, as all runs do with
+    method = "exact". Every plan is audited. pareto.json and pareto.html go to the folder JOB-pareto
+    unless --out names another. After a stop, even kill -9, the same command continues.
 
     Example: kerfpath pareto door.toml --criteria displacement,velocity,range_6 --runs 200
 

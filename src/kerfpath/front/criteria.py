@@ -260,6 +260,13 @@ class Clearance(Criterion):
         return replace(run, clearance=max(0.0, value * (1 - ROUNDING)))
 
 
+class Rotation(Criterion):
+    """Range of gamma: how far the head turns about the beam, which hoses and cables must follow."""
+
+    def value(self, plan: Plan, problem: ParetoProblem) -> float:
+        return float(np.ptp(np.unwrap(plan.gamma)))
+
+
 class LeastMeasure(Criterion):
     """Least value at the nodes of the measure of `kerfpath.comfort` with the same name."""
 
@@ -284,6 +291,7 @@ CRITERIA: dict[str, Criterion] = {
         Acceleration(name="acceleration", words="peak acceleration", unit="share"),
         Speed(name="speed", words="fastest speed of the path", unit="m/s"),
         Time(name="time", words="time from home and back", unit="s"),
+        Rotation(name="rotation", words="rotation about the beam", unit="rad"),
         Clearance(name="clearance", words="clearance in the cell", unit="m"),
         *(LeastMeasure(name=name, words=name, unit=m.unit) for name, m in MEASURES.items()),
     )
