@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from kerfpath.arrays import Array
+from kerfpath.kernels.cost_to_go import LANES, SIX
 from kerfpath.kernels.jit import jit_inline, jit_vector, larger, trailing_zeros
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import apart, wrap_angle
 from kerfpath.kernels.search import Aim, SortedLayers, runs
 from kerfpath.kernels.states import Scratch, States
-from kerfpath.kernels.to_go import LANES, SIX
 
 __all__ = ["fill_candidates"]
 

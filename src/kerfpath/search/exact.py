@@ -8,7 +8,8 @@ import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
 from kerfpath.effort import current_effort
-from kerfpath.kernels import exact, to_go
+from kerfpath.kernels import exact
+from kerfpath.kernels.cost_to_go import cost_to_go
 from kerfpath.kernels.search import Aim, SortedLayers
 from kerfpath.kernels.states import EVERY
 
@@ -137,7 +138,7 @@ def _grow(
     """
     layers, rise = lifted(layers, aim)
     h, K = np.empty(len(layers.low)), len(layers.start) - 1
-    to_go.cost_to_go(layers, aim, allowed, h)
+    cost_to_go(layers, aim, allowed, h)
     entry = h[: layers.start[1]]
     enter = layers.cost[: layers.start[1]]
     least = float((np.maximum(enter, entry) if aim.minimax else enter + entry).min(initial=np.inf))

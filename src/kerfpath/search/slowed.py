@@ -9,7 +9,8 @@ import numpy as np
 from kerfpath.arrays import Array, Ints, freeze, scalar, short_repr
 from kerfpath.effort import current_effort
 from kerfpath.errors import InputError
-from kerfpath.kernels import exact, to_go
+from kerfpath.kernels import exact
+from kerfpath.kernels.cost_to_go import cost_to_go
 from kerfpath.kernels.search import Aim, LostTime, SortedLayers
 from kerfpath.kernels.states import EVERY
 from kerfpath.search.exact import (
@@ -126,7 +127,7 @@ def _best(layers: SortedLayers, aim: Aim) -> tuple[Ints, float]:
     """Raise the bound until the recursion finds a path; return the path and its cost."""
     layers, rise = lifted(layers, aim)
     K, h = len(layers.start) - 1, np.empty(len(layers.low))
-    to_go.cost_to_go(layers, aim, np.ones(len(h), np.bool_), h)
+    cost_to_go(layers, aim, np.ones(len(h), np.bool_), h)
     _add_corners(layers, aim, h)
     least = float((layers.cost + h)[: layers.start[1]].min())
     bound = least * (1 + ROUNDING)

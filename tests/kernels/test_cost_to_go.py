@@ -13,8 +13,9 @@ from tests.search.posed import problem_of
 import naive
 from from_python import from_python
 from kerfpath import NoFeasiblePath, shortest_path
-from kerfpath.kernels import exact, limits, to_go
+from kerfpath.kernels import exact, limits
 from kerfpath.kernels import search as kernel
+from kerfpath.kernels.cost_to_go import SIX, cost_to_go
 from kerfpath.kernels.search import LostTime
 from kerfpath.search.exact import NO_SEAM, best_allowed
 from kerfpath.search.problem import sort_layers
@@ -71,7 +72,7 @@ def test_the_bound_is_that_of_the_scalar_recursion_to_the_bit(metric, minimax):
             aim = aim._replace(cap=0.7 * float(aim.weight.sum()))
         allowed = rng.random(len(layers.low)) < 0.9
         h = np.empty(len(layers.low))
-        to_go.cost_to_go(layers, aim, allowed, h)
+        cost_to_go(layers, aim, allowed, h)
         np.testing.assert_array_equal(h, scalar(layers, aim, allowed))
         finite += int(np.isfinite(h[: layers.start[-2]]).sum())
     assert finite > 300
@@ -87,7 +88,7 @@ def test_lost_time_and_leaps_count_with_the_distance(metric, leap):
         aim = aim._replace(metric=metric, timed=True, lost=LostTime(2.0, 2.5, leap))
         allowed = rng.random(len(layers.low)) < 0.9
         h = np.empty(len(layers.low))
-        to_go.cost_to_go(layers, aim, allowed, h)
+        cost_to_go(layers, aim, allowed, h)
         np.testing.assert_allclose(h, scalar(layers, aim, allowed), rtol=1e-13)
         finite += int(np.isfinite(h[: layers.start[-2]]).sum())
     assert finite > 300
@@ -98,10 +99,10 @@ def test_lost_time_and_leaps_count_with_the_distance(metric, leap):
 def test_its_innermost_loop_takes_several_numbers_at_once():
     # Python's own min, a sum that may be reordered or a constant infinity would undo it unnoticed.
     rng = np.random.default_rng(0)
-    while len((made := graph(rng, layers=(3, 4), size=(5, 9)))[0].q) != to_go.SIX:
+    while len((made := graph(rng, layers=(3, 4), size=(5, 9)))[0].q) != SIX:
         pass
     layers, aim = made
-    fresh = numba.njit(nogil=True)(to_go.cost_to_go.py_func)
+    fresh = numba.njit(nogil=True)(cost_to_go.py_func)
     fresh(layers, aim, np.ones(len(layers.low), bool), np.empty(len(layers.low)))
     assert re.search(r"llvm\.minnum\.v\d+f64", next(iter(fresh.inspect_llvm().values())))
 
@@ -114,7 +115,7 @@ def test_without_a_bound_too_no_path_begins_where_it_is_not_allowed():
             allowed = np.ones(len(layers.low), np.bool_)
             allowed[: layers.start[1]] = np.arange(layers.start[1]) == v
             h = np.empty(len(allowed))
-            to_go.cost_to_go(layers, aim, allowed, h)
+            cost_to_go(layers, aim, allowed, h)
             found = best_allowed(layers, aim, allowed, NO_SEAM, 0.0)
             few = exact.recursion(layers, aim, h, np.inf, NO_SEAM, 0, 2).cost
             assert few >= (np.inf if found is None else found.cost * (1 - 1e-12))
