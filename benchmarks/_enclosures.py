@@ -12,7 +12,7 @@ from kerfpath.kernels.enclosure import BOX, NONE, SMOOTH
 __all__ = ["run"]
 
 HOW = """\
-`Robot.enclose` on one core, on cells of uniformly random flange poses turned by uniformly random
+`Arm.enclose` on one core, on cells of uniformly random flange poses turned by uniformly random
 gamma, joint limits ignored. Time is per cell and posture, those without a solution included. How
 tight: per smooth posture and joint, the width of the proven curvature as a share of its largest
 absolute value, or of 1 rad/rad^2 where that is more: median and 90th percentile, which the

@@ -8,7 +8,7 @@ TURN = 2 * np.pi
 
 
 def every_cell(plan, level=0):
-    """All cells of a level that `Robot.enclose` does not rule out: node, posture, index, q, slope.
+    """All cells of a level that `Arm.enclose` does not rule out: node, posture, index, q, slope.
 
     On every turn that the ranges let any joint of the cell have.
     """

@@ -1,6 +1,5 @@
 """Enclosures of all solutions on cells of gamma, against solutions sampled by other means."""
 
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -8,11 +7,11 @@ import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from conftest import pose
+from conftest import pose, rebuilt
 from kerfpath import InputError, robot
 from kerfpath.auditor import chain_of
 from kerfpath.auditor.enclosure import Status, enclose, linear_minimum
-from kerfpath.robots import robot_ids
+from kerfpath.robots import Arm, Robot, robot_ids
 
 NAMES = [name for name in robot_ids() if robot(name).kinematics in ("opw", "ur")]
 TOOL = pose([0.1, 0.02, 0.25], Rotation.from_rotvec([0.3, 0.7, -0.2]).as_matrix())
@@ -72,7 +71,7 @@ def test_every_sampled_solution_is_inside(name):
 def test_a_base_and_a_flange_elsewhere_and_other_zeros_are_followed(name):
     rng = np.random.default_rng(5)
     moved = [pose(rng.normal(size=3), Rotation.random(random_state=i).as_matrix()) for i in (1, 2)]
-    arm = replace(
+    arm = rebuilt(
         robot(name), T_base_foot=moved[0], T_end_flange=moved[1],
         sign=rng.choice([-1.0, 1.0], 6), offset=rng.uniform(-4, 4, 6),
     )  # fmt: skip
@@ -410,15 +409,7 @@ def test_no_cells_are_no_trouble():
 def test_what_has_no_closed_form_here_is_refused():
     arm = robot("abb_irb4600_60_205").with_limits(acceleration=np.ones(6))
     rail = arm.on_rail([1, 0, 0], lower=0, upper=1, velocity=1, acceleration=1, step=0.1)
-    six = dict.fromkeys(("lower", "upper", "velocity", "acceleration"))
-    five = replace(
-        arm,
-        kinematics="five",
-        sign=np.ones(5),
-        offset=np.zeros(5),
-        endless=np.zeros(5, bool),
-        **six,
-    )
+    five = Robot(id="five", arm=Arm(kinematics="five", geometry=arm.geometry))
     cell = np.zeros(1)
     for other, words in ((five, "of family opw or ur, got"), (rail, "has rail")):
         with pytest.raises(InputError, match=words):

@@ -186,7 +186,8 @@ def test_common_names_of_contours_are_not(name):
 
 
 def test_joint_speeds_must_be_known(program):
-    slow = replace(program, robot=replace(program.robot, velocity=None))
+    limits = replace(program.robot.limits, velocity=None)
+    slow = replace(program, robot=replace(program.robot, limits=limits))
     assert codes(slow, "error", "urscript", GAS) == ["joint-speed"]
 
 
