@@ -15,7 +15,7 @@ from kerfpath.arrays import LONGEST, short_repr
 from kerfpath.cad import read
 from kerfpath.cell import Cell
 from kerfpath.job import read_job, run_job
-from kerfpath.job.format.prepared import cell_of_job
+from kerfpath.job.format.cell import cell_of_job
 
 MOST = 300
 

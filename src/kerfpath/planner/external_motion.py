@@ -1,4 +1,4 @@
-"""Plans with free courses: planned along the most promising courses; the best is taken."""
+"""Courses of external axes and elbows, and the best plan along the most promising ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Collision map: the clearance of each vertex of a layered graph in a cell."""
+"""The layers of a task: graph of poses, time between nodes, and clearance of the poses."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from kerfpath.comfort import Band, Comfort
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job import read_job
-from kerfpath.job.format.reading import TomlPlaces
+from kerfpath.job.format.faults import TomlPlaces
 from kerfpath.job.format.values import heads, pose
 from kerfpath.operations import micro_joints, slow_corners
 from kerfpath.options import PlanOptions

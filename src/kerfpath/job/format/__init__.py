@@ -1,24 +1,24 @@
 """The job file: its tables, their values in SI, and one-line messages about faults."""
 
+from kerfpath.job.format.cell import cell_of_job as cell_of_job
+from kerfpath.job.format.cell import with_map as with_map
 from kerfpath.job.format.contour import ContourSpec as ContourSpec
 from kerfpath.job.format.drawing import Drawing as Drawing
+from kerfpath.job.format.faults import all_of as all_of
+from kerfpath.job.format.faults import refusal_at as refusal_at
 from kerfpath.job.format.more_contours import with_loops as with_loops
 from kerfpath.job.format.more_contours import without_contour as without_contour
 from kerfpath.job.format.prepared import Candidate as Candidate
 from kerfpath.job.format.prepared import CutRequest as CutRequest
 from kerfpath.job.format.prepared import PreparedJob as PreparedJob
-from kerfpath.job.format.prepared import cell_of_job as cell_of_job
 from kerfpath.job.format.prepared import chord_error as chord_error
 from kerfpath.job.format.prepared import closer_nodes as closer_nodes
 from kerfpath.job.format.prepared import divide_nodes as divide_nodes
 from kerfpath.job.format.prepared import prepare as prepare
-from kerfpath.job.format.prepared import with_map as with_map
 from kerfpath.job.format.reading import Job as Job
-from kerfpath.job.format.reading import all_of as all_of
 from kerfpath.job.format.reading import home_of as home_of
 from kerfpath.job.format.reading import places_of as places_of
 from kerfpath.job.format.reading import read_job as read_job
-from kerfpath.job.format.reading import refusal_at as refusal_at
 from kerfpath.job.format.tables import TABLES as TABLES
 from kerfpath.job.format.tables import VARIABLES as VARIABLES
 from kerfpath.job.format.tables import AuditTable as AuditTable

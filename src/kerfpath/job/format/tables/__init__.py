@@ -7,7 +7,6 @@ as the expected value and its example as the way to write it.
 
 from kerfpath.job.format.tables.cell import CellTable as CellTable
 from kerfpath.job.format.tables.cell import FixtureTable as FixtureTable
-from kerfpath.job.format.tables.cell import given as given
 from kerfpath.job.format.tables.job import LIMITS_MARGIN as LIMITS_MARGIN
 from kerfpath.job.format.tables.job import REPEATED as REPEATED
 from kerfpath.job.format.tables.job import TABLES as TABLES
@@ -21,3 +20,4 @@ from kerfpath.job.format.tables.job import SequenceTable as SequenceTable
 from kerfpath.job.format.tables.part import ContourTable as ContourTable
 from kerfpath.job.format.tables.plan import PlanTable as PlanTable
 from kerfpath.job.format.tables.robot import ExternalTable as ExternalTable
+from kerfpath.job.format.tables.table import given as given

@@ -1,4 +1,4 @@
-"""The complete job file: every table, and the rules between tables."""
+"""The job file: the other tables, [comfort] to [sequence], and the rules between tables."""
 
 from __future__ import annotations
 
@@ -21,20 +21,14 @@ from pydantic import (
 
 from kerfpath.comfort import Band, Comfort
 from kerfpath.errors import InputError
-from kerfpath.job.format.tables.cell import (
-    CellTable,
-    Table,
-    ToolTable,
-    fields_of,
-    given,
-    require_distinct,
-)
+from kerfpath.job.format.tables.cell import CellTable, ToolTable
 from kerfpath.job.format.tables.part import (
     ContourTable,
     PartTable,
 )
 from kerfpath.job.format.tables.plan import PlanTable
 from kerfpath.job.format.tables.robot import RobotTable
+from kerfpath.job.format.tables.table import Table, fields_of, given, require_distinct
 from kerfpath.job.format.tolerances import Tolerances
 from kerfpath.job.format.values import (
     Identifier,

@@ -1,4 +1,4 @@
-"""The [[contour]] tables: which loops are cut, how fast, and how finely sampled."""
+"""The [part] and [[contour]] tables: drawing, loops, speeds, operations and sampling."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from kerfpath.arrays import Array, freeze
 from kerfpath.cad import GAP, UNITS_MM, Loop, Part
 from kerfpath.job.format.drawing import Drawing
-from kerfpath.job.format.tables.cell import Table, given, require_one
+from kerfpath.job.format.tables.table import Table, given, require_one
 from kerfpath.job.format.values import (
     MOST_NODES,
     NotNegative,

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import create_model, model_validator
 
 from kerfpath.certificate import Certify
-from kerfpath.job.format.tables.cell import Table, fields_of
+from kerfpath.job.format.tables.table import Table, fields_of
 from kerfpath.job.format.values import fault
 from kerfpath.options import CLEARANCE, EXACT_OR_BETTER, PENALTIES, OptionConflict, PlanOptions
 from kerfpath.robots import Robot, postures_named

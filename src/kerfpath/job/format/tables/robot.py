@@ -1,4 +1,4 @@
-"""The [robot] table: which robot, and limits that replace the known ones."""
+"""The [robot] and [[robot.external]] tables: the robot, its limits, and the axes that carry it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pydantic_core import PydanticCustomError
 
 from kerfpath.arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.job.format.tables.cell import Table, given, require_distinct
+from kerfpath.job.format.tables.table import Table, given, require_distinct
 from kerfpath.job.format.values import (
     FAULT,
     Axis,

@@ -1,0 +1,192 @@
+"""The run of a job: plan and audit every contour, and put them in order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+from kerfpath.auditor import bound_checks, transfer_checks, worst_of
+from kerfpath.cad import Part
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.job.format import Job, PreparedJob, prepare
+from kerfpath.job.run.contour import advised, cut_candidate, cut_in_posture
+from kerfpath.job.run.foresee import require_foreseen
+from kerfpath.job.run.results import CutResult, JobResult
+from kerfpath.planner import (
+    with_bound,
+)
+from kerfpath.plans import Plan
+from kerfpath.progress import Progress, no_progress
+from kerfpath.sequence import longest_search, order_candidates
+
+# -----------------------------------------------------------------------------
+# The order in which the contours of a job are cut, and the transfer moves between them.
+
+
+def order_cuts(
+    prepared: PreparedJob,
+    tried: Sequence[Sequence[tuple[CutResult, ...]]],
+    progress: Progress,
+) -> JobResult:
+    """Return one cut (or its pieces) of each contour's candidates, in the requested order.
+
+    The result has the moves between them if the job asks for moves and every contour has a plan.
+
+    Parameters
+    ----------
+    prepared : PreparedJob
+    tried : sequence of sequences of tuples of CutResult
+        The result of each candidate of each contour: one cut, or its pieces.
+    progress : callable
+    """
+    job = prepared.job
+    result = JobResult(job=job, cuts=(), mesh=prepared.part.mesh(), cell=prepared.cell)
+    passed = [[cuts for cuts in each if all(cut.passed for cut in cuts)] for each in tried]
+    if job.sequence is None or not all(passed):
+        first = [(fine or each)[0] for fine, each in zip(passed, tried, strict=True)]
+        return replace(result, cuts=tuple(cut for cuts in first for cut in cuts))
+    units, owner, before = _units(passed, prepared.inner_first)
+
+    longest = longest_search(job.sequence.seconds)
+    progress(f"order and moves, at most {longest:g} s without a solution", 0, 0)
+    requests = [prepared.contours[i] for i in owner]
+    # Picked plans and pieces are not planned in other postures.
+    others = [
+        () if r.run is not None or owner.count(i) > 1 else r.options.postures
+        for r, i in zip(requests, owner, strict=True)
+    ]
+    try:
+        part = order_candidates(
+            units,
+            _plan,
+            lambda unit, posture: cut_in_posture(prepared, requests[unit], posture),
+            others,
+            progress=lambda unit, done, total: progress(
+                f"{requests[unit].task.name}: other postures", done, total
+            ),
+            home=job.home,
+            cell=prepared.cell,
+            before=before,
+            heat_spacing=job.sequence.heat_spacing_mm / 1000,
+            given_order=job.sequence.order == "given",
+            retract=job.program.retract,
+            air_speed=job.program.air_speed or 1.0,
+            approach_speed=job.program.approach_speed,
+            pierce_time=job.program.pierce_time,
+            seconds=job.sequence.seconds,
+        )
+    except NoFeasiblePath as stuck:
+        return replace(result, cuts=tuple(unit[0] for unit in units), stuck=stuck)
+    cuts = [
+        replace(units[unit][candidate], plan=made)
+        for (unit, candidate), made in zip(part.chosen, part.plans, strict=True)
+    ]
+    o = job.options
+    audited = (
+        transfer_checks(job.robot, m.q, m.time, cell=prepared.cell, eta_v=o.eta_v, eta_a=o.eta_a)
+        for m in part.moves
+    )
+    return replace(result, cuts=tuple(cuts), part=part, air=tuple(worst_of(audited)))
+
+
+def _units(
+    passed: Sequence[Sequence[tuple[CutResult, ...]]], inner_first: Sequence[tuple[int, int]]
+) -> tuple[list[list[CutResult]], list[int], list[tuple[int, int]]]:
+    """Return the units to order, the contour of each, and the pairs in a required order.
+
+    A unit is the candidates of a contour that are cut in one go, or a single piece.
+    """
+    units: list[list[CutResult]] = []
+    owner: list[int] = []
+    pieces: list[tuple[int, int]] = []
+    for i, fine in enumerate(passed):
+        whole = [cuts[0] for cuts in fine if len(cuts) == 1]
+        new = [whole] if whole else [[piece] for piece in fine[0]]
+        pieces += pairwise(range(len(units), len(units) + len(new)))
+        units += new
+        owner += [i] * len(new)
+    members = [[u for u, i in enumerate(owner) if i == k] for k in range(len(passed))]
+    inner = [(a, b) for i, j in inner_first for a in members[i] for b in members[j]]
+    return units, owner, inner + pieces
+
+
+def _plan(cut: CutResult) -> Plan:
+    """Return the plan of a cut that has passed."""
+    assert cut.plan is not None
+    return cut.plan
+
+
+# -----------------------------------------------------------------------------
+# The run of a job: plan and audit every contour, and put them in order.
+
+
+def run_job(job: Job, part: Part | None = None, *, progress: Progress = no_progress) -> JobResult:
+    """Plan and audit every contour of a job.
+
+    `part` is the part in its drawing, if that is read already. A contour without a feasible path
+    does not stop the others; its result has the reason.
+
+    Raises
+    ------
+    InputError
+        The part cannot be read, a loop does not exist, or a contour cannot be sampled; or a fault
+        is known before planning, such as a contour below the floor or a reserved name.
+    """
+    prepared = prepare(job, part)
+    require_foreseen(prepared)
+    return run_prepared(prepared, progress=progress)
+
+
+def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> JobResult:
+    """Plan and audit every contour of a prepared job, in the order of its contours.
+
+    Its contours replace those of the job: a touch-up has other paths in them, a plan picked from
+    a Pareto set has other options.
+    """
+    tried = [
+        [
+            tuple(
+                advised(prepared, cut, progress)
+                for cut in cut_candidate(prepared, contour, candidate, progress)
+            )
+            for candidate in contour.candidates
+        ]
+        for contour in prepared.contours
+    ]
+    result = order_cuts(prepared, tried, progress)
+    cuts = tuple(certified(cut, progress) for cut in result.cuts)
+    return measured(prepared, result.with_cuts(cuts))
+
+
+def measured(prepared: PreparedJob, result: JobResult) -> JobResult:
+    """Return the result with the departures of its nodes from the CAD curves."""
+    part = prepared.part
+    moved = {
+        contour.task.name: part.departure(contour.task.pick, contour.loop)
+        for contour in prepared.contours
+        if contour.leaves_the_loop
+    }
+    return replace(
+        result, cuts=tuple(cut.measured(part, moved.get(cut.contour)) for cut in result.cuts)
+    )
+
+
+def certified(cut: CutResult, progress: Progress) -> CutResult:
+    """Return a cut with the bound of its plan, if one is asked for.
+
+    The bound is audited if plan.json is to keep its certificate.
+    """
+    asked = cut.request.options.certify
+    if cut.plan is None or asked is None:
+        return cut
+
+    def named(what: str, done: int, total: int, /) -> None:
+        share = f", {100 * done // total} %" if total else ""
+        progress(f"{cut.name}: {what}{share}", 0, 0)
+
+    made = with_bound(cut.plan, asked, progress=named)
+    if not asked.keep:
+        return replace(cut, plan=made)
+    named("audit of the certificate", 0, 0)
+    return replace(cut, plan=made, checks=(*cut.checks, *bound_checks(made)))
