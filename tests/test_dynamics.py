@@ -139,20 +139,20 @@ def test_a_held_positioner_takes_gravity_along(tmp_path):
 
 
 def test_efforts_and_jerks_are_read(tmp_path):
-    assert arm_with_masses(tmp_path).torque == pytest.approx(EFFORTS)
+    assert arm_with_masses(tmp_path).limits.torque == pytest.approx(EFFORTS)
     inside = (
         '<limit lower="-3" upper="3" velocity="2" acceleration="5" deceleration="4" '
         'jerk="{}" effort="{}"/>'
     )
     path = described_with_masses(tmp_path, "ur_ur10e", inside=inside.format(80, 150))
     found = Robot.from_urdf(path)
-    np.testing.assert_array_equal(found.jerk, np.full(6, 80.0))
-    np.testing.assert_array_equal(found.torque, np.full(6, 150.0))
+    np.testing.assert_array_equal(found.limits.jerk, np.full(6, 80.0))
+    np.testing.assert_array_equal(found.limits.torque, np.full(6, 150.0))
     np.testing.assert_array_equal(found.acceleration, np.full(6, 4.0))
     # Many descriptions write an effort of 0 that nobody means.
     for effort in ("0", "-1", "inf", "nan", "many"):
         path = described_with_masses(tmp_path, "ur_ur10e", inside=inside.format(80, effort))
-        assert Robot.from_urdf(path).torque is None
+        assert Robot.from_urdf(path).limits.torque is None
     path = described_with_masses(tmp_path, "ur_ur10e", inside=inside.format(-1, 1))
     with pytest.raises(InputError, match="joint 'j1' has the jerk limit -1 rad/s\\^3"):
         Robot.from_urdf(path)
@@ -161,7 +161,7 @@ def test_efforts_and_jerks_are_read(tmp_path):
 def test_a_jerk_may_be_known_of_some_joints(tmp_path):
     path = described_with_masses(tmp_path, "ur_ur10e")
     path.write_text(path.read_text().replace('effort="900.0"', 'effort="900" jerk="50"'))
-    jerk = Robot.from_urdf(path).jerk
+    jerk = Robot.from_urdf(path).limits.jerk
     np.testing.assert_array_equal(jerk, [np.inf, np.inf, np.inf, 50, np.inf, np.inf])
 
 
@@ -205,7 +205,7 @@ def test_masses_that_are_missing_or_impossible_are_refused_where_torques_are_ask
     text = re.sub(rf'<link name="{link}">.*?</link>', f'<link name="{link}">{element}</link>', text)
     path.write_text(text)
     found = Robot.from_urdf(path)  # kinematics need no masses
-    assert found.inertia is None
+    assert found.dynamics.inertia is None
     with pytest.raises(InputError, match="its torques cannot be computed: ") as fault:
         found.with_load(LOAD)
     said = why.replace("no inertial", "link 'link_3' has no <inertial>")
@@ -215,7 +215,7 @@ def test_masses_that_are_missing_or_impossible_are_refused_where_torques_are_ask
 
 def test_a_frame_needs_no_mass_and_a_link_on_a_foreign_joint_is_refused(tmp_path):
     path = described_with_masses(tmp_path, "ur_ur10e", tool=False)
-    assert Robot.from_urdf(path).inertia is not None
+    assert Robot.from_urdf(path).dynamics.inertia is not None
     finger = (
         f'<link name="finger">{random_inertial(np.random.default_rng(1), 0.2)}</link>'
         '<joint name="grip" type="prismatic"><parent link="tool0"/><child link="finger"/></joint>'
@@ -242,7 +242,9 @@ def test_what_is_not_known_is_refused(tmp_path):
         unlimited.with_limits(torque=[1, 1, 1, 1, 1, 0])
     with pytest.raises(InputError, match="jerk: must be positive"):
         unlimited.with_limits(jerk=[1, 1, 1, 1, 1, -1])
-    assert unlimited.with_limits(torque=np.ones(6)).with_load(Load(mass=0.0)).load.mass == 0
+    assert (
+        unlimited.with_limits(torque=np.ones(6)).with_load(Load(mass=0.0)).dynamics.load.mass == 0
+    )
 
 
 def test_loads_are_checked():
