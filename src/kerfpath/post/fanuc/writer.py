@@ -1,4 +1,13 @@
-"""TP, the language of FANUC controllers, as listings: this module only formats."""
+"""TP, the language of FANUC controllers, as listings: this module only formats.
+
+Units of TP: mm, deg, cm/min or mm/sec, per cent, seconds in hundredths. A listing is one
+program: attributes, numbered lines, and the positions that they name. TB on the line of a
+motion switches an output the given time before the tip reaches its end; a separate line after a
+motion that stops switches it once the tip is there.
+
+The layout is that of controllers' own listings: LeroyDu56/robconv, docs/fanuc_ls_format.md and
+tests/fixtures/fanuc/roboguide_export, JuniorNatalin/VASC (TB).
+"""
 
 from __future__ import annotations
 
@@ -122,15 +131,7 @@ class Listing(LineReader):
 
 
 # -----------------------------------------------------------------------------
-# TP, the language of FANUC controllers, as listings: this module only formats.
-#
-# Units of TP: mm, deg, cm/min or mm/sec, per cent, seconds in hundredths. A listing is one
-# program: attributes, numbered lines, and the positions that they name. TB on the line of a
-# motion switches an output the given time before the tip reaches its end; a separate line after a
-# motion that stops switches it once the tip is there.
-#
-# The layout is that of controllers' own listings: LeroyDu56/robconv, docs/fanuc_ls_format.md and
-# tests/fixtures/fanuc/roboguide_export, JuniorNatalin/VASC (TB).
+# The formatter of programs.
 
 ANGLES: Final = "xyz"
 """W turns about x, then P about y, then R about z, all axes fixed."""

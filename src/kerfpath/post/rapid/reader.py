@@ -130,7 +130,7 @@ IN_ROUTINE = only(
 
 
 # -----------------------------------------------------------------------------
-# Read back the RAPID that `Rapid` writes; anything else is refused.
+# The reader of modules.
 
 _T = TypeVar("_T")
 

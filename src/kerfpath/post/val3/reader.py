@@ -181,7 +181,7 @@ def _poses(values: list[Element], father: str) -> Array:
 
 
 # -----------------------------------------------------------------------------
-# Read back the projects that `Val3` writes; anything else is refused.
+# The reader of programs.
 
 _NAME = r"([A-Za-z]\w*)"
 _CALL = re.compile(rf"call (?:{_NAME}:)?{_NAME}\(\)", re.ASCII)
