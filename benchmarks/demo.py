@@ -17,7 +17,7 @@ included: B-pillar from STEP to plan, audit, RAPID program and report. Cold: wit
 for numba's compiled code (NUMBA_CACHE_DIR), as after installing; the files of Python and its
 packages are warm. Warm: kernels compiled before. The parts are from further runs of the same
 command with a clock around the library's calls; "other" is the rest of the process: interpreter
-start, frames and sampling, plan and program files, kernels that `warm_up` leaves out, end."""
+start, frames and sampling, files written, kernels that `warm_up` leaves out, end."""
 
 CLOCKS = {
     "compile (cold only)": ("kerfpath.job", "warm_up"),
@@ -25,6 +25,8 @@ CLOCKS = {
     "graph": ("kerfpath.job.format.reading", "layered_graph"),
     "search and refinement": ("kerfpath.planner.continuous", "clear_motion"),
     "audit": ("kerfpath.job.format.tolerances", "checks"),
+    "certificate": ("kerfpath.job.run.job", "certified"),
+    "program, with its audit": ("kerfpath.job.output.writing", "program_texts"),
     "report": ("kerfpath.job.output.writing", "report_text"),
 }
 PARTS = ("import", *CLOCKS, "other")
