@@ -1,6 +1,6 @@
 /** Joints and external axes as the page shows them: their names, units and colours. */
 
-import { UNITS } from "./format.js";
+import { shownUnit } from "./format.js";
 
 /**
  * @typedef {object} Axis
@@ -19,7 +19,7 @@ import { UNITS } from "./format.js";
 export function axesOf(robot) {
   const arm = robot?.joints.filter(({ carries }) => !carries).length ?? 0;
   return (robot?.joints ?? []).map(({ name, unit, carries }, j) => ({
-    ...UNITS[unit],
+    ...shownUnit(unit),
     label: carries ? name : `J${j + 1}`,
     colour: carries ? `--external-${j - arm + 1}` : `--joint-${j + 1}`,
     external: carries !== null,

@@ -70,13 +70,19 @@ export const counted = (count, word) => `${count} ${word}${count === 1 ? "" : "s
  * Shown units by the units of the server, with the conversion of values.
  * @type {Record<string, {unit: string, of: (value: number) => number}>}
  */
-export const UNITS = {
+const UNITS = {
   rad: { unit: "deg", of: deg },
   m: { unit: "mm", of: (value) => 1e3 * value },
   "m/s": { unit: "m/min", of: (value) => 60 * value },
   share: { unit: "% limit", of: (value) => 100 * value },
   "m^3": { unit: "m\u00b3", of: (value) => value },
 };
+
+/**
+ * Return the shown unit for a unit of the server, and the conversion to it; other units stay.
+ * @param {string} unit
+ */
+export const shownUnit = (unit) => UNITS[unit] ?? { unit, of: Number };
 
 /**
  * Return an SI value in the units that are shown.
@@ -90,8 +96,11 @@ export function inUnits(value, unit) {
   return `${digits(value, 3)}${unit ? ` ${unit}` : ""}`;
 }
 
+/** @param {number[]} values */
+export const sum = (values) => values.reduce((total, each) => total + each, 0);
+
 /**
  * Return how long the cut of a contour takes, s.
  * @param {import("./messages.js").PlanMessage[]} plans  its pieces
  */
-export const secondsOf = (plans) => plans.reduce((sum, { time }) => sum + time[time.length - 1], 0);
+export const secondsOf = (plans) => sum(plans.map(({ time }) => time[time.length - 1]));

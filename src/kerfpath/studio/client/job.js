@@ -9,7 +9,7 @@ import { send, store } from "./app.js";
  * @param {string} key
  * @returns {Path}
  */
-export function pathOf(key) {
+function pathOf(key) {
   const [first, ...rest] = key.split(".");
   const inner = rest.map((part) => (/^\d+$/.test(part) ? Number(part) : part));
   return first === "contour" ? [first, store.table ?? 0, ...inner] : [first, ...inner];

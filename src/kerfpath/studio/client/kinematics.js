@@ -38,7 +38,7 @@ export function rotation(axis, angle) {
 }
 
 /** The identity pose. */
-export const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
 /**
  * Return the pose by which an external axis has moved what it carries.

@@ -24,7 +24,7 @@ export function uncut(inside = false) {
  * Return the kind of a loop in words.
  * @param {Loop} loop
  */
-export function kindOf({ kind, diameter }) {
+function kindOf({ kind, diameter }) {
   if (kind === "open") return "open line";
   if (kind === "outer") return "trim line";
   return diameter === null ? "opening" : `hole, diameter ${millimetres(diameter)}`;

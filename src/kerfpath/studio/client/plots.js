@@ -7,7 +7,7 @@ import { columns, dashed, scaleOf, span } from "./curves.js";
 import { player, store } from "./app.js";
 import { byId, onNextFrame, textSize, themeColour } from "./dom.js";
 import { digits, fixed, secondsOf } from "./format.js";
-import { colourKey, draw, html, mount, redraw, segmentButtons } from "./ui.js";
+import { colourKey, draw, html, mount, redraw, segments } from "./ui.js";
 
 /** @typedef {import("./curves.js").Kind} Kind */
 
@@ -56,7 +56,7 @@ export class Plots {
   /** Buttons for what is plotted. */
   tabs() {
     const kinds = Object.entries(KINDS).map(([value, { title }]) => ({ value, label: title }));
-    return segmentButtons(kinds, this.kind, (kind) => {
+    return segments("Plotted quantity", kinds, this.kind, (kind) => {
       this.kind = /** @type {Kind} */ (kind);
       this.invalidate();
       redraw();

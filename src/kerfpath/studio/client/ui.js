@@ -81,22 +81,12 @@ export const card = (title, tools, body, more = "") => html`
  */
 export const segments = (label, choices, value, choose, disabled = false) => html`
   <div class="segments" role="group" aria-label=${label}>
-    ${segmentButtons(choices, value, choose, disabled)}
+    ${choices.map(
+      (each) => html`
+        <button key=${each.value} aria-pressed=${String(each.value === value)} disabled=${disabled}
+          onClick=${() => choose(each.value)}>${each.label}</button>`,
+    )}
   </div>`;
-
-/**
- * The buttons of such a group.
- * @param {Choice[]} choices
- * @param {string} value
- * @param {(value: string) => void} choose
- * @param {boolean} [disabled]
- */
-export const segmentButtons = (choices, value, choose, disabled = false) =>
-  choices.map(
-    (each) => html`
-      <button key=${each.value} aria-pressed=${String(each.value === value)} disabled=${disabled}
-        onClick=${() => choose(each.value)}>${each.label}</button>`,
-  );
 
 /**
  * Options of a list; "" is a choice like any other.

@@ -1,5 +1,6 @@
 /** The drawing of a map on its canvas: cells, axes, courses, cursors. */
 
+import { isDark } from "../desk.js";
 import { freshContext, pixelRatio, textSize, themeColour } from "../dom.js";
 import { deg, fixed } from "../format.js";
 import { wrapped } from "./grid.js";
@@ -47,13 +48,9 @@ export class Chart {
     new ResizeObserver(() => (this.frame = this.measured())).observe(canvas);
   }
 
-  dark() {
-    return document.documentElement.dataset.theme === "dark";
-  }
-
   inks() {
     const { message } = /** @type {Grid} */ (this.grid);
-    return inks(message, this.dark(), themeColour("--free"), this.shade !== null);
+    return inks(message, isDark(), themeColour("--free"), this.shade !== null);
   }
 
   measured() {
@@ -112,7 +109,7 @@ export class Chart {
     const { graph, contour } = grid.message;
     const shaded = this.shade ? `${this.shade.message.by} ${this.shade.number}` : "";
     const { from, to, top, bottom } = this.window;
-    const key = [graph, contour, this.layer, w, h, this.dark(), shaded, from, to, top, bottom];
+    const key = [graph, contour, this.layer, w, h, isDark(), shaded, from, to, top, bottom];
     if (key.join(" ") === this.painted) return;
     this.painted = key.join(" ");
     Object.assign(this.back, { width: w, height: h });

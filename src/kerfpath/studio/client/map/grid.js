@@ -1,5 +1,7 @@
 /** A map message, unpacked: the codes of all poses, and the node and sample of a place. */
 
+import { interval } from "../kinematics.js";
+
 /** @typedef {import("../messages.js").MapMessage} MapMessage */
 
 export class Grid {
@@ -27,12 +29,8 @@ export class Grid {
    */
   nodeAt(s) {
     const list = this.message.s;
-    let [low, high] = [0, list.length - 1];
-    while (high - low > 1) {
-      const middle = (low + high) >> 1;
-      if (list[middle] <= s) low = middle;
-      else high = middle;
-    }
+    const low = interval(list, s);
+    const high = Math.min(low + 1, list.length - 1);
     return s - list[low] <= list[high] - s ? low : high;
   }
 
@@ -43,13 +41,9 @@ export class Grid {
   sampleAt(gamma) {
     const list = this.message.gamma;
     const angle = wrapped(gamma);
-    let [low, high] = [-1, list.length]; // the ends of windows are also samples: steps are uneven
-    while (high - low > 1) {
-      const middle = (low + high) >> 1;
-      if (list[middle] <= angle) low = middle;
-      else high = middle;
-    }
-    const [below, above] = [low < 0 ? list.length - 1 : low, high % list.length];
+    // The ends of windows are also samples: steps are uneven.
+    const low = list.findLastIndex((each) => each <= angle);
+    const [below, above] = [low < 0 ? list.length - 1 : low, (low + 1) % list.length];
     const off = (/** @type {number} */ at) => Math.abs(wrapped(list[at] - angle));
     return off(above) < off(below) ? above : below;
   }

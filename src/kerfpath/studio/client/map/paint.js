@@ -17,7 +17,7 @@ export const MOST = 253;
  * @param {string} hex  #rrggbb
  * @returns {Rgb}
  */
-export const rgb = (hex) => {
+const rgb = (hex) => {
   const value = parseInt(hex.slice(1), 16);
   return [value >> 16, (value >> 8) & 255, value & 255];
 };

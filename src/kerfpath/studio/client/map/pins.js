@@ -22,7 +22,7 @@ const written = (angle) => Math.round((turned(angle + 180) - 180) * 10) / 10;
  * Return how wide a pin is, deg.
  * @param {Pin} pin
  */
-export const widthOf = (pin) => turned(pin.high - pin.low);
+const widthOf = (pin) => turned(pin.high - pin.low);
 
 /**
  * Return the intervals of a pin on a map from -180 to 180 deg: two if it crosses the edge.
@@ -33,11 +33,10 @@ export function intervals(pin) {
   const low = turned(pin.low + 180) - 180;
   const high = low + widthOf(pin);
   if (high <= 180) return [[low, high]];
-  const parts = /** @type {[number, number][]} */ ([
+  return [
     [low, 180],
     [-180, high - 360],
-  ]);
-  return parts;
+  ];
 }
 
 /**

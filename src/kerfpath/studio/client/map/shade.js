@@ -1,6 +1,6 @@
 /** A quantity that shades the admitted poses of a map. */
 
-import { UNITS, digits, fixed } from "../format.js";
+import { digits, fixed, shownUnit } from "../format.js";
 import { bytes } from "./grid.js";
 import { MOST, NO_SHADE, TOO_NEAR } from "./paint.js";
 
@@ -52,7 +52,7 @@ export class Shade {
 
   /** @param {number} value */
   shown(value) {
-    const { unit, of } = UNITS[this.message.unit] ?? { unit: this.message.unit, of: Number };
+    const { unit, of } = shownUnit(this.message.unit);
     return `${digits(of(value), 2)} ${unit}`.trim();
   }
 

@@ -3,7 +3,7 @@
 import { player, send, store } from "../app.js";
 import { byId, onNextFrame } from "../dom.js";
 import { deg } from "../format.js";
-import { html, mount, redraw, segmentButtons } from "../ui.js";
+import { html, mount, redraw, segments } from "../ui.js";
 import { Bands, courseAt } from "./bands.js";
 import { Chart } from "./chart.js";
 import { Choices } from "./choices.js";
@@ -104,7 +104,7 @@ export class MapView {
     const layers = this.grid?.layers ?? [];
     if (layers.length < 2) return null;
     const choices = layers.map(({ name }, i) => ({ value: String(i), label: name }));
-    return segmentButtons(choices, String(this.layer), (layer) => this.show(Number(layer)));
+    return segments("Posture", choices, String(this.layer), (layer) => this.show(Number(layer)));
   }
 
   /** A text if there is no map. */

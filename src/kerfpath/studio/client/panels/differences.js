@@ -1,6 +1,6 @@
 /** The figures of two plans of a contour, by criterion and by joint. */
 
-import { UNITS, digits, fixed, secondsOf } from "../format.js";
+import { digits, fixed, secondsOf, shownUnit, sum } from "../format.js";
 import { html } from "../ui.js";
 
 /** @typedef {import("../messages.js").PlanMessage} PlanMessage */
@@ -16,8 +16,6 @@ import { html } from "../ui.js";
  * @property {1 | -1} [better]  1: more is better; default: less is better
  * @property {number} [places]  default: three significant digits
  */
-
-const sum = (/** @type {number[]} */ values) => values.reduce((total, each) => total + each, 0);
 
 /**
  * Return a criterion of a joint over all pieces of a contour, in its unit or % of its limit.
@@ -41,7 +39,7 @@ function nearest(plans) {
   const found = new Map();
   for (const { name, value, unit } of plans.flatMap(({ criteria }) => criteria.nearest)) {
     if (value === null) continue;
-    const shown = UNITS[unit] ?? { unit, of: (/** @type {number} */ same) => same };
+    const shown = shownUnit(unit);
     const known = found.get(name)?.value ?? Infinity;
     if (shown.of(value) < known) found.set(name, { value: shown.of(value), unit: shown.unit });
   }

@@ -3,7 +3,7 @@
 import { useEffect, useRef } from "preact/hooks";
 
 import { send, store } from "../app.js";
-import { UNITS, digits } from "../format.js";
+import { digits, shownUnit } from "../format.js";
 import { SCALE_GRADIENT } from "../scene/scale.js";
 import { Scatter } from "../scatter.js";
 import { card, html, options, redraw } from "../ui.js";
@@ -44,7 +44,7 @@ function show(number) {
  * @param {FrontMessage["axes"][number]} axis
  */
 function shownAxis({ name, words, unit, better }) {
-  const known = UNITS[unit] ?? { unit, of: (/** @type {number} */ value) => value };
+  const known = shownUnit(unit);
   const label = `${words}, ${known.unit} ${better === "less" ? "\u2193" : "\u2191"}`;
   return { ...known, name, words, label };
 }

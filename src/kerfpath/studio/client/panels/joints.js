@@ -2,7 +2,7 @@
 
 import { send, store } from "../app.js";
 import { axesOf } from "../axes.js";
-import { UNITS, digits, fixed } from "../format.js";
+import { digits, fixed, sum } from "../format.js";
 import { Slider, card, colourKey, gesture, html, icon, useHeld } from "../ui.js";
 import { staleClass } from "./result.js";
 
@@ -40,12 +40,10 @@ export function jointsPanel() {
       onClick=${() => setWeights(null, gesture())}>${icon("reset")}Default weights</button>`;
   const units = [...new Set(axes.map(({ unit }) => unit))].join(", ");
   const columns = [
-    ...[
-      ["", ""],
-      ["weight", "× default"],
-      ["moves", units],
-      ["speed", "% limit"],
-    ],
+    ["", ""],
+    ["weight", "× default"],
+    ["moves", units],
+    ["speed", "% limit"],
     ["accel.", "% limit"],
   ];
   const named = axes.some(({ external }) => external) ? "named" : "";
@@ -60,7 +58,7 @@ export function jointsPanel() {
           <label for=${`weight-${j + 1}`}>${colourKey(axis.colour)}${axis.label}</label>
         </th>
         <td><${Weight} ...${weight} set=${set} /></td>
-        <td>${plans.length > 0 && travel(plans, j, axis, scene.robot.joints[j].unit)}</td>
+        <td>${plans.length > 0 && travel(plans, j, axis)}</td>
         ${share(plans.map(({ criteria }) => criteria.peak_velocity[j]))}
         ${share(plans.map(({ criteria }) => criteria.peak_acceleration[j]))}
       </tr>`;
@@ -102,11 +100,10 @@ function Weight({ joint, times, title, set }) {
  * @param {PlanMessage[]} plans
  * @param {number} joint
  * @param {Axis} axis
- * @param {string} unit
  */
-function travel(plans, joint, axis, unit) {
+function travel(plans, joint, axis) {
   const moved = (/** @type {PlanMessage[]} */ all) =>
-    UNITS[unit].of(all.reduce((sum, { criteria }) => sum + criteria.displacement[joint], 0));
+    axis.of(sum(all.map(({ criteria }) => criteria.displacement[joint])));
   const [now, before] = [moved(plans), moved(store.before.get(plans[0].contour) ?? [])];
   if (!before || Math.abs(now - before) < 0.02 * before) return fixed(now, 1);
   const more = now > before;

@@ -3,7 +3,7 @@
 import { useLayoutEffect, useRef } from "preact/hooks";
 
 import { send, store } from "../app.js";
-import { change, counted, fixed } from "../format.js";
+import { change, counted, fixed, sum } from "../format.js";
 import { NUMBER, blurOnEnter, html, redraw, segments } from "../ui.js";
 import { candidates } from "./candidates.js";
 
@@ -211,11 +211,8 @@ function Place({ label, short, unit, step, value, moved, put, commit }) {
 function reach(answer) {
   const contours = answer?.contours ?? [];
   const lost = contours.filter(({ out }) => out.length);
-  const count = lost.reduce((sum, { out }) => sum + out.length, 0);
-  const nodes = counted(
-    contours.reduce((sum, each) => sum + each.nodes, 0),
-    "node",
-  );
+  const count = sum(lost.map(({ out }) => out.length));
+  const nodes = counted(sum(contours.map((each) => each.nodes)), "node");
   const all = counted(contours.length, "contour");
   const words = !answer
     ? "Testing what the robot reaches."

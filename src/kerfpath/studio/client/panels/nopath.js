@@ -1,7 +1,7 @@
 /** No feasible path: where it breaks, why, what is proved, and buttons for changes that help. */
 
 import { send } from "../app.js";
-import { millimetres } from "../format.js";
+import { millimetres, sum } from "../format.js";
 import { dot, html, icon } from "../ui.js";
 
 /** @typedef {import("../messages.js").NoPathMessage} NoPathMessage */
@@ -21,7 +21,7 @@ const NOTHING =
  */
 export function noPath(answer, show) {
   const { node, s, reasons } = answer;
-  const total = reasons.reduce((sum, { count }) => sum + count, 0) || 1;
+  const total = sum(reasons.map(({ count }) => count)) || 1;
   const at = s === null ? "" : `at ${millimetres(s)} of the path, `;
   const place =
     node < 0 ? "Its first node has no admitted pose." : `It breaks ${at}after node ${node + 1}.`;

@@ -2,7 +2,7 @@
 
 import { store } from "../app.js";
 import { byId } from "../dom.js";
-import { change, counted, digits, fixed, inUnits, percent, secondsOf } from "../format.js";
+import { change, counted, digits, fixed, inUnits, percent, secondsOf, sum } from "../format.js";
 import { card, dot, html, icon } from "../ui.js";
 import { standing } from "./contours.js";
 import { noPath } from "./nopath.js";
@@ -41,9 +41,9 @@ export const staleClass = (plans) => (plans.some((plan) => store.stale(plan)) ? 
 
 /** @param {PlanMessage[]} plans */
 function figures(plans) {
-  const sum = (/** @type {PlanMessage[]} */ all) =>
-    all.reduce((total, { cost }) => total + cost, 0);
-  const [cost, before] = [sum(plans), sum(store.before.get(plans[0].contour) ?? [])];
+  const [cost, before] = [plans, store.before.get(plans[0].contour) ?? []].map((all) =>
+    sum(all.map((plan) => plan.cost)),
+  );
   const changed = store.comparable(plans[0].contour) ? change(cost, before) : "";
   const better = changed === "same" ? "" : cost > before ? "up" : "down";
   return html`

@@ -34,7 +34,7 @@ export function mesh(id) {
  * @param {ArrayBuffer} bytes
  * @returns {Triangles}
  */
-export function unpack(bytes) {
+function unpack(bytes) {
   const [nv, nt] = new Uint32Array(bytes, 0, 2);
   const xyz = new Float32Array(bytes, 8, 3 * nv);
   return { xyz, corners: new Uint32Array(bytes, 8 + 12 * nv, 3 * nt) };

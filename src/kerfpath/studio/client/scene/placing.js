@@ -20,7 +20,7 @@ const DEG = 180 / Math.PI;
  * @param {number[]} xyz  mm
  * @param {number[]} rpy  deg
  */
-export function poseOf(xyz, rpy) {
+function poseOf(xyz, rpy) {
   const [roll, pitch, yaw] = rpy.map((each) => each / DEG);
   const turn = new Matrix4().makeRotationFromEuler(new Euler(roll, pitch, yaw, "ZYX"));
   return turn.setPosition(new Vector3().fromArray(xyz.map((each) => each / MM)));
@@ -31,7 +31,7 @@ export function poseOf(xyz, rpy) {
  * @param {Matrix4} pose
  * @returns {{xyz: number[], rpy: number[]}} mm, deg
  */
-export function numbersOf(pose) {
+function numbersOf(pose) {
   const { x, y, z } = new Euler().setFromRotationMatrix(pose, "ZYX");
   const at = new Vector3().setFromMatrixPosition(pose).toArray();
   return {

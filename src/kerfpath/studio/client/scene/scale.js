@@ -2,9 +2,8 @@
 
 import { Color } from "three";
 
-const STOPS = ["#440154", "#3b528b", "#21918c", "#5ec962", "#fde725"].map(
-  (each) => new Color(each),
-);
+const COLOURS = ["#440154", "#3b528b", "#21918c", "#5ec962", "#fde725"];
+const STOPS = COLOURS.map((each) => new Color(each));
 
 /**
  * Return the colour of a share of the scale; beyond 1 the colour of excess.
@@ -19,5 +18,4 @@ export function alongScale(share) {
 }
 
 /** The same scale for style sheets. */
-export const SCALE_GRADIENT =
-  "linear-gradient(to right, #440154, #3b528b, #21918c, #5ec962, #fde725)";
+export const SCALE_GRADIENT = `linear-gradient(to right, ${COLOURS.join(", ")})`;
