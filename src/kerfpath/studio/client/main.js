@@ -63,6 +63,8 @@ mount(byId("audit"), auditPanel);
 mount(byId("status"), foot);
 mount(byId("sheet"), drawSheet);
 store.on(["anything"], redraw);
+// What a gesture changes is drawn with the next frame; its handlers need not ask for it.
+for (const type of ["click", "input", "change"]) document.addEventListener(type, redraw);
 splitter();
 followTheme(() => {
   view.paint();

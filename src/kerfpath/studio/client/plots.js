@@ -7,7 +7,7 @@ import { columns, dashed, scaleOf, span } from "./curves.js";
 import { player, store } from "./app.js";
 import { byId, onNextFrame, textSize, themeColour } from "./dom.js";
 import { digits, fixed, secondsOf } from "./format.js";
-import { colourKey, draw, html, mount, redraw, segments } from "./ui.js";
+import { colourKey, draw, html, mount, segments } from "./ui.js";
 
 /** @typedef {import("./curves.js").Kind} Kind */
 
@@ -59,7 +59,6 @@ export class Plots {
     return segments("Plotted quantity", kinds, this.kind, (kind) => {
       this.kind = /** @type {Kind} */ (kind);
       this.invalidate();
-      redraw();
     });
   }
 
@@ -237,7 +236,6 @@ export class Plots {
       const toggle = () => {
         if (!this.off.delete(j)) this.off.add(j);
         this.plot?.setSeries(j + 1, { show: !this.off.has(j) });
-        redraw();
       };
       return html`
         <button class="joint" aria-pressed=${String(!this.off.has(j))} title=${title}

@@ -138,7 +138,6 @@ export class MapView {
   show(layer) {
     this.layer = layer;
     this.picked = true;
-    redraw();
     this.invalidate();
   }
 

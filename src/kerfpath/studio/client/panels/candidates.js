@@ -2,7 +2,7 @@
 
 import { send, store } from "../app.js";
 import { change, counted, digits, fixed } from "../format.js";
-import { NUMBER, dot, html, options, redraw } from "../ui.js";
+import { NUMBER, dot, html, options } from "../ui.js";
 import { bar } from "./bar.js";
 
 /** @typedef {import("../messages.js").TryEntry} Try */
@@ -120,10 +120,7 @@ export function candidates(placing, moved) {
     const continuous = job?.values?.plan?.method === "continuous";
     const goals = Object.entries(GOALS).map(([value, goal]) => ({ value, label: goal.words }));
     /** @type {(key: "goal" | "judged" | "evaluations") => (event: any) => void} */
-    const set = (key) => (event) => {
-      wanted[key] = event.target.value;
-      redraw();
-    };
+    const set = (key) => (event) => (wanted[key] = event.target.value);
     const count = { ...NUMBER, min: 8, max: 100000, step: 8, value: wanted.evaluations };
     return html`
       <section class="card">
@@ -162,18 +159,12 @@ export function candidates(placing, moved) {
   function variable(name) {
     const [label, unit] = VARIABLES[name];
     const end = (/** @type {0 | 1} */ i) => {
-      const set = (/** @type {any} */ { target }) => {
-        wanted.ranges[name][i] = target.value;
-        redraw();
-      };
+      const set = (/** @type {any} */ { target }) => (wanted.ranges[name][i] = target.value);
       const words = `${label}, ${["least", "most"][i]}, ${unit}`;
       const value = wanted.ranges[name][i];
       return html`<input ...${NUMBER} value=${value} aria-label=${words} onInput=${set} />`;
     };
-    const toggle = () => {
-      if (!wanted.varied.delete(name)) wanted.varied.add(name);
-      redraw();
-    };
+    const toggle = () => wanted.varied.delete(name) || wanted.varied.add(name);
     return html`
       <div class="vary" key=${name}>
         <label>

@@ -3,7 +3,7 @@
 import { player, send, store } from "../app.js";
 import { axesOf } from "../axes.js";
 import { jointsAt } from "../kinematics.js";
-import { Input, card, html, icon, redraw, segments } from "../ui.js";
+import { Input, card, html, icon, segments } from "../ui.js";
 import { jointRows, rows, table } from "./differences.js";
 
 /** @typedef {import("../messages.js").PlanMessage} PlanMessage */
@@ -140,7 +140,6 @@ function comparison({ entry, plans }, live, view) {
   const haunt = () => {
     state.ghost = !state.ghost;
     view.accompany(companion());
-    redraw();
   };
   return html`
     ${both ? figures(entry, then, now) : html`<p class="quiet small">${why}</p>`}
@@ -171,10 +170,7 @@ function figures({ name, metric, objective, cycle }, then, now) {
   const known = outcome && !store.stale(outcome) ? outcome.cycle : null;
   const axes = axesOf(store.scene?.robot);
   const more = { alike, axes };
-  const pick = (/** @type {string} */ kind) => {
-    state.kind = /** @type {OfJoint} */ (kind);
-    redraw();
-  };
+  const pick = (/** @type {string} */ kind) => (state.kind = /** @type {OfJoint} */ (kind));
   const unlike = "Their costs cannot be compared: weights, metric or objective differ.";
   return html`
     <div>

@@ -5,7 +5,7 @@ import { useState } from "preact/hooks";
 import { player, store } from "../app.js";
 import { axesOf } from "../axes.js";
 import { faultOf, isGiven, setKeys, valueOf } from "../job.js";
-import { Input, NUMBER, card, html, icon, options, redraw } from "../ui.js";
+import { Input, NUMBER, card, html, icon, options } from "../ui.js";
 
 /** @typedef {import("../messages.js").OptionField} OptionField */
 /** @typedef {import("../messages.js").Sampling} Sampling */
@@ -23,10 +23,7 @@ const found = (...words) =>
 export function formPanel() {
   const { options: form } = store;
   if (!form) return null;
-  const find = (/** @type {any} */ { target }) => {
-    wanted = target.value.trim().toLowerCase();
-    redraw();
-  };
+  const find = (/** @type {any} */ { target }) => (wanted = target.value.trim().toLowerCase());
   const field = { type: "search", class: "find", placeholder: "Find an option", onInput: find };
   const search = html`<input ...${field} aria-label="Find an option" />`;
   let any = false;

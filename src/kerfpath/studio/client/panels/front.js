@@ -86,10 +86,7 @@ const clamped = (text) => Math.min(1000, Math.max(10, Math.round(Number(text)) |
 
 /** @param {string} word */
 function criterion(word) {
-  const toggle = () => {
-    if (!wanted.delete(word)) wanted.add(word);
-    redraw();
-  };
+  const toggle = () => wanted.delete(word) || wanted.add(word);
   const on = wanted.has(word);
   const off = !on && wanted.size >= MOST;
   return html`
@@ -101,10 +98,6 @@ function criterion(word) {
 /** @param {FrontMessage} front */
 function set(front) {
   const axes = front.axes.map(shownAxis);
-  const pick = (/** @type {number} */ i, /** @type {number} */ axis) => {
-    scatter.shown[i] = axis;
-    redraw();
-  };
   scatter.load(
     front,
     axes,
@@ -118,7 +111,7 @@ function set(front) {
       <select
         aria-label=${`Criterion ${name}`}
         value=${String(scatter.shown[i])}
-        onChange=${(/** @type {any} */ { target }) => pick(i, Number(target.value))}
+        onChange=${(/** @type {any} */ { target }) => (scatter.shown[i] = Number(target.value))}
       >${options(i === 2 ? [{ value: "-1", label: "one colour" }, ...names] : names)}</select>`,
   );
   return html`

@@ -101,7 +101,6 @@ export function layoutSheet(placing) {
   function choose(what, turn) {
     turns = turn;
     placing.choose(/** @type {What} */ (what), turns);
-    redraw();
   }
 
   function body() {
@@ -202,7 +201,7 @@ function Place({ label, short, unit, step, value, moved, put, commit }) {
       <span>${short}</span>
       <input ref=${input} ...${NUMBER} step=${step} disabled=${!store.live} aria-label=${label}
         onInput=${() => given() && put(Number(input.current?.value))}
-        onChange=${() => (given() ? commit() : redraw())} onKeyDown=${blurOnEnter} />
+        onChange=${() => given() && commit()} onKeyDown=${blurOnEnter} />
       <span class="unit">${unit}</span>
     </label>`;
 }
@@ -270,13 +269,11 @@ function fastestHere(placing) {
   function find() {
     looked = known().key;
     looking = send({ type: "fastest", contour: store.selected ?? "" });
-    redraw();
   }
 
   function stop() {
     looking = false;
     send({ type: "cancel" });
-    redraw();
   }
 
   /** @param {number | null} now  m/min */

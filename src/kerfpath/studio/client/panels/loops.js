@@ -4,7 +4,7 @@ import { send, store } from "../app.js";
 import { byId } from "../dom.js";
 import { counted } from "../format.js";
 import { barred, contoursByLoop, cutLoops, described, leaving } from "../part.js";
-import { html, redraw } from "../ui.js";
+import { html } from "../ui.js";
 
 /** @typedef {import("../messages.js").LoopEntry} Loop */
 
@@ -28,16 +28,10 @@ function body() {
       !(filter.uncut && known.has(name)) &&
       `${name} ${known.get(name)?.name ?? ""}`.toLowerCase().includes(wanted),
   );
-  const find = (/** @type {any} */ { target }) => {
-    filter.words = target.value;
-    redraw();
-  };
+  const find = (/** @type {any} */ { target }) => (filter.words = target.value);
   /** @type {(key: "uncut" | "inner", words: string, hidden?: boolean) => unknown} */
   const box = (key, words, hidden = false) => {
-    const toggle = () => {
-      filter[key] = !filter[key];
-      redraw();
-    };
+    const toggle = () => (filter[key] = !filter[key]);
     return html`
       <label hidden=${hidden}>
         <input type="checkbox" checked=${filter[key]} onChange=${toggle} />${words}

@@ -15,7 +15,6 @@ import {
   html,
   icon,
   options,
-  redraw,
   segments,
   useHeld,
 } from "../ui.js";
@@ -56,10 +55,7 @@ export function optionsPanel() {
     ...{ value: valueOf(SPEED) ?? shape?.speed_m_min ?? 1, disabled, fault: faultOf(SPEED) },
     onSet: (/** @type {number} */ value, /** @type {string} */ drag) => setKey(SPEED, value, drag),
   };
-  const find = () => {
-    fastest.looking = send({ type: "fastest", contour: selected ?? "" });
-    redraw();
-  };
+  const find = () => (fastest.looking = send({ type: "fastest", contour: selected ?? "" }));
   const start = html`
     <button class="plain" disabled=${disabled || fastest.looking} onClick=${find}>
       ${icon("speed")}Find the fastest

@@ -69,7 +69,6 @@ function request() {
 function ask(language) {
   Object.assign(state, { language, asked: store.outcome?.revision ?? 0, waiting: true, why: "" });
   request();
-  redraw();
 }
 
 function languages() {

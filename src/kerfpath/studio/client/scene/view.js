@@ -87,7 +87,6 @@ export class SceneView {
     const by = byId("colour-by", HTMLSelectElement);
     by.addEventListener("change", () => {
       this.paths.colour(/** @type {import("./paths.js").ColourBy} */ (by.value));
-      redraw();
       this.show(player.moment);
     });
   }
