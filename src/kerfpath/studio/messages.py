@@ -131,12 +131,28 @@ class Sampling(Message):
     usual: float
 
 
+class Variable(Message):
+    """An offset of part, robot base or head that a search for the best placement may vary."""
+
+    key: str
+    """Its name in `[layout]`, in requests and in offsets."""
+    label: str
+    unit: str
+    usual: Numbers
+    """The least and the largest value of its usual range."""
+    varies: bool
+    """Whether it varies if the job has no range at all."""
+
+
 class OptionsMessage(Message):
     """The form of options of the job: which keys have a control, and what it must know of them."""
 
     type: Literal["options"] = "options"
     groups: list[OptionGroup]
     samplings: list[Sampling]
+    goals: dict[str, str]
+    """The goals of a search for the best placement, in words."""
+    variables: list[Variable]
     criteria: list[str]
     """The criteria of a Pareto set."""
     languages: list[str]

@@ -6,6 +6,7 @@ a job; of a planning option its group and its label, too. Those of other keys ar
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any, get_args, get_origin
@@ -13,12 +14,21 @@ from typing import Any, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from kerfpath.front import CRITERIA
-from kerfpath.job import TABLES, JobFile
+from kerfpath.job import TABLES, VARIABLES, JobFile
 from kerfpath.options import PlanOptions
 from kerfpath.post import languages
+from kerfpath.report.layout import GOALS
 from kerfpath.robots import Robot
 from kerfpath.setting import settings
-from kerfpath.studio.messages import Companion, OptionField, OptionGroup, OptionsMessage, Sampling
+from kerfpath.studio.messages import (
+    Companion,
+    OptionField,
+    OptionGroup,
+    OptionsMessage,
+    Sampling,
+    Variable,
+)
+from kerfpath.study.placing import DEFAULT_RANGES
 
 UNITS = {
     "_mm_s2": "mm/s2", "_deg_s2": "deg/s2", "_mm_s": "mm/s", "_deg_s": "deg/s", "_m_min": "m/min",
@@ -166,6 +176,8 @@ def options_message(robot: Robot | None, external: Sequence[str] = ()) -> Option
             )
             for label, keys in SAMPLINGS.items()
         ],
+        goals={goal: words.capitalize() for goal, words in GOALS.items()},
+        variables=[_variable(key, label) for key, label in VARIABLES.items()],
         criteria=list(CRITERIA),
         languages=[*sorted(languages()), "none"],
     )
@@ -191,6 +203,13 @@ def _external(robot: Robot, names: Sequence[str]) -> Iterator[OptionField]:
         }
         for key, label in keys.items():
             yield _field(f"robot.external.{i}.{key}", f"{name}, {label}")
+
+
+def _variable(key: str, label: str) -> Variable:
+    """Return a variable of the search for the best placement."""
+    usual = json.loads((_declaration(f"layout.{key}").examples or [])[0])
+    varies = key in DEFAULT_RANGES
+    return Variable(key=key, label=label, unit=_unit(key), usual=usual, varies=varies)
 
 
 def _field(key: str, label: str, **more: Any) -> OptionField:

@@ -20,6 +20,7 @@ from kerfpath.errors import InputError
 from kerfpath.front import AHEAD, Criterion, Evaluation, FrontSearch, Subproblem
 from kerfpath.job import CutResult, Job, PreparedJob
 from kerfpath.plans import Plan
+from kerfpath.report.layout import WORDS
 from kerfpath.studio.document import Change, with_values
 from kerfpath.studio.entries import plan_message
 from kerfpath.studio.messages import (
@@ -41,7 +42,6 @@ from kerfpath.studio.messages import (
 from kerfpath.studio.work import Newest, Seldom, Stop
 from kerfpath.study import job_key, problem_of_job
 from kerfpath.study.placing import (
-    UNITS,
     Layout,
     Placement,
     PlacementTrial,
@@ -413,7 +413,7 @@ class _LayoutStudy:
                 revision=self.revision,
                 goal=self._ask.goal,
                 grid=self._ask.grid,
-                unit=UNITS[self._ask.goal],
+                unit=WORDS[self._ask.goal],
                 best=[self._entry(trial) for trial in sorted(self.trials, key=self._rank)[:SHOWN]],
                 tried=len(self.trials),
                 feasible=sum(trial.result.feasible for trial in self.trials),

@@ -82,11 +82,26 @@ export interface Sampling {
   usual: number;
 }
 
+/** An offset of part, robot base or head that a search for the best placement may vary. */
+export interface Variable {
+  /** Its name in `[layout]`, in requests and in offsets. */
+  key: string;
+  label: string;
+  unit: string;
+  /** The least and the largest value of its usual range. */
+  usual: number[];
+  /** Whether it varies if the job has no range at all. */
+  varies: boolean;
+}
+
 /** The form of options of the job: which keys have a control, and what it must know of them. */
 export interface OptionsMessage {
   type: "options";
   groups: OptionGroup[];
   samplings: Sampling[];
+  /** The goals of a search for the best placement, in words. */
+  goals: Record<string, string>;
+  variables: Variable[];
   /** The criteria of a Pareto set. */
   criteria: string[];
   /** The languages of a program. */

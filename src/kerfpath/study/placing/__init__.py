@@ -1,5 +1,6 @@
 """Search for the best placement of the part, the robot base and the head."""
 
+from kerfpath.study.placing.place import DEFAULT_RANGES as DEFAULT_RANGES
 from kerfpath.study.placing.place import Placement as Placement
 from kerfpath.study.placing.place import changes_of as changes_of
 from kerfpath.study.placing.place import middle_of as middle_of
@@ -7,7 +8,6 @@ from kerfpath.study.placing.place import placed_text as placed_text
 from kerfpath.study.placing.place import placement_of as placement_of
 from kerfpath.study.placing.place import ranges_of as ranges_of
 from kerfpath.study.placing.search import PlacementTrial as PlacementTrial
-from kerfpath.study.placing.study import UNITS as UNITS
 from kerfpath.study.placing.study import Layout as Layout
 from kerfpath.study.placing.study import contours_of as contours_of
 from kerfpath.study.placing.study import layout as layout

@@ -139,12 +139,6 @@ class ComfortTable(Table):
 # The [layout] table: what may be moved and how far, and the goal of the best placement.
 
 Goal = Literal["speed", "margin", "motion"]
-VARIABLES = (
-    "x_mm", "y_mm", "z_mm", "yaw_deg", "tilt_x_deg", "tilt_y_deg",
-    "base_x_mm", "base_y_mm", "base_z_mm", "base_yaw_deg",
-    "mount_deg",
-)  # fmt: skip
-"""What may vary: offsets of the part, then of the robot's base, then the rotation of the head."""
 
 
 def rising(value: tuple[float, ...]) -> tuple[float, ...]:
@@ -168,12 +162,12 @@ Span = Annotated[
     Field(strict=False, min_length=2, max_length=2),
     AfterValidator(rising),
 ]
-Millimetres = Annotated[
-    Span | None, key("2 numbers, the least and the largest offset in mm", "[-200, 200]")
-]
-Degrees = Annotated[
-    Span | None, key("2 numbers, the least and the largest rotation in deg", "[-30, 30]")
-]
+
+
+def variable(label: str, what: str, usual: int) -> Any:
+    """Return the field of a variable; `usual` is how far it may go to either side by default."""
+    expected = f"2 numbers, the least and the largest {what}"
+    return Field(None, title=label, description=expected, examples=[f"[-{usual}, {usual}]"])
 
 
 class LayoutTable(Table):
@@ -183,17 +177,17 @@ class LayoutTable(Table):
     move: Annotated[
         Text, key('"part", or the name of an external axis that carries it', '"part"')
     ] = "part"
-    x_mm: Millimetres = None
-    y_mm: Millimetres = None
-    z_mm: Millimetres = None
-    yaw_deg: Degrees = None
-    tilt_x_deg: Degrees = None
-    tilt_y_deg: Degrees = None
-    base_x_mm: Millimetres = None
-    base_y_mm: Millimetres = None
-    base_z_mm: Millimetres = None
-    base_yaw_deg: Degrees = None
-    mount_deg: Degrees = None
+    x_mm: Span | None = variable("Part x", "offset in mm", 200)
+    y_mm: Span | None = variable("Part y", "offset in mm", 200)
+    z_mm: Span | None = variable("Part z", "offset in mm", 200)
+    yaw_deg: Span | None = variable("Part about z", "rotation in deg", 30)
+    tilt_x_deg: Span | None = variable("Part about x", "rotation in deg", 20)
+    tilt_y_deg: Span | None = variable("Part about y", "rotation in deg", 20)
+    base_x_mm: Span | None = variable("Robot base x", "offset in mm", 200)
+    base_y_mm: Span | None = variable("Robot base y", "offset in mm", 200)
+    base_z_mm: Span | None = variable("Robot base z", "offset in mm", 200)
+    base_yaw_deg: Span | None = variable("Robot base about z", "rotation in deg", 30)
+    mount_deg: Span | None = variable("Head about flange", "rotation in deg", 90)
     standing: Annotated[tuple[Text, ...], key("names of fixtures", '["column"]', strict=False)] = ()
     evaluations: Annotated[
         int, key("a whole number of placements from 8 to 100000", "240", ge=8, le=100_000)
@@ -211,6 +205,9 @@ class LayoutTable(Table):
         spans = {name: getattr(self, name) for name in given(self, *VARIABLES)}
         return {name: (low, high) for name, (low, high) in spans.items()}
 
+
+VARIABLES = {name: field.title for name, field in LayoutTable.model_fields.items() if field.title}
+"""What may vary, in words: offsets of the part, of the robot's base, the rotation of the head."""
 
 # -----------------------------------------------------------------------------
 # The [program] and [audit] tables: the robot program, and the tolerances of its audit.

@@ -6,32 +6,16 @@ import { NUMBER, dot, html, options } from "../ui.js";
 import { bar } from "./bar.js";
 
 /** @typedef {import("../messages.js").TryEntry} Try */
+/** @typedef {import("../messages.js").Variable} Variable */
+/** @typedef {import("../messages.js").LayoutMessage} Layout */
 
-/** The variables: label, unit, and default range on either side. */
-const VARIABLES = /** @type {Record<string, [string, string, number]>} */ ({
-  x_mm: ["Part x", "mm", 200],
-  y_mm: ["Part y", "mm", 200],
-  z_mm: ["Part z", "mm", 200],
-  yaw_deg: ["Part about z", "deg", 30],
-  tilt_x_deg: ["Part about x", "deg", 20],
-  tilt_y_deg: ["Part about y", "deg", 20],
-  base_x_mm: ["Robot base x", "mm", 200],
-  base_y_mm: ["Robot base y", "mm", 200],
-  base_z_mm: ["Robot base z", "mm", 200],
-  base_yaw_deg: ["Robot base about z", "deg", 30],
-  mount_deg: ["Head about flange", "deg", 90],
-});
-const USUAL = ["x_mm", "y_mm", "yaw_deg"];
-const GOALS = {
-  speed: { words: "Fastest speed of the slowest contour", value: "m/min" },
-  margin: { words: "Least ratio of fastest to requested speed", value: "times requested speed" },
-  motion: { words: "Least displacement of the joints", value: "displacement" },
-};
 const JUDGED = [
   { value: "grid", label: "Judged on the grid (faster)" },
   { value: "plans", label: "Judged by plans over continuous gamma" },
 ];
 const LOST = { unreachable: "out of reach", collision: "collides", speed: "no path", feasible: "" };
+
+const variables = () => store.options?.variables ?? [];
 
 /**
  * The search for the best placement.
@@ -47,12 +31,10 @@ export function candidates(placing, moved) {
     goal: /** @type {import("../messages.js").LayoutRequest["goal"]} */ ("speed"),
     judged: "grid",
     evaluations: "64",
-    varied: new Set(USUAL),
-    ranges: /** @type {Record<string, [string, string]>} */ (
-      Object.fromEntries(
-        Object.entries(VARIABLES).map(([name, [, , far]]) => [name, [String(-far), String(far)]]),
-      )
-    ),
+    /** @type {Set<string>} */
+    varied: new Set(),
+    /** @type {Record<string, string[]>} */
+    ranges: {},
   };
   return { card, forget: () => (shown = null) };
 
@@ -62,10 +44,12 @@ export function candidates(placing, moved) {
 
   /** The requested ranges; null if there is none, or one is invalid. */
   function ranges() {
-    const spans = [...wanted.varied].map((name) => wanted.ranges[name]);
-    const bad = spans.some(([low, high]) => !low || !high || !(Number(low) < Number(high)));
-    if (!spans.length || bad) return null;
-    const names = Object.keys(VARIABLES).filter((name) => wanted.varied.has(name));
+    const names = variables().flatMap(({ key }) => (wanted.varied.has(key) ? [key] : []));
+    const rising = names.every((name) => {
+      const [low, high] = wanted.ranges[name];
+      return low && high && Number(low) < Number(high);
+    });
+    if (!names.length || !rising) return null;
     const numbers = names.map((name) => [name, wanted.ranges[name].map(Number)]);
     return /** @type {Record<string, [number, number]>} */ (Object.fromEntries(numbers));
   }
@@ -83,15 +67,15 @@ export function candidates(placing, moved) {
   /** Take the settings of [layout] from the job, once. */
   function fill() {
     const table = store.job?.values?.layout;
-    if (filled || !table) return;
+    if (filled || !table || !store.options) return;
     filled = true;
     wanted.goal = table.goal;
     if (store.job?.given.includes("layout.evaluations")) wanted.evaluations = table.evaluations;
-    const given = Object.keys(VARIABLES).filter((name) => table[name]);
-    if (!given.length) return;
-    wanted.varied = new Set(given);
-    for (const name of given)
-      wanted.ranges[name] = /** @type {[string, string]} */ (table[name].map(String));
+    const given = variables().filter(({ key }) => table[key]);
+    const varied = given.length ? given : variables().filter(({ varies }) => varies);
+    wanted.varied = new Set(varied.map(({ key }) => key));
+    for (const { key, usual } of variables())
+      wanted.ranges[key] = (table[key] ?? usual).map(String);
   }
 
   /** @param {Try} tried */
@@ -118,7 +102,7 @@ export function candidates(placing, moved) {
     const off = !store.live || (!running() && (!planned || !ranges()));
     const words = running() ? "Stop" : layout ? "Search again" : "Search";
     const continuous = job?.values?.plan?.method === "continuous";
-    const goals = Object.entries(GOALS).map(([value, goal]) => ({ value, label: goal.words }));
+    const goals = Object.entries(store.options?.goals ?? {});
     /** @type {(key: "goal" | "judged" | "evaluations") => (event: any) => void} */
     const set = (key) => (event) => (wanted[key] = event.target.value);
     const count = { ...NUMBER, min: 8, max: 100000, step: 8, value: wanted.evaluations };
@@ -131,7 +115,7 @@ export function candidates(placing, moved) {
         </header>
         <p class="field">
           <select aria-label="Goal" value=${wanted.goal} onChange=${set("goal")}>
-            ${options(goals)}
+            ${options(goals.map(([value, label]) => ({ value, label })))}
           </select>
         </p>
         <p class="field">
@@ -140,7 +124,7 @@ export function candidates(placing, moved) {
         </p>
         <details class="group-of-keys">
           <summary>Variables and ranges</summary>
-          ${Object.keys(VARIABLES).map(variable)}
+          ${filled && variables().map(variable)}
           <p class="field head">
             <span>Placements to try </span>
             <input ...${count} aria-label="Placements to try" onInput=${set("evaluations")} />
@@ -155,20 +139,19 @@ export function candidates(placing, moved) {
       </section>`;
   }
 
-  /** @param {string} name */
-  function variable(name) {
-    const [label, unit] = VARIABLES[name];
+  /** @param {Variable} each */
+  function variable({ key, label, unit }) {
     const end = (/** @type {0 | 1} */ i) => {
-      const set = (/** @type {any} */ { target }) => (wanted.ranges[name][i] = target.value);
+      const set = (/** @type {any} */ { target }) => (wanted.ranges[key][i] = target.value);
       const words = `${label}, ${["least", "most"][i]}, ${unit}`;
-      const value = wanted.ranges[name][i];
+      const value = wanted.ranges[key][i];
       return html`<input ...${NUMBER} value=${value} aria-label=${words} onInput=${set} />`;
     };
-    const toggle = () => wanted.varied.delete(name) || wanted.varied.add(name);
+    const toggle = () => wanted.varied.delete(key) || wanted.varied.add(key);
     return html`
-      <div class="vary" key=${name}>
+      <div class="vary" key=${key}>
         <label>
-          <input type="checkbox" checked=${wanted.varied.has(name)} onChange=${toggle} /> ${label}
+          <input type="checkbox" checked=${wanted.varied.has(key)} onChange=${toggle} /> ${label}
         </label>
         ${end(0)}${end(1)}
         <span class="unit">${unit}</span>
@@ -222,10 +205,9 @@ export function candidates(placing, moved) {
  */
 function worth(tried) {
   const { value, bound, estimate, status } = tried;
-  const goal = store.layout?.goal ?? "speed";
-  const unit = GOALS[goal].value;
+  const { goal, unit, best } = /** @type {Layout} */ (store.layout);
   if (value !== null) {
-    const own = isOwn(tried) ? null : (store.layout?.best.find(isOwn)?.value ?? null);
+    const own = isOwn(tried) ? null : (best.find(isOwn)?.value ?? null);
     return `${digits(value, 3)} ${unit}${own === null ? "" : `, ${change(value, own)}`}`;
   }
   if (status !== "feasible") return LOST[status];
@@ -239,10 +221,10 @@ const isOwn = ({ offsets }) => Object.values(offsets).every((each) => each === 0
 
 /** @param {Record<string, number>} offsets */
 const moves = (offsets) =>
-  Object.entries(offsets)
-    .filter(([, value]) => value !== 0)
-    .map(([name, value]) => {
-      const [label, unit] = VARIABLES[name];
+  variables()
+    .filter(({ key }) => offsets[key])
+    .map(({ key, label, unit }) => {
+      const value = offsets[key];
       return `${label} ${value > 0 ? "+" : ""}${fixed(value, 1)} ${unit}`;
     })
     .join(", ");
