@@ -33,11 +33,11 @@ def _example(kinematics: str) -> tuple[Robot, Contour]:
 
 def _compile_poses(kinematics: str) -> None:
     """Compile the kernels of frames, poses, their layered graph, and the measures of a path."""
-    arm, contour = _example(kinematics)
+    robot, contour = _example(kinematics)
     for kind in FRAME_KINDS:
         frames = contour.frames(kind)
-        graph = build(frames, arm, T_flange_tip=np.eye(4), gamma=gamma_grid(np.pi / 2))
-    arm.inverse(arm.forward(graph.q[:1]))
+        graph = build(frames, robot, T_flange_tip=np.eye(4), gamma=gamma_grid(np.pi / 2))
+    robot.inverse(robot.forward(graph.q[:1]))
     increments = np.diff(graph.q, axis=0)
     for distance in (total_distance, maximum_distance):
         distance(increments, graph.q[0], MANHATTAN)
@@ -46,9 +46,9 @@ def _compile_poses(kinematics: str) -> None:
 
 def _compile_cells(kinematics: str) -> None:
     """Compile the kernels that enclose the joints on cells of gamma."""
-    arm, contour = _example(kinematics)
+    robot, contour = _example(kinematics)
     node, gamma = np.zeros(1, np.int64), np.zeros(1)
-    arm.arm.enclose(contour.frames(), node, gamma, np.full(1, 0.1), np.eye(4))
+    robot.arm.enclose(contour.frames(), node, gamma, np.full(1, 0.1), np.eye(4))
 
 
 STAGES: dict[str, Callable[[str], None]] = {

@@ -210,9 +210,9 @@ def build(
         exist.
     """
     wanted = _wanted(postures, robot.postures)
-    arm = robot.alone()
-    arm.require_few_turns()
-    limits, inner = arm.turn_limits(), len(arm.free)
+    alone = robot.alone()
+    alone.require_few_turns()
+    limits, inner = alone.turn_limits(), len(alone.free)
     if not robot.family.free_rotation:
         gamma = freeze(np.zeros(1))
     tilt = freeze(np.zeros((1, 2))) if tilt is None else tilt
@@ -231,7 +231,7 @@ def build(
             H = np.linalg.inv(base_in_part(robot.externals, x[..., inner:]))[:, None] @ H
         H = np.ascontiguousarray(np.broadcast_to(H, (*H.shape[:2], places, 4, 4)))
         given = np.broadcast_to(x[:, None, :, 0], H.shape[:3]).ravel() if inner else None
-        q, reach = arm.arm.inverse_nodes(H.reshape(-1, 4, 4), gamma, T_flange_tip, given)
+        q, reach = robot.arm.inverse_nodes(H.reshape(-1, 4, 4), gamma, T_flange_tip, given)
         q = q.reshape(last - first, samples, *q.shape[2:])
         piece = _admitted(q, reach.reshape(q.shape[:3]), wanted, limits, reason[first:last])
         if robot.externals:
@@ -263,7 +263,7 @@ def build(
         posture=freeze(_end_to_end(posture)),
         turn=freeze(_end_to_end(turn)),
         reason=freeze(reason),
-        reasons=arm.reasons(),
+        reasons=alone.reasons(),
         external=freeze(np.array(external)) if robot.free.size else None,
     )
 

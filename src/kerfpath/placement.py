@@ -144,10 +144,10 @@ def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
     """
     T_base_part = as_pose(T_base_part, "T_base_part")
     T_base_flange = T_base_part @ plan.T_part_tip @ np.linalg.inv(plan.T_flange_tip)
-    arm, axes = plan.robot.family.joints, plan.robot.externals
-    x = plan.q[:, arm:]
+    n, axes = plan.robot.arm.joints, plan.robot.externals
+    x = plan.q[:, n:]
     T_arm_flange = np.asarray(np.linalg.inv(base_in_part(axes, x)) @ T_base_flange, np.float64)
-    q = plan.robot.arm.follow(T_arm_flange, plan.q[:, :arm], plan.posture)
+    q = plan.robot.arm.follow(T_arm_flange, plan.q[:, :n], plan.posture)
     q = np.column_stack([q, x])
     lost = np.flatnonzero(np.isnan(q).any(axis=1))
     if lost.size:
@@ -161,7 +161,7 @@ def placed(plan: Plan, T_base_part: ArrayLike) -> Plan:
     # At the first node the turn nearest to the old joints; after it no jump by whole turns.
     q = plan.q + np.unwrap(q - plan.q, axis=0)
     turn = turns_of(q).astype(np.int64)
-    turn[:, arm:] = 0
+    turn[:, n:] = 0
     before = plan.proof.without_bound().statement
     there = replace(
         plan,

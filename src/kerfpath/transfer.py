@@ -91,11 +91,11 @@ def back_off(plan: Plan, end: End, retract: float) -> Array:
     node = 0 if end == "start" else len(plan.q) - 1
     # Endless joints, not wrapped: with all their turns along the contour.
     q = plan.q[0] + plan.increments[:node].sum(axis=0)
-    arm, n = plan.robot.alone(), plan.robot.family.joints
+    arm, n = plan.robot.arm, plan.robot.arm.joints
     T = arm.forward(q[:n]) @ plan.T_flange_tip
     T[:3, 3] -= retract * T[:3, 2]
-    given = arm.arm.given_of(q[None])
-    found = arm.inverse(T @ np.linalg.inv(plan.T_flange_tip), given=given)
+    given = arm.given_of(q[None])
+    found = plan.robot.alone().inverse(T @ np.linalg.inv(plan.T_flange_tip), given=given)
     q_found = found.q[found.posture == plan.posture[node]]
     q_found = np.hstack([q_found, np.tile(q[n:], (len(q_found), 1))])
     # An endless joint is solved within one turn: bring it onto the turn that the contour is on.

@@ -65,7 +65,7 @@ def rounding_of(plan: Plan, point: float, angle: float, time: Array, *, jointed:
     jointed : bool
         Whether the text has joints instead of poses; then `angle` is that of a joint.
     """
-    arm = plan.robot.family.joints
+    n = plan.robot.arm.joints
     linear = np.array([unit == "m" for unit in plan.robot.units])
     own = np.where(linear, point, angle)
     if jointed:
@@ -75,8 +75,8 @@ def rounding_of(plan: Plan, point: float, angle: float, time: Array, *, jointed:
     tips, jacobian = chain.jacobian(plan.q)
     inverse = np.linalg.pinv(jacobian, rcond=SINGULAR)
     # The text has the external axes too, and the arm compensates for their rounding.
-    carried = np.abs(inverse @ chain.twists(plan.q, tips[:, :3, 3])) @ own[arm:]
+    carried = np.abs(inverse @ chain.twists(plan.q, tips[:, :3, 3])) @ own[n:]
     off = np.sqrt(3.0) * point * np.linalg.norm(inverse[..., :3], axis=-1)
     turned = AXES * angle * np.linalg.norm(inverse[..., 3:], axis=-1)
-    external = np.tile(own[arm:], (len(plan.q), 1))
+    external = np.tile(own[n:], (len(plan.q), 1))
     return Rounding(q=np.hstack([off + turned + carried, external]), time=time)

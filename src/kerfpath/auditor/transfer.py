@@ -127,18 +127,18 @@ def transfer_checks(
     limits = robot.joint_limits()
     beyond = np.maximum(limits.lower - corners, corners - limits.upper)
     beyond[:, robot.endless] = -np.inf
-    arm = robot.family.joints
+    n = robot.arm.joints
     rows = [
         _check("air-time", "time that a transfer move needs", late, 1 + TRANSFER_SLACK, "share"),
         _check(
             "air-limits",
             "excess over the joint limits",
-            beyond[:, :arm].max(axis=1),
+            beyond[:, :n].max(axis=1),
             TRANSFER_SLACK,
             "rad",
         ),
     ]
-    for i, axis in enumerate(robot.externals, arm):
+    for i, axis in enumerate(robot.externals, n):
         if not robot.endless[i]:
             title = f"excess over the limits of {axis.name}"
             rows.append(

@@ -196,13 +196,13 @@ def link_capsules(robot: Robot) -> tuple[Body, ...]:
     InputError
         An arm without length.
     """
-    arm, base = robot.alone(), len(robot.externals)
-    chain, zero = chain_of(arm), np.zeros((1, arm.joints))
+    arm, base = robot.arm, len(robot.externals)
+    chain, zero = arm.joint_chain(), np.zeros((1, arm.joints))
     places = np.tile(np.eye(4), (arm.joints + 1, 1, 1))
     if robot.kinematics in _LINES:
         lines = _LINES[robot.kinematics](robot.geometry)
         # Model and description have frames of different pose for the same links.
-        model = robot.arm.model_chain().frames(zero)[0]
+        model = arm.model_chain().frames(zero)[0]
         places = np.linalg.inv(chain.frames(zero)[0]) @ model
         places[0] = robot.T_base_foot
     else:

@@ -307,9 +307,9 @@ def _by_pose(
     T_flange_tip: Array,
 ) -> Array:  # fmt: skip
     """Return the joints (m, n) at times (m,) that are close to those at the targets (K, n)."""
-    arm, x, seen = _alone(robot, motion, time, targets, T_base_part)
+    x, seen = _externals(robot, motion, time, targets, T_base_part)
     near = np.stack([np.interp(time, motion.time, joint) for joint in targets.T], axis=1)
-    q = arm.arm.nearest(seen @ np.linalg.inv(T_flange_tip), near[:, : arm.joints])
+    q = robot.arm.nearest(seen @ np.linalg.inv(T_flange_tip), near[:, : robot.arm.joints])
     return np.concatenate([q, x], axis=1)
 
 
@@ -318,24 +318,24 @@ def _by_wrist(
     T_flange_tip: Array,
 ) -> Array:  # fmt: skip
     """Return the joints (m, n) at times (m,), with even motion of the wrist between targets."""
-    arm, x, seen = _alone(robot, motion, time, targets, T_base_part)
-    require_wrist(arm)
-    near = motion.blended(targets[:, : arm.joints], time)
-    q = joints_with_wrist(arm, seen[:, :3, 3], near, T_flange_tip)
+    x, seen = _externals(robot, motion, time, targets, T_base_part)
+    robot = robot.alone()
+    require_wrist(robot)
+    near = motion.blended(targets[:, : robot.joints], time)
+    q = joints_with_wrist(robot, seen[:, :3, 3], near, T_flange_tip)
     return np.concatenate([q, x], axis=1)
 
 
-def _alone(
+def _externals(
     robot: Robot, motion: ToolMotion, time: Array, targets: Array, T_base_part: Array
-) -> tuple[Robot, Array, Array]:
-    """Return the arm, its external axes (m, E) at times, and the poses of the tip that it sees.
+) -> tuple[Array, Array]:
+    """Return the external axes (m, E) at times, and the poses of the tip that the arm sees.
 
     The poses are in the robot base, wherever external axes carry it.
     """
-    arm = robot.alone()
-    x = motion.blended(targets[:, arm.joints :], time)
+    x = motion.blended(targets[:, robot.arm.joints :], time)
     base = base_in_part(robot.externals, x)
-    return arm, x, np.linalg.inv(base) @ T_base_part @ motion.poses(time)
+    return x, np.linalg.inv(base) @ T_base_part @ motion.poses(time)
 
 
 def _sampled(robot: Robot, controller: Controller) -> str:

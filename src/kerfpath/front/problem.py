@@ -306,15 +306,15 @@ def plan_run(
             graph=graph,
             phase=phase,
         )
-    arm, windowed = robot, run.windowed(robot.endless)
+    narrowed, windowed = robot, run.windowed(robot.endless)
     if windowed:
         _require_ranges(asked, windowed)
-        arm, graph = _narrowed(robot, graph, run.window, windowed, asked)
-        cell = cell and replace(cell, endless=arm.endless)
+        narrowed, graph = _narrowed(robot, graph, run.window, windowed, asked)
+        cell = cell and replace(cell, endless=narrowed.endless)
     empty = robot.externals and not np.diff(graph.start).all()
     made = best_motion(
         contour,
-        replace(setup, robot=arm, cell=cell),
+        replace(setup, robot=narrowed, cell=cell),
         asked,
         speed=speed,
         graph=None if empty else graph,
@@ -357,8 +357,8 @@ def _narrowed(
         else:
             lower[joint] = max(lower[joint], low - margin)
             upper[joint] = min(upper[joint], high + margin)
-    arm = robot.with_limits(lower=lower, upper=upper, endless=endless)
-    return arm, replace(graph, q=freeze(q), turn=freeze(turn))
+    narrowed = robot.with_limits(lower=lower, upper=upper, endless=endless)
+    return narrowed, replace(graph, q=freeze(q), turn=freeze(turn))
 
 
 def _widened(made: Plan, robot: Robot) -> Plan:

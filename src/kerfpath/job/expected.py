@@ -96,9 +96,9 @@ def _posture(robot: Robot, q: Array, said: Ints) -> Ints:
 
     At a singularity, where no posture gives the joints back, any may be right.
     """
-    arm = robot.alone()
+    arm = robot.arm
     q = np.ascontiguousarray(q[:, : arm.joints])
-    solved, reach = arm.arm.inverse_all(np.ascontiguousarray(arm.forward(q)), arm.arm.given_of(q))
+    solved, reach = arm.inverse_all(np.ascontiguousarray(arm.forward(q)), arm.given_of(q))
     off = np.abs(np.remainder(solved - q[:, None] + np.pi, 2 * np.pi) - np.pi)
     fits = reach & (np.where(reach[..., None], off, np.inf).max(axis=2) < SAME_POSTURE)
     row = np.arange(len(q))

@@ -826,8 +826,7 @@ def read_plan_file(path: str | Path) -> PlanFile:
     path = Path(path)
     data = read_document(path)
     try:
-        arm = _read_robot(data["robot"], data["limits"])
-        robot = add_externals(data["external_axes"], arm)
+        robot = add_externals(data["external_axes"], _read_robot(data["robot"], data["limits"]))
         entries = planned_entries(data)
         return PlanFile(
             path=path,
@@ -1066,9 +1065,9 @@ def _robot_entry(robot: Robot) -> RobotData:
 
 
 def _limits_entry(robot: Robot) -> LimitsData:
-    arm = robot.alone()
-    couplings = [_written(CouplingData, each) for each in arm.couplings]
-    entry = _written(LimitsData, arm) | {"couplings": couplings} | dynamics_entry(arm)
+    alone = robot.alone()
+    couplings = [_written(CouplingData, each) for each in alone.couplings]
+    entry = _written(LimitsData, alone) | {"couplings": couplings} | dynamics_entry(alone)
     return cast(LimitsData, entry)
 
 

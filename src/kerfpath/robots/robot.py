@@ -864,16 +864,16 @@ def chain_of(robot: Robot) -> KinematicChain:
         The robot has no description and its family has no model with joint frames; or it has
         external axes and its joint limits are not known.
     """
-    arm = robot.arm.joint_chain()
+    chain = robot.arm.joint_chain()
     if not robot.externals:
-        return arm
+        return chain
     limits = robot.joint_limits()
     return CarriedChain(
-        origins=arm.origins,
-        axes=arm.axes,
-        end=arm.end,
+        origins=chain.origins,
+        axes=chain.axes,
+        end=chain.end,
         externals=robot.externals,
-        travel=np.column_stack([limits.lower, limits.upper])[len(arm.axes) :],
+        travel=np.column_stack([limits.lower, limits.upper])[len(chain.axes) :],
     )
 
 
@@ -900,9 +900,9 @@ def require_axes(chain: KinematicChain, robot: Robot) -> None:
             f"cell: it was built with other external axes ({here}) than the robot has ({there})"
         )
     if own is not None:
-        limits, arm = robot.joint_limits(), len(own.axes)
-        beyond = (limits.lower[arm:] < own.travel[:, 0]) | (limits.upper[arm:] > own.travel[:, 1])
-        if (beyond & ~robot.endless[arm:]).any():
+        limits, n = robot.joint_limits(), len(own.axes)
+        beyond = (limits.lower[n:] < own.travel[:, 0]) | (limits.upper[n:] > own.travel[:, 1])
+        if (beyond & ~robot.endless[n:]).any():
             raise InputError(
                 "cell: it was built with less travel of the external axes than the robot has; "
                 "build it again for this robot"
@@ -1040,11 +1040,11 @@ def can_back_off(
     margin : float rad
         Distance kept from every joint limit in the backed-off pose.
     """
-    arm, q = robot.alone(), q[:, : robot.arm.joints]
+    arm, q = robot.arm, q[:, : robot.arm.joints]
     T = arm.forward(q) @ tool
     T[:, :3, 3] -= retract * T[:, :3, 2]
-    back = arm.arm.follow(T @ np.linalg.inv(tool), q, posture)
-    limits = arm.joint_limits()
+    back = arm.follow(T @ np.linalg.inv(tool), q, posture)
+    limits = robot.alone().joint_limits()
     reached = np.asarray(np.isfinite(back).all(axis=1))
     back = np.where(reached[:, None], back, q)
     room = np.minimum(back - limits.lower, limits.upper - back)

@@ -180,9 +180,9 @@ def pose_message(
     sample = int(np.argmin(np.abs(off)))
     why = graph.reasons[int(codes[node, sample, posture])]
     x = _external(graph, cuts, nodes, node, sample, posture)
-    arm = job.robot if x is None else job.robot.held(x)
+    robot = job.robot if x is None else job.robot.held(x)
     H = job.placement @ nodes.frames(job.options.frames)[node : node + 1]
-    solved, reach = arm.arm.inverse_nodes(
+    solved, reach = robot.arm.inverse_nodes(
         np.ascontiguousarray(H), np.ascontiguousarray(graph.gamma[[sample]]), job.tool
     )
     q = solved[0, 0, posture] if reach[0, 0, posture] else None

@@ -319,9 +319,9 @@ def _from_stop_to_stop(robot: Robot, one: Array, two: Array, took: float) -> tup
 def _straight(made: Plan, one: Array, two: Array, end: int) -> Array:
     """Return joints (m, n) of a straight tip motion between two joint vectors, at a plan's end."""
     guess = one + np.linspace(0.0, 1.0, STRAIGHT)[:, None] * (two - one)
-    arm, n = made.robot.alone(), made.robot.family.joints  # external axes are at rest
+    arm, n = made.robot.arm, made.robot.arm.joints  # external axes are at rest
     T = arm.forward(np.array([one, two])[:, :n])
     poses = np.repeat(T[:1], STRAIGHT, axis=0)
     poses[:, :3, 3] = np.linspace(T[0, :3, 3], T[1, :3, 3], STRAIGHT)
     posture = np.full(STRAIGHT, made.posture[end])
-    return np.column_stack([arm.arm.follow(poses, guess[:, :n], posture), guess[:, n:]])
+    return np.column_stack([arm.follow(poses, guess[:, :n], posture), guess[:, n:]])

@@ -159,13 +159,13 @@ def which_robots(
         keys = [tasks.submit(**same, name=name, ratio=used) for name, used in asked]
         for key, (name, used) in zip(keys, asked, strict=True):
             result = tasks.result(key)
-            arm = job.robot if name is None else robot(name, acceleration_ratio=used)
+            tried = job.robot if name is None else robot(name, acceleration_ratio=used)
             if result.failure is None:
                 contours = tuple(ContourReach(**data) for data in result.value)
                 why = _reason(contours)
             else:
                 contours, why = (), result.failure.message
-            found.append(RobotSpeed(robot=arm, own=name is None, contours=contours, reason=why))
+            found.append(RobotSpeed(robot=tried, own=name is None, contours=contours, reason=why))
     return sorted(found, key=_order)
 
 
@@ -389,14 +389,14 @@ def robots_entry(found: Sequence[RobotSpeed]) -> list[dict[str, object]]:
 
 
 def _entry(each: RobotSpeed) -> dict[str, object]:
-    binding, arm = each.binding, each.robot
+    binding, robot = each.binding, each.robot
     return {
-        "robot": arm.id,
-        "model": f"{arm.manufacturer} {arm.model}".strip(),
+        "robot": robot.id,
+        "model": f"{robot.manufacturer} {robot.model}".strip(),
         "own": each.own,
-        "payload_kg": arm.payload,
-        "reach_m": arm.reach,
-        "acceleration": arm.acceleration_source or None,
+        "payload_kg": robot.payload,
+        "reach_m": robot.reach,
+        "acceleration": robot.acceleration_source or None,
         "margin": binding and binding.margin,
         "binding_contour": binding and binding.name,
         "slowest_m_min": _slowest(each),
@@ -462,15 +462,15 @@ def robot_rows(found: Sequence[RobotSpeed]) -> list[list[str]]:
 
 
 def _row(each: RobotSpeed) -> list[str]:
-    arm, binding = each.robot, each.binding
+    robot, binding = each.robot, each.binding
     row = [
-        f"{arm.id} (the job's own)" if each.own else arm.id,
-        "-" if arm.payload is None else f"{arm.payload:g}",
-        "-" if arm.reach is None else f"{arm.reach * 1000:.0f}",
+        f"{robot.id} (the job's own)" if each.own else robot.id,
+        "-" if robot.payload is None else f"{robot.payload:g}",
+        "-" if robot.reach is None else f"{robot.reach * 1000:.0f}",
     ]
     if binding is None or binding.margin is None or binding.fastest is None:
         return [*row, "-", "-", "-", each.reason]
-    source = arm.acceleration_source
+    source = robot.acceleration_source
     return [
         *row,
         f"{binding.margin:.3f}",

@@ -121,8 +121,8 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
     ]
     speeds = sorted({task.speed * 60 for task in job.contours})
     robot, options = job.robot, job.options
-    arm = robot.family.joints
-    velocity, acceleration = (np.degrees(v[:arm]).round(1) for v in robot.speed_limits())
+    n = robot.arm.joints
+    velocity, acceleration = (np.degrees(v[:n]).round(1) for v in robot.speed_limits())
     facts = [
         ("Job", job.path.name),
         ("Part", job.part_file.name),
@@ -138,7 +138,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
             f"{_row(acceleration)} deg/s^2 ({robot.acceleration_source})",
         ),
         *_more_limits(robot),
-        ("Endless axes", _row(np.flatnonzero(robot.endless[:arm]) + 1) or "none"),
+        ("Endless axes", _row(np.flatnonzero(robot.endless[:n]) + 1) or "none"),
         *_external_facts(robot),
     ]
     # Moves from and to home are long, and would make the part small in the picture.
@@ -168,9 +168,9 @@ def _more_limits(robot: Robot) -> Iterator[tuple[str, str]]:
 
 def _external_facts(robot: Robot) -> list[tuple[str, str]]:
     """Return a row for each external axis: what it carries, and its limits."""
-    limits, arm = robot.joint_limits(), robot.family.joints
+    limits, n = robot.joint_limits(), robot.arm.joints
     facts = []
-    for i, axis in enumerate(robot.externals, arm):
+    for i, axis in enumerate(robot.externals, n):
         scale, unit = (1e3, "mm") if axis.unit == "m" else (180 / np.pi, "deg")
         low, high, velocity, acceleration = (
             f"{scale * values[i]:.6g}"
