@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from html import escape
 from pathlib import PurePath
@@ -122,6 +122,15 @@ def require_one_of(value: object, name: str, known: Collection[str]) -> None:
     """Raise InputError unless `value` is one of the known words."""
     if value not in known:
         raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
+
+
+def require_keywords(given: Iterable[str], allowed: type, **hints: str) -> None:
+    """Raise TypeError unless all keywords are those of a TypedDict; `hints` replace the list."""
+    known = allowed.__annotations__
+    for name in given:
+        if name not in known:
+            hint = hints.get(name, f"the options are {', '.join(sorted(known))}")
+            raise TypeError(f"unexpected keyword argument {name!r}; {hint}")
 
 
 def as_pose(value: ArrayLike, name: str) -> Array:

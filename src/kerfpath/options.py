@@ -9,7 +9,7 @@ from typing import Any, Literal, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath.arrays import Array, floats, short_repr
+from kerfpath.arrays import Array, floats, require_keywords, short_repr
 from kerfpath.certificate import USUAL, Certify
 from kerfpath.comfort import Comfort
 from kerfpath.contour import FrameKind
@@ -378,12 +378,7 @@ def with_keywords(
     InputError
         As `PlanOptions`.
     """
-    known = allowed.__annotations__
-    for name in keywords:
-        if name not in known:
-            said = f"the options are {', '.join(sorted(known))}"
-            said = KEEPS if name == "between_nodes" else said
-            raise TypeError(f"unexpected keyword argument {name!r}; {said}")
+    require_keywords(keywords, allowed, between_nodes=KEEPS)
     return replace(options or PlanOptions(), **keywords, **more)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -40,23 +40,11 @@ def read_description(path: str | Path, snap: float | None, keywords: ChainKeywor
         As `read_urdf`. Also without snap where the arm as written belongs to no family with a
         closed form, but does with its angles rounded: the message says how far that moves the tip.
     """
-    base, tip, mount = (keywords.get("base"), keywords.get("tip"), keywords.get("mount"))
-    found = read_urdf(
-        path,
-        base=base,
-        tip=tip,
-        mount=mount,
-        part=keywords.get("part"),
-        packages=keywords.get("packages"),
-        meshes=keywords.get("meshes", True),
-        snap=0.0 if snap is None else snap,
-    )
+    chain: Any = {k: v for k, v in keywords.items() if k in ChainKeywords.__annotations__}
+    found = read_urdf(path, snap=snap or 0.0, **chain)
     if snap is not None or in_closed_form(found.chain):
         return found
-    meant = {
-        snap: read_urdf(path, base=base, tip=tip, mount=mount, meshes=False, snap=snap).chain
-        for snap in SNAPS
-    }
+    meant = {snap: read_urdf(path, snap=snap, **chain | {"meshes": False}).chain for snap in SNAPS}
     whole = meant[SNAPS[-1]]
     if not in_closed_form(whole):
         return found

@@ -19,6 +19,7 @@ from kerfpath.arrays import (
     freeze,
     html_table,
     in_degrees,
+    require_keywords,
     scalar,
     short_repr,
 )
@@ -211,9 +212,7 @@ class Robot:
             The description is faulty, its chain belongs to no family, or a limit is missing or zero
             and not given.
         """
-        unknown = keywords.keys() - DescriptionKeywords.__annotations__.keys()
-        if unknown:
-            raise TypeError(f"from_urdf() got an unexpected keyword argument {min(unknown)!r}")
+        require_keywords(keywords, DescriptionKeywords)
         description = read_description(path, snap, keywords)
         where = f"{description.path} ({description.base} to {description.tip})"
         try:
