@@ -113,24 +113,22 @@ class RobotLimits:
         InputError
             An array of another shape, a speed or another rate that is not positive.
         """
-        n = (joints,)
 
-        def known(name: str, cast: Callable[[ArrayLike], Array]) -> Array | None:
-            return None if (values := getattr(self, name)) is None else cast(values)
+        def known(cast: Callable[..., Array], name: str, size: int = joints) -> Array | None:
+            values = getattr(self, name)
+            return None if values is None else cast(values, name, (size,))
 
         for coupling in self.couplings:
-            floats(coupling.row, "coupling row", n)
-        return RobotLimits(
-            endless=bools(for_each(self.endless, joints), "endless", n),
-            lower=known("lower", lambda x: floats(x, "lower", n)),
-            upper=known("upper", lambda x: floats(x, "upper", n)),
-            velocity=known("velocity", lambda x: positive(x, "velocity", n)),
-            acceleration=known("acceleration", lambda x: positive(x, "acceleration", n)),
-            jerk=known(
-                "jerk", lambda x: JerkLimit(bound=floats(x, "jerk", (arm,), infinite=True)).bound
-            ),
-            torque=known("torque", lambda x: positive(x, "torque", (arm,))),
-            couplings=self.couplings,
+            floats(coupling.row, "coupling row", (joints,))
+        return replace(
+            self,
+            endless=bools(for_each(self.endless, joints), "endless", (joints,)),
+            lower=known(floats, "lower"),
+            upper=known(floats, "upper"),
+            velocity=known(positive, "velocity"),
+            acceleration=known(positive, "acceleration"),
+            jerk=known(lambda *of: JerkLimit(bound=floats(*of, infinite=True)).bound, "jerk", arm),
+            torque=known(positive, "torque", arm),
         )
 
     def of_arm(self, n: int) -> RobotLimits:

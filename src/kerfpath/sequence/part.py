@@ -415,34 +415,36 @@ def order_plans(
     InputError
         A length, speed or time is out of range.
     """
-    o = OrderOptions(**keywords)
-    cell, home, before, seconds = o.cell, o.home, o.before, o.seconds
+    options = OrderOptions(**keywords)
+    cell, before = options.cell, options.before
     every = [list(made) for made in candidates]
     further = MorePlans(every, more)
-    places = reachable(every, cell, o.retract, further)
-    if o.given_order:
+    places = reachable(every, cell, options.retract, further)
+    if options.given_order:
         before = [*before, *((i, i + 1) for i in range(len(every) - 1))]
-    warm = _too_warm([c[0].contour for c in every], o.heat_spacing)
+    warm = _too_warm([c[0].contour for c in every], options.heat_spacing)
     air: MoveTimes | None = None
     while True:
         plans = [every[i][c] for i, c in places]
         group = np.array([i for i, _ in places])
         air = (
-            MoveTimes(plans, group, cell, o.retract, seconds, o.air_speed)
+            MoveTimes(plans, group, cell, options.retract, options.seconds, options.air_speed)
             if air is None
             else air.extended(plans, group)
         )
         air.forbid(warm[np.ix_(group, group)])
-        if home is not None and air.home is None:
-            air.home = floats(home, "home", (plans[0].robot.joints,))
+        if options.home is not None and air.home is None:
+            air.home = floats(options.home, "home", (plans[0].robot.joints,))
         own = np.array([p.time[-1] - p.time[0] for p in plans])
-        own += o.pierce_time + 2 * o.retract / o.approach_speed
-        found = _settle_order(air, group, own, before, seconds)
+        own += options.pierce_time + 2 * options.retract / options.approach_speed
+        found = _settle_order(air, group, own, before, options.seconds)
         if not isinstance(found, NoFeasiblePath):
             order = found
             break
         contours = sorted({int(group[c]) for leg in air.failed for c in leg if c != HOME})
-        fresh = more_reachable(every, cell, o.retract, further, contours) if air.failed else []
+        fresh = (
+            more_reachable(every, cell, options.retract, further, contours) if air.failed else []
+        )
         if not fresh:
             raise further.mentioned_in(found)
         places += fresh
@@ -452,9 +454,9 @@ def order_plans(
         moves=moves,
         order=order,
         chosen=tuple(places[k] for k in order.candidates.tolist()),
-        retract=o.retract,
-        approach_speed=o.approach_speed,
-        pierce_time=o.pierce_time,
+        retract=options.retract,
+        approach_speed=options.approach_speed,
+        pierce_time=options.pierce_time,
     )
 
 
