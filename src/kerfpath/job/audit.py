@@ -53,7 +53,6 @@ from kerfpath.job.expected import (
     recompute,
 )
 from kerfpath.job.format import (
-    AuditTable,
     Candidate,
     Job,
     JobFile,
@@ -68,7 +67,6 @@ from kerfpath.job.plan_file import (
     plan_document,
     plan_entry,
     read_plan_file,
-    table_of,
 )
 from kerfpath.job.program_file import (
     ReadCut,
@@ -896,8 +894,7 @@ def _list_claims(file: PlanFile, tables: Mapping[str, Sequence[Check]]) -> str:
 
 def _by_itself(file: PlanFile) -> AuditReport:
     """Audit a plan.json without its job."""
-    tolerances = table_of(file, "audit", AuditTable, AuditTable.resolve)
-    tables = {}
+    tables, tolerances = {}, file.tolerances
     for p in file.plans:
         own, said = recompute(p), file.entries[p.name]
         made = tolerances.checks(own)

@@ -9,7 +9,7 @@ import math
 import re
 import zlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from types import UnionType
@@ -41,9 +41,11 @@ from kerfpath.comfort import MEASURES
 from kerfpath.contour import KINDS, Contour
 from kerfpath.dynamics import Load
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.job.format import AuditTable, ProgramTable, Tolerances
 from kerfpath.options import PlanOptions
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof
+from kerfpath.post import ProgramOptions
 from kerfpath.robots import Arm, Coupling, ExternalAxis, Robot, RobotLimits
 from kerfpath.sequence import PartPlan
 from kerfpath.setting import settings
@@ -756,7 +758,6 @@ def read_moves(entry: SequenceData | None, robot: Robot) -> tuple[TransferMove, 
 # Read a plan.json: its plans and moves, with the type of every value checked.
 
 _M = TypeVar("_M", bound=BaseModel)
-_R = TypeVar("_R")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -803,6 +804,31 @@ class PlanFile:
     def entries(self) -> dict[str, PlanData]:
         """The entry of each contour, or piece, that has a plan, by its name."""
         return {entry["name"]: entry for entry in planned_entries(self.data)}
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """The tolerances of its job."""
+        return self.table("audit", AuditTable).resolve()
+
+    def program(self, stem: str, **changes: str) -> ProgramOptions:
+        """Return the [program] of its job, with keys replaced; `stem` is the name by default."""
+        allowed = self.tolerances.path
+        return self.table("program", ProgramTable, **changes).resolve(stem, allowed)
+
+    def table(self, name: str, model: type[_M], **changes: str) -> _M:
+        """Return a table of its job, with keys replaced.
+
+        Raises
+        ------
+        InputError
+            The table is not valid.
+        """
+        table: Any = self.job.get(name, {})
+        try:
+            return model.model_validate({**table, **changes})
+        except (ValidationError, TypeError) as error:
+            said = " ".join(str(error).split())
+            raise InputError(f"{self.path}: its [{name}] table is not valid ({said})") from None
 
 
 def read_plan_file(path: str | Path) -> PlanFile:
@@ -856,18 +882,6 @@ def read_plan_file(path: str | Path) -> PlanFile:
 def planned_entries(data: PlanDocument) -> list[PlanData]:
     """Return the entries of the contours that have a plan."""
     return [cast(PlanData, entry) for entry in data["contours"] if entry["feasible"]]
-
-
-def table_of(
-    file: PlanFile, name: str, model: type[_M], read: Callable[[_M], _R], **changes: str
-) -> _R:
-    """Return a table of the job that a plan was made from, read like that of a job file."""
-    table: Any = file.job.get(name, {})
-    try:
-        return read(model.model_validate({**table, **changes}))
-    except (ValidationError, TypeError) as error:
-        said = " ".join(str(error).split())
-        raise InputError(f"{file.path}: its [{name}] table is not valid ({said})") from None
 
 
 def _read_robot(robot: RobotData, limits: LimitsData) -> Robot:

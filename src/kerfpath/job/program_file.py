@@ -296,8 +296,8 @@ def _arc(
 
 def branch_of(robot: Robot, q: Array) -> int:
     """Return the posture of joints (n,); external axes have no effect on it."""
-    robot, q = robot.alone(), q[: robot.family.joints]
-    solved, reach = robot.arm.inverse_all(robot.forward(q)[None], robot.arm.given_of(q[None]))
+    arm, q = robot.arm, q[: robot.arm.joints]
+    solved, reach = arm.inverse_all(arm.forward(q)[None], arm.given_of(q[None]))
     apart = np.abs((solved[0] - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
     return int(np.argmin(np.where(reach[0], apart, np.inf)))
 

@@ -16,7 +16,6 @@ from kerfpath.job.audit import Audit
 from kerfpath.job.audit_report import AuditReport
 from kerfpath.job.expected import Expected, ExpectedContour
 from kerfpath.job.format import (
-    AuditTable,
     Candidate,
     Drawing,
     ExternalTable,
@@ -30,7 +29,7 @@ from kerfpath.job.format import (
     prepare,
     read_job,
 )
-from kerfpath.job.plan_file import PlanFile, read_plan_file, table_of
+from kerfpath.job.plan_file import PlanFile, read_plan_file
 from kerfpath.job.run import CutResult
 from kerfpath.placement import MeasuredFrame, place_moves, placed, planned_again
 from kerfpath.plans import Plan
@@ -219,19 +218,17 @@ def program_from_file(
         if prepared.job.options.interruptions == "none":
             by_job = required
         file = replace(file, job=prepared.job.source)
-    options = _options(
-        file,
-        language or program_language(file.job, job_file or plan_file),
-        (job_file or plan_file).stem,
-    )
+    given = job_file or plan_file
+    language = language or program_language(file.job, given)
+    find_language(language)  # refused by its name if it is unknown
+    options = file.program(given.stem, language=language)
     options = options if name is None else replace(options, name=name)
     if frame is not None:
         file, again = _at_measured(file, frame, options.retract)
         notes += [*again, MEASURED_NOTE, *([MEASURED_MOVES_NOTE] if file.moves else [])]
-    tolerances = table_of(file, "audit", AuditTable, AuditTable.resolve)
     there = "" if frame is None else " at the measured placement"
     for p in file.plans:
-        if (failed := _first_failed(tolerances.checks(p))) is not None:
+        if (failed := _first_failed(file.tolerances.checks(p))) is not None:
             raise AuditFailed(
                 f"no program: contour {p.name!r} fails its audit{there}: {failed.issue()}"
             )
@@ -265,7 +262,7 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
     first = file.plans[0]
     sequence = None
     if file.job.get("sequence") is not None:
-        sequence = table_of(file, "sequence", SequenceTable, lambda table: table)
+        sequence = file.table("sequence", SequenceTable)
     axes = file.job["robot"].get("external", ())
     external = [ExternalTable.model_validate(axis) for axis in axes]
     return Job(
@@ -280,7 +277,7 @@ def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
         home=home_of(sequence, external, first.robot),
         sequence=sequence,
         layout=LayoutTable(),
-        tolerances=table_of(file, "audit", AuditTable, AuditTable.resolve),
+        tolerances=file.tolerances,
         program=options,
         source=file.job,
     )
@@ -292,9 +289,7 @@ def _planned_requirements(prepared: PreparedJob, file: PlanFile) -> PreparedJob:
     The retract, transfer and pierce times of the plan follow from that one. The program is built
     with the current one of the job, and refused if the planned moves do not fit its retract.
     """
-    stem = prepared.job.path.stem
-    allowed = table_of(file, "audit", AuditTable, AuditTable.resolve).path
-    then = table_of(file, "program", ProgramTable, lambda table: table.resolve(stem, allowed))
+    then = file.program(prepared.job.path.stem)
     return replace(prepared, job=replace(prepared.job, program=then))
 
 
@@ -313,9 +308,9 @@ def _at_measured(
 
     A contour that would fail its audit there is planned again; a note names it.
     """
-    tolerances, plans, notes = table_of(file, "audit", AuditTable, AuditTable.resolve), [], []
+    plans, notes = [], []
     for p in file.plans:
-        moved, why = _moved(p, frame, tolerances)
+        moved, why = _moved(p, frame, file.tolerances)
         if why:
             try:
                 moved = planned_again(p, frame.T_base_part)
@@ -343,15 +338,3 @@ def _moved(p: Plan, frame: MeasuredFrame, tolerances: Tolerances) -> tuple[Plan,
 def _first_failed(table: Sequence[Check]) -> Check | None:
     """Return the first check that is an error; None if the plan passes."""
     return next((check for check in table if check.level == "error" and not check.ok), None)
-
-
-def _options(file: PlanFile, language: str, stem: str) -> ProgramOptions:
-    find_language(language)
-    allowed = table_of(file, "audit", AuditTable, AuditTable.resolve).path
-    return table_of(
-        file,
-        "program",
-        ProgramTable,
-        lambda table: table.resolve(stem, allowed),
-        language=language,
-    )
