@@ -84,6 +84,11 @@ EDITS = {
 }
 
 
+ASK_AGAIN = ("krl", "val3", "inform")
+"""Languages whose programs make their requests again after a pause, so that they must be the same
+there."""
+
+
 @pytest.mark.parametrize(("name", "number"), [(name, k) for name in ARMS for k in (0, 1)])
 def test_an_edited_handshake_is_found(name, number):
     made, options = program(name, handshakes=ASKED), settings(name)
@@ -91,7 +96,12 @@ def test_an_edited_handshake_is_found(name, number):
     old = old.replace("\\\\", "\\")
     files = post(made, name, options)
     (file,) = [f for f, text in files.items() if old in text]
-    read = read_program(files | {file: files[file].replace(old, new, 1)}, name, made.robot, options)
+    edited = files | {file: files[file].replace(old, new, 1)}
+    if number == 1 and name in ASK_AGAIN:
+        with pytest.raises(InputError, match="expected"):
+            read_program(edited, name, made.robot, options)
+        return
+    read = read_program(edited, name, made.robot, options)
     assert len(deviations(made, read, language(name), options)) == 1
 
 

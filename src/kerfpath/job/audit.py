@@ -87,6 +87,7 @@ from kerfpath.post import (
     ReadProgram,
     Rules,
     differences,
+    unsafe_paths,
 )
 from kerfpath.transfer import End, TransferMove, back_off
 
@@ -783,6 +784,7 @@ class Audit:
         tables[name] = [
             check("frames", "distance of tool and part from the job's", off, SAME_FRAME, "m"),
             *check_laser_and_gas(read, job.robot, process),
+            _check_paths(read),
         ]
         done: list[int] = []
         starts: list[str] = []
@@ -942,6 +944,13 @@ WHAT = {
     "kinds": "kinds of moves",
 }
 """What differs, by the code of the difference."""
+
+
+def _check_paths(read: ReadProgram) -> Check:
+    """Return the check of all paths through a program, also without answers and after pauses."""
+    found = unsafe_paths(read)
+    row = count("paths", "steps that are not safe on some path, after a missing answer", len(found))
+    return replace(row, advice=str(found[0])) if found else row
 
 
 def _new_title(title: str, tables: Mapping[str, object]) -> str:

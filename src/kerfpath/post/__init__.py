@@ -17,6 +17,7 @@ from kerfpath.post.comparison import Difference as Difference
 from kerfpath.post.comparison import deviations as deviations
 from kerfpath.post.comparison import differences as differences
 from kerfpath.post.comparison import not_compared as not_compared
+from kerfpath.post.flow import unsafe_paths as unsafe_paths
 from kerfpath.post.folder import MANIFEST as MANIFEST
 from kerfpath.post.folder import FolderChanges as FolderChanges
 from kerfpath.post.folder import replace_program as replace_program
@@ -62,9 +63,15 @@ from kerfpath.post.program import Signal as Signal
 from kerfpath.post.program import Step as Step
 from kerfpath.post.program import Switch as Switch
 from kerfpath.post.program import Wait as Wait
+from kerfpath.post.read_program import FlowStep as FlowStep
+from kerfpath.post.read_program import ReadEnd as ReadEnd
 from kerfpath.post.read_program import Reader as Reader
 from kerfpath.post.read_program import ReadHandshake as ReadHandshake
+from kerfpath.post.read_program import ReadJump as ReadJump
+from kerfpath.post.read_program import ReadLabel as ReadLabel
 from kerfpath.post.read_program import ReadMove as ReadMove
+from kerfpath.post.read_program import ReadOff as ReadOff
+from kerfpath.post.read_program import ReadPause as ReadPause
 from kerfpath.post.read_program import ReadProgram as ReadProgram
 from kerfpath.post.read_program import ReadSection as ReadSection
 from kerfpath.post.read_program import ReadStep as ReadStep

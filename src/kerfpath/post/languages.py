@@ -23,6 +23,7 @@ from kerfpath.post.program import (
     Await,
     CircularMove,
     Comment,
+    Handshake,
     JointMove,
     LinearMove,
     Partner,
@@ -33,6 +34,7 @@ from kerfpath.post.program import (
     Signal,
     Step,
     Wait,
+    still_asked,
 )
 from kerfpath.post.read_program import Reader
 from kerfpath.robots import AXIS_3, Robot
@@ -184,6 +186,28 @@ def handshakes(settings: LanguageSettings) -> dict[tuple[Partner, str], Any]:
     }
 
 
+def ask_again_lines(
+    asked: Iterable[Handshake], ports: Mapping[tuple[Any, Any], Any], request: str, wait: str
+) -> list[str]:
+    """Return the lines that make requests again after a pause, and wait for answers without limit.
+
+    Parameters
+    ----------
+    asked : iterable of Handshake
+        What holds before the pause, see `still_asked`.
+    ports : mapping
+        Name or number of each port by partner and way, as `handshakes` returns it.
+    request, wait : str
+        Lines of the language, with {} for the output and the input.
+    """
+    return [
+        wait.format(ports[step.partner, "input"])
+        if isinstance(step, Await)
+        else request.format(ports[step.partner, "output"])
+        for step in asked
+    ]
+
+
 def outputs(settings: Any) -> list[Any]:
     """Return all outputs that settings name: laser, gas, and those of requests."""
     requests = (port for (_, way), port in handshakes(settings).items() if way == "output")
@@ -251,6 +275,8 @@ class Formatter(ABC):
 
     def __init__(self, program: Program, settings: LanguageSettings) -> None:
         self.program, self.settings = program, settings
+        self.asked: list[Handshake] = []
+        """Handshakes that hold at the step that is being written."""
 
     @abstractmethod
     def files(self) -> dict[str, str]:
@@ -308,8 +334,15 @@ class Formatter(ABC):
 
     def lines(self, section: Section) -> Iterator[str]:
         """Yield the lines of all steps of a section."""
+        self.asked = list(self.asked_before(section))
         for step in section.steps:
             yield from self.step(step)
+            if isinstance(step, Request | Await):
+                self.asked = still_asked([*self.asked, step])
+
+    def asked_before(self, section: Section) -> Sequence[Handshake]:
+        """Return the handshakes that hold where a section begins."""
+        return ()
 
     def lengths(self) -> dict[str, int]:
         """Return how many lines each contour takes, by its name."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -9,9 +10,29 @@ from dataclasses import replace
 from typing import Any, Literal
 
 from kerfpath.errors import InputError
+from kerfpath.post.flow import section_of
 from kerfpath.post.languages import LanguageSettings, handshakes
-from kerfpath.post.program import Await, Handshake, Partner, Request, Signal, Switch
-from kerfpath.post.read_program import MoveKind, ReadHandshake, ReadMove, ReadStep, ReadWait
+from kerfpath.post.program import (
+    Await,
+    Handshake,
+    Partner,
+    Request,
+    Signal,
+    Switch,
+    still_asked,
+)
+from kerfpath.post.read_program import (
+    FlowStep,
+    MoveKind,
+    ReadEnd,
+    ReadHandshake,
+    ReadJump,
+    ReadLabel,
+    ReadMove,
+    ReadOff,
+    ReadPause,
+    ReadWait,
+)
 from kerfpath.robots import Robot
 
 # -----------------------------------------------------------------------------
@@ -95,10 +116,16 @@ class LineReader:
         self.file, self.robot, self.settings = file, robot, settings
         self.rows, self.row = rows, -1
         self.line, self.text = 0, ""
-        self.steps: list[ReadStep] = []
+        self.steps: list[FlowStep] = []
         """Steps of the routine that is being read."""
+        self.asked_before: Sequence[Handshake] = ()
+        """Handshakes that hold where the routine begins."""
+        self.loops: list[int] = []
+        """Lines at which the loops begin that are being read, the innermost last."""
         self.required: list[str] = []
         """Lines that must come next, exactly."""
+        self.flow_lines: Mapping[str, re.Pattern[str]] | None = None
+        """Patterns of those lines, see `require_next`."""
 
     # Lines.
 
@@ -135,11 +162,25 @@ class LineReader:
         self.advance()
         return match.groups()
 
-    def expect(self, lines: Iterable[str]) -> None:
-        """Pass over lines that must come here, exactly."""
+    def expect(
+        self, lines: Iterable[str], flow_lines: Mapping[str, re.Pattern[str]] | None = None
+    ) -> None:
+        """Pass over lines that must come here, exactly; `flow_lines` is that of `require_next`."""
         for line in lines:
             self.require_line(self.text, line.strip())
+            if flow_lines is not None:
+                self.follow(self.text, flow_lines)
             self.advance()
+
+    def require_next(
+        self, lines: Iterable[str], flow_lines: Mapping[str, re.Pattern[str]] | None = None
+    ) -> None:
+        """Require these lines to come next, exactly.
+
+        If they have a flow of control, `flow_lines` has the patterns of them all by the method here
+        that reads them; "" has those that do nothing to it.
+        """
+        self.required, self.flow_lines = list(lines), flow_lines
 
     def require_line(self, row: str, expected: str) -> None:
         """Refuse a row that is not the expected one."""
@@ -150,6 +191,8 @@ class LineReader:
         """Read a row with the method of its kind, unless it is a required row."""
         if self.required:
             self.require_line(row, self.required.pop(0))
+            if self.flow_lines is not None:
+                self.follow(row, self.flow_lines)
             return
         for kind, pattern in kinds.items():
             if match := pattern.fullmatch(row):
@@ -157,6 +200,22 @@ class LineReader:
                 getattr(self, kind)(*match.groups())
                 return
         raise self.fault(f"not expected here: {row[:SHOWN]!r}")
+
+    def follow(self, row: str, flow_lines: Mapping[str, re.Pattern[str]]) -> None:
+        """Add the steps of the flow of control on a required row.
+
+        Raises
+        ------
+        InputError
+            It is not known what the row does to the flow of control.
+        """
+        for kind, pattern in flow_lines.items():
+            if match := pattern.fullmatch(row):
+                if kind:
+                    said = (int(word) if word.isdecimal() else word for word in match.groups())
+                    getattr(self, kind)(*said)
+                return
+        raise self.fault(f"it is not known where the program goes on after {row[:SHOWN]!r}")
 
     def admit(self, kind: str) -> None:
         """Refuse a kind of line that must not come here; each language overrides this."""
@@ -174,27 +233,97 @@ class LineReader:
     def require_stopped(self, what: str) -> None:
         """Refuse a wait or handshake while the robot moves; each language overrides this."""
 
+    def add(self, step: type[FlowStep], /, **said: Any) -> None:
+        """Add a step on this line, by its type and attributes."""
+        self.steps.append(step(file=self.file, line=self.line, **said))
+
     def add_move(self, kind: MoveKind, speed: float | None, **said: Any) -> None:
         """Add the move on this line; `said` are further attributes of `ReadMove`."""
-        self.steps.append(ReadMove(kind=kind, speed=speed, file=self.file, line=self.line, **said))
+        self.add(ReadMove, kind=kind, speed=speed, **said)
 
     def wait(self, time: str | float) -> None:
         """Add a wait (s)."""
         self.require_stopped("a wait")
-        self.steps.append(ReadWait(time=float(time), file=self.file, line=self.line))
+        self.add(ReadWait, time=float(time))
 
     def ask(self, port: object, *, on: bool) -> None:
         """Add a request through an output that the settings name."""
         self.add_handshake(Request(partner=self.partner(port, "output"), on=on))
 
-    def expect_answer(self, port: object, timeout: float) -> None:
-        """Add a wait for an input that the settings name, for at most `timeout` (s)."""
-        self.add_handshake(Await(partner=self.partner(port, "input"), timeout=timeout))
+    def expect_answer(self, port: object, timeout: float, otherwise: str = "") -> None:
+        """Add a wait for an input that the settings name, for at most `timeout` (s).
 
-    def add_handshake(self, what: Handshake) -> None:
+        Without an answer the program goes on at the label or error exit `otherwise`.
+        """
+        self.add_handshake(Await(partner=self.partner(port, "input"), timeout=timeout), otherwise)
+
+    def add_handshake(self, what: Handshake, otherwise: str = "") -> None:
         """Add a handshake."""
         self.require_stopped("a handshake")
-        self.steps.append(ReadHandshake(what=what, file=self.file, line=self.line))
+        self.add(ReadHandshake, what=what, otherwise=otherwise)
+
+    def asked(self) -> list[Handshake]:
+        """Return the handshakes that hold here: those before the routine, and its own."""
+        steps = section_of("", self.steps).steps
+        own = (step.what for step in steps if isinstance(step, ReadHandshake))
+        return still_asked([*self.asked_before, *own])
+
+    # Flow of control.
+
+    def label(self, name: object) -> None:
+        """Add a label, a name or number."""
+        self.add(ReadLabel, name=str(name))
+
+    def jump(self, label: object) -> None:
+        """Add a jump to a label."""
+        self.add(ReadJump, label=str(label))
+
+    def jump_if_on(self, label: object, port: object) -> None:
+        """Add a jump to a label that is made only while an input is on."""
+        self.add(ReadJump, label=str(label), partner=self.partner(port, "input"))
+
+    def begin_loop(self) -> None:
+        """Add the start of a loop."""
+        self.loops.append(self.line)
+        self.label(f"loop {self.line}")
+
+    def leave_loop_if_on(self, port: object) -> None:
+        """Add that the innermost loop is left if an input is on."""
+        self.jump_if_on(f"end of loop {self.loops[-1]}", port)
+
+    def end_loop(self) -> None:
+        """Add the end of the innermost loop."""
+        line = self.loops.pop()
+        self.jump(f"loop {line}")
+        self.label(f"end of loop {line}")
+
+    def off(self, port: object) -> None:
+        """Add that the output of a signal or partner is switched off, whatever it is."""
+        names = {self.settings.laser_output: "laser", self.settings.gas_output: "gas"}
+        name = names.get(port) or self.partner(port, "output")
+        self.add(ReadOff, output=name)
+
+    def ask_again(self, port: object) -> None:
+        """Add a request that is made again after a pause."""
+        self.ask(port, on=True)
+
+    def wait_again(self, port: object) -> None:
+        """Add a wait for an input without a limit."""
+        self.expect_answer(port, math.inf)
+
+    def pause(self) -> None:
+        """Add a pause, after which the operator may continue."""
+        self.add(ReadPause)
+
+    def end_program(self) -> None:
+        """Add the end of the program."""
+        self.add(ReadEnd, of_program=True)
+
+    def leave_routine(self) -> None:
+        """Add the end of the routine."""
+        self.add(ReadEnd, of_program=False)
+
+    # Names of inputs and outputs.
 
     def partner(self, port: object, way: Literal["input", "output"]) -> Partner:
         """Return the partner of an input or output, by the settings."""

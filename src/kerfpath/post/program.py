@@ -236,6 +236,20 @@ def switches_of(step: Step) -> tuple[Switch, ...]:
     return step.switches if isinstance(step, LinearMove) else ()
 
 
+def still_asked(handshakes: Iterable[Handshake]) -> list[Handshake]:
+    """Return the requests and waits that hold after `handshakes`.
+
+    A request that is taken back ends the answers, too: partners give them for all requests.
+    """
+    held: list[Handshake] = []
+    for step in handshakes:
+        if isinstance(step, Await) or step.on:
+            held.append(step)
+        else:
+            held = [s for s in held if isinstance(s, Request) and s.partner != step.partner]
+    return held
+
+
 PathMove = LinearMove | CircularMove
 Move = JointMove | LinearMove | CircularMove
 Handshake = Request | Await

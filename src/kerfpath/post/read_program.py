@@ -1,4 +1,4 @@
-"""A program as read back from its text: positions, speeds and events, in SI units."""
+"""A program as read back from its text, in SI units: positions, speeds, events, flow of control."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, freeze, short_repr
 from kerfpath.errors import InputError
-from kerfpath.post.program import Handshake, Switch
+from kerfpath.post.program import Handshake, Partner, Signal, Switch
 from kerfpath.robots import ExternalAxis, Robot
 
 MoveKind = Literal["joint", "linear", "circular"]
@@ -103,9 +103,18 @@ class ReadWait(_InFile):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadHandshake(_InFile):
-    """A handshake with a partner while the robot is stopped."""
+    """A handshake with a partner while the robot is stopped.
+
+    Parameters
+    ----------
+    what : Request or Await
+    otherwise : str
+        Where the program goes on without an answer: a label of the routine or an error exit of the
+        program. Empty: it goes on with the next step.
+    """
 
     what: Handshake
+    otherwise: str = ""
 
     __repr__ = short_repr
 
@@ -114,11 +123,69 @@ ReadStep = ReadMove | ReadWait | ReadHandshake
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ReadLabel(_InFile):
+    """A place in a routine to which jumps go, by its name."""
+
+    name: str
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadJump(_InFile):
+    """A jump to a label of the routine: always, or only while the input of `partner` is on."""
+
+    label: str
+    partner: Partner | None = None
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOff(_InFile):
+    """Switch an output off, whatever it is: that of a signal or of the request to a partner."""
+
+    output: Signal | Partner
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadPause(_InFile):
+    """The program stops until the operator continues it."""
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadEnd(_InFile):
+    """The end of the whole program, or only of the routine."""
+
+    of_program: bool
+
+    __repr__ = short_repr
+
+
+FlowStep = ReadStep | ReadLabel | ReadJump | ReadOff | ReadPause | ReadEnd
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ReadSection:
-    """One routine of the program and its steps."""
+    """One routine of the program.
+
+    Parameters
+    ----------
+    name : str
+    steps : tuple of ReadStep
+        What it does if every partner answers at once.
+    flow : tuple of FlowStep
+        All its steps in the order of the text, with those of its flow of control, see
+        `kerfpath.post.flow`; empty if the language has none.
+    """
 
     name: str
     steps: tuple[ReadStep, ...]
+    flow: tuple[FlowStep, ...] = ()
 
     __repr__ = short_repr
 
@@ -141,6 +208,8 @@ class ReadProgram:
         Tool and work object; None if the text only gives their numbers.
     externals : tuple of ExternalAxis
         External axes of the robot that it was read for.
+    exits : mapping of str to tuple of FlowStep
+        What is done at each error exit, to which a wait without an answer leads from any routine.
     """
 
     name: str
@@ -148,6 +217,7 @@ class ReadProgram:
     T_flange_tip: Array | None = None
     T_base_part: Array | None = None
     externals: tuple[ExternalAxis, ...] = ()
+    exits: Mapping[str, tuple[FlowStep, ...]] = field(default_factory=dict)
 
     __repr__ = short_repr
 

@@ -13,6 +13,7 @@ from kerfpath.plans import Plan
 from kerfpath.post.build import build_program
 from kerfpath.post.checks import preflight
 from kerfpath.post.comparison import deviations
+from kerfpath.post.flow import unsafe_paths
 from kerfpath.post.languages import Language, LanguageSettings
 from kerfpath.post.languages import language as find_language
 from kerfpath.post.line_reader import CheckedTexts
@@ -30,7 +31,7 @@ def post(
 ) -> dict[str, str]:
     """Return the files of a program in a robot language; the same input gives the same bytes.
 
-    The text is read back and compared with the program first.
+    The text is read back first, compared with the program, and every path through it followed.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ def post(
     ------
     InputError
         The language is unknown, the settings are those of another language, the preflight finds
-        errors, or the text does not read back as the program.
+        errors, the text does not read back as the program, or a path through it is not safe.
     """
     program = source if isinstance(source, Program) else build_program(source)
     return post_and_read(program, language, settings, strict=strict).files
@@ -100,7 +101,7 @@ def post_and_read(
         files = chosen.formatter(program, settings).files()
         if chosen.read is not None:
             read = read_program(files, language, program.robot, settings)
-            refused = deviations(program, read, chosen, settings)
+            refused = deviations(program, read, chosen, settings) or unsafe_paths(read)
     if refused:
         more = f" (and {len(refused) - 1} more)" if len(refused) > 1 else ""
         raise InputError(f"program {program.name!r}: {refused[0]}{more}")

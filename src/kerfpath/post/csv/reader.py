@@ -12,9 +12,10 @@ from kerfpath.errors import InputError
 from kerfpath.post.arcs import pose_of
 from kerfpath.post.build import from_controller_units
 from kerfpath.post.csv.writer import POSE, CsvSettings, columns
+from kerfpath.post.flow import section_of
 from kerfpath.post.line_reader import LineReader, program_lines
 from kerfpath.post.program import SIGNALS, Switch
-from kerfpath.post.read_program import MOVE_KINDS, ReadProgram, ReadSection, ReadStep
+from kerfpath.post.read_program import MOVE_KINDS, FlowStep, ReadProgram
 from kerfpath.robots import Robot
 
 _NUMBER = re.compile(r"-?\d+\.\d+", re.ASCII)
@@ -40,7 +41,7 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: CsvSetting
     if reader.via is not None:
         raise reader.fault("expected the target of the arc after its point on the way")
     name = main.removesuffix(".csv")
-    sections = [ReadSection(name=name, steps=tuple(s)) for name, s in reader.sections.items()]
+    sections = [section_of(name, s) for name, s in reader.sections.items()]
     return ReadProgram(name=name, sections=tuple(sections))
 
 
@@ -54,7 +55,7 @@ class _Reader(LineReader):
     def __init__(self, file: str, robot: Robot, settings: CsvSettings) -> None:
         super().__init__(file, robot, settings)
         self.line, self.columns = 1, columns(robot)
-        self.sections: dict[str, list[ReadStep]] = {}
+        self.sections: dict[str, list[FlowStep]] = {}
 
     def read_row(self, fields: list[str]) -> None:
         if len(fields) != len(self.columns):

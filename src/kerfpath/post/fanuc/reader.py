@@ -24,6 +24,7 @@ from kerfpath.post.fanuc.controller import (
 )
 from kerfpath.post.fanuc.writer import (
     ANGLES,
+    NO_ANSWER,
     WRIST,
     Listing,
     abort_lines,
@@ -31,16 +32,16 @@ from kerfpath.post.fanuc.writer import (
     switch_off_lines,
     watch_lines,
 )
+from kerfpath.post.flow import section_of
 from kerfpath.post.line_reader import patterns
 from kerfpath.post.places import off_name
 from kerfpath.post.program import Await, Switch
 from kerfpath.post.read_program import (
+    FlowStep,
     MoveKind,
     ReadHandshake,
     ReadMove,
     ReadProgram,
-    ReadSection,
-    ReadStep,
 )
 from kerfpath.robots import Robot
 
@@ -56,16 +57,16 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: FanucSetti
     for name in top.calls:
         listing = _Section(f"{name}.ls", files[f"{name}.ls"], robot, settings)
         steps = _time_early(listing.completed(part), listing.early, robot, part, tool)
-        sections.append(ReadSection(name=listing.name, steps=steps))
+        sections.append(section_of(listing.name, steps))
     return ReadProgram(name=top.name, sections=tuple(sections), T_flange_tip=tool, T_base_part=part)
 
 
 def _time_early(
-    steps: Sequence[ReadStep], early: Mapping[int, tuple[Switch, ...]], robot: Robot,
+    steps: Sequence[FlowStep], early: Mapping[int, tuple[Switch, ...]], robot: Robot,
     part: Array, tool: Array,
-) -> tuple[ReadStep, ...]:  # fmt: skip
+) -> list[FlowStep]:  # fmt: skip
     """Return the steps; `early` switches get a lead before the end of the motion on their line."""
-    found: list[ReadStep] = []
+    found: list[FlowStep] = []
     start: Array | None = None
     for step in steps:
         if not isinstance(step, ReadMove):
@@ -84,7 +85,7 @@ def _time_early(
         start = end
         if step.q is not None:
             start = np.asarray(np.linalg.solve(part, robot.forward(step.q) @ tool))
-    return tuple(found)
+    return found
 
 
 _NUMBER = r"(-?\d*\.\d+)"
@@ -111,6 +112,13 @@ _SECTION = patterns(
         "timeout": r"  \$WAITTMOUT=(\d+)",
         "answer": r"  WAIT DI\[(\d+)\]=ON TIMEOUT,LBL\[1\]",
         "aborting": r"  END",
+    }
+)
+_WITHOUT_ANSWER = patterns(
+    {
+        "label": r"  LBL\[(\d+)\]",
+        "off": r"  DO\[(\d+)\]=OFF",
+        "end_program": "  ABORT",
     }
 )
 _POSITION = re.compile(
@@ -183,7 +191,7 @@ class _Watching(Listing):
 
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
         super().__init__(file, text, robot, settings)
-        self.require(watch_lines(settings))
+        self.require_next(watch_lines(settings))
         self.body({})
         self.end()
 
@@ -202,7 +210,7 @@ class _Section(Listing):
         self.pending: tuple[Switch, ...] = ()
         self.timeout_s: float | None = None
         self.says_abort = False
-        self.require(selection_lines(settings))
+        self.require_next(selection_lines(settings))
         self.body(_SECTION)
         if self.pending or self.timeout_s is not None:
             raise self.fault("expected a motion, or the wait of a timeout, before the end")
@@ -284,12 +292,13 @@ class _Section(Listing):
     def answer(self, number: str) -> None:
         if self.timeout_s is None:
             raise self.fault("expected $WAITTMOUT before the wait")
-        self.expect_answer(int(number), self.timeout_s)
+        self.expect_answer(int(number), self.timeout_s, otherwise=str(NO_ANSWER))
         self.timeout_s = None
 
     def aborting(self) -> None:
         self.says_abort = True
-        self.require(abort_lines(self.settings)[1:])
+        self.leave_routine()
+        self.require_next(abort_lines(self.settings)[1:], _WITHOUT_ANSWER)
 
     def positions(self) -> None:
         """Read the positions, each a block of rows."""
@@ -318,7 +327,7 @@ class _Section(Listing):
         except InputError as error:
             raise self.fault(f"P[{number}]: {error}") from None
 
-    def completed(self, T_base_part: Array) -> list[ReadStep]:
+    def completed(self, T_base_part: Array) -> list[FlowStep]:
         """Return the steps with their targets in SI units."""
         values = np.array([_six(words) for words in self.targets.values()]).reshape(-1, 6)
         arm = joints_from_axes(self.robot, np.radians(values))

@@ -12,7 +12,7 @@ tests/fixtures/fanuc/roboguide_export, JuniorNatalin/VASC (TB).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import count
 from typing import Final
 
@@ -110,9 +110,10 @@ class Listing(LineReader):
         if counted != number:
             raise self.fault(f"LINE_COUNT is {counted}, but there are {number} lines")
 
-    def require(self, lines: Sequence[str]) -> None:
-        """Require that these lines come next."""
-        self.required = [line.removesuffix(" ;").rstrip() for line in lines]
+    def require_next(
+        self, lines: Iterable[str], flow_lines: Mapping[str, re.Pattern[str]] | None = None
+    ) -> None:
+        super().require_next((line.removesuffix(" ;").rstrip() for line in lines), flow_lines)
 
     def end(self) -> None:
         """Read the end of the listing."""

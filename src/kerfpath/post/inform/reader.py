@@ -11,6 +11,7 @@ import numpy as np
 from kerfpath.arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import faceplate, from_euler, world
+from kerfpath.post.flow import section_of
 from kerfpath.post.inform.controller import (
     ExternalPulses,
     InformSettings,
@@ -28,8 +29,8 @@ from kerfpath.post.inform.writer import (
 )
 from kerfpath.post.line_reader import LineReader, patterns, program_lines
 from kerfpath.post.places import off_name
-from kerfpath.post.program import Switch
-from kerfpath.post.read_program import MoveKind, ReadProgram, ReadSection
+from kerfpath.post.program import Await, Handshake, Switch
+from kerfpath.post.read_program import MoveKind, ReadProgram
 from kerfpath.robots import Robot
 
 _NUMBER, _WHOLE = r"(-?\d+\.\d+)", r"(-?\d+)"
@@ -56,6 +57,18 @@ _JOB = patterns(
         "wait_for": r"\*WAIT(\d+)",
     }
 )
+_WITHOUT_ANSWER = patterns(
+    {
+        "": r"WAIT IN#\(\d+\)=ON T=\d+\.\d\d",
+        "jump_if_on": r"JUMP \*(\w+) IF IN#\((\d+)\)=ON",
+        "off": r"DOUT OT#\((\d+)\) OFF",
+        "pause": "PAUSE",
+        "ask_again": r"DOUT OT#\((\d+)\) ON",
+        "wait_again": r"WAIT IN#\((\d+)\)=ON",
+        "jump": r"JUMP \*(\w+)",
+        "label": r"\*(\w+)",
+    }
+)
 
 
 def read(
@@ -68,10 +81,12 @@ def read(
     off, *calls = top.calls
     _Off(f"{off}{SUFFIX}", files[f"{off}{SUFFIX}"], robot, settings)
     sections, last = [], None
+    asked: Sequence[Handshake] = ()
     for name in calls:
-        job = _Job(f"{name}{SUFFIX}", files[f"{name}{SUFFIX}"], robot, settings, last, part, tool)
-        sections.append(ReadSection(name=name, steps=tuple(job.steps)))
-        last = job.last
+        file = f"{name}{SUFFIX}"
+        job = _Job(file, files[file], robot, settings, last, asked, part, tool)
+        sections.append(section_of(name, job.steps))
+        last, asked = job.last, job.asked()
     return ReadProgram(
         name=top.name,
         sections=tuple(sections),
@@ -129,7 +144,7 @@ class _Off(_Text):
         if self.begin():
             raise self.fault("this job must have no positions")
         self.require_rows(middle("main", settings, self.external)[1])
-        self.required = switch_off_lines(settings)
+        self.require_next(switch_off_lines(settings))
         self.instructions({})
 
 
@@ -172,9 +187,10 @@ class _Job(_Text):
 
     def __init__(
         self, file: str, text: str, robot: Robot, settings: InformSettings, last: Array | None,
-        T_base_part: Array, T_flange_tip: Array,
+        asked_before: Sequence[Handshake], T_base_part: Array, T_flange_tip: Array,
     ) -> None:  # fmt: skip
         super().__init__(file, text, robot, settings)
+        self.asked_before = asked_before
         self.last = last
         self.T_base_part, self.T_tip_flange = T_base_part, np.linalg.inv(T_flange_tip)
         self.arc_poses: list[Array] = []
@@ -310,9 +326,12 @@ class _Job(_Text):
         said = re.match(r"WAIT IN#\((\d+)\)=ON T=(\d+\.\d\d)$", below)
         if said is None:
             raise self.fault("expected the wait for an input after the label")
-        port, timeout = int(said[1]), float(said[2])
-        self.required = wait_lines(int(label), port, timeout, self.settings)[1:]
-        self.expect_answer(port, timeout)
+        partner = self.partner(int(said[1]), "input")
+        awaited = Await(partner=partner, timeout=float(said[2]))
+        lines = wait_lines(int(label), awaited, self.asked(), self.settings)[1:]
+        self.label(f"WAIT{label}")
+        self.add_handshake(awaited)
+        self.require_next(lines, _WITHOUT_ANSWER)
 
     def require_stopped(self, what: str) -> None:
         if not self.stands:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import count
 from typing import Final
 
@@ -24,11 +25,12 @@ from kerfpath.post.inform.controller import (
     axes_from_joints,
     manipulator_type,
 )
-from kerfpath.post.languages import number, outputs
+from kerfpath.post.languages import ask_again_lines, handshakes, number, outputs
 from kerfpath.post.places import CalledFormatter
 from kerfpath.post.program import (
     Await,
     CircularMove,
+    Handshake,
     JointMove,
     LinearMove,
     Move,
@@ -37,6 +39,7 @@ from kerfpath.post.program import (
     Section,
     Step,
     Wait,
+    still_asked,
     stop_to_switch,
 )
 
@@ -79,17 +82,23 @@ def switch_off_lines(settings: InformSettings) -> list[str]:
     return [f"DOUT OT#({output}) OFF" for output in outputs(settings)]
 
 
-def wait_lines(label: int, number: int, timeout: float, settings: InformSettings) -> list[str]:
-    """Return the instructions that wait for an input.
+def wait_lines(
+    label: int, awaited: Await, asked: Sequence[Handshake], settings: InformSettings
+) -> list[str]:
+    """Return the instructions that wait for an input, and what is done without an answer.
 
-    After `timeout` (s) everything is off and the job pauses; when started again, it waits again.
+    Everything is switched off and the job pauses. When it is started again, what was `asked` for
+    before is asked for again.
     """
+    ports = handshakes(settings)
+    number = ports[awaited.partner, "input"]
     return [
         f"*WAIT{label}",
-        f"WAIT IN#({number})=ON T={timeout:.2f}",
+        f"WAIT IN#({number})=ON T={awaited.timeout:.2f}",
         f"JUMP *GO{label} IF IN#({number})=ON",
         *switch_off_lines(settings),
         "PAUSE",
+        *ask_again_lines(asked, ports, "DOUT OT#({}) ON", "WAIT IN#({})=ON"),
         f"JUMP *WAIT{label}",
         f"*GO{label}",
     ]
@@ -157,6 +166,20 @@ class Inform(CalledFormatter):
         self._targets, self._labels = [], count(1)
         yield from super().lines(section)
 
+    def asked_before(self, section: Section) -> Sequence[Handshake]:
+        """Return the handshakes that hold where a job begins: jobs share those of a contour."""
+        return self._asked[section.name]
+
+    @cached_property
+    def _asked(self) -> dict[str, list[Handshake]]:
+        found: dict[str, list[Handshake]] = {}
+        held: list[Handshake] = []
+        for section in self.program.sections:
+            found[section.name] = held
+            own = (step for step in section.steps if isinstance(step, Request | Await))
+            held = still_asked([*held, *own])
+        return found
+
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a MOVJ."""
         T = None if self.settings.pulses_per_deg else self.program.tips([move])[0]
@@ -196,8 +219,7 @@ class Inform(CalledFormatter):
 
     def wait_for(self, awaited: Await) -> Iterator[str]:
         """Yield a WAIT with a time, and what is done without an answer."""
-        port = self.port(awaited.partner, "input")
-        yield from wait_lines(next(self._labels), port, awaited.timeout, self.settings)
+        yield from wait_lines(next(self._labels), awaited, self.asked, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield remarks; remarks with frames have no space."""

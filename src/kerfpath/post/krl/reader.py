@@ -11,6 +11,7 @@ from kerfpath.arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import from_euler
 from kerfpath.post.build import carrier_frame
+from kerfpath.post.flow import section_of
 from kerfpath.post.krl.controller import AXES, KrlSettings, coupled, joints_from_axes, read_fields
 from kerfpath.post.krl.writer import (
     ANGLES,
@@ -24,8 +25,8 @@ from kerfpath.post.krl.writer import (
     wait_lines,
 )
 from kerfpath.post.line_reader import LineReader, only, patterns, program_lines, statements
-from kerfpath.post.program import Switch
-from kerfpath.post.read_program import MoveKind, ReadProgram, ReadSection, ReadStep
+from kerfpath.post.program import Await, Switch
+from kerfpath.post.read_program import FlowStep, MoveKind, ReadProgram, ReadSection
 from kerfpath.robots import Robot
 
 _NAME = r"([A-Za-z]\w*)"
@@ -65,6 +66,17 @@ _IN_ROUTINE = only(
     "linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "request",
     "wait_for", "end",
 )  # fmt: skip
+_WITHOUT_ANSWER = patterns(
+    {
+        "": r"\$TIMER_STOP\[\d+\]=(?:TRUE|FALSE)|WAIT FOR \$IN\[\d+\] OR \$TIMER_FLAG\[\d+\]",
+        "while_off": r"WHILE NOT \$IN\[(\d+)\]",
+        "off": r"\$OUT\[(\d+)\]=FALSE",
+        "pause": "HALT",
+        "ask_again": r"\$OUT\[(\d+)\]=TRUE",
+        "wait_again": r"WAIT FOR \$IN\[(\d+)\]",
+        "end_loop": "ENDWHILE",
+    }
+)
 _FIRST = re.compile(rf"INT {FIRST}=(\d+)", re.ASCII)
 
 
@@ -75,11 +87,11 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: KrlSetting
     sections: list[ReadSection] = []
     for name, number in first.calls.items():
         if name in first.contours:
-            sections.append(ReadSection(name=name, steps=tuple(first.contours[name])))
+            sections.append(section_of(name, first.contours[name]))
         else:
             own = _File(f"{name}.src", files, robot, settings, [], before=len(sections))
             own.require_data([])
-            sections += [ReadSection(name=n, steps=tuple(own.contours[n])) for n in own.calls]
+            sections += [section_of(n, own.contours[n]) for n in own.calls]
         if number != len(sections):
             first.line = 1
             raise first.fault(f"{name} is called for contours up to {number}, not {len(sections)}")
@@ -117,7 +129,7 @@ class _File(LineReader):
         self.calls: dict[str, int] = {}
         self.before, self.condition_open, self.number = before, False, 0
         self.begins_again = False
-        self.contours: dict[str, list[ReadStep]] = {}
+        self.contours: dict[str, list[FlowStep]] = {}
         self.frames: dict[str, Array] = {}
         self.held: dict[str, float] = {}
         self.held_at: dict[str, str] = {}
@@ -178,12 +190,12 @@ class _File(LineReader):
             raise self.fault("only the first routine of a file that is called takes a number")
         self.routines.append(name)
         if name == SWITCH_OFF:
-            self.required = [*switch_off_lines(self.settings), "END"]
+            self.require_next([*switch_off_lines(self.settings), "END"])
             return
         if len(self.routines) > 1:
             self.steps = self.contours[name] = []
         elif passed:
-            self.required = [f"INT {PASSED}"]
+            self.require_next([f"INT {PASSED}"])
         self.inside, self.held = True, {}
 
     def end(self) -> None:
@@ -233,10 +245,16 @@ class _File(LineReader):
         if said is None:
             raise self.fault("expected the wait for an input two lines below")
         port, timeout = int(said[1]), float(timeout_ms) * 1e-3
-        first, *self.required = wait_lines(port, timeout, self.settings)
+        awaited = Await(partner=self.partner(port, "input"), timeout=timeout)
+        first, *others = wait_lines(awaited, self.asked(), self.settings)
         if here != first:
             raise self.fault(f"expected {first!r}")
-        self.expect_answer(port, timeout)
+        self.add_handshake(awaited)
+        self.require_next(others, _WITHOUT_ANSWER)
+
+    def while_off(self, port: int) -> None:
+        self.begin_loop()
+        self.leave_loop_if_on(port)
 
     def require_opening(self) -> None:
         if self.opening:

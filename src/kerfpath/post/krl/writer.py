@@ -30,10 +30,19 @@ from kerfpath.post.krl.controller import (
     remarks,
     status_and_turn,
 )
-from kerfpath.post.languages import Formatter, divide_program, number, outputs, rename_sections
+from kerfpath.post.languages import (
+    Formatter,
+    ask_again_lines,
+    divide_program,
+    handshakes,
+    number,
+    outputs,
+    rename_sections,
+)
 from kerfpath.post.program import (
     Await,
     CircularMove,
+    Handshake,
     JointMove,
     LinearMove,
     Move,
@@ -89,16 +98,24 @@ def switch_off_lines(settings: KrlSettings) -> list[str]:
     return [f"$OUT[{output}]=FALSE" for output in outputs(settings)]
 
 
-def wait_lines(number: int, timeout: float, settings: KrlSettings) -> list[str]:
-    """Return the lines that wait for an input; after `timeout` (s) all is off until it is on."""
+def wait_lines(awaited: Await, asked: Sequence[Handshake], settings: KrlSettings) -> list[str]:
+    """Return the lines that wait for an input, and what is done without an answer.
+
+    Everything is switched off and the program halts. When it is continued, what was `asked` for
+    before is asked for again.
+    """
+    ports = handshakes(settings)
+    number = ports[awaited.partner, "input"]
+    again = ask_again_lines([*asked, awaited], ports, "$OUT[{}]=TRUE", "WAIT FOR $IN[{}]")
     return [
-        f"$TIMER[{TIMER}]={-round(timeout * 1e3)}",
+        f"$TIMER[{TIMER}]={-round(awaited.timeout * 1e3)}",
         f"$TIMER_STOP[{TIMER}]=FALSE",
         f"WAIT FOR $IN[{number}] OR $TIMER_FLAG[{TIMER}]",
         f"$TIMER_STOP[{TIMER}]=TRUE",
         f"WHILE NOT $IN[{number}]",
         *switch_off_lines(settings),
         "HALT",
+        *again,
         "ENDWHILE",
     ]
 
@@ -203,7 +220,7 @@ class Krl(Formatter):
 
     def wait_for(self, awaited: Await) -> Iterator[str]:
         """Yield a wait for an input with its timer."""
-        yield from wait_lines(self.port(awaited.partner, "input"), awaited.timeout, self.settings)
+        yield from wait_lines(awaited, self.asked, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield a comment; a bar keeps the word FOLD in it from folding the program."""

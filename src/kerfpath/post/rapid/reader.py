@@ -13,6 +13,7 @@ import numpy as np
 from kerfpath.arrays import Array
 from kerfpath.post.arcs import pose_of
 from kerfpath.post.build import carrier_frame
+from kerfpath.post.flow import section_of
 from kerfpath.post.line_reader import LineReader, only, patterns, program_lines, statements
 from kerfpath.post.program import Switch
 from kerfpath.post.rapid.controller import (
@@ -32,7 +33,7 @@ from kerfpath.post.rapid.writer import (
     switch_off_lines,
     zone_data,
 )
-from kerfpath.post.read_program import ReadMove, ReadProgram, ReadSection, ReadStep
+from kerfpath.post.read_program import FlowStep, ReadMove, ReadProgram
 from kerfpath.robots import Robot
 
 # -----------------------------------------------------------------------------
@@ -128,6 +129,17 @@ IN_ROUTINE = only(
     "request", "wait_for", "end_routine",
 )  # fmt: skip
 
+_ON_ERROR = patterns(
+    {
+        "off": r"SetDO (\w+),0;",
+        "": rf"{SWITCH_OFF};|StopMove;|UNDO|ENDPROC|ERROR",
+        "end_program": "RAISE;",
+    }
+)
+"""What is done at an error: main calls the routine that switches off, and stops."""
+ERROR = "ERROR"
+"""Name of the handler of errors in main, which is the exit of a wait without an answer."""
+
 
 # -----------------------------------------------------------------------------
 # The reader of modules.
@@ -166,7 +178,9 @@ class _Reader(Aggregates):
         self.zones: dict[str, float] = {"fine": 0.0}
         self.triggers: dict[str, Switch | None] = {}
         self.called_in: dict[str, str] = {}
-        self.routines: dict[str, list[ReadStep]] = {}
+        self.routines: dict[str, list[FlowStep]] = {}
+        self.switch_off: list[FlowStep] = []
+        self.on_error: list[FlowStep] = []
         self.homes: dict[str, str] = {}
         self.first_number = 0
         self.number: str | None = None
@@ -187,7 +201,9 @@ class _Reader(Aggregates):
             raise self.fault("nothing may follow ENDMODULE")
         in_main = self.routine_name == "main"
         if in_main and not self.required and not self.number and line == ending_lines()[0].strip():
-            self.required = [*(row.strip() for row in ending_lines()[1:]), "ENDPROC"]
+            rows = (row.strip() for row in ending_lines()[1:])
+            self.steps = self.on_error
+            self.require_next([*rows, "ENDPROC"], _ON_ERROR)
             self.routine_name = None
         elif not self.name:
             self.read(line, MODULE)
@@ -218,9 +234,10 @@ class _Reader(Aggregates):
             T_flange_tip=self.frames["tool"][1],
             T_base_part=self.frames["work_object"][1],
             sections=tuple(
-                ReadSection(name=name, steps=tuple(self.routines[name]))
+                section_of(name, self.routines[name])
                 for name in list(self.called_in)[self.first_number - 1 :]
             ),
+            exits={ERROR: (*self.switch_off, *self.on_error)},
         )
 
     def module(self, name: str) -> None:
@@ -276,14 +293,15 @@ class _Reader(Aggregates):
     def routine(self, name: str) -> None:
         self.unused(name, self.routines)
         if name == SWITCH_OFF and self.file == self.main:
-            self.required = [*switch_off_lines(self.settings), "ENDPROC"]
+            self.steps = self.switch_off
+            self.require_next([*switch_off_lines(self.settings), "ENDPROC"], _ON_ERROR)
             self.homes[name] = self.main
             return
         self.routine_name = name
         self.steps = self.routines[name] = []
         if name == "main":
             wrist = [WRIST] if self.settings.orientation == "wrist" else []
-            self.required = [r"ConfL\Off;", *wrist, f"{SWITCH_OFF};"]
+            self.require_next([r"ConfL\Off;", *wrist, f"{SWITCH_OFF};"])
         if name != "main":
             self.homes[name] = self.file
         elif self.file != self.main:
@@ -303,7 +321,7 @@ class _Reader(Aggregates):
         self.ask(output, on=value == "1")
 
     def wait_for(self, name: str, timeout: str) -> None:
-        self.expect_answer(name, float(timeout))
+        self.expect_answer(name, float(timeout), otherwise=ERROR)
 
     def set_trigger(self, name: str, lead_time: str, output: str, value: str) -> None:
         if self.called_in:
@@ -341,7 +359,8 @@ class _Reader(Aggregates):
         if not self.loaded or self.number is None:
             raise self.fault(f"{name} is called while no module is loaded, or without a condition")
         self.call(self.number, name)
-        self.number, self.required = None, ["ENDIF"]
+        self.number = None
+        self.require_next(["ENDIF"])
 
     def call(self, number: str, name: str) -> None:
         if name in self.called_in:

@@ -10,9 +10,10 @@ import numpy as np
 from kerfpath.arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import pose_of
+from kerfpath.post.flow import section_of
 from kerfpath.post.line_reader import LineReader, patterns, program_lines
 from kerfpath.post.program import SIGNALS, Switch
-from kerfpath.post.read_program import ReadProgram, ReadSection, ReadStep
+from kerfpath.post.read_program import FlowStep, ReadProgram
 from kerfpath.post.ros.writer import SECOND, RosSettings, head, joint_names, rates
 from kerfpath.robots import Robot
 
@@ -121,7 +122,7 @@ class _Events(LineReader):
         self.points = points
         self.last = -1
         self.tips = np.empty((0, 3))
-        self.sections: dict[str, list[ReadStep]] = {}
+        self.sections: dict[str, list[FlowStep]] = {}
         self.advance()
 
     def program(self) -> ReadProgram:
@@ -136,7 +137,7 @@ class _Events(LineReader):
             self.advance()
         if self.last != len(self.points.time) - 1:
             raise self.fault("the trajectory goes on after the last event")
-        sections = [ReadSection(name=word, steps=tuple(s)) for word, s in self.sections.items()]
+        sections = [section_of(word, s) for word, s in self.sections.items()]
         return ReadProgram(name=name, sections=tuple(sections), T_flange_tip=tool, T_base_part=part)
 
     def section(self, name: str) -> None:

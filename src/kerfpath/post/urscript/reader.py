@@ -10,10 +10,11 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, freeze
 from kerfpath.post.build import offset_near
+from kerfpath.post.flow import section_of
 from kerfpath.post.languages import outputs
 from kerfpath.post.line_reader import END_OF_FILE, LineReader, patterns, program_lines, statements
 from kerfpath.post.program import SIGNALS, Switch
-from kerfpath.post.read_program import MoveKind, ReadProgram, ReadSection, ReadStep
+from kerfpath.post.read_program import FlowStep, MoveKind, ReadProgram, ReadSection
 from kerfpath.post.urscript.writer import (
     FIRST,
     URScriptSettings,
@@ -59,6 +60,15 @@ _STEPS = patterns(
         "wait_for": rf"await_input\((\d), {_NUMBER}\)",
     }
 )
+WAITING = "await_input"
+"""Name of the routine that waits for an input; without an answer the program ends there."""
+_WITHOUT_ANSWER = patterns(
+    {
+        "": r"def await_input.*|waited = .*|while .*|sync\(\)|if .*|popup\(.*|end",
+        "off": r"set_standard_digital_out\((\d), False\)",
+        "end_program": "halt",
+    }
+)
 
 
 class _Reader(LineReader):
@@ -83,7 +93,8 @@ class _Reader(LineReader):
         self.expect(stop_lines(outputs(self.settings)))
         self.can_wait = self.text == wait_lines([])[0]
         if self.can_wait:
-            self.expect(wait_lines(outputs(self.settings)))
+            self.expect(wait_lines(outputs(self.settings)), _WITHOUT_ANSWER)
+        exits = {WAITING: tuple(self.steps)}
         signals = self.signals
         for known in SIGNALS.values():
             if self.text != f"global {known}_waits = False":
@@ -98,7 +109,7 @@ class _Reader(LineReader):
             if match[1] in sections:
                 raise self.fault(f"{match[1]} is defined twice")
             self.advance()
-            sections[match[1]] = ReadSection(name=match[1], steps=self.section())
+            sections[match[1]] = section_of(match[1], self.section())
         for signal in signals:
             self.expect([f"{signal}_set(False)", f"{signal}_run = run {signal}_thread()"])
         calls: list[str] = []
@@ -117,9 +128,10 @@ class _Reader(LineReader):
             sections=tuple(sections.values())[begin - 1 :],
             T_flange_tip=freeze(np.linalg.inv(robot.T_end_flange) @ tool),
             T_base_part=freeze(robot.T_base_foot @ part),
+            exits=exits,
         )
 
-    def section(self) -> tuple[ReadStep, ...]:
+    def section(self) -> list[FlowStep]:
         """Return the steps of a contour, to its end."""
         self.steps = []
         while self.text != "end":
@@ -127,7 +139,7 @@ class _Reader(LineReader):
             self.advance()
         self.require_stopped("a move")
         self.advance()
-        return tuple(self.steps)
+        return self.steps
 
     def joint(self, *said: str | None) -> None:
         self.require_stopped("a move")
@@ -195,7 +207,7 @@ class _Reader(LineReader):
     def wait_for(self, port: str, timeout: str) -> None:
         if not self.can_wait:
             raise self.fault("the program does not define how it waits for an input")
-        self.expect_answer(int(port), float(timeout))
+        self.expect_answer(int(port), float(timeout), otherwise=WAITING)
 
     def require_stopped(self, what: str) -> None:
         """Require that a signal switched ahead of the end of a move is also switched at its end."""

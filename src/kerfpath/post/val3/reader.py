@@ -12,9 +12,10 @@ import numpy as np
 from kerfpath.arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import faceplate, from_euler, world
+from kerfpath.post.flow import section_of
 from kerfpath.post.line_reader import LineReader, patterns, program_lines, statements
-from kerfpath.post.program import PARTNERS, Partner, Switch
-from kerfpath.post.read_program import MoveKind, ReadMove, ReadProgram, ReadSection, ReadStep
+from kerfpath.post.program import PARTNERS, SIGNALS, Await, Partner, Switch
+from kerfpath.post.read_program import FlowStep, MoveKind, ReadMove, ReadOff, ReadProgram
 from kerfpath.post.val3.controller import SAME, Val3Settings, joints_from_axes
 from kerfpath.post.val3.writer import (
     ANGLES,
@@ -193,8 +194,18 @@ _LINES = patterns(
         "stand": r"waitEndMove\(\)",
         "switch": r"(dioLaser|dioGas)=(true|false)",
         "request": r"(do[A-Z]\w*)=(true|false)",
-        "wait_for": r"if watch\((di\w+)==true,(\d+\.\d+)\)==false",
+        "wait_for": r"while watch\((di\w+)==true,(\d+\.\d+)\)==false",
         "wait": r"delay\((\d+\.\d+)\)",
+    }
+)
+_WITHOUT_ANSWER = patterns(
+    {
+        "off": r"(d\w+)=false",
+        "": r'disablePower\(\)|logMsg\("\w+: no answer"\)',
+        "pause": r"wait\(isPowered\(\)\)",
+        "ask_again": r"(do\w+)=true",
+        "wait_again": r"wait\((di\w+)==true\)",
+        "end_loop": "endWhile",
     }
 )
 
@@ -214,7 +225,7 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: Val3Settin
         if (alias, name) in called:
             raise start.fault(f"{name} is called twice", line)
         called.add((alias, name))
-        sections.append(ReadSection(name=name, steps=projects[alias].steps(name)))
+        sections.append(section_of(name, projects[alias].steps(name)))
     begin = top.data.first
     if begin is None or begin > len(sections):
         raise start.fault(f"{FIRST} must be the number of a contour")
@@ -337,9 +348,9 @@ class _Project:
         if [row for _, row in self.statements(stop)] != stop_lines(self.settings):
             raise stop.fault(f"expected {' and '.join(stop_lines(self.settings))} in stop()")
 
-    def steps(self, name: str) -> tuple[ReadStep, ...]:
+    def steps(self, name: str) -> list[FlowStep]:
         """Return the steps of a routine."""
-        return tuple(_Routine(self, self.routine(name)).steps)
+        return _Routine(self, self.routine(name)).steps
 
 
 class _Routine(LineReader):
@@ -404,9 +415,15 @@ class _Routine(LineReader):
         self.ask(name, on=state == "true")
 
     def wait_for(self, name: str, timeout: str) -> None:
-        partner = self.partner(name, "input")
-        self.required = wait_lines(partner, float(timeout), self.settings)[1:]
-        self.expect_answer(name, float(timeout))
+        awaited = Await(partner=self.partner(name, "input"), timeout=float(timeout))
+        self.require_next(wait_lines(awaited, self.asked(), self.settings)[1:], _WITHOUT_ANSWER)
+        self.begin_loop()
+        self.add_handshake(awaited)
+        self.leave_loop_if_on(name)
+
+    def off(self, port: object) -> None:
+        signals = {name: SIGNALS[signal] for signal, name in OUTPUTS.items()}
+        self.add(ReadOff, output=signals.get(str(port)) or self.partner(port, "output"))
 
     def partner(self, port: object, way: str) -> Partner:
         if port in links(self.settings):

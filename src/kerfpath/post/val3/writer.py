@@ -19,10 +19,18 @@ import numpy as np
 from kerfpath.arrays import Array, short_repr
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import controller_frames, euler
-from kerfpath.post.languages import Formatter, divide_program, handshakes, number, rename_sections
+from kerfpath.post.languages import (
+    Formatter,
+    ask_again_lines,
+    divide_program,
+    handshakes,
+    number,
+    rename_sections,
+)
 from kerfpath.post.program import (
     Await,
     CircularMove,
+    Handshake,
     JointMove,
     LinearMove,
     Move,
@@ -194,19 +202,21 @@ def opening_lines(settings: Val3Settings) -> list[str]:
     return [f"{name}=false" for name in links(settings) if name not in inputs]
 
 
-def wait_lines(partner: str, timeout: float, settings: Val3Settings) -> list[str]:
-    """Return the statements that wait for an input.
+def wait_lines(awaited: Await, asked: Sequence[Handshake], settings: Val3Settings) -> list[str]:
+    """Return the statements that wait for an input, and what is done without an answer.
 
-    After `timeout` (s) everything is off, including the arm's power, until the input is on.
+    Everything is switched off, including the arm's power. Once the operator has switched that on
+    again, what was `asked` for before is asked for again.
     """
-    asked = f"{PORTS[partner, 'input']}==true"
+    name = PORTS[awaited.partner, "input"]
     return [
-        f"if watch({asked},{number(timeout, 3)})==false",
+        f"while watch({name}==true,{number(awaited.timeout, 3)})==false",
         *opening_lines(settings),
         "disablePower()",
-        f'logMsg("{partner}: no answer")',
-        f"wait({asked})",
-        "endIf",
+        f'logMsg("{awaited.partner}: no answer")',
+        "wait(isPowered())",
+        *ask_again_lines(asked, PORTS, "{}=true", "wait({}==true)"),
+        "endWhile",
     ]
 
 
@@ -328,7 +338,7 @@ class Val3(Formatter):
     def wait_for(self, awaited: Await) -> Iterator[str]:
         """Yield a wait for an input, once the robot has stopped."""
         yield from self.standing()
-        yield from wait_lines(awaited.partner, awaited.timeout, self.settings)
+        yield from wait_lines(awaited, self.asked, self.settings)
 
     def comment(self, text: str) -> Iterator[str]:
         """Yield a comment, which must not end the CDATA section that contains it."""

@@ -1,0 +1,258 @@
+"""The flow of control of a program, and what must hold on every path through it.
+
+Readers turn the texts of all languages into the same few steps, so that the rules stand here once.
+A path leaves the planned one where a partner does not answer in time, and may come back to it after
+a pause, when the operator continues. Every path is followed, with the outputs that are on and the
+answers that were given at each of its steps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from kerfpath.errors import InputError
+from kerfpath.post.program import Await, ProgramIssue, Request
+from kerfpath.post.read_program import (
+    FlowStep,
+    ReadEnd,
+    ReadHandshake,
+    ReadJump,
+    ReadLabel,
+    ReadMove,
+    ReadOff,
+    ReadPause,
+    ReadProgram,
+    ReadSection,
+    ReadStep,
+    ReadWait,
+)
+
+# -----------------------------------------------------------------------------
+# One routine: from each step to those that may follow.
+
+State = frozenset[str]
+"""The outputs that are on and the answers that were given."""
+ALL_OFF = State()
+LASER, ANSWER = "the laser", "the answer of "
+
+
+def _output(name: str) -> str:
+    return LASER if name == "laser" else f"the output of {name}"
+
+
+class _Routine:
+    """The steps of a routine or an error exit, and the ways between them."""
+
+    def __init__(self, flow: Sequence[FlowStep]) -> None:
+        self.flow = flow
+        self.labels: dict[str, int] = {}
+        for index, step in enumerate(flow):
+            if isinstance(step, ReadLabel) and self.labels.setdefault(step.name, index) != index:
+                raise InputError(f"{step.place}: the label {step.name} is given twice")
+        for step in flow:
+            if isinstance(step, ReadJump) and step.label not in self.labels:
+                raise InputError(f"{step.place}: the label {step.label} is missing")
+
+    def following(self, at: int, state: State) -> Iterator[tuple[int | str, State]]:
+        """Yield the steps that may follow one, the planned one first, with the state there.
+
+        A step is an index, or the name of an error exit of the program. Nothing follows an end.
+        """
+        match self.flow[at]:
+            case ReadMove(switches=switches):
+                for switch in switches:
+                    name = _output(switch.signal)
+                    state = state | {name} if switch.on else state - {name}
+                yield at + 1, state
+            case ReadEnd():
+                return
+            case ReadJump(label=label, partner=None):
+                yield self.labels[label], state
+            case ReadJump(label=label, partner=str(partner)):
+                answered = ANSWER + partner in state
+                yield self.labels[label] if answered else at + 1, state
+            case ReadHandshake(what=Await(partner=partner, timeout=timeout), otherwise=otherwise):
+                yield at + 1, state | {ANSWER + partner}
+                if timeout < math.inf:
+                    late = self.labels.get(otherwise, otherwise) if otherwise else at + 1
+                    yield late, state - {ANSWER + partner}
+            case ReadHandshake(what=Request(partner=partner, on=True)):
+                yield at + 1, state | {_output(partner)}
+            case ReadHandshake(what=Request(partner=output)) | ReadOff(output=output):
+                yield at + 1, _switched_off(state, output)
+            case _:
+                yield at + 1, state
+
+
+def _switched_off(state: State, output: str) -> State:
+    """Return the state without an output; what partners answered to a request holds no longer."""
+    state -= {_output(output)}
+    if output in ("laser", "gas"):
+        return state
+    return frozenset(name for name in state if not name.startswith(ANSWER))
+
+
+def section_of(name: str, flow: Sequence[FlowStep]) -> ReadSection:
+    """Return a routine with its flow of control.
+
+    Parameters
+    ----------
+    name : str
+    flow : sequence of FlowStep
+        All steps of the routine in the order of its text.
+
+    Raises
+    ------
+    InputError
+        A label is missing or given twice, or the routine does not end though every partner answers.
+    """
+    routine, steps, passed = _Routine(flow), list[ReadStep](), set[int]()
+    ways: list[tuple[int | str, State]] = [(0, ALL_OFF)]
+    while ways:
+        at, state = ways[0]
+        if at == len(flow) or not isinstance(at, int):
+            break
+        step = flow[at]
+        if at in passed:
+            raise InputError(f"{step.place}: the routine comes back to this line for ever")
+        passed.add(at)
+        if isinstance(step, ReadMove | ReadWait | ReadHandshake):
+            steps.append(step)
+        ways = list(routine.following(at, state))
+    return ReadSection(name=name, steps=tuple(steps), flow=tuple(flow))
+
+
+# -----------------------------------------------------------------------------
+# The program: every path is followed.
+
+
+@dataclass(frozen=True, slots=True)
+class _Visit:
+    """A step on a path: the routine by its number or the error exit by its name, and the index."""
+
+    routine: int | str
+    at: int
+    state: State = ALL_OFF
+    unanswered: tuple[str, ...] = ()
+    """Places of the waits that ended without an answer."""
+
+
+def unsafe_paths(program: ReadProgram) -> list[ProgramIssue]:
+    """Return where a program is not safe on some path through it; empty if it is.
+
+    The laser is off wherever the robot waits for a partner, moves by its joints, pauses or ends.
+    Everything is off at a pause, and where the program ends for want of an answer. A path that
+    comes back to the planned one finds the same outputs on and the same answers given: what was
+    asked for before a pause is asked for again. Every motion belongs to the planned path.
+
+    Parameters
+    ----------
+    program : ReadProgram
+        Sections without flow of control are taken as their steps in order.
+
+    Raises
+    ------
+    InputError
+        A wait leads to a label that is missing.
+    """
+    machine = _Machine(program)
+    issues = [*machine.issues, *machine.never_reached()]
+    queue, seen = deque(machine.branches), set[_Visit]()
+    while queue:
+        visit = queue.popleft()
+        if (alike := replace(visit, unanswered=())) in seen:
+            continue
+        seen.add(alike)
+        if found := list(machine.check(visit)):
+            issues += found
+        elif machine.planned.get((visit.routine, visit.at)) != visit.state:
+            queue.extend(machine.following(visit))
+    return issues
+
+
+class _Machine:
+    """A program, the state at each step of its planned path, and the branches from it."""
+
+    def __init__(self, program: ReadProgram) -> None:
+        self.routines: dict[int | str, _Routine] = {
+            number: _Routine(section.flow or section.steps)
+            for number, section in enumerate(program.sections)
+        }
+        self.routines |= {name: _Routine(flow) for name, flow in program.exits.items()}
+        self.planned: dict[tuple[int | str, int], State] = {}
+        self.branches: list[_Visit] = []
+        self.issues: list[ProgramIssue] = []
+        ways = [_Visit(0, 0)] if program.sections else []
+        while ways:
+            visit, *others = ways
+            self.branches += others
+            self.planned[visit.routine, visit.at] = visit.state
+            self.issues += self.check(visit)
+            ways = list(self.following(visit))
+
+    def step(self, visit: _Visit) -> FlowStep | None:
+        """Return the step of a visit, None at the end of a routine."""
+        flow = self.routines[visit.routine].flow
+        return flow[visit.at] if visit.at < len(flow) else None
+
+    def following(self, visit: _Visit) -> Iterator[_Visit]:
+        """Yield the visits that may follow one, the planned one first."""
+        step = self.step(visit)
+        if step is None or isinstance(step, ReadEnd):
+            ends = step is not None and step.of_program
+            if not ends and isinstance(visit.routine, int) and visit.routine + 1 in self.routines:
+                yield replace(visit, routine=visit.routine + 1, at=0)
+            return
+        ways = self.routines[visit.routine].following(visit.at, visit.state)
+        for number, (at, state) in enumerate(ways):
+            left = visit.unanswered if number == 0 else (*visit.unanswered, step.place)
+            if isinstance(at, int):
+                yield _Visit(visit.routine, at, state, left)
+            elif at in self.routines:
+                yield _Visit(at, 0, state, left)
+            else:
+                raise InputError(f"{step.place}: the label {at} is missing")
+
+    def never_reached(self) -> Iterator[ProgramIssue]:
+        """Yield an issue for the first motion of each routine that is not on the planned path."""
+        for name, routine in self.routines.items():
+            for at, step in enumerate(routine.flow):
+                if isinstance(step, ReadMove) and (name, at) not in self.planned:
+                    message = "the program never comes to this motion"
+                    yield ProgramIssue("error", "flow", message, step.place)
+                    break
+
+    def check(self, visit: _Visit) -> Iterator[ProgramIssue]:
+        """Yield an issue for each rule that a step breaks in this state."""
+        planned = self.planned.get((visit.routine, visit.at), visit.state)
+        for wrong in _wrongs(self.step(visit), visit.state, planned):
+            flow = self.routines[visit.routine].flow
+            place = flow[min(visit.at, len(flow) - 1)].place if flow else "program"
+            message = f"the program {wrong}"
+            if visit.unanswered:
+                message += f" after no answer at {' and '.join(visit.unanswered)}"
+            yield ProgramIssue("error", "flow", message, place)
+
+
+def _wrongs(step: FlowStep | None, state: State, planned: State) -> Iterator[str]:
+    """Yield in words what is wrong with a step in a state; None is the end of a routine."""
+    on_path = isinstance(step, ReadMove) and step.kind != "joint"
+    if LASER in state and not (
+        on_path or isinstance(step, ReadWait | ReadLabel | ReadJump | ReadOff)
+    ):
+        yield f"comes here with {LASER} on"
+    elif isinstance(step, ReadPause) or (isinstance(step, ReadEnd) and step.of_program):
+        if outputs := [name for name in state if not name.startswith(ANSWER)]:
+            yield f"stops here with {_listed(outputs)} on"
+    elif state != planned and (step is None or isinstance(step, ReadStep)):
+        if lacks := planned - state:
+            yield f"goes on here without {_listed(lacks)}"
+        if beyond := state - planned:
+            yield f"goes on here with {_listed(beyond)}"
+
+
+def _listed(names: Iterable[str]) -> str:
+    return " and ".join(sorted(names))
