@@ -14,7 +14,7 @@ import numpy as np
 from kerfpath.arrays import Array
 from kerfpath.auditor.chain import JointChain
 from kerfpath.auditor.rounding import Rounding
-from kerfpath.auditor.table import Check, Unit
+from kerfpath.auditor.table import Check, Unit, check_worst
 from kerfpath.plans import Plan
 
 ELBOW = 2
@@ -62,18 +62,9 @@ def _above_floor(plan: Plan, chain: JointChain) -> list[Check]:
         [links[:, len(chain.externals) + 1 + ELBOW :], links[:, -1:] @ chain.tip], axis=1
     )[:, :, 2, 3]
     deep = floor - heights.min(axis=1)
-    node = int(np.argmax(deep))
-    return [
-        Check(
-            code="floor",
-            title="depth of elbow, wrist or flange below the floor at the nodes",
-            value=float(deep[node]),
-            limit=MARGIN_SLACK,
-            unit="m",
-            node=node,
-            advice="write floor_mm in [robot] where the floor is lower, or none",
-        )
-    ]
+    title = "depth of elbow, wrist or flange below the floor at the nodes"
+    advice = "write floor_mm in [robot] where the floor is lower, or none"
+    return [check_worst("floor", title, deep, MARGIN_SLACK, "m", advice=advice)]
 
 
 def _lines(plan: Plan, chain: JointChain) -> tuple[list[Array], list[Array]]:

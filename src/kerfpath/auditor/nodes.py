@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath.arrays import Array, Ints, scalar
+from kerfpath.arrays import Array, scalar
 from kerfpath.auditor.between import BetweenNodes, bound_between_nodes
 from kerfpath.auditor.certificate import bound_checks
 from kerfpath.auditor.chain import chain_of
@@ -17,7 +17,7 @@ from kerfpath.auditor.dynamics import LagrangeArm
 from kerfpath.auditor.margins import margins
 from kerfpath.auditor.motion import Interpolation, Motion, joint_increments, motion_of
 from kerfpath.auditor.rounding import MOST_ROUNDED, Rounding
-from kerfpath.auditor.table import Check, Issue, Level, Unit
+from kerfpath.auditor.table import Check, Issue, check_worst
 from kerfpath.auditor.transfer import retract_checks
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -193,17 +193,8 @@ def window_checks(plan: Plan, tool: Array, *, slack: float = WINDOW_SLACK) -> li
         off = np.abs(np.angle(np.exp(1j * (gamma - w.low - half))))
         held = (s >= w.start - ON_IT) & (s <= w.end + ON_IT)
         out = np.where(held, np.maximum(out, off - half), out)
-    node = int(np.argmax(np.where(np.isnan(out), np.inf, out)))
-    return [
-        Check(
-            code="gamma-window",
-            title="gamma outside its pinned windows at the nodes",
-            value=float(out[node]),
-            limit=slack,
-            unit="rad",
-            node=node,
-        )
-    ]
+    title = "gamma outside its pinned windows at the nodes"
+    return [check_worst("gamma-window", title, out, slack, "rad")]
 
 
 def _reference(contour: Contour, kind: str) -> Array:
@@ -352,14 +343,14 @@ def _at_nodes(plan: Plan, tool: Array) -> list[Check]:
     nominal, s = plan.contour.axes @ plan.T_base_part[:3, :3].T, plan.contour.s
     axis = _angle(tool[:, :3, 2], axes_asked_for(nominal, s, tilt_turns(plan), s))
     rows = [
-        _worst("tip-at-nodes", "tool tip at the nodes", tip, TIP_AT_NODES, "m"),
-        _worst("axis-at-nodes", "tool axis at the nodes", axis, AXIS_AT_NODES, "rad"),
+        check_worst("tip-at-nodes", "tool tip at the nodes", tip, TIP_AT_NODES, "m"),
+        check_worst("axis-at-nodes", "tool axis at the nodes", axis, AXIS_AT_NODES, "rad"),
     ]
     allowed = plan.settings.tilt
     if allowed is not None or plan.tilt.any():
         cone = (0.0 if allowed is None else allowed.cone) + AXIS_AT_NODES
         angle = _angle(tool[:, :3, 2], nominal)
-        rows.append(_worst("tilt", "tilt of the tool axis at the nodes", angle, cone, "rad"))
+        rows.append(check_worst("tilt", "tilt of the tool axis at the nodes", angle, cone, "rad"))
     return rows
 
 
@@ -394,7 +385,7 @@ def _between_nodes(
     ends = np.linalg.norm(ends @ rotation.T + origin - motion.tip[worst, [0, -1]], axis=1)
     advice = FINER if ends.max() <= path_tolerance else OFF_THE_PATH
     return [
-        _worst(
+        check_worst(
             "tip-between-nodes",
             "tool tip between the nodes",
             off[row, near],
@@ -403,7 +394,7 @@ def _between_nodes(
             cell,
             advice=advice,
         ),
-        _worst(
+        check_worst(
             "axis-between-nodes",
             "tool axis between the nodes",
             turned,
@@ -412,7 +403,7 @@ def _between_nodes(
             cell,
             advice=FINER,
         ),
-        _worst(
+        check_worst(
             "straight-move",
             "pose that the joints miss on a straight move",
             np.maximum(motion.residual.max(axis=1), reached.residual),
@@ -437,7 +428,7 @@ def _positions(
             x = motion.q[..., i]
             over = np.maximum(limits.lower[i] - x, x - limits.upper[i]).max(axis=1)
             title = f"excess over the limits of {axis.name}"
-            rows.append(_worst("external-limits", title, over, LIMIT_SLACK, axis.unit))
+            rows.append(check_worst("external-limits", title, over, LIMIT_SLACK, axis.unit))
     bound[arm:] = False
     if bound.any():
         n = len(bound)
@@ -459,15 +450,15 @@ def _positions(
         over = np.maximum(coupling.lower - reached.low[:, c], reached.high[:, c] - coupling.upper)
         over = over - left @ np.abs(coupling.row)
         title = f"excess over the limits of {coupling.name}"
-        rows.append(_worst("coupled-limits", title, over, LIMIT_SLACK, "rad"))
+        rows.append(check_worst("coupled-limits", title, over, LIMIT_SLACK, "rad"))
     if plan.settings.rotation is not None:
         turned = np.cumsum(joint_increments(plan), axis=0)
         over = (np.abs(turned) - plan.settings.rotation).max(axis=1)
         title = "excess over the limits of accumulated rotation"
-        rows.append(_worst("rotation", title, over, LIMIT_SLACK, "rad"))
+        rows.append(check_worst("rotation", title, over, LIMIT_SLACK, "rad"))
     hidden = reached.open.astype(float)
     rows.append(
-        _worst(
+        check_worst(
             "unbounded",
             "intervals between nodes in which the joints may do more than their samples show",
             hidden * hidden.sum(),
@@ -478,33 +469,10 @@ def _positions(
         )
     )
     step = np.abs(joint_increments(plan)[:, own]).max(axis=1)
-    rows.append(_worst("joint-step", "joint step between nodes", step, np.pi * (1 - 1e-9), "rad"))
-    return rows
-
-
-def _worst(
-    code: str,
-    title: str,
-    values: Array,
-    limit: float,
-    unit: Unit,
-    nodes: Ints | None = None,
-    *,
-    level: Level = "error",
-    advice: str = "",
-) -> Check:
-    """Return the check of the largest of `values`; NaN counts as worst."""
-    i = int(np.argmax(np.where(np.isnan(values), np.inf, values)))
-    return Check(
-        code=code,
-        title=title,
-        value=float(values[i]),
-        limit=limit,
-        unit=unit,
-        node=i if nodes is None else int(nodes[i]),
-        level=level,
-        advice=advice,
+    rows.append(
+        check_worst("joint-step", "joint step between nodes", step, np.pi * (1 - 1e-9), "rad")
     )
+    return rows
 
 
 def _angle(a: Array, b: Array) -> Array:

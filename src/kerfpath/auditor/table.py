@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from kerfpath.arrays import short_repr
+from kerfpath.arrays import Array, Ints, short_repr
 
 Unit = Literal["m", "rad", "m^3", "s", "share", "count"]
 Level = Literal["error", "warning"]
@@ -75,6 +75,31 @@ class Issue:
 
     def __str__(self) -> str:
         return f"{self.level}: {self.message} [{self.code}]"
+
+
+def check_worst(
+    code: str,
+    title: str,
+    values: Array,
+    limit: float,
+    unit: Unit,
+    nodes: Ints | None = None,
+    *,
+    level: Level = "error",
+    advice: str = "",
+) -> Check:
+    """Return the check of the largest of `values`; NaN counts as worst."""
+    i = int(np.argmax(np.where(np.isnan(values), np.inf, values)))
+    return Check(
+        code=code,
+        title=title,
+        value=float(values[i]),
+        limit=limit,
+        unit=unit,
+        node=i if nodes is None else int(nodes[i]),
+        level=level,
+        advice=advice,
+    )
 
 
 def worst_of(tables: Iterable[Iterable[Check]]) -> list[Check]:

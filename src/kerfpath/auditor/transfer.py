@@ -12,7 +12,7 @@ from kerfpath.arrays import Array, Ints, floats
 from kerfpath.auditor.chain import JointChain, chain_of
 from kerfpath.auditor.collision import collision_along
 from kerfpath.auditor.motion import follow
-from kerfpath.auditor.table import Check, Unit
+from kerfpath.auditor.table import Check, check_worst
 from kerfpath.cell import Cell
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot, require_axes
@@ -129,8 +129,10 @@ def transfer_checks(
     beyond[:, robot.endless] = -np.inf
     n = robot.arm.joints
     rows = [
-        _check("air-time", "time that a transfer move needs", late, 1 + TRANSFER_SLACK, "share"),
-        _check(
+        check_worst(
+            "air-time", "time that a transfer move needs", late, 1 + TRANSFER_SLACK, "share"
+        ),
+        check_worst(
             "air-limits",
             "excess over the joint limits",
             beyond[:, :n].max(axis=1),
@@ -142,7 +144,7 @@ def transfer_checks(
         if not robot.endless[i]:
             title = f"excess over the limits of {axis.name}"
             rows.append(
-                _check("air-external-limits", title, beyond[:, i], TRANSFER_SLACK, axis.unit)
+                check_worst("air-external-limits", title, beyond[:, i], TRANSFER_SLACK, axis.unit)
             )
     if cell is not None and len(cell.pairs):
         samples, leg = _sample_motions(corners)
@@ -172,10 +174,3 @@ def _sample_motions(corners: Array) -> tuple[Array, Ints]:
         samples.append(one + np.linspace(0, 1, count + 1)[:, None] * (two - one))
         legs.append(np.full(count + 1, k))
     return np.vstack(samples), np.concatenate(legs)
-
-
-def _check(code: str, title: str, values: Array, limit: float, unit: Unit) -> Check:
-    worst = int(np.argmax(np.where(np.isnan(values), np.inf, values)))
-    return Check(
-        code=code, title=title, value=float(values[worst]), limit=limit, unit=unit, node=worst
-    )
