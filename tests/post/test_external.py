@@ -190,7 +190,7 @@ EDITS = {
         (",\r\n\tE1=    20.000000  mm", "", "E1 is missing: the position has no value for rail"),
         ("\tE1=    20.000000  mm", "\tE1=    20.000000 deg", "E1: expected mm, got deg"),
         ("\tE1=    20.000000  mm", "\tE2=    20.000000  mm", "E2: the robot has no such external"),
-        ("1,1,*,*,*", "1,*,*,*,*", "not an attribute"),
+        ("1,1,*,*,*", "1,*,*,*,*", "expected DEFAULT_GROUP = 1,1,*,*,*, got 1,*"),
         (" COORD", "", "expected COORD on this line"),
     ),
     "inform": (

@@ -240,6 +240,20 @@ def test_several_contours_gas_waits_and_micro_joints(cell):
     assert "DEFAULT_GROUP\t= *,*,*,*,*;" in off
 
 
+@pytest.mark.parametrize(
+    ("file", "groups"),
+    [(OFF, "1,*,*,*,*"), (MAIN, "*,*,*,*,*"), (MAIN, "1,1,*,*,*"), (CONTOUR, "*,*,*,*,*")],
+)
+def test_motion_groups_are_those_of_the_listing(file, groups):
+    """Background logic must have none, and a program that moves the robot must have group 1."""
+    for row in (f"DEFAULT_GROUP\t= {groups};\r\n", ""):
+        text = re.sub(r"DEFAULT_GROUP.*\r\n", row, golden[file])
+        with pytest.raises(InputError, match=rf"{file}, line \d+: expected DEFAULT_GROUP"):
+            CASE.read(golden | {file: text}, robot("fanuc_m20id_25"), OPTIONS)
+    more = golden | {file: re.sub(r"(DEFAULT_GROUP.*);", r"\1,*,*,*;", golden[file])}
+    CASE.read(more, robot("fanuc_m20id_25"), OPTIONS)
+
+
 def test_what_cannot_be_switched_with_one_tb_is_refused(program):
     gas = Switch(signal="gas", on=True, lead_time=0.1)
     inside = changed(program, 4, switches=(gas, Switch(signal="gas", on=False, lead_time=0.02)))
@@ -330,7 +344,7 @@ def test_preflight_finds_what_only_this_language_cannot_say(program, cell):
         (MAIN, "/PROG  CUT", "/PROG  PUT", "line 1: expected /PROG and the name of the file"),
         (MAIN, "/ATTR", "/APPL", "line 2: expected /ATTR"),
         (MAIN, "VERSION", "VISION", "line 9: not an attribute: 'VISION"),
-        (MAIN, "1,*,*,*,*", "1,1,*,*,*", "not an attribute"),
+        (MAIN, "1,*,*,*,*", "1,1,*,*,*", "expected DEFAULT_GROUP"),
         (MAIN, "LINE_COUNT\t= 27", "LINE_COUNT\t= 26", "LINE_COUNT is 26, but there are 27"),
         (MAIN, "  11:", "  12:", "expected line number 11"),
         (MAIN, "/END\r\n", "", "/END is missing"),

@@ -256,6 +256,11 @@ def test_preflight_refuses_a_joint_move_that_rounds_its_corner(program):
         ("END\r\n\r\nDEF", "END\r\n\r\nHALT\r\nDEF", "not expected here: 'HALT'"),
         ("BAS(#INITMOV,0)\r\n", "", "line 13: not expected here: '$ADVANCE=5'"),
         (
+            "INTERRUPT ON 20\r\n",
+            "INTERRUPT ON 20\r\n$BASE={X 0,Y 0,Z 0,A 0,B 0,C 0}\r\n",
+            "expected BAS(#INITMOV,0) before this line",
+        ),
+        (
             "DEF switch_off()\r\n$OUT[5]=FALSE\r\n",
             "DEF switch_off()\r\n",
             "expected '$OUT[5]=FALSE'",

@@ -17,6 +17,7 @@ from kerfpath.post.fanuc.controller import (
     GROUP_2,
     UNITS,
     FanucSettings,
+    groups,
     joints_from_axes,
     leads,
     read_values,
@@ -25,6 +26,7 @@ from kerfpath.post.fanuc.controller import (
 from kerfpath.post.fanuc.writer import (
     ANGLES,
     NO_ANSWER,
+    NO_GROUP,
     WRIST,
     Listing,
     abort_lines,
@@ -142,7 +144,7 @@ class _Main(Listing):
         self.selected: dict[str, str] = {}
         self.calls: list[str] = []
         self.resets: list[str] = []
-        self.body(_MAIN)
+        self.body(_MAIN, groups(robot))
         self.end()
         if self.resets != [line.strip(" ;") for line in switch_off_lines(settings)]:
             raise self.fault("expected one reset of every output that the settings name")
@@ -192,7 +194,7 @@ class _Watching(Listing):
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
         super().__init__(file, text, robot, settings)
         self.require_next(watch_lines(settings))
-        self.body({})
+        self.body({}, NO_GROUP)
         self.end()
 
 
@@ -211,7 +213,7 @@ class _Section(Listing):
         self.timeout_s: float | None = None
         self.says_abort = False
         self.require_next(selection_lines(settings))
-        self.body(_SECTION)
+        self.body(_SECTION, groups(robot))
         if self.pending or self.timeout_s is not None:
             raise self.fault("expected a motion, or the wait of a timeout, before the end")
         asked = [step.what for step in self.steps if isinstance(step, ReadHandshake)]

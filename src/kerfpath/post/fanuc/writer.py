@@ -63,11 +63,7 @@ _ATTRIBUTE = re.compile(
     r"CONTROL_CODE|LOCAL_REGISTERS)\s*=[^;]*;|"
     r"(?:TCD:)?\s+[A-Z_]+\s*= \d+[,;])"
 )
-_GROUPS = {
-    False: re.compile(r"DEFAULT_GROUP\s*= [1*](?:,\*){4,7};"),
-    True: re.compile(r"DEFAULT_GROUP\s*= (?:1,1|\*,\*)(?:,\*){3,6};"),
-}
-"""The motion groups of a program, by whether group 2 carries the part."""
+_GROUPS = re.compile(r"DEFAULT_GROUP\s*= ([1*](?:,[1*]){4,7});")
 _COUNT = re.compile(r"LINE_COUNT\s*= (\d+);")
 _NUMBERED = re.compile(r" *(\d+):(.*?) *;")
 _VIA = re.compile(r" *\d+:C P\[\d+\] *")
@@ -84,20 +80,29 @@ class Listing(LineReader):
         super().__init__(file, robot, settings, rows)
         self.name = ""
 
-    def body(self, kinds: Mapping[str, re.Pattern[str]]) -> None:
-        """Read the attributes and the numbered lines, up to /POS."""
+    def body(self, kinds: Mapping[str, re.Pattern[str]], group: str) -> None:
+        """Read the attributes and the numbered lines, up to /POS.
+
+        `group` has the motion groups that the program must have; controllers may list more.
+        """
         match = re.fullmatch(r"/PROG  ([A-Z][A-Z0-9_]*)", self.next_row())
         self.name = match[1] if match else ""
         if f"{self.name}.ls" != self.file.rpartition("/")[2]:
             raise self.fault(f"expected /PROG and the name of the file, got {self.text[:60]!r}")
         if (row := self.next_row()) != "/ATTR":
             raise self.fault(f"expected /ATTR, got {row[:60]!r}")
-        counted = None
+        counted, moved = None, False
         while (row := self.next_row()) != "/MN":
             if match := _COUNT.fullmatch(row):
                 counted = int(match[1])
-            elif not _ATTRIBUTE.fullmatch(row) and not _GROUPS[leads(self.robot)].fullmatch(row):
+            elif match := _GROUPS.fullmatch(row):
+                if match[1].rstrip("*,") != group.rstrip("*,"):
+                    raise self.fault(f"expected DEFAULT_GROUP = {group}, got {match[1]}")
+                moved = True
+            elif not _ATTRIBUTE.fullmatch(row):
                 raise self.fault(f"not an attribute: {row[:60]!r}")
+        if not moved:
+            raise self.fault(f"expected DEFAULT_GROUP = {group} before this line")
         number = 0
         while (row := self.next_row()) != "/POS":
             number += 1
@@ -142,6 +147,8 @@ NEW_LINE = "\r\n"
 PADDING = "    "
 REMARK = 32
 """Characters of a remark that every controller keeps."""
+NO_GROUP = "*,*,*,*,*"
+"""Motion groups of a program without motion, as background logic must be."""
 NO_ANSWER = 1
 """The label to which a wait for an input jumps without an answer."""
 JOINT_WORDS = tuple((f"J{k}=", "deg") for k in range(1, 7))
@@ -211,7 +218,7 @@ class Fanuc(CalledFormatter):
             positions = self._positions(section)
             files[f"{section.name}.ls"] = _listing(section.name, lines, positions, settings, own)
         off = self.off_name
-        files[f"{off}.ls"] = _listing(off, watch_lines(settings), [], settings, "*,*,*,*,*")
+        files[f"{off}.ls"] = _listing(off, watch_lines(settings), [], settings, NO_GROUP)
         return files
 
     def main(self) -> list[str]:

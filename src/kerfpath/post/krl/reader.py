@@ -281,6 +281,8 @@ class _File(LineReader):
         self.frames["base"] = freeze(np.asarray(frame @ self.frames["base"]))
 
     def frame(self, kind: str, numbered: int | None, point: Sequence[str]) -> None:
+        if self.opening:  # its BAS(#INITMOV,0) would replace the frame
+            raise self.fault(f"expected {self.opening[0]} before this line")
         if numbered is not None or kind in self.frames:
             raise self.fault(f"expected no {kind} here: it is given before, or by its number")
         self.frames[kind] = self.pose(point)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -182,6 +182,8 @@ class _Reader(Aggregates):
         self.switch_off: list[FlowStep] = []
         self.on_error: list[FlowStep] = []
         self.homes: dict[str, str] = {}
+        self.names = {"fine", FIRST.lower()}
+        """Names of data and routines, in lower case."""
         self.first_number = 0
         self.number: str | None = None
         self.units = ExternalUnits(robot, settings)
@@ -269,10 +271,11 @@ class _Reader(Aggregates):
     def declare(self, kind: str, name: str, T: Array) -> None:
         if kind in self.frames:
             raise self.fault(f"a second {kind.replace('_', ' ')} is declared")
+        self.define(name)
         self.frames[kind] = (name, T)
 
     def speed(self, name: str, text: str) -> None:
-        self.unused(name, self.speeds)
+        self.define(name)
         self.speeds[name] = self.numbers(self.values(text, 4), 4)
         self.said_at[name] = self.place
 
@@ -280,18 +283,18 @@ class _Reader(Aggregates):
         stop, *sizes = self.values(text, 7)
         if stop is not False:
             raise self.fault("expected a zone without a stop, FALSE first")
-        self.unused(name, self.zones)
+        self.define(name)
         values = self.numbers(sizes, 6)
         self.zones[name] = float(values[0]) * 1e-3
         self.require_same(values, zone_data(self.zones[name]), "sizes of the zone")
         self.said_at[name] = self.place
 
     def trigger(self, name: str) -> None:
-        self.unused(name, self.triggers)
+        self.define(name)
         self.triggers[name] = None
 
     def routine(self, name: str) -> None:
-        self.unused(name, self.routines)
+        self.define(name)
         if name == SWITCH_OFF and self.file == self.main:
             self.steps = self.switch_off
             self.require_next([*switch_off_lines(self.settings), "ENDPROC"], _ON_ERROR)
@@ -471,9 +474,11 @@ class _Reader(Aggregates):
             raise self.fault(f"{name} is not declared")
         return known[name]
 
-    def unused(self, name: str, known: Container[str]) -> None:
-        if name in known:
+    def define(self, name: str) -> None:
+        """Refuse a name that is used already; case makes no difference."""
+        if name.lower() in self.names:
             raise self.fault(f"{name} is declared twice")
+        self.names.add(name.lower())
 
     def elsewhere(self, **named: str) -> dict[str, str]:
         """Return file and line where the data named by a move are declared or set."""
