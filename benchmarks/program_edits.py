@@ -163,7 +163,7 @@ class Subject:
     def outcome(self, files: Mapping[str, str]) -> tuple[Outcome, str]:
         """Return the outcome of the audit of files, and the first finding."""
         try:
-            found = self.audit.program(self.read(files), self.language, self.settings, "job")
+            found = self.audit.program(self.read(files), "job")
         except InputError as error:
             return "refused", str(error)
         if found.passed:

@@ -55,7 +55,7 @@ def test_a_value_that_jumps_leaves_the_range_or_moves_beside_the_cut_is_found(su
 
 def codes(subject, files):
     """Codes of the checks that fail."""
-    found = subject.audit.program(subject.read(files), subject.language, subject.settings, "job")
+    found = subject.audit.program(subject.read(files), "job")
     return {
         check.code
         for table in found.tables.values()
@@ -114,7 +114,7 @@ def test_a_trajectory_that_moves_one_axis_leaves_the_contour(subjects):
 
 def as_run(subject, files):
     """The rows of the motion between the nodes, by contour and code."""
-    found = subject.audit.program(subject.read(files), subject.language, subject.settings, "job")
+    found = subject.audit.program(subject.read(files), "job")
     return {
         (name.partition("(")[2].rstrip(")"), check.code): check
         for name, table in found.tables.items()

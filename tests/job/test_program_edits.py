@@ -100,7 +100,7 @@ def test_a_cut_that_comes_again_in_the_same_routine_hides_no_finding_of_the_firs
     body = re.search(r"(?<=PROC slit\(\)\n).*?(?=  ENDPROC)", text, re.DOTALL)[0]
     slow = body.replace("WaitTime 0.250;", "WaitTime 0.100;")
     edited = subject.read({"job.mod": text.replace(body, slow + body)})
-    found = subject.audit.program(edited, subject.language, subject.settings, "job.mod")
+    found = subject.audit.program(edited, "job.mod")
     assert {"slit (slit)", "slit (slit), again"} <= found.tables.keys()
     wrong = {(name, c.code) for name, table in found.tables.items() for c in table if not c.ok}
     assert {("slit (slit)", "pierce"), ("slit (slit), again", "once")} <= wrong

@@ -24,13 +24,12 @@ from kerfpath.execution import (
 )
 from kerfpath.job.format import Job
 from kerfpath.plans import Plan
-from kerfpath.post import Controller, Program, build_program, language
+from kerfpath.post import Controller, Program, build_program
 
 __all__ = [
     "AsRun",
     "as_run",
     "checks_of_unknown",
-    "controller_of",
     "keeps_between_nodes",
     "kept_between_nodes",
     "run_judged",
@@ -71,7 +70,7 @@ def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsR
     unknown = _not_modelled(job)
     if not unknown:
         try:
-            run = longest_run(_program(job)(plan), controller_of(job))
+            run = longest_run(_program(job)(plan), job.program.rules.controller)
         except InputError as fault:  # reported when the program is written
             unknown = str(fault)
     if unknown:
@@ -199,7 +198,7 @@ def kept_between_nodes(job: Job, plan: Plan) -> Kept | None:
     if not keeps_between_nodes(job):
         return None
     try:
-        return keep_limits(plan, _program(job), controller=controller_of(job))
+        return keep_limits(plan, _program(job), controller=job.program.rules.controller)
     except InputError:  # reported when the program is written
         return None
 
@@ -216,16 +215,11 @@ def _program(job: Job) -> Callable[[Plan], Program]:
     return lambda plan: build_program([plan], job.program)
 
 
-def controller_of(job: Job) -> Controller:
-    """Return the controller of a job, by the settings of its language."""
-    return language(job.program.language).controller(job.program.settings)
-
-
 def _not_modelled(job: Job) -> str:
     """Return why the motion of the job's programs between the nodes is unknown; else empty."""
     if job.program.language == "none":
         return "there is no program; name a language in [program]"
-    if not language(job.program.language).zones:
+    if not job.program.robot_language.zones:
         return f"{job.program.language} has no zones, so the motion of its controller is unknown"
     if job.program.zone == 0:
         return 'the robot stops at every node; write zone_mm = "auto" in [program]'

@@ -72,7 +72,7 @@ from kerfpath.job.program_file import (
     ReadCut,
     add_tips,
     divide_arcs,
-    language_of,
+    in_language_of,
     program_on_disk,
     read_cuts,
 )
@@ -81,8 +81,6 @@ from kerfpath.plans import Plan, Proof
 from kerfpath.post import (
     CircularMove,
     Controller,
-    Language,
-    LanguageSettings,
     LinearMove,
     ReadProgram,
     Rules,
@@ -427,17 +425,14 @@ SHORTEST = 1e-9
 """Least duration of a move, s."""
 
 
-def check_run(
-    job: Job, cut: ReadCut, made: Plan, path: Contour, digits: Rounding, chosen: Language,
-    settings: LanguageSettings,
-) -> list[Check]:  # fmt: skip
+def check_run(job: Job, cut: ReadCut, made: Plan, path: Contour, digits: Rounding) -> list[Check]:
     """Return the checks of a cut's motion along a path, by its own zones and speeds.
 
     The checks allow for the digits of the text, which over short intervals add accelerations.
     """
+    chosen, controller = job.program.robot_language, job.program.rules.controller
     if not chosen.zones:
         return [*checks_of_unknown(job, f"{chosen.name} has no zones")]
-    controller = chosen.controller(settings)
     if any(move.zone is None for move in cut.targets) and not controller.rounds_by_itself:
         return [*checks_of_unknown(job, f"the zones of {chosen.name} here are not lengths")]
     runs = [
@@ -500,9 +495,8 @@ CLIMB = 0.05
 
 
 def check_cut(
-    job: Job, candidate: Candidate, cut: ReadCut, cell: Cell | None, chosen: Language,
-    settings: LanguageSettings,
-) -> tuple[list[Check], tuple[TargetNodes, Plan] | None]:  # fmt: skip
+    job: Job, candidate: Candidate, cut: ReadCut, cell: Cell | None
+) -> tuple[list[Check], tuple[TargetNodes, Plan] | None]:
     """Return the checks of a cut, and its nodes and plan if it can be compared with the job."""
     unreached = np.flatnonzero(np.isnan(cut.q).any(axis=1))
     if unreached.size:
@@ -520,12 +514,11 @@ def check_cut(
     allowed, tilt = job.tolerances, job.options.tilt
     if tilt is not None:
         allowed = replace(allowed, axis=allowed.axis + tilt.cone)
-    rules = chosen.rules(settings)
-    digits = _rounding(cut, made, rules)
+    digits = _rounding(cut, made, job.program.rules)
     rows += allowed.checks(made, reference=reference, cell=cell, rounding=digits)
-    rows += _process_checks(job, candidate, cut, made, digits.time, ahead=chosen.ahead)
-    rows += _postures(job, cut, chosen, settings, digits.q)
-    rows += check_run(job, cut, made, reference, digits, chosen, settings)
+    rows += _process_checks(job, candidate, cut, made, digits.time)
+    rows += _postures(job, cut, digits.q)
+    rows += check_run(job, cut, made, reference, digits)
     found = nodes_at_targets(job, candidate, cut, s)
     off, alone = int(np.argmax(found.off)), int(np.argmax(found.alone))
     said = "distance of the targets from the nodes of the job"
@@ -592,12 +585,9 @@ def _rounding(cut: ReadCut, made: Plan, rules: Rules) -> Rounding:
 
 
 def _process_checks(
-    job: Job, candidate: Candidate, cut: ReadCut, made: Plan, digits: Array, *, ahead: bool
+    job: Job, candidate: Candidate, cut: ReadCut, made: Plan, digits: Array
 ) -> list[Check]:
-    """Compare speeds, switches and waits with those of the job.
-
-    If the language cannot switch `ahead` of a target, it must switch at the target.
-    """
+    """Compare speeds, switches and waits with those of the job."""
     s, nodes, path = made.contour.s, candidate.nodes, candidate.path
     middle = (s[1:] + s[:-1]) / 2
     when = candidate.dt * np.arange(len(nodes))
@@ -609,8 +599,9 @@ def _process_checks(
     fast = int(np.argmax(excess - digits))
     most = SAME_SPEED + digits[fast]
     node = int(np.argmax(wrong)) if wrong.any() else 0
-    lead = np.abs(cut.lead_times - (job.program.lead_time if ahead else 0.0))
-    wait = abs(float(cut.waits.sum()) - job.program.pierce_time)
+    process = BeamProcess.of(job.program)
+    lead = np.abs(cut.lead_times - process.lead_time)
+    wait = abs(float(cut.waits.sum()) - process.pierce_time)
     lengths = np.diff(s)[wrong].sum()
     return [
         check("speed", "difference of the speed from the job's", excess[fast], most, "share", fast),
@@ -627,9 +618,7 @@ def _process_checks(
     ]
 
 
-def _postures(
-    job: Job, cut: ReadCut, chosen: Language, settings: LanguageSettings, left: Array
-) -> list[Check]:
+def _postures(job: Job, cut: ReadCut, left: Array) -> list[Check]:
     """Count the targets whose words for posture and turn do not fit the joints there.
 
     Digits leave joints uncertain by `left` (K, n) rad: that near to a change of a word, both words
@@ -638,10 +627,11 @@ def _postures(
     moves, q = (*cut.moves, cut.group.path[-1]), np.vstack([cut.q, cut.q_out])
     left = np.vstack([left, left[-1:]])
     worded = [k for k in (*cut.ends.tolist(), len(cut.moves)) if moves[k].posture]
-    if not worded or chosen.posture is None:
+    words_of, settings = job.program.robot_language.posture, job.program.language_settings
+    if not worded or words_of is None:
         return []
     ways = [q[worded] + sign * left[worded] for sign in (0, -1, 1)]
-    expected = zip(*(chosen.posture(job.robot, way, settings) for way in ways), strict=True)
+    expected = zip(*(words_of(job.robot, way, settings) for way in ways), strict=True)
     wrong = [
         k
         for k, words in zip(worded, expected, strict=True)
@@ -728,10 +718,9 @@ class Audit:
                 f"{job.path}: programs of jobs with interruptions cannot be compared with the "
                 "drawing yet; audit the plan.json"
             )
-        chosen, settings = language_of(file, job)
-        return self.program(
-            program_on_disk(file, chosen, settings, job.robot), chosen, settings, file.name
-        )
+        job = in_language_of(file, job)
+        audit = Audit(expected=replace(self.expected, job=job))
+        return audit.program(program_on_disk(file, job), file.name)
 
     def plan_file(self, path: Path) -> AuditReport:
         """Audit every contour of a plan.json."""
@@ -767,10 +756,8 @@ class Audit:
             note=f"{note} {_list_claims(file, tables)}".strip(),
         )
 
-    def program(
-        self, read: ReadProgram, chosen: Language, settings: LanguageSettings, name: str
-    ) -> AuditReport:
-        """Audit every cut of a program that was read."""
+    def program(self, read: ReadProgram, name: str) -> AuditReport:
+        """Audit every cut of a program that was read, in the language of the job."""
         job, contours, cell = self.expected.job, self.expected.contours, self.expected.cell
         names = self.expected.names
         read = add_tips(read, job)
@@ -780,10 +767,9 @@ class Audit:
         tool = job.tool if read.T_flange_tip is None else read.T_flange_tip
         placed = job.placement if read.T_base_part is None else read.T_base_part
         off = max(np.abs(tool - job.tool).max(), np.abs(placed - job.placement).max())
-        process = BeamProcess.of(job.program, ahead=chosen.ahead)
         tables[name] = [
             check("frames", "distance of tool and part from the job's", off, SAME_FRAME, "m"),
-            *check_laser_and_gas(read, job.robot, process),
+            *check_laser_and_gas(read, job.robot, BeamProcess.of(job.program)),
             _check_paths(read),
         ]
         done: list[int] = []
@@ -800,20 +786,20 @@ class Audit:
             candidate = contours[which].candidates[c]
             cut = divide_arcs(cut, candidate.dt, job)
             places[title] = tuple(move.place for move in (*cut.moves, cut.group.path[-1]))
-            tables[title], along = check_cut(job, candidate, cut, cell, chosen, settings)
+            tables[title], along = check_cut(job, candidate, cut, cell)
             tables[title].append(count("once", "earlier cuts of this contour", done.count(which)))
             done.append(which)
             starts.append(cut.moves[0].place)
             if along is not None:
                 followed.append((cut, *along))
-                windows, rules = contours[which].options.gamma_windows, chosen.rules(settings)
-                tables[title] += check_pins(job, cut, *along, windows, rules)
+                windows = contours[which].options.gamma_windows
+                tables[title] += check_pins(job, cut, *along, windows)
         steps = [places[name].index(start) for start in starts]
         tables[name] += [
             row if row.ok else replace(row, node=steps[row.node])
             for row in check_order(job.sequence, self.expected.inner_first, done)
         ]
-        tables[name] += _compared(job, followed, home, read, chosen, settings)
+        tables[name] += _compared(job, followed, home, read)
         tables[_new_title("air", tables)] = _air(
             job, cuts, home, cell if job.sequence is not None else None
         )
@@ -959,9 +945,8 @@ def _new_title(title: str, tables: Mapping[str, object]) -> str:
 
 
 def _compared(
-    job: Job, followed: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array,
-    read: ReadProgram, chosen: Language, settings: LanguageSettings,
-) -> list[Check]:  # fmt: skip
+    job: Job, followed: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array, read: ReadProgram
+) -> list[Check]:
     """Compare a program with the one that the job would have along the same paths.
 
     Each kind of difference is a check, with the number of moves and the place of the largest.
@@ -969,11 +954,11 @@ def _compared(
     if not followed:
         return []
     try:
-        expected = expect_program(job, followed, home, chosen, settings)
+        expected = expect_program(job, followed, home)
     except InputError as error:
         said = f"the program of the job cannot be made along these paths ({error})"
         return [count("asked", said, 1)]
-    rules = chosen.rules(settings)
+    rules = job.program.rules
     expected = add_tips(expected, job)
     found = differences(expected, read, rules=(rules,), names=("the job", "the text"), strict=True)
     places = [step.place for step in read.steps]

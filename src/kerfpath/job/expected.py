@@ -22,8 +22,6 @@ from kerfpath.post import (
     ZONE_STEP,
     CircularMove,
     JointMove,
-    Language,
-    LanguageSettings,
     LinearMove,
     Program,
     ReadProgram,
@@ -524,9 +522,8 @@ def nodes_at_targets(job: Job, candidate: Candidate, cut: ReadCut, s: Array) -> 
 
 
 def expect_program(
-    job: Job, cuts: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array,
-    language: Language, settings: LanguageSettings,
-) -> ReadProgram:  # fmt: skip
+    job: Job, cuts: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array
+) -> ReadProgram:
     """Return the job's program along the paths of these cuts, as it would be read back.
 
     The paths, and with [sequence] the corners of the moves between them, are those that were read;
@@ -538,7 +535,7 @@ def expect_program(
     InputError
         There is no such program: joints leave the path, or the tool cannot back off.
     """
-    rules, options = language.rules(settings), job.program
+    rules, options = job.program.rules, job.program
     plans = [whole_cut(job, cut, requested, plan) for cut, requested, plan in cuts]
     moves = _moves(job, [cut for cut, _, _ in cuts], plans, home)
     # Arcs are added below, where they were read.
@@ -556,7 +553,8 @@ def expect_program(
         if options.arc_tolerance is not None:
             steps = _with_arcs(steps, cut, requested)
         sections.append(replace(section, steps=tuple(steps)))
-    return read_as_written(replace(program, sections=tuple(sections)), language, settings)
+    program = replace(program, sections=tuple(sections))
+    return read_as_written(program, options.robot_language, options.language_settings)
 
 
 def whole_cut(job: Job, cut: ReadCut, requested: TargetNodes, plan: Plan) -> Plan:
@@ -701,7 +699,6 @@ def check_pins(
     requested: TargetNodes,
     plan: Plan,
     windows: Sequence[GammaWindow],
-    rules: Rules,
 ) -> list[Check]:
     """Return the check of a cut's windows of gamma, at the nodes that the job asks for.
 
@@ -714,4 +711,4 @@ def check_pins(
     pinned = replace(whole, contour=requested.nodes, settings=settings)
     tool = job.robot.forward(pinned.q) @ job.tool
     # Digits of three angles, or of the four numbers of a quaternion.
-    return window_checks(pinned, tool, slack=OUTSIDE + 4 * rules.angle_step)
+    return window_checks(pinned, tool, slack=OUTSIDE + 4 * job.program.rules.angle_step)

@@ -59,9 +59,9 @@ class BeamProcess:
     stops: bool
 
     @classmethod
-    def of(cls, options: ProgramOptions, *, ahead: bool) -> BeamProcess:
-        """Return the requirements of [program], in a language that can switch `ahead` or not."""
-        gas = options.gas_lead
+    def of(cls, options: ProgramOptions) -> BeamProcess:
+        """Return the requirements of [program], as far as its language can express them."""
+        gas, ahead = options.gas_lead, options.robot_language.ahead
         return cls(
             lead_time=options.lead_time if ahead else 0.0,
             pierce_time=options.pierce_time,

@@ -14,8 +14,6 @@ from kerfpath.execution import ToolMotion
 from kerfpath.job.format import Job, ProgramTable, read_job
 from kerfpath.post import (
     Difference,
-    Language,
-    LanguageSettings,
     ReadGroup,
     ReadMove,
     ReadProgram,
@@ -58,8 +56,8 @@ class _Folder(Mapping[str, str]):
         return sum(1 for _ in self.folder.iterdir())
 
 
-def language_of(path: Path, job: Job) -> tuple[Language, LanguageSettings]:
-    """Return the language of a program by the suffix of its file, and the job's settings for it.
+def in_language_of(path: Path, job: Job) -> Job:
+    """Return a job with [program] in the language of a program, by the suffix of its file.
 
     Raises
     ------
@@ -75,14 +73,11 @@ def language_of(path: Path, job: Job) -> tuple[Language, LanguageSettings]:
     chosen = (own or fitting)[0]
     table = {**job.source.get("program", {}), "language": chosen.name}
     settings = ProgramTable.model_validate(table).settings()
-    assert settings is not None
-    return chosen, settings
+    return replace(job, program=replace(job.program, language=chosen.name, settings=settings))
 
 
-def program_on_disk(
-    path: Path, chosen: Language, settings: LanguageSettings, robot: Robot
-) -> ReadProgram:
-    """Return the program whose main file is at `path`.
+def program_on_disk(path: Path, job: Job) -> ReadProgram:
+    """Return the program whose main file is at `path`, in the language of the job.
 
     Raises
     ------
@@ -91,7 +86,8 @@ def program_on_disk(
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file; give the path of a program or a plan.json")
-    return read_program(_Folder(path.parent), chosen.name, robot, settings, main=path.name)
+    options, files = job.program, _Folder(path.parent)
+    return read_program(files, options.language, job.robot, options.settings, main=path.name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -369,15 +365,13 @@ def compare_programs(a: Path, b: Path, job_file: Path) -> ProgramComparison:
         A file cannot be read, or a line was not written by kerfpath.
     """
     job = read_job(job_file)
-    (one, settings), (two, other) = language_of(a, job), language_of(b, job)
-    reads = [
-        add_tips(program_on_disk(path, chosen, of, job.robot), job)
-        for path, chosen, of in ((a, one, settings), (b, two, other))
-    ]
+    one, two = in_language_of(a, job), in_language_of(b, job)
+    reads = [add_tips(program_on_disk(path, of), of) for path, of in ((a, one), (b, two))]
     rules: tuple[Rules, ...] = ()
     said = any(move.posture for read in reads for move in read.moves)
-    if one.name != two.name:  # words for postures have another meaning in another language
-        rules = (one.rules(settings), two.rules(other))
+    # Words for postures have another meaning in another language.
+    if one.program.language != two.program.language:
+        rules = (one.program.rules, two.program.rules)
         reads = [_without_postures(read) for read in reads]
     found, left = differences(*reads, rules=rules), not_compared(*reads)
     left += ["postures"] if said and rules else []

@@ -106,15 +106,14 @@ def program_of(
     """
     if not plans:
         raise AuditFailed("no program: there is no plan to write one from")
-    chosen = find_language(options.language)
+    chosen = options.robot_language
     if refusal := chosen.refusal(plans[0].robot):
         raise InputError(f"no program: {refusal}")
     program = build_program(plans, options, moves=moves)
     written = post_and_read(program, options.language, options.settings, strict=strict)
     if written.read is not None:
         audit = Audit(expected=replace(expected, job=replace(expected.job, program=options)))
-        settings = chosen.completed(options.settings)
-        found = audit.program(written.read, chosen, settings, next(iter(written.files)))
+        found = audit.program(written.read, next(iter(written.files)))
         _require_passed(found, chosen.title)
     if dry_share is not None:
         dry = dry_run(program, dry_share)

@@ -14,7 +14,7 @@ from kerfpath.contour import Contour, angle_between
 from kerfpath.errors import InputError
 from kerfpath.job.format import Candidate, CutRequest, Job, prepare, read_job
 from kerfpath.job.plan_file import PlanFile, read_plan_file
-from kerfpath.job.program_file import add_tips, language_of, program_on_disk
+from kerfpath.job.program_file import add_tips, in_language_of, program_on_disk
 from kerfpath.job.programs import expected_of_plans, program_of
 from kerfpath.job.run import JobResult, run_prepared
 from kerfpath.operations import touched_up
@@ -178,16 +178,14 @@ def _require_same_setup(plan: Plan, job: Job, path: Path) -> None:
 
 def _read_edits(program: Path, job: Job, file: PlanFile) -> tuple[list[ReadGroup], list[str]]:
     """Return the steps of an edited program, a group for each plan, and its other changes."""
-    chosen, settings = language_of(program, job)
-    options = replace(job.program, language=chosen.name, settings=settings)
-    texts, _ = program_of(
-        file.plans, options, file.moves, expected=expected_of_plans(job, file.plans)
-    )
+    job = in_language_of(program, job)
+    options, expected = job.program, expected_of_plans(job, file.plans)
+    texts, _ = program_of(file.plans, options, file.moves, expected=expected)
     planned, edited = (
         add_tips(read, job)
         for read in (
-            read_program(texts, chosen.name, job.robot, settings),
-            program_on_disk(program, chosen, settings, job.robot),
+            read_program(texts, options.language, job.robot, options.settings),
+            program_on_disk(program, job),
         )
     )
     found = {each.code: each for each in differences(planned, edited)}

@@ -8,7 +8,7 @@ from typing import TypedDict
 
 from kerfpath.arrays import not_negative, short_repr
 from kerfpath.post.arcs import Zone
-from kerfpath.post.languages import LanguageSettings
+from kerfpath.post.languages import Language, LanguageSettings, Rules, language
 from kerfpath.post.program import Handshake
 from kerfpath.setting import check, documented, setting
 
@@ -146,3 +146,18 @@ class ProgramOptions:
         if self.zone != "auto":
             object.__setattr__(self, "zone", not_negative(self.zone, "zone", unit="m"))
         object.__setattr__(self, "handshakes", tuple(self.handshakes))
+
+    @property
+    def robot_language(self) -> Language:
+        """The language itself."""
+        return language(self.language)
+
+    @property
+    def language_settings(self) -> LanguageSettings:
+        """The settings of the language, complete."""
+        return self.robot_language.completed(self.settings)
+
+    @property
+    def rules(self) -> Rules:
+        """The rules of programs in the language with these settings."""
+        return self.robot_language.rules(self.language_settings)

@@ -12,7 +12,7 @@ from commands import assert_refused, run
 from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job import plan_file_text, program_from_file, read_job, read_plan_file, run_job
 from kerfpath.job.audit import audit_file
-from kerfpath.job.program_file import language_of
+from kerfpath.job.program_file import in_language_of
 from kerfpath.post import MANIFEST, groups_of, read_program, write_files
 from kerfpath.post import language as find_language
 from kerfpath.post.languages import SHIPPED
@@ -308,7 +308,7 @@ def test_joint_moves_take_the_time_that_was_planned(planned, name, language, air
     job = job_file(folder, program=said)
     files, _ = program_from_file(folder / "plan.json", language, job_file=job)
     chosen = find_language(language)
-    settings = language_of(Path(next(iter(files))), read_job(job))[1]
+    settings = in_language_of(Path(next(iter(files))), read_job(job)).program.settings
     read = read_program(files, language, file.plans[0].robot, chosen.completed(settings))
     ways = [move.q for move in file.moves]
     took = programmed_time(read, file.plans[0].robot, ways)

@@ -13,7 +13,7 @@ import numpy as np
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
-from kerfpath.job.as_run import controller_of, keeps_between_nodes
+from kerfpath.job.as_run import keeps_between_nodes
 from kerfpath.job.format import ContourSpec, CutRequest, Job, PreparedJob, pose
 from kerfpath.job.format.tables import CellTable
 from kerfpath.operations import Side
@@ -219,7 +219,7 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
 
 def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
     """Return what a job asks for that a script cannot express; empty if there is none."""
-    assumed = not keeps_between_nodes(job) or bool(controller_of(job).assumed)
+    assumed = not keeps_between_nodes(job) or bool(job.program.rules.controller.assumed)
     beyond = {
         'between_nodes = "guaranteed" without a proof': assumed
         and job.options.between_nodes == "guaranteed",

@@ -33,13 +33,11 @@ from kerfpath.post import (
     TimedLine,
     build_program,
     issue_lines,
-    language,
     preflight,
     read_program,
     replace_program,
     timed_lines,
 )
-from kerfpath.post import language as find_language
 from kerfpath.report import ContourSection, render
 from kerfpath.robots import Robot
 from kerfpath.sequence import PartPlan
@@ -87,7 +85,7 @@ def program_places(outcome: JobResult, files: Mapping[str, str]) -> ProgramPlace
         return ProgramPlaces()
     where: tuple[Line | None, ...] = (None,) * len(issues)
     lines: tuple[TimedLine, ...] = ()
-    if files and find_language(options.language).read is not None:
+    if files and options.robot_language.read is not None:
         read = read_program(files, options.language, program.robot, options.settings)
         where = issue_lines(issues, program, read)
         lines = timed_lines(program, read)
@@ -383,7 +381,7 @@ def _programs(options: ProgramOptions, folder: Path) -> list[Path]:
     """
     if options.language == "none":
         return []
-    name, suffix = options.name.lower(), language(options.language).suffix
+    name, suffix = options.name.lower(), options.robot_language.suffix
     there = sorted([*folder.glob(f"*{suffix}"), *folder.glob(f"*/*{suffix}")])
     shortest = min(len(name), SHORTEST_CUT)
     return [p for p in there if name.startswith(p.stem.lower()) and len(p.stem) >= shortest]
@@ -466,7 +464,7 @@ def require_language(job: Job) -> None:
     """
     if job.program.language == "none":
         return
-    if refusal := language(job.program.language).refusal(job.robot):
+    if refusal := job.program.robot_language.refusal(job.robot):
         raise refusal_at(
             job.path,
             ("program", "language"),
