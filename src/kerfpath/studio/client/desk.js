@@ -68,10 +68,7 @@ function remembered(name) {
   }
 }
 
-/**
- * @param {string} name
- * @param {string | null} value
- */
+/** @type {(name: string, value: string | null) => void} */
 function remember(name, value) {
   try {
     if (value === null) localStorage.removeItem(`kerfpath.${name}`);

@@ -72,10 +72,7 @@ function difference(from, to) {
   return [to[3] - from[3], to[7] - from[7], to[11] - from[11], ...turn];
 }
 
-/**
- * @param {number[]} a
- * @param {number[]} b
- */
+/** @type {(a: number[], b: number[]) => number[]} */
 const cross = (a, b) => [
   a[1] * b[2] - a[2] * b[1],
   a[2] * b[0] - a[0] * b[2],

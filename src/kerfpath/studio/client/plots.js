@@ -172,12 +172,7 @@ export class Plots {
     return [first, Math.max(last, times[times.length - 1] ?? last)];
   }
 
-  /**
-   * @param {number} least
-   * @param {number} most
-   * @param {string} scale
-   * @returns {[number, number]}
-   */
+  /** @type {(least: number, most: number, scale: string) => [number, number]} */
   range(least, most, scale) {
     const { axes } = this.shown();
     const here = (/** @type {number} */ j) =>

@@ -97,19 +97,13 @@ export class Store extends Messages {
     }
   }
 
-  /**
-   * @param {Topic} topic
-   * @param {unknown} [about]
-   */
+  /** @type {(topic: Topic, about?: unknown) => void} */
   emit(topic, about) {
     for (const each of [topic, /** @type {const} */ ("anything")])
       for (const listener of this.listeners.get(each) ?? []) listener(about);
   }
 
-  /**
-   * @param {import("./connection.js").Status} status
-   * @param {number | null} retryAt
-   */
+  /** @type {(status: import("./connection.js").Status, retryAt: number | null) => void} */
   connected(status, retryAt) {
     this.connection = status;
     this.retryAt = retryAt;

@@ -38,10 +38,7 @@ export class Bands {
     return this.drag?.moved ?? false;
   }
 
-  /**
-   * @param {{offsetX: number, offsetY: number}} event
-   * @returns {Place}
-   */
+  /** @type {(event: {offsetX: number, offsetY: number}) => Place} */
   place({ offsetX: x, offsetY: y }) {
     return { x, y, s: this.chart.sAt(x), gamma: this.chart.gammaAt(y) };
   }

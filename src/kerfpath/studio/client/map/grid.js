@@ -14,11 +14,7 @@ export class Grid {
     this.length = message.s[message.s.length - 1] - message.s[0] || 1;
   }
 
-  /**
-   * @param {number} layer
-   * @param {number} node
-   * @param {number} sample
-   */
+  /** @type {(layer: number, node: number, sample: number) => number} */
   code(layer, node, sample) {
     return this.layers[layer].codes[node * this.samples + sample];
   }

@@ -144,10 +144,7 @@ export class Pins {
     this.chosen = list.length;
   }
 
-  /**
-   * @param {number} index
-   * @param {Pin} pin
-   */
+  /** @type {(index: number, pin: Pin) => void} */
   change(index, pin) {
     this.write(this.list.map((each, i) => (i === index ? pin : each)));
   }

@@ -211,10 +211,6 @@ function Lost() {
   return notice("bad", `${what} ${when}`, again);
 }
 
-/**
- * @param {"bad" | ""} kind
- * @param {string} text
- * @param {unknown} buttons
- */
+/** @type {(kind: "bad" | "", text: string, buttons: unknown) => unknown} */
 const notice = (kind, text, buttons) =>
   html`<div class=${`notice ${kind}`}>${icon("warning")}<p>${text}</p>${buttons}</div>`;

@@ -172,10 +172,7 @@ export function candidates(placing, moved) {
     return `${tried}, ${layout.feasible} feasible${stopped}. ${layout.said}${layout.grid ? grid : ""}`;
   }
 
-  /**
-   * @param {Try} tried
-   * @param {boolean} disabled
-   */
+  /** @type {(tried: Try, disabled: boolean) => unknown} */
   function entry(tried, disabled) {
     const { number, offsets, value, status, reason } = tried;
     const mark = status !== "feasible" ? "none" : value !== null ? "done" : "";

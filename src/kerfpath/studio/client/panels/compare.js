@@ -105,10 +105,7 @@ export function comparePanel(view) {
   ]);
 }
 
-/**
- * @param {KeptEntry} entry
- * @param {boolean} live
- */
+/** @type {(entry: KeptEntry, live: boolean) => unknown} */
 function naming({ id, name }, live) {
   const field = {
     ...{ class: "name", value: name, maxlength: 40, disabled: !live },
@@ -123,11 +120,7 @@ function naming({ id, name }, live) {
       onClick=${() => send({ type: "forget", id })}>${icon("close")}</button>`;
 }
 
-/**
- * @param {import("../store.js").Against} against
- * @param {boolean} live
- * @param {View} view
- */
+/** @type {(against: import("../store.js").Against, live: boolean, view: View) => unknown} */
 function comparison({ entry, plans }, live, view) {
   const { id, name } = entry;
   const [then, now] = [store.compared(store.selected ?? ""), store.chosen];
@@ -155,11 +148,7 @@ function comparison({ entry, plans }, live, view) {
     </div>`;
 }
 
-/**
- * @param {KeptEntry} entry
- * @param {PlanMessage[]} then
- * @param {PlanMessage[]} now
- */
+/** @type {(entry: KeptEntry, then: PlanMessage[], now: PlanMessage[]) => unknown} */
 function figures({ name, metric, objective, cycle }, then, now) {
   const { outcome } = store;
   const options = store.job?.values?.plan ?? {};

@@ -9,10 +9,7 @@ import { staleClass } from "./result.js";
 /** @typedef {import("../messages.js").PlanMessage} PlanMessage */
 /** @typedef {import("../axes.js").Axis} Axis */
 
-/**
- * @param {number[] | null} value
- * @param {string} drag
- */
+/** @type {(value: number[] | null, drag: string) => boolean} */
 const setWeights = (value, drag) =>
   send({ type: "edit", path: ["plan", "weights"], value, gesture: drag });
 

@@ -211,10 +211,7 @@ export class Paths {
 /** @param {number[]} values */
 const least = (values) => values.reduce((low, value) => Math.min(low, value), Infinity);
 
-/**
- * @param {Track} track
- * @param {ColourBy} by
- */
+/** @type {(track: Track, by: ColourBy) => number[] | null} */
 function valuesOf({ plan, clearance }, by) {
   // Overlaps have the colour of values beyond the scale; large distances share one colour.
   if (by === "clearance")

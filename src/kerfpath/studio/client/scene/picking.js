@@ -127,11 +127,7 @@ export class Picking {
     );
   }
 
-  /**
-   * @param {string} words
-   * @param {string[]} loops
-   * @param {"plain" | "primary"} kind
-   */
+  /** @type {(words: string, loops: string[], kind: "plain" | "primary") => unknown} */
   button(words, loops, kind) {
     const cut = () => {
       cutLoops(loops);
@@ -140,11 +136,7 @@ export class Picking {
     return html`<button class=${kind} onClick=${cut}>${words}</button>`;
   }
 
-  /**
-   * @param {number} x  px
-   * @param {number} y  px
-   * @param {import("../ui.js").Content} content
-   */
+  /** @type {(x: number, y: number, content: import("../ui.js").Content) => void} */
   open(x, y, content) {
     const { menu, view } = this;
     draw(menu, content);

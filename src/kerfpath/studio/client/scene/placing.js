@@ -40,10 +40,7 @@ function numbersOf(pose) {
   };
 }
 
-/**
- * @param {number} value
- * @param {number} places
- */
+/** @type {(value: number, places: number) => number} */
 const rounded = (value, places) => Number(value.toFixed(places)) + 0;
 
 export class Placing {
@@ -338,10 +335,7 @@ export class Placing {
   }
 }
 
-/**
- * @param {Object3D} target
- * @param {Matrix4} at
- */
+/** @type {(target: Object3D, at: Matrix4) => void} */
 function set(target, at) {
   target.matrix.copy(at);
   target.matrixWorldNeedsUpdate = true;
