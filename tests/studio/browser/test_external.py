@@ -7,7 +7,7 @@ import pytest
 
 from kerfpath.robots import ExternalAxis, base_in_part, chain_of, robot
 from kerfpath.studio.options import options_message
-from studio.browser.test_page import MODULE, ready, sent, serious, until
+from studio.browser.test_page import FRAMES, MODULE, ready, sent, serious, until
 
 pytestmark = pytest.mark.slow
 
@@ -113,7 +113,7 @@ def carried(messages):
 def test_the_frames_are_those_of_the_cell(modules, carried):
     scene = carried[1]
     for q in np.random.default_rng(3).uniform(-1, 1, (4, N)):
-        found = modules.evaluate(MODULE, ["kinematics", "frames", scene["robot"], q.tolist()])
+        found = modules.evaluate(FRAMES, [scene["robot"], q.tolist()])
         expected = chain_of(CARRIED).frames(q[None])[0]
         # The scene says the joints to 15 digits; the rest is rounding.
         assert np.array(found[:-1]).reshape(-1, 4, 4) == pytest.approx(expected, abs=1e-12)
@@ -125,7 +125,7 @@ def test_a_pose_is_turned_about_its_beam_while_the_axes_stand(modules, carried):
     found = modules.evaluate(MODULE, ["inverse", "turnedAbout", scene["robot"], q, 0.2])
     assert found[ARM:] == q[ARM:]
     before, after = (
-        np.array(modules.evaluate(MODULE, ["kinematics", "frames", scene["robot"], each])[-1])
+        np.array(modules.evaluate(FRAMES, [scene["robot"], each])[-1])
         for each in (q, found)
     )
     turn = before.reshape(4, 4)[:3, :3].T @ after.reshape(4, 4)[:3, :3]
@@ -177,7 +177,7 @@ def test_all_that_is_carried_moves_and_the_floor_stands(page, studio, carried):
         (lines,) = square(seen["lines"])
         assert lines == pytest.approx(expected[0], abs=1e-9)
         tip = lines @ [*points[seen["node"]], 1]
-        own = page.evaluate(MODULE, ["kinematics", "frames", carried[1]["robot"], seen["q"]])[-1]
+        own = page.evaluate(FRAMES, [carried[1]["robot"], seen["q"]])[-1]
         assert tip[:3] == pytest.approx([own[3], own[7], own[11]], abs=1e-6)
         beam = np.array(seen["beam"]) - tip[:3]
         # The beam begins 20 mm behind the tip, along its axis; in single precision.

@@ -14,6 +14,11 @@ THEMES = pytest.mark.parametrize(
     indirect=True,
     ids=lambda value: f"{value[0]}-{value[1]}",
 )
+FRAMES = """async ([robot, q]) => {
+    const { frames } = await import('/client/kinematics.js');
+    return frames(robot, q).map((each) => each.transpose().toArray());
+}"""
+"""The frames of a robot, each row by row."""
 MODULE = "async ([name, call, ...given]) => (await import(`/client/${name}.js`))[call](...given)"
 
 
@@ -48,9 +53,7 @@ def serious(page):
 
 def test_kinematics_are_those_of_the_robot(modules, messages):
     (scene,) = messages["scene"]
-    frames = modules.evaluate(
-        MODULE, ["kinematics", "frames", scene["robot"], scene["sample"]["q"]]
-    )
+    frames = modules.evaluate(FRAMES, [scene["robot"], scene["sample"]["q"]])
     assert len(frames) == len(scene["robot"]["joints"]) + 2
     # Both are sums of a few products of numbers of about 1, so rounding is about 1e-15.
     assert frames[-1] == pytest.approx(scene["sample"]["T"], abs=1e-12)
@@ -61,7 +64,7 @@ def test_the_tip_follows_the_points_of_the_plan(modules, messages):
     joints = len(scene["robot"]["joints"])
     for k in (0, 17, len(plan["time"]) - 1):
         q = plan["q"][k * joints : (k + 1) * joints]
-        tip = modules.evaluate(MODULE, ["kinematics", "frames", scene["robot"], q])[-1]
+        tip = modules.evaluate(FRAMES, [scene["robot"], q])[-1]
         # Joints and points are sent to 1e-9, and the arm is about 2 m long.
         assert [tip[3], tip[7], tip[11]] == pytest.approx(
             plan["points"][3 * k : 3 * k + 3], abs=1e-7
@@ -308,7 +311,7 @@ def test_the_tool_turned_about_its_beam_stays_at_its_tip(modules, messages):
     q = plan["q"][: len(scene["robot"]["joints"])]
 
     def tip(joints):
-        return modules.evaluate(MODULE, ["kinematics", "frames", scene["robot"], joints])[-1]
+        return modules.evaluate(FRAMES, [scene["robot"], joints])[-1]
 
     before = tip(q)
     for angle in (-2.5, 0.02, 1.0, 3.0):

@@ -1,8 +1,11 @@
 /** Inverse kinematics near a known pose, for turning the tool about its beam (Newton's method). */
 
-import { baseOf, frames, multiply, rotation } from "./kinematics.js";
+import { Vector3 } from "three";
+
+import { baseOf, frames, position, product, rotation } from "./kinematics.js";
 
 /** @typedef {import("./messages.js").RobotEntry} RobotModel */
+/** @typedef {import("three").Matrix4} Matrix4 */
 
 const STRIDE = 0.1; // rad of the beam's rotation from one solution to the next
 const FAR = 0.6; // rad that a joint may move in one stride: more means a singularity is near
@@ -23,7 +26,7 @@ export function turnedAbout(robot, from, angle) {
   const tip = frames(robot, q)[robot.joints.length + 1];
   const strides = Math.max(1, Math.ceil(Math.abs(angle) / STRIDE));
   for (let i = 1; i <= strides; i++) {
-    const next = newton(robot, base, q, multiply(tip, rotation([0, 0, 1], (angle * i) / strides)));
+    const next = newton(robot, base, q, product(tip, rotation([0, 0, 1], (angle * i) / strides)));
     if (!next || next.some((each, j) => Math.abs(each - q[j]) > FAR)) return null;
     q = next;
   }
@@ -35,7 +38,7 @@ export function turnedAbout(robot, from, angle) {
  * @param {RobotModel} robot
  * @param {number} base  its frame
  * @param {number[]} from
- * @param {number[]} goal  16
+ * @param {Matrix4} goal
  */
 function newton(robot, base, from, goal) {
   const q = [...from];
@@ -46,10 +49,8 @@ function newton(robot, base, from, goal) {
     if (Math.max(...error.map(Math.abs)) < ENOUGH) return q;
     const columns = robot.joints.slice(0, 6).map(({ axis }, i) => {
       const frame = found[base + i + 1];
-      const z = [0, 4, 8].map(
-        (r) => frame[r] * axis[0] + frame[r + 1] * axis[1] + frame[r + 2] * axis[2],
-      );
-      return [...cross(z, [tip[3] - frame[3], tip[7] - frame[7], tip[11] - frame[11]]), ...z];
+      const z = new Vector3().fromArray(axis).transformDirection(frame);
+      return [...z.clone().cross(position(tip).sub(position(frame))), ...z];
     });
     const step = solved(columns, error);
     if (!step) return null;
@@ -60,24 +61,17 @@ function newton(robot, base, from, goal) {
 
 /**
  * Return the difference of two poses: m along the axes, rad about them.
- * @param {number[]} from
- * @param {number[]} to
+ * @param {Matrix4} from
+ * @param {Matrix4} to
  */
 function difference(from, to) {
-  const turn = [0, 0, 0];
+  const turn = new Vector3();
   for (let c = 0; c < 3; c++) {
-    const [a, b] = [from, to].map((pose) => [pose[c], pose[4 + c], pose[8 + c]]);
-    cross(a, b).forEach((each, r) => (turn[r] += each / 2));
+    const [a, b] = [from, to].map((pose) => new Vector3().setFromMatrixColumn(pose, c));
+    turn.addScaledVector(a.cross(b), 0.5);
   }
-  return [to[3] - from[3], to[7] - from[7], to[11] - from[11], ...turn];
+  return [...position(to).sub(position(from)), ...turn];
 }
-
-/** @type {(a: number[], b: number[]) => number[]} */
-const cross = (a, b) => [
-  a[1] * b[2] - a[2] * b[1],
-  a[2] * b[0] - a[0] * b[2],
-  a[0] * b[1] - a[1] * b[0],
-];
 
 /**
  * Solve columns * x = right by elimination with pivoting; null if the matrix is singular.

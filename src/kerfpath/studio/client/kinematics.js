@@ -1,44 +1,32 @@
 /** Forward kinematics: the frames of all joints from their values, for the robot of the server. */
 
+import { Matrix4, Vector3 } from "three";
+
 /** @typedef {import("./messages.js").RobotEntry} RobotModel */
 
 /**
- * Return the product of two poses.
- * @param {ArrayLike<number>} a  16, row-major
- * @param {ArrayLike<number>} b  16, row-major
- * @returns {number[]}
+ * Return the matrix of a pose.
+ * @param {number[]} pose  16, row-major
  */
-export function multiply(a, b) {
-  const out = new Array(16);
-  for (let row = 0; row < 4; row++)
-    for (let column = 0; column < 4; column++) {
-      let sum = 0;
-      for (let i = 0; i < 4; i++) sum += a[4 * row + i] * b[4 * i + column];
-      out[4 * row + column] = sum;
-    }
-  return out;
-}
+export const matrix = (pose) => new Matrix4().fromArray(pose).transpose();
+
+/** @type {(first: Matrix4, ...more: Matrix4[]) => Matrix4} */
+export const product = (first, ...more) =>
+  more.reduce((found, each) => found.multiply(each), first.clone());
 
 /**
- * Return the rotation by an angle about a unit vector (Rodrigues), as a pose.
- * @param {ArrayLike<number>} axis
- * @param {number} angle  rad
- * @returns {number[]}
+ * Return the position of a pose.
+ * @param {Matrix4} pose
  */
-export function rotation(axis, angle) {
-  const [x, y, z] = [axis[0], axis[1], axis[2]];
-  const [c, s] = [Math.cos(angle), Math.sin(angle)];
-  const t = 1 - c;
-  return [
-    ...[t * x * x + c, t * x * y - s * z, t * x * z + s * y, 0],
-    ...[t * x * y + s * z, t * y * y + c, t * y * z - s * x, 0],
-    ...[t * x * z - s * y, t * y * z + s * x, t * z * z + c, 0],
-    ...[0, 0, 0, 1],
-  ];
-}
+export const position = (pose) => new Vector3().setFromMatrixPosition(pose);
 
-/** The identity pose. */
-const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+/**
+ * Return the rotation by an angle about a unit vector, as a pose.
+ * @param {number[]} axis
+ * @param {number} angle  rad
+ */
+export const rotation = (axis, angle) =>
+  new Matrix4().makeRotationAxis(new Vector3().fromArray(axis), angle);
 
 /**
  * Return the pose by which an external axis has moved what it carries.
@@ -46,13 +34,10 @@ const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
  * @param {number} value  rad or m
  */
 function motion({ T, axis, unit }, value) {
-  const pose = unit === "m" ? [...IDENTITY] : rotation(axis, value);
-  const [x, y, z] = [T[3], T[7], T[11]];
-  [0, 1, 2].forEach((r) => {
-    const [a, b, c] = [pose[4 * r], pose[4 * r + 1], pose[4 * r + 2]];
-    pose[4 * r + 3] = unit === "m" ? value * axis[r] : T[4 * r + 3] - (a * x + b * y + c * z);
-  });
-  return pose;
+  const move = new Matrix4();
+  if (unit === "m") return move.setPosition(new Vector3().fromArray(axis).multiplyScalar(value));
+  const point = move.setPosition(position(matrix(T)));
+  return product(point, rotation(axis, value), point.clone().invert());
 }
 
 /**
@@ -72,24 +57,24 @@ export const baseOf = ({ joints }) => joints.filter(({ carries }) => carries).le
  * each joint, and last the tip. Without external axes the first one is ground and base.
  * @param {RobotModel} robot
  * @param {ArrayLike<number>} q  rad or m
- * @returns {number[][]} n + 2 poses
+ * @returns {Matrix4[]} n + 2 poses
  */
 export function frames({ joints, T_flange, T_tool }, q) {
-  /** @type {(what: "part" | "robot") => number[][]} poses of what 0, 1, ... axes carry */
+  /** @type {(what: "part" | "robot") => Matrix4[]} poses of what 0, 1, ... axes carry */
   const carried = (what) =>
     joints.reduce(
       (found, joint, i) =>
         joint.carries === what
-          ? [...found, multiply(found[found.length - 1], motion(joint, q[i]))]
+          ? [...found, product(found[found.length - 1], motion(joint, q[i]))]
           : found,
-      [IDENTITY],
+      [new Matrix4()],
     );
   const found = [...carried("part").reverse(), ...carried("robot").slice(1)];
   joints.forEach(({ carries, T, axis }, i) => {
     if (carries) return;
-    found.push(multiply(multiply(found[found.length - 1], T), rotation(axis, q[i])));
+    found.push(product(found[found.length - 1], matrix(T), rotation(axis, q[i])));
   });
-  found.push(multiply(multiply(found[found.length - 1], T_flange), T_tool));
+  found.push(product(found[found.length - 1], matrix(T_flange), matrix(T_tool)));
   return found;
 }
 

@@ -7,7 +7,6 @@ import {
   Group,
   LineBasicMaterial,
   LineSegments,
-  Matrix4,
   Mesh,
   MeshBasicMaterial,
   MeshStandardMaterial,
@@ -61,12 +60,6 @@ function goesWith({ kind, name, frame }, robot, layout) {
   const goes = alone ? frame < ground : frame < moved || frame === ground;
   return goes ? "carried" : "standing";
 }
-
-/**
- * Return the matrix of a pose.
- * @param {ArrayLike<number>} pose  16, row-major
- */
-export const matrix = (pose) => new Matrix4().fromArray(Array.from(pose)).transpose();
 
 export class Machine {
   constructor() {
@@ -217,7 +210,7 @@ export class Machine {
     // Until a robot with other joints is built, the previous one stays.
     const built = groups.length === found.length - 1 ? groups : [];
     built.forEach((group, i) => {
-      group.matrix.copy(matrix(found[i]));
+      group.matrix.copy(found[i]);
       group.matrixWorldNeedsUpdate = true;
       // Hide the ghost of the part where it coincides with the part.
       if (ghost && i < this.ground) group.visible = !group.matrix.equals(this.frames[i].matrix);

@@ -182,15 +182,13 @@ export class Paths {
 
   /**
    * Show the beam through the tip along the tool axis, or hide it.
-   * @param {ArrayLike<number> | null} tip  pose of the tip
+   * @param {import("three").Matrix4 | null} tip  pose of the tip
    */
   shine(tip) {
     this.beam.visible = tip !== null;
     if (!tip) return;
-    const at = new Vector3(tip[3], tip[7], tip[11]);
-    const axis = new Vector3(tip[2], tip[6], tip[10]);
-    const [from, to] = [-0.02, 0.045].map((by) => at.clone().addScaledVector(axis, by));
-    this.beam.geometry.setPositions([...from.toArray(), ...to.toArray()]);
+    const ends = [-0.02, 0.045].map((by) => new Vector3(0, 0, by).applyMatrix4(tip));
+    this.beam.geometry.setPositions(ends.flatMap((each) => [...each]));
   }
 
   /**

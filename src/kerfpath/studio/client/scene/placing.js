@@ -4,7 +4,7 @@ import { Euler, Group, Matrix4, Object3D, Vector3 } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 
 import { store } from "../app.js";
-import { matrix } from "./machine.js";
+import { matrix } from "../kinematics.js";
 import { fill, line, paintLines } from "./paths.js";
 
 /** @typedef {import("./view.js").SceneView} SceneView */

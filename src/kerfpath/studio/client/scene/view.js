@@ -5,6 +5,7 @@ import { Box3, Vector3 } from "three";
 import { player, store } from "../app.js";
 import { byId, floatAt } from "../dom.js";
 import { fixed, millimetres, percent } from "../format.js";
+import { position } from "../kinematics.js";
 import { draw, html, mount, redraw } from "../ui.js";
 import { Machine } from "./machine.js";
 import { Ghosts } from "./ghosts.js";
@@ -200,7 +201,7 @@ export class SceneView {
     const cutting = moment?.span.kind === "cut" || moment?.span.kind === "pierce";
     this.paths.shine(cutting ? tip : null);
     this.paths.cutUntil(moment?.t ?? 0);
-    const at = new Vector3(tip[3], tip[7], tip[11]);
+    const at = position(tip);
     this.near.show(this.paths.by === "clearance" ? moment : null, at);
     if (this.follow && moment) {
       if (this.carried) this.stage.carry(at.clone().sub(this.carried));
@@ -241,13 +242,12 @@ export class SceneView {
     if (!scene || !this.ready) return;
     const { moment } = player;
     const tip = this.machine.pose(scene.robot, moment?.q ?? scene.sample.q);
-    const head = [tip[3], tip[7], tip[11]];
+    const head = position(tip);
     const mark = nopaths.get(selected ?? "")?.point;
     const { matrix: there } = this.paths.group;
-    if (view === "head") this.carried = new Vector3().fromArray(head);
+    if (view === "head") this.carried = head;
     if (view === "head" || (view === "mark" && mark)) {
-      const at = new Vector3().fromArray((view === "mark" && mark) || head);
-      if (view === "mark") at.applyMatrix4(there);
+      const at = view === "mark" && mark ? new Vector3().fromArray(mark).applyMatrix4(there) : head;
       const around = [-1, 1].map((sign) => at.clone().addScalar(0.16 * sign));
       this.stage.look("part", around);
       return;
