@@ -125,7 +125,7 @@ class PlanOptions(Settings):
         example="0.95",
         key="eta_velocity",
         group="Objective and limits",
-        label="Share of the speed limits",
+        label="Speed limits used",
         concerns="search",
     )
     eta_a: float = setting(
@@ -136,7 +136,7 @@ class PlanOptions(Settings):
         example="0.9",
         key="eta_acceleration",
         group="Objective and limits",
-        label="Share of the acceleration limits",
+        label="Acceleration limits used",
         concerns="search",
     )
     closure: Closure = setting(

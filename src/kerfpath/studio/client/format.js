@@ -66,6 +66,9 @@ export function change(now, before) {
  */
 export const counted = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;
 
+/** @param {string} words */
+export const capital = (words) => words[0].toUpperCase() + words.slice(1);
+
 /**
  * Shown units by the units of the server, with the conversion of values.
  * @type {Record<string, {unit: string, of: (value: number) => number}>}

@@ -13,11 +13,12 @@
  *   | "sheet" | "anything"} Topic
  */
 
-/**
- * Of these types only the newest message is kept, under its type.
- * @typedef {"job" | "options" | "part" | "scene" | "program" | "outcome" | "fastest" | "pose"
- *   | "program_text" | "front" | "reach" | "layout"} Latest
- */
+/** Of these types only the newest message is kept, under its type. */
+const LATEST = /** @type {const} */ ([
+  ...["job", "options", "part", "scene", "program", "outcome", "fastest", "pose"],
+  ...["program_text", "front", "reach", "layout"],
+]);
+/** @typedef {(typeof LATEST)[number]} Latest */
 
 const MOST_SHADES = 12; // some 100 kB each
 const MOST_ERRORS = 3;
@@ -26,18 +27,9 @@ const ERROR_STAYS = 12_000; // ms
 /** @type {new () => {[T in Latest]: Extract<ServerMessage, {type: T}> | null}} */
 const Messages = /** @type {any} */ (
   class {
-    job = null;
-    options = null;
-    part = null;
-    scene = null;
-    program = null;
-    outcome = null;
-    fastest = null;
-    pose = null;
-    program_text = null;
-    front = null;
-    reach = null;
-    layout = null;
+    constructor() {
+      for (const type of LATEST) Object.assign(this, { [type]: null });
+    }
   }
 );
 

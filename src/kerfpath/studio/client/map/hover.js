@@ -2,7 +2,7 @@
 
 import { send, store } from "../app.js";
 import { byId } from "../dom.js";
-import { degrees, millimetres } from "../format.js";
+import { capital, degrees, millimetres } from "../format.js";
 import { turnedAbout } from "../inverse.js";
 import { draw, html } from "../ui.js";
 import { wrapped } from "./grid.js";
@@ -141,7 +141,7 @@ export class Hover {
     draw(
       tip,
       html`
-        <b>${head[0].toUpperCase() + head.slice(1)}</b>
+        <b>${capital(head)}</b>
         ${[shaded, numbers].map((each) => each && html`<span>${each}</span><br />`)}
         <span class="quiet">
           ${millimetres(s - grid.message.s[0])}, gamma ${degrees(gamma, 0)}

@@ -33,11 +33,11 @@ export function layoutSheet(placing) {
   let [turns, revision] = [false, 0];
   const search = candidates(placing, moved);
   const speed = fastestHere(placing);
-  placing.on((done) => {
+  placing.dragged = (done) => {
     search.forget();
     if (done) commit();
     else moved();
-  });
+  };
   store.on(["job"], () => {
     if (!placing.open || store.job?.revision === revision) return;
     revision = store.job?.revision ?? 0;

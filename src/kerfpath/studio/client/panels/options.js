@@ -3,7 +3,7 @@
 import { useRef } from "preact/hooks";
 
 import { send, store } from "../app.js";
-import { fixed } from "../format.js";
+import { capital, fixed } from "../format.js";
 import { faultOf, setKey, valueOf } from "../job.js";
 import {
   Input,
@@ -19,14 +19,8 @@ import {
   useHeld,
 } from "../ui.js";
 
-/** @type {Record<string, string>} */
-const WORDS = {
-  sum: "Sum",
-  max: "Largest",
-  euclid: "Euclid",
-  manhattan: "Manhattan",
-  chebychev: "Chebychev",
-};
+/** @typedef {import("../messages.js").OptionField} OptionField */
+
 const SPEED = "contour.speed_m_min";
 
 /** What is known of the fastest speed of the chosen contour. */
@@ -47,7 +41,7 @@ export function followFastest() {
 export function optionsPanel() {
   const { job, selected, table } = store;
   if (!job) return null;
-  const disabled = !store.live || !selected;
+  const disabled = off();
   const shape = store.scene?.contours.find(({ name }) => name === selected);
   const alike = job.contours.filter(({ index }) => index === table).length;
   const speed = {
@@ -70,17 +64,12 @@ export function optionsPanel() {
         ${alike > 1 && html`<p class="quiet small">${shared}</p>`}
         <div class="answer" aria-live="polite">${answer()}</div>`,
     ),
-    html`
-      <section class="card">
-        <h2>Objective and limits</h2>
-        ${words("objective", "Objective", disabled)}
-        ${words("metric", "Metric", disabled)}
-        ${posture(disabled)}
-        ${share("eta_velocity", "Speed limits used", disabled)}
-        ${share("eta_acceleration", "Acceleration limits used", disabled)}
-      </section>`,
+    store.options && main(store.options.groups[0]),
   ];
 }
+
+/** Whether nothing can be changed. */
+const off = () => !store.live || !store.selected;
 
 /** What was found of the fastest speed. */
 function answer() {
@@ -100,49 +89,43 @@ function answer() {
     }`;
 }
 
-/** @param {string} key */
-const choicesOf = (key) =>
-  store.options?.groups.flatMap(({ fields }) => fields).find((each) => each.key === key)?.choices ??
-  [];
+/**
+ * The main options of the job: choices first, then shares of the limits.
+ * @param {import("../messages.js").OptionGroup} group
+ */
+const main = ({ title, fields }) => html`
+  <section class="card">
+    <h2>${title}</h2>
+    ${fields.filter(({ kind }) => kind === "choice").map(choice)}
+    ${fields.filter(({ kind }) => kind === "number").map(share)}
+  </section>`;
 
-/** @type {(name: string, label: string, disabled: boolean) => unknown} */
-function words(name, label, disabled) {
-  const key = `plan.${name}`;
+/** @param {OptionField} field  a list if it may be left open, else buttons */
+function choice({ key, label, choices, default: usual }) {
   const now = valueOf(key) ?? "";
-  const choices = choicesOf(key).map((value) => ({ value, label: WORDS[value] ?? value }));
-  const choose = (/** @type {string} */ value) => value !== now && setKey(key, value, gesture());
+  const words = now && !choices.includes(now) ? [now, ...choices] : choices;
+  const set = (/** @type {string} */ value) =>
+    value !== now && setKey(key, value || null, gesture());
+  const named = words.map((value) => ({ value, label: usual === null ? value : capital(value) }));
+  const list = () => html`
+    <select aria-label=${label} value=${now} disabled=${off()}
+      onChange=${(/** @type {any} */ { target }) => set(target.value)}>
+      ${options([{ value: "", label: "any" }, ...named])}
+    </select>`;
   return html`
     <div class="field row">
       <span class="label">${label}</span>
-      ${segments(label, choices, now, choose, disabled)}
+      ${usual === null ? list() : segments(label, named, now, set, off())}
     </div>`;
 }
 
-/** @param {boolean} disabled */
-function posture(disabled) {
-  const now = valueOf("plan.posture") ?? "";
-  const known = choicesOf("plan.posture");
-  const all = now && !known.includes(now) ? [now, ...known] : known;
-  const choose = (/** @type {any} */ { target }) =>
-    setKey("plan.posture", target.value || null, gesture());
-  const choices = all.map((word) => ({ value: word, label: word }));
-  return html`
-    <div class="field row">
-      <label for="posture">Posture</label>
-      <select id="posture" value=${now} disabled=${disabled} onChange=${choose}>
-        ${options([{ value: "", label: "any" }, ...choices])}
-      </select>
-    </div>`;
-}
-
-/** @type {(name: string, label: string, disabled: boolean) => unknown} */
-function share(name, label, disabled) {
-  const key = `plan.${name}`;
-  const set = (/** @type {number} */ value, /** @type {string} */ drag) =>
-    setKey(key, Number((value / 100).toFixed(4)), drag);
+/** @param {OptionField} field */
+function share({ key, label }) {
   const field = {
-    ...{ id: name, label, unit: "%", least: 30, most: 100, step: 1, places: 0 },
-    ...{ value: 100 * (valueOf(key) ?? 1), disabled, fault: faultOf(key), onSet: set },
+    ...{ id: key.replace("plan.", ""), label, unit: "%", least: 30, most: 100, step: 1, places: 0 },
+    ...{ value: 100 * (valueOf(key) ?? 1), disabled: off(), fault: faultOf(key) },
+    onSet: (/** @type {number} */ value, /** @type {string} */ drag) =>
+      setKey(key, Number((value / 100).toFixed(4)), drag),
   };
   return html`<${Amount} ...${field} />`;
 }

@@ -79,12 +79,12 @@ export class Placing {
     stage.scene.add(this.handle, this.group);
     /** @type {ReachMessage | null} */
     this.reach = null;
-    /** @type {Set<(done: boolean) => void>} */
-    this.listeners = new Set();
+    /** Called after each move by hand; with true when the handle is released. @type {(done: boolean) => void} */
+    this.dragged = () => {};
     this.gizmo.addEventListener("change", () => stage.invalidate());
     this.gizmo.addEventListener("dragging-changed", ({ value }) => {
       stage.controls.enabled = !value;
-      if (!value && this.moved) this.tell(true);
+      if (!value && this.moved) this.dragged(true);
     });
     this.gizmo.addEventListener("objectChange", () => {
       this.handle.updateMatrix();
@@ -96,21 +96,8 @@ export class Placing {
       }
       this.fresh = true;
       this.apply();
-      this.tell(false);
+      this.dragged(false);
     });
-  }
-
-  /**
-   * Call `listener` after each move by hand, with true when the handle is released.
-   * @param {(done: boolean) => void} listener
-   */
-  on(listener) {
-    this.listeners.add(listener);
-  }
-
-  /** @param {boolean} done */
-  tell(done) {
-    for (const listener of this.listeners) listener(done);
   }
 
   /** Whether anything has been moved from its place in the job. */
