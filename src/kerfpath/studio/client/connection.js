@@ -1,7 +1,6 @@
 /** The connection to the server: it sends and receives messages, and reconnects. */
 
-/** @typedef {import("./messages.js").ClientMessage} ClientMessage */
-/** @typedef {import("./messages.js").ServerMessage} ServerMessage */
+/** @import { ClientMessage, ServerMessage } from "./messages.js" */
 /** @typedef {"connecting" | "open" | "lost"} Status */
 
 const FIRST_WAIT = 500;

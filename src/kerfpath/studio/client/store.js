@@ -1,9 +1,6 @@
 /** The state of the page: the newest messages, the chosen contour, and listeners to changes. */
 
-/** @typedef {import("./messages.js").ServerMessage} ServerMessage */
-/** @typedef {import("./messages.js").PlanMessage} PlanMessage */
-/** @typedef {import("./messages.js").NoPathMessage} NoPathMessage */
-/** @typedef {import("./messages.js").KeptEntry} KeptEntry */
+/** @import { KeptEntry, NoPathMessage, PlanMessage, ServerMessage } from "./messages.js" */
 /** @typedef {{entry: KeptEntry, plans: Map<string, PlanMessage[]>}} Against */
 /** @typedef {{name: string, s: number[], gamma: number[], posture: number[]}} Course */
 

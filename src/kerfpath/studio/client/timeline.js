@@ -2,8 +2,7 @@
 
 import { interval, jointsAt } from "./kinematics.js";
 
-/** @typedef {import("./messages.js").PlanMessage} PlanMessage */
-/** @typedef {import("./messages.js").ProgramMessage} ProgramMessage */
+/** @import { PlanMessage, ProgramMessage } from "./messages.js" */
 
 /**
  * @typedef {object} Span

@@ -54,14 +54,8 @@ export class Choices {
   ask(kind, key, name) {
     const { selected: contour } = store;
     if ((key && this.asked[kind] === key) || !contour) return;
-    if (
-      !send(
-        kind === "shade"
-          ? { type: kind, contour, by: name }
-          : { type: kind, contour, method: name },
-      )
-    )
-      return;
+    const what = { [kind === "shade" ? "by" : "method"]: name };
+    if (!send(/** @type {any} */ ({ type: kind, contour, ...what }))) return;
     this.asked[kind] = key;
     delete this.refused[kind];
   }

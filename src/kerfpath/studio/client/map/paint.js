@@ -33,6 +33,9 @@ const mix = (a, b, share) => {
   return [at(0), at(1), at(2)];
 };
 
+/** @type {Record<string, Pattern>} by kind of reason; pinned: hatched where the pin is drawn */
+const PATTERNS = { reach: "dots", cell: "cross", margin: "level" };
+
 /**
  * Return the pattern of a reason; it repeats the colour for people who cannot distinguish colours.
  * @param {string} kind
@@ -40,13 +43,8 @@ const mix = (a, b, share) => {
  * @returns {Pattern}
  */
 function patternOf(kind, words) {
-  if (kind === "admitted") return "none";
   if (kind === "joint") return words.endsWith("low") ? "falling" : "rising";
-  if (kind === "reach") return "dots";
-  if (kind === "cell") return "cross";
-  if (kind === "margin") return "level";
-  if (kind === "pinned") return "none"; // hatched where the pin is drawn
-  return "none";
+  return PATTERNS[kind] ?? "none";
 }
 
 /**

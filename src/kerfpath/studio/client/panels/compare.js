@@ -6,8 +6,7 @@ import { jointsAt } from "../kinematics.js";
 import { Input, card, html, icon, segments } from "../ui.js";
 import { jointRows, rows, table } from "./differences.js";
 
-/** @typedef {import("../messages.js").PlanMessage} PlanMessage */
-/** @typedef {import("../messages.js").KeptEntry} KeptEntry */
+/** @import { KeptEntry, PlanMessage } from "../messages.js" */
 /** @typedef {import("./differences.js").OfJoint} OfJoint */
 /** @typedef {{accompany: (q: ArrayLike<number> | null) => void}} View */
 

@@ -7,8 +7,7 @@ import { axesOf } from "../axes.js";
 import { faultOf, isGiven, setKeys, valueOf } from "../job.js";
 import { Input, NUMBER, card, html, icon, options } from "../ui.js";
 
-/** @typedef {import("../messages.js").OptionField} OptionField */
-/** @typedef {import("../messages.js").Sampling} Sampling */
+/** @import { OptionField, Sampling } from "../messages.js" */
 
 let wanted = ""; // the words of the search
 
