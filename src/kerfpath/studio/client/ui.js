@@ -69,6 +69,11 @@ export const card = (title, tools, body, more = "") => html`
     ${body}
   </section>`;
 
+/** @type {(summary: Content, texts: string[]) => unknown} texts that fold; nothing without any */
+export const folded = (summary, texts) =>
+  texts.length > 0 &&
+  html`<details><summary>${summary}</summary>${texts.map((each) => html`<p>${each}</p>`)}</details>`;
+
 /** @typedef {{value: string, label: string}} Choice */
 
 /**

@@ -303,11 +303,10 @@ export class Bands {
     return html`
       <section class="pins" aria-label="Pins of gamma">
         <h3>Pins</h3>
-        ${
-          rows.length
-            ? html`<ul>${rows}</ul>`
-            : html`<p class="quiet">Drag over the map to keep gamma inside a rectangle.</p>`
-        }
+        <ul>${rows}</ul>
+        <p class="quiet" hidden=${rows.length > 0}>
+          Drag over the map to keep gamma inside a rectangle.
+        </p>
       </section>`;
   }
 }

@@ -3,7 +3,7 @@
 import { send, store } from "../app.js";
 import { digits, fixed } from "../format.js";
 import { SCALE_GRADIENT } from "../scene/scale.js";
-import { html, options } from "../ui.js";
+import { folded, html, options } from "../ui.js";
 import { Shade } from "./shade.js";
 
 /** @typedef {import("../messages.js").TechniqueMessage} TechniqueMessage */
@@ -111,10 +111,8 @@ export class Choices {
    * @param {Grid | null} grid
    */
   lists(grid) {
-    const shades = (grid?.message.shades ?? []).map(({ by, words }) => ({
-      value: by,
-      label: words,
-    }));
+    const known = grid?.message.shades ?? [];
+    const shades = known.map(({ by, words }) => ({ value: by, label: words }));
     const techniques = Object.entries(TECHNIQUES).map(([value, label]) => ({ value, label }));
     /** @type {(kind: "shade" | "technique", label: string, value: string, choices: {value: string, label: string}[]) => unknown} */
     const list = (kind, label, value, choices) => {
@@ -159,29 +157,21 @@ export class Choices {
   beside(contour) {
     const { technique } = this;
     const name = TECHNIQUES[/** @type {keyof typeof TECHNIQUES} */ (this.chosen.technique)];
-    const notes = technique?.notes.map((each) => html`<p class="quiet">${each}</p>`);
     return html`
       <p class="technique"><i class="line dots" />${name}</p>
       ${!this.fresh(contour) && this.waiting("technique", "Being computed …")}
-      ${
-        technique?.cost === null &&
-        html`
-        <details>
-          <summary>finds no path</summary>
-          <p>${technique.statement}</p>
-          ${notes}
-        </details>`
-      }
-      ${
-        technique &&
-        technique.cost !== null &&
-        html`
-        <p>cost ${digits(technique.cost, 4)}</p>
-        ${peak("speed", technique.peak_velocity)}
-        ${peak("acceleration", technique.peak_acceleration)}
-        ${notes}`
-      }`;
+      ${technique && found(technique)}`;
   }
+}
+
+/** @param {TechniqueMessage} technique */
+function found({ cost, statement, notes, peak_velocity, peak_acceleration }) {
+  if (cost === null) return folded("finds no path", [statement, ...notes]);
+  return html`
+    <p>cost ${digits(cost, 4)}</p>
+    ${peak("speed", peak_velocity)}
+    ${peak("acceleration", peak_acceleration)}
+    ${notes.map((each) => html`<p class="quiet">${each}</p>`)}`;
 }
 
 /**

@@ -4,7 +4,7 @@ import { useLayoutEffect, useRef } from "preact/hooks";
 
 import { percent } from "../format.js";
 import { SCALE_GRADIENT } from "../scene/scale.js";
-import { html } from "../ui.js";
+import { folded, html } from "../ui.js";
 import { swatch } from "./paint.js";
 
 const SWATCH = 28; // px, drawn at half that size
@@ -47,14 +47,7 @@ export function legend(grid, layer, inks, { course, before, shaded }) {
     <ul>${rows}</ul>
     ${external && html`<p class="quiet">${external}</p>`}
     ${(course || before) && lines}
-    ${
-      hidden.length > 0 &&
-      html`
-      <details>
-        <summary>Postures not shown</summary>
-        ${hidden.map((each) => html`<p>${each}</p>`)}
-      </details>`
-    }`;
+    ${folded("Postures not shown", hidden)}`;
 }
 
 /** @param {{ink: import("./paint.js").Ink}} props */

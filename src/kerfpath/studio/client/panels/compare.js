@@ -138,12 +138,8 @@ function comparison({ entry, plans }, live, view) {
     <div class="actions">
       <button class="plain" title="Restore this job, as one step of undo" disabled=${!live}
         onClick=${() => send({ type: "restore", id })}>Go back to ${name}</button>
-      ${
-        both &&
-        html`
-        <button class="text" title="Show its robot in the scene, at the same path length"
-          aria-pressed=${String(state.ghost)} onClick=${haunt}>Show its robot</button>`
-      }
+      <button class="text" title="Show its robot in the scene, at the same path length" hidden=${!both}
+        aria-pressed=${String(state.ghost)} onClick=${haunt}>Show its robot</button>
     </div>`;
 }
 

@@ -2,7 +2,7 @@
 
 import { store } from "../app.js";
 import { clock, fixed, millimetres, secondsOf } from "../format.js";
-import { dot, html, icon } from "../ui.js";
+import { dot, folded, html, icon } from "../ui.js";
 import { openSheet } from "./sheet.js";
 
 /** @typedef {import("../messages.js").ContourEntry} ContourShape */
@@ -72,24 +72,13 @@ function cycle() {
   const total = times?.total ?? program?.total ?? 0;
   const title = notes.length > 1 ? `${notes.length} notes on the program` : "A note on the program";
   return html`
-    ${
-      total > 0 &&
-      html`
-      <div class="total">
-        <span>Cycle time</span>
-        <b>${total < 60 ? `${fixed(total)} s` : `${clock(total)} min`}</b>
-      </div>`
-    }
+    ${total > 0 && html`<div class="total"><span>Cycle time</span><b>${duration(total)}</b></div>`}
     ${total > 0 && times && shares(times)}
-    ${
-      notes.length > 0 &&
-      html`
-      <details>
-        <summary>${icon("warning")}${title}</summary>
-        ${notes.map((note) => html`<p>${note}</p>`)}
-      </details>`
-    }`;
+    ${folded(html`${icon("warning")}${title}`, notes)}`;
 }
+
+/** @param {number} seconds */
+const duration = (seconds) => (seconds < 60 ? `${fixed(seconds)} s` : `${clock(seconds)} min`);
 
 /** @param {{cutting: number, air: number, piercing: number}} times */
 function shares({ cutting, air, piercing }) {

@@ -60,9 +60,10 @@ export function rows(then, now, { alike, cycle, axes }) {
   /** @type {(kind: "peak_velocity" | "peak_acceleration") => (plans: PlanMessage[]) => number} */
   const largest = (kind) => (plans) =>
     100 * Math.max(...plans.flatMap(({ criteria }) => criteria[kind]));
-  /** @type {(chosen: (axis: Axis) => boolean) => (plans: PlanMessage[]) => number} */
+  /** @type {(chosen: Axis[]) => (plans: PlanMessage[]) => number} */
   const travel = (chosen) => (plans) =>
-    sum(axes.map((axis, j) => (chosen(axis) ? ofJoint(plans, "displacement", j, axis) : 0)));
+    sum(chosen.map((axis) => ofJoint(plans, "displacement", axes.indexOf(axis), axis)));
+  const [arm, others] = [false, true].map((is) => axes.filter(({ external }) => external === is));
   const gap = (/** @type {PlanMessage[]} */ plans) =>
     100 * Math.max(...plans.map((plan) => plan.gap ?? Infinity));
   const known = (/** @type {number} */ value) => (value < Infinity ? value : null);
@@ -72,22 +73,8 @@ export function rows(then, now, { alike, cycle, axes }) {
     ...(alike ? [row("Cost", "", (plans) => sum(plans.map(({ cost }) => cost)))] : []),
     row("Time of the cut", "s", secondsOf),
     { name: "Cycle of the job", unit: "s", then: cycle[0], now: cycle[1], places: 1 },
-    row(
-      "Joint travel",
-      "deg",
-      travel(({ external }) => !external),
-      1,
-    ),
-    ...axes
-      .filter(({ external }) => external)
-      .map((axis) =>
-        row(
-          `Travel of ${axis.label}`,
-          axis.unit,
-          travel((each) => each === axis),
-          1,
-        ),
-      ),
+    row("Joint travel", "deg", travel(arm), 1),
+    ...others.map((axis) => row(`Travel of ${axis.label}`, axis.unit, travel([axis]), 1)),
     row("Top speed", "% limit", largest("peak_velocity"), 1),
     row("Top acceleration", "% limit", largest("peak_acceleration"), 1),
     ...measures.map(([name, { unit }]) => ({

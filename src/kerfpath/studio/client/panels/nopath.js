@@ -34,10 +34,9 @@ export function noPath(answer, show) {
         <p class="quiet">${SCOPES[answer.scope]}</p>
       </div>
     </div>
-    ${
-      answer.point &&
-      html`<p><button class="plain" onClick=${show}>${icon("follow")}Show the place</button></p>`
-    }
+    <p hidden=${!answer.point}>
+      <button class="plain" onClick=${show}>${icon("follow")}Show the place</button>
+    </p>
     <h3 class="sub">Reasons of loss there</h3>
     <ul class="reasons">
       ${reasons.slice(0, 6).map(

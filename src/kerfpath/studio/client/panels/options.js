@@ -81,12 +81,11 @@ function answer() {
     edits.forEach(({ path, value }) => send({ type: "edit", path, value, gesture: "fastest" }));
   const found =
     best === null ? "No feasible speed was found. " : `Fastest: ${fixed(best, 2)} m/min. `;
+  const button = html`
+    <button class="plain" onClick=${take}>Cut at ${fixed(best ?? 0, 2)} m/min</button>`;
   return html`
     <p>${found}<span class="quiet">${binds && `Binding limit: ${binds}`}</span></p>
-    ${
-      edits.length > 0 &&
-      html`<button class="plain" onClick=${take}>Cut at ${fixed(best ?? 0, 2)} m/min</button>`
-    }`;
+    ${edits.length > 0 && button}`;
 }
 
 /**
