@@ -125,8 +125,7 @@ def test_a_pose_is_turned_about_its_beam_while_the_axes_stand(modules, carried):
     found = modules.evaluate(MODULE, ["inverse", "turnedAbout", scene["robot"], q, 0.2])
     assert found[ARM:] == q[ARM:]
     before, after = (
-        np.array(modules.evaluate(FRAMES, [scene["robot"], each])[-1])
-        for each in (q, found)
+        np.array(modules.evaluate(FRAMES, [scene["robot"], each])[-1]) for each in (q, found)
     )
     turn = before.reshape(4, 4)[:3, :3].T @ after.reshape(4, 4)[:3, :3]
     # Newton's method ends below 1e-7.
