@@ -46,19 +46,6 @@ export function columns(plans, axes, kind) {
 }
 
 /**
- * Return the least and the largest value of columns.
- * @param {(number | null)[][]} found
- * @returns {[number, number]}
- */
-export function span(found) {
-  let [low, high] = [Infinity, -Infinity];
-  for (const column of found)
-    for (const value of column)
-      if (value !== null) [low, high] = [Math.min(low, value), Math.max(high, value)];
-  return [low, high];
-}
-
-/**
  * Draw the curves of another plan behind those of a plot, dashed, in the colours of the joints.
  * @param {import("uplot")} plot
  * @param {(number | null)[][]} found

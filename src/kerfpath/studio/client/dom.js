@@ -29,6 +29,14 @@ export function onNextFrame(act) {
   };
 }
 
+/** @type {Record<string, [number, number] | undefined>} directions of keys: to the right, downwards */
+export const ARROWS = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, -1],
+  ArrowDown: [0, 1],
+};
+
 /** @type {Map<string, string>} cached, as every frame needs them; by theme and name */
 const colours = new Map();
 

@@ -99,6 +99,17 @@ export function inUnits(value, unit) {
   return `${digits(value, 3)}${unit ? ` ${unit}` : ""}`;
 }
 
+/**
+ * Return the least and the largest value; null does not count.
+ * @param {(number | null)[]} values
+ */
+export function extent(values) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const value of values)
+    if (value !== null) [low, high] = [Math.min(low, value), Math.max(high, value)];
+  return /** @type {[number, number]} */ ([low, high]);
+}
+
 /** @param {number[]} values */
 export const sum = (values) => values.reduce((total, each) => total + each, 0);
 

@@ -3,10 +3,10 @@
 import UPlot from "uplot";
 
 import { axesOf } from "./axes.js";
-import { columns, dashed, scaleOf, span } from "./curves.js";
+import { columns, dashed, scaleOf } from "./curves.js";
 import { player, store } from "./app.js";
 import { byId, onNextFrame, textSize, themeColour } from "./dom.js";
-import { digits, fixed, secondsOf } from "./format.js";
+import { digits, extent, fixed, secondsOf } from "./format.js";
 import { colourKey, draw, html, mount, segments } from "./ui.js";
 
 /** @typedef {import("./curves.js").Kind} Kind */
@@ -177,7 +177,8 @@ export class Plots {
     const { axes } = this.shown();
     const here = (/** @type {number} */ j) =>
       !this.off.has(j) && axes[j] && scaleOf(axes[j], this.kind) === scale;
-    const [other, others] = span(this.beside.slice(1).filter((_, j) => here(j)));
+    const beside = this.beside.slice(1).filter((_, j) => here(j));
+    const [other, others] = extent(beside.flat());
     const [low, high] = [Math.min(least, other), Math.max(most, others)];
     if (this.kind === "angle") {
       const room = Math.max(2, 0.06 * (high - low));

@@ -1,7 +1,7 @@
 /** A scatter plot of a Pareto set in two of its criteria, with a third one as colour. */
 
 import { freshContext, textSize, themeColour } from "./dom.js";
-import { digits } from "./format.js";
+import { digits, extent } from "./format.js";
 import { alongScale } from "./scene/scale.js";
 
 /** @typedef {{number: number, values: number[], best: boolean}} Point */
@@ -31,7 +31,7 @@ export function ticks(low, high, most) {
  * @returns {[number, number]}
  */
 function spanOf(values) {
-  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const [low, high] = extent(values);
   const room = 0.06 * (high - low) || Math.abs(low) * 0.05 || 1;
   return [low - room, high + room];
 }

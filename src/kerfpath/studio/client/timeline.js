@@ -37,7 +37,6 @@ export class Timeline {
     this.joints = joints;
     this.whole = whole;
     this.total = spans.length ? spans[spans.length - 1].end : 0;
-    this.begins = spans.map((span) => span.begin);
   }
 
   /**
@@ -48,8 +47,10 @@ export class Timeline {
   at(t) {
     if (!this.spans.length) return null;
     const clamped = Math.min(Math.max(t, 0), this.total);
-    let index = this.spans.length === 1 ? 0 : interval([...this.begins, Infinity], clamped);
-    index = Math.min(index, this.spans.length - 1);
+    const index = Math.max(
+      0,
+      this.spans.findLastIndex(({ begin }) => begin <= clamped),
+    );
     const span = this.spans[index];
     const local = Math.min(clamped - span.begin, span.end - span.begin);
     const q = jointsAt(span.time, span.q, this.joints, local);

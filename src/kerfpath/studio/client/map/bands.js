@@ -110,15 +110,9 @@ export class Bands {
     const to = this.place(event);
     if (!drag) {
       const sides = (this.chart.grid && this.hit(to)?.sides) || new Set();
-      const [across, up] = [sides.has("start") || sides.has("end"), sides.has("low")];
-      canvas.style.cursor =
-        across && (up || sides.has("high"))
-          ? "move"
-          : across
-            ? "ew-resize"
-            : up || sides.has("high")
-              ? "ns-resize"
-              : "";
+      const across = sides.has("start") || sides.has("end");
+      const up = sides.has("low") || sides.has("high");
+      canvas.style.cursor = across ? (up ? "move" : "ew-resize") : up ? "ns-resize" : "";
       return;
     }
     if (!drag.moved && Math.hypot(to.x - drag.from.x, to.y - drag.from.y) < STILL) return;
@@ -231,18 +225,13 @@ export class Bands {
       if (i !== chosen) return;
       context.fillStyle = themeColour("--accent");
       const size = 7 * scale;
+      const handle = (/** @type {number} */ at, /** @type {number} */ up) =>
+        context.fillRect(at - size / 2, up - size / 2, size, size);
       for (const { x, y, width, height } of boxes)
-        for (const [at, up] of [
-          [x + width / 2, y],
-          [x + width / 2, y + height],
-          ...(width > 3 * NEAR
-            ? [
-                [x, y + height / 2],
-                [x + width, y + height / 2],
-              ]
-            : []),
-        ])
-          context.fillRect(at - size / 2, up - size / 2, size, size);
+        for (const end of [0, 1]) {
+          handle(x + width / 2, y + end * height);
+          if (width > 3 * NEAR) handle(x + end * width, y + height / 2);
+        }
     });
   }
 

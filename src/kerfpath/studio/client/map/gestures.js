@@ -1,6 +1,6 @@
 /** Zoom and pan of a map: wheel, a drag with Shift or the middle button, keys. */
 
-import { byId } from "../dom.js";
+import { ARROWS, byId } from "../dom.js";
 import { isWhole, moved, showing, WHOLE, zoomed } from "./window.js";
 
 /** @typedef {import("./chart.js").Chart} Chart */
@@ -119,8 +119,7 @@ export class Gestures {
    * @param {{x: number, y: number}} at  shares of what is seen
    */
   key(event, at) {
-    const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-    const move = moves[/** @type {keyof typeof moves} */ (event.key)];
+    const move = ARROWS[event.key];
     const ctrl = event.ctrlKey || event.metaKey;
     if (ctrl && move) this.see(moved(this.chart.window, 0.2 * move[0], 0.2 * move[1]));
     else if (ctrl || event.altKey) return false;

@@ -1,7 +1,7 @@
 /** The map: the reason of loss of every rotation along the path, the plan's course, and ghosts. */
 
 import { player, send, store } from "../app.js";
-import { byId, onNextFrame } from "../dom.js";
+import { ARROWS, byId, onNextFrame } from "../dom.js";
 import { deg } from "../format.js";
 import { html, mount, redraw, segments } from "../ui.js";
 import { Bands, courseAt } from "./bands.js";
@@ -190,8 +190,7 @@ export class MapView {
       return;
     }
     if (!plain) return;
-    const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-    const move = moves[/** @type {keyof typeof moves} */ (event.key)];
+    const move = ARROWS[event.key];
     if (event.key === "Escape") hover.leave();
     if (event.key === "Enter" && hover.cell) this.go(hover.cell);
     if (!move) return;
@@ -199,7 +198,7 @@ export class MapView {
     const from = hover.cell ?? { node: 0, sample: grid.sampleAt(plan?.gamma[0] ?? 0) };
     const stride = event.shiftKey ? 10 : 1;
     const node = Math.min(Math.max(from.node + move[0] * stride, 0), grid.nodes - 1);
-    const sample = (from.sample + move[1] * stride + 10 * grid.samples) % grid.samples;
+    const sample = (from.sample - move[1] * stride + 10 * grid.samples) % grid.samples;
     const { s, gamma } = grid.message;
     gestures.show((s[node] - s[0]) / grid.length, 0.5 - deg(gamma[sample]) / 360);
     hover.enter({ node, sample });

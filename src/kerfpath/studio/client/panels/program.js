@@ -3,7 +3,6 @@
 import { useEffect, useRef } from "preact/hooks";
 
 import { player, send, store } from "../app.js";
-import { interval } from "../kinematics.js";
 import { html, options, redraw, segments } from "../ui.js";
 import { sheetShown } from "./sheet.js";
 
@@ -216,8 +215,8 @@ function follow() {
   // The line that ends next; the robot may also be before the first one.
   let [at, line, soonest] = [-1, 0, Infinity];
   files.forEach(({ lines, end }, i) => {
-    const k = !end.length || end[0] >= t - near ? 0 : interval([...end, Infinity], t - near) + 1;
-    if (k < end.length && end[k] < soonest) [at, line, soonest] = [i, lines[k], end[k]];
+    const k = end.findIndex((each) => each >= t - near);
+    if (k >= 0 && end[k] < soonest) [at, line, soonest] = [i, lines[k], end[k]];
   });
   if (at < 0) return;
   if (at !== state.file) show(at);

@@ -1,6 +1,6 @@
 /** Ghosts that stay: copies of all moving bodies at chosen poses, until they are cleared. */
 
-import { Color, Group, Mesh, MeshStandardMaterial } from "three";
+import { Group, Mesh, MeshStandardMaterial } from "three";
 
 import { player, store } from "../app.js";
 import { byId, themeColour } from "../dom.js";
@@ -25,7 +25,7 @@ export class Ghosts {
 
   /** Take the colours of the theme. */
   paint() {
-    this.material.color = new Color(themeColour("--moving"));
+    this.material.color.set(themeColour("--moving"));
   }
 
   /** Keep a ghost where the robot is; if there are too many, the oldest is removed. */

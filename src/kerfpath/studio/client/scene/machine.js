@@ -3,7 +3,6 @@
 import {
   BufferAttribute,
   BufferGeometry,
-  Color,
   Group,
   LineBasicMaterial,
   LineSegments,
@@ -95,16 +94,9 @@ export class Machine {
     this.edge = new LineBasicMaterial({ transparent: true, opacity: 0.55 });
     // The veil only writes the depth of the ghost, so that only its nearest link is visible.
     this.veil = new MeshBasicMaterial({ colorWrite: false, transparent: true });
-    this.ghostMaterial = new MeshStandardMaterial({
-      transparent: true,
-      opacity: 0.42,
-      roughness: 0.8,
-    });
-    this.leftMaterial = new MeshBasicMaterial({
-      transparent: true,
-      opacity: 0.22,
-      depthWrite: false,
-    });
+    const clear = { transparent: true };
+    this.ghostMaterial = new MeshStandardMaterial({ ...clear, opacity: 0.42, roughness: 0.8 });
+    this.leftMaterial = new MeshBasicMaterial({ ...clear, opacity: 0.22, depthWrite: false });
     this.triangles = 0;
     this.paint();
   }
@@ -112,10 +104,10 @@ export class Machine {
   /** Take the colours of the theme. */
   paint() {
     for (const [kind, material] of Object.entries(this.materials))
-      material.color = new Color(themeColour(COLOURS[/** @type {Kind} */ (kind)]));
-    this.edge.color = new Color(themeColour("--edge"));
-    this.leftMaterial.color = new Color(themeColour("--part"));
-    this.ghostMaterial.color = new Color(themeColour("--ghost"));
+      material.color.set(themeColour(COLOURS[/** @type {Kind} */ (kind)]));
+    this.edge.color.set(themeColour("--edge"));
+    this.leftMaterial.color.set(themeColour("--part"));
+    this.ghostMaterial.color.set(themeColour("--ghost"));
   }
 
   /**
@@ -124,25 +116,19 @@ export class Machine {
    * @param {Layout} layout
    */
   async build(scene, layout) {
-    /** @type {Map<string, Body[]>} */
-    const groups = new Map();
-    for (const body of scene.bodies) {
-      const by = goesWith(body, scene.robot, layout);
-      const key = `${body.frame} ${by} ${body.kind} ${body.approximate}`;
-      groups.set(key, [...(groups.get(key) ?? []), body]);
-    }
+    const groups = Map.groupBy(scene.bodies, (body) =>
+      [body.frame, goesWith(body, scene.robot, layout), body.kind, body.approximate].join(" "),
+    );
     const made = await Promise.all(
-      [...groups.values()].map(async (bodies) => ({
+      [...groups.values()].map(async (bodies) => {
+        const [body] = bodies;
+        const { frame, kind } = body;
         // The edges of an approximate shape mean nothing.
-        ...creased(
-          merged(await Promise.all(bodies.map((body) => mesh(body.mesh)))),
-          bodies[0].approximate && bodies[0].kind === "robot" ? Math.PI / 2 : undefined,
-        ),
-        edged: !(bodies[0].approximate && bodies[0].kind === "robot"),
-        by: goesWith(bodies[0], scene.robot, layout),
-        frame: bodies[0].frame,
-        kind: bodies[0].kind,
-      })),
+        const edged = !(body.approximate && kind === "robot");
+        const whole = merged(await Promise.all(bodies.map((each) => mesh(each.mesh))));
+        const drawn = creased(whole, edged ? undefined : Math.PI / 2);
+        return { ...drawn, edged, frame, kind, by: goesWith(body, scene.robot, layout) };
+      }),
     );
     this.clear();
     this.ground = groundOf(scene.robot);

@@ -1,6 +1,6 @@
 /** The nearest pair of bodies: both highlighted, with their distance beside the tip. */
 
-import { Color, Mesh, MeshBasicMaterial, Vector3 } from "three";
+import { Mesh, MeshBasicMaterial, Vector3 } from "three";
 
 import { store } from "../app.js";
 import { byId, floatAt, themeColour } from "../dom.js";
@@ -90,7 +90,7 @@ export class Near {
       each.removeFromParent();
       each.geometry.dispose();
     }
-    this.material.color = new Color(themeColour("--caution-line"));
+    this.material.color.set(themeColour("--caution-line"));
     const bodies = (store.scene?.bodies ?? []).filter(({ name }) => names.includes(name));
     const made = await Promise.all(
       bodies.map(async (body) => creased(await mesh(body.mesh)).faces),

@@ -6,6 +6,7 @@ import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
 
 import { textSize, themeColour } from "../dom.js";
+import { extent } from "../format.js";
 import { alongScale } from "./scale.js";
 
 /** @typedef {import("../messages.js").PlanMessage} PlanMessage */
@@ -63,6 +64,8 @@ export function paintLines(lines) {
 
 /** Distance from which on all distances have the same colour, m. */
 export const FAR = 0.2;
+/** @type {Partial<Record<ColourBy, [number, number]>>} scales that do not follow from the values */
+const SCALES = { load: [0, 1], clearance: [0, FAR] };
 
 export class Paths {
   constructor() {
@@ -109,12 +112,7 @@ export class Paths {
   colour(by = this.by) {
     this.by = by;
     const values = this.tracks.flatMap((track) => valuesOf(track, by) ?? []);
-    this.range =
-      by === "load"
-        ? [0, 1]
-        : by === "clearance"
-          ? [0, FAR]
-          : [least(values), -least(values.map((v) => -v))];
+    this.range = SCALES[by] ?? extent(values);
     if (!this.tracks.length) return;
     const waiting = new Color(themeColour("--moving"));
     /** @type {number[]} */
@@ -122,15 +120,12 @@ export class Paths {
     for (const track of this.tracks) {
       const { plan, points, kind } = track;
       const shown = plan && by !== "kind" ? valuesOf(track, by) : null;
-      const at = (/** @type {number} */ k) =>
-        !plan || (by !== "kind" && !shown)
-          ? waiting
-          : shown
-            ? alongScale(
-                (shown[Math.min(k, shown.length - 1)] - this.range[0]) /
-                  (this.range[1] - this.range[0] || 1),
-              )
-            : new Color(colourOfKind(kind[k]));
+      const [low, high] = this.range;
+      const at = (/** @type {number} */ k) => {
+        if (!plan || (by !== "kind" && !shown)) return waiting;
+        if (!shown) return new Color(colourOfKind(kind[k]));
+        return alongScale((shown[Math.min(k, shown.length - 1)] - low) / (high - low || 1));
+      };
       for (let k = 0; k + 1 < points.length / 3; k++)
         colours.push(...at(k).toArray(), ...at(shown ? k + 1 : k).toArray());
     }
@@ -205,9 +200,6 @@ export class Paths {
     fill(this.mark, point ? ends.map((points) => ({ points })) : []);
   }
 }
-
-/** @param {number[]} values */
-const least = (values) => values.reduce((low, value) => Math.min(low, value), Infinity);
 
 /** @type {(track: Track, by: ColourBy) => number[] | null} */
 function valuesOf({ plan, clearance }, by) {

@@ -2,7 +2,6 @@
 
 import {
   Box3,
-  Color,
   DirectionalLight,
   GridHelper,
   HemisphereLight,
@@ -14,7 +13,7 @@ import {
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
-import { onNextFrame, pixelRatio, themeColour } from "../dom.js";
+import { ARROWS, onNextFrame, pixelRatio, themeColour } from "../dom.js";
 
 /** Directions from which the views look, z up. */
 const VIEWS = {
@@ -85,12 +84,9 @@ export class Stage {
   layFloor(box, z) {
     this.floor?.removeFromParent();
     this.floor?.dispose();
-    const [main, line] = [
-      new Color(themeColour("--floor-main")),
-      new Color(themeColour("--floor-line")),
-    ];
     const size = box.getSize(new Vector3());
     const squares = 2 * Math.ceil(Math.max(size.x, size.y) / 0.5);
+    const [main, line] = ["--floor-main", "--floor-line"].map(themeColour);
     this.floor = new GridHelper(squares * 0.25, squares, main, line);
     this.floor.rotation.x = Math.PI / 2;
     const whole = (/** @type {number} */ at) => Math.round(at / 0.25) * 0.25;
@@ -157,8 +153,7 @@ export class Stage {
 
   /** @param {KeyboardEvent} event */
   key(event) {
-    const turns = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-    const turn = turns[/** @type {keyof typeof turns} */ (event.key)];
+    const turn = ARROWS[event.key];
     const zoom = { "+": 0.88, "=": 0.88, "-": 1 / 0.88 }[event.key];
     if (event.ctrlKey || event.metaKey || event.altKey || event.shiftKey || (!turn && !zoom))
       return;
