@@ -500,6 +500,7 @@ class Export(Message):
     """A file that can be exported, or why it cannot."""
 
     name: str
+    about: str
     href: str
     ready: bool
     why: str = ""

@@ -83,12 +83,20 @@ def exports_of(result: JobResult, *, settled: bool) -> list[Export]:
     files = "" if settled else WAIT
     script = script_refusal(result.job, [cut.request for cut in result.cuts])
     return [
-        Export(name="job", href="/export/job", ready=True),
-        Export(name="program", href="/export/program", ready=not program, why=program),
-        Export(name="plan.json", href="/export/plan.json", ready=settled, why=files),
-        Export(name="trajectory.csv", href="/export/trajectory.csv", ready=settled, why=files),
-        Export(name="script", href="/export/script", ready=not script, why=script),
-        Export(name="report", href="/report", ready=settled, why=files),
+        Export(name=name, about=about, href=href, ready=not why, why=why)
+        for name, about, href, why in (
+            ("job", "the job file with its comments", "/export/job", ""),
+            ("program", "in the language of the job", "/export/program", program),
+            ("plan.json", "", "/export/plan.json", files),
+            ("trajectory.csv", "one row for each node", "/export/trajectory.csv", files),
+            (
+                "script",
+                "in Python: the same plans from the public functions",
+                "/export/script",
+                script,
+            ),
+            ("report", "on a separate page", "/report", files),
+        )
     ]
 
 

@@ -421,6 +421,7 @@ export interface ProgramMessage {
 /** A file that can be exported, or why it cannot. */
 export interface Export {
   name: string;
+  about: string;
   href: string;
   ready: boolean;
   why: string;

@@ -11,21 +11,15 @@ import { colourKey, draw, html, mount, segments } from "./ui.js";
 
 /** @typedef {import("./curves.js").Kind} Kind */
 
-/** @type {Record<Kind, {title: string, per: string}>} */
+/** @type {Record<Kind, {title: string, per: string, labels: Record<string, string>}>} labels of scales */
 const KINDS = {
-  speed: { title: "Speed", per: "/s" },
-  acceleration: { title: "Accel.", per: "/s\u00b2" },
-  angle: { title: "Angle", per: "" },
-};
-
-/**
- * The labels of the scales of each kind.
- * @type {Record<Kind, Record<string, string>>}
- */
-const SCALES = {
-  speed: { "%": "joint speed, % of limit" },
-  acceleration: { "%": "joint acceleration, % of limit" },
-  angle: { deg: "joint angle, deg", mm: "linear axes, mm" },
+  speed: { title: "Speed", per: "/s", labels: { "%": "joint speed, % of limit" } },
+  acceleration: {
+    title: "Accel.",
+    per: "/s\u00b2",
+    labels: { "%": "joint acceleration, % of limit" },
+  },
+  angle: { title: "Angle", per: "", labels: { deg: "joint angle, deg", mm: "linear axes, mm" } },
 };
 
 export class Plots {
@@ -127,7 +121,7 @@ export class Plots {
             side: /** @type {const} */ ([3, 1])[i],
             grid: i ? { show: false } : grid,
             ticks,
-            label: SCALES[this.kind][scale],
+            label: KINDS[this.kind].labels[scale],
             size: 2.9 * em,
             gap: 3,
             space: 2 * em,

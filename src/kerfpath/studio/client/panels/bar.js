@@ -101,7 +101,7 @@ function exports(extras) {
   const files = store.outcome?.exports ?? [];
   const none = "Files can be exported once every contour is planned.";
   return html`
-    ${files.map(({ name, href, ready, why }) => (ready ? file(name, href, why) : off(name, why)))}
+    ${files.map((each) => (each.ready ? link(each) : off(each.name, each.why)))}
     ${!files.length && off("Nothing yet", none)}
     ${extras.map(({ name, about, why, make }) =>
       why()
@@ -113,30 +113,16 @@ function exports(extras) {
 /** @type {(name: string, why: string | null) => unknown} */
 const off = (name, why) => html`<div class="off">${name}<small>${why}</small></div>`;
 
-/**
- * A link to a file of the server.
- * @param {string} name
- * @param {string} path
- * @param {string | null} why
- */
-function file(name, path, why) {
+/** @param {import("../messages.js").Export} file  a link to it */
+function link({ name, about, href: path }) {
   const token = location.search.slice(1);
   const href = path.slice(1) + (token && (path.includes("?") ? "&" : "?") + token);
   const own = path.startsWith("/report"); // it is shown, not saved
-  const about = ABOUT.find(([begin]) => path.startsWith(begin))?.[1] ?? "";
   return html`
     <a href=${href} download=${own ? null : ""} target=${own ? "_blank" : null}>
-      ${name}<small>${why || about}</small>
+      ${name}<small>${about}</small>
     </a>`;
 }
-
-const ABOUT = [
-  ["/export/script", "in Python: the same plans from the public functions"],
-  ["/export/job", "the job file with its comments"],
-  ["/export/program", "in the language of the job"],
-  ["/export/trajectory", "one row for each node"],
-  ["/report", "on a separate page"],
-];
 
 /** The footer of the page. */
 export function foot() {
