@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import fields
 from itertools import product
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -21,7 +22,10 @@ from kerfpath import (
     Tilt,
 )
 from kerfpath.job.format.tables.plan import PlanTable
+from kerfpath.operations.kerf import Lead, LeadKeywords
 from kerfpath.options import PlanKeywords
+from kerfpath.post.options import ProgramKeywords, ProgramOptions
+from kerfpath.sequence.part import OrderKeywords, OrderOptions
 from reference import plan_options
 
 EVERY = PlanOptions(
@@ -59,6 +63,16 @@ def test_every_option_is_in_the_data_and_in_the_keywords():
     only_whole = {"refine_parts", "between_nodes", "interruptions", "least_piece"}
     only_whole |= {"retract", "floor"}
     assert set(PlanKeywords.__annotations__) == names - only_whole
+
+
+def test_keywords_of_functions_are_fields_of_their_options_with_the_same_types():
+    for keywords, options, others in (
+        (LeadKeywords, Lead, {"length"}),
+        (OrderKeywords, OrderOptions, set()),
+        (ProgramKeywords, ProgramOptions, {"language", "settings"}),
+    ):
+        known = get_type_hints(options)
+        assert get_type_hints(keywords) == {k: known[k] for k in known.keys() - others}
 
 
 CONFLICTS = {
