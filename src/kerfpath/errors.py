@@ -45,10 +45,12 @@ class InputError(KerfpathError, ValueError):
     message : str
     others : sequence of str
         Messages about further faults found at the same time.
+    parameter : str
+        Name of the parameter that is wrong or missing; a job has a key for it.
     """
 
-    def __init__(self, message: str, others: Sequence[str] = ()) -> None:
-        self.others = tuple(others)
+    def __init__(self, message: str, others: Sequence[str] = (), *, parameter: str = "") -> None:
+        self.others, self.parameter = tuple(others), parameter
         line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)
         if len(line) > LONGEST:
             line = f"{line[:BEGINNING]} ... {line[BEGINNING + 5 - LONGEST :]}"

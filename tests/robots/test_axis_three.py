@@ -121,7 +121,7 @@ def test_the_parallel_rod_of_a_description_is_that_of_the_library(tmp_path):
         ("fanuc_m20ia", {"axis_3": "serial"}, "the convention of controllers by FANUC"),
         ("kuka_kr16_2", {"axis_3": "horizontal", "axis_3_limits": [-1, 1]}, "expected 'serial'"),
         ("abb_irb2400_155", {"axis_3": "horizontal"}, 'two limits of axis 3 with "horizontal"'),
-        ("abb_irb2400_155", {"axis_3_limits": [-1, 1]}, 'expected them with axis_3="horizontal"'),
+        ("abb_irb2400_155", {"axis_3_limits": [-1, 1]}, 'expected them with axis_3 = "horizontal"'),
         ("abb_irb4600_60_205", {"axis_3": "serial", "axis_3_limits": [-1, 1]}, "none with"),
         (
             "abb_irb2400_155",

@@ -228,7 +228,7 @@ def test_the_graph_counts_what_no_posture_reaches(offset_wrist):
 
 def test_a_velocity_that_is_missing_is_asked_for(tmp_path):
     path = described(tmp_path, arm_from(*OFFSET_WRIST), '<limit lower="-3" upper="3" effort="1"/>')
-    with pytest.raises(InputError, match="joint 'j1' has no velocity limit; give velocity="):
+    with pytest.raises(InputError, match="joint 'j1' has no velocity limit; give velocity"):
         Robot.from_urdf(path)
 
 

@@ -152,10 +152,10 @@ def test_accelerations_of_every_joint_are_read_the_smaller_of_both_ways(tmp_path
 @pytest.mark.parametrize(
     ("limit", "message"),
     [
-        ("", "joint 'j1' has no position limits; give lower= and upper= for all 6 joints"),
+        ("", "joint 'j1' has no position limits; give lower and upper for all 6 joints"),
         ('<limit velocity="1"/>', "joint 'j1' has no position limits"),
         ('<limit lower="0" upper="0" velocity="1"/>', "has the same lower and upper limit, 0 rad"),
-        ('<limit lower="-3" upper="3"/>', "joint 'j1' has no velocity limit; give velocity="),
+        ('<limit lower="-3" upper="3"/>', "joint 'j1' has no velocity limit; give velocity"),
         ('<limit lower="-3" upper="3" velocity="0"/>', "the velocity limit 0 rad/s, so it"),
     ],
 )
@@ -223,7 +223,7 @@ def test_angles_of_few_digits_are_taken_as_meant_only_when_asked(tmp_path, name,
         Robot.from_urdf(path)
     assert monotonic() - begun < 10  # not the minutes of a solver
     said = re.search(
-        r"snap=(\S+) to round them, .* up to (\S+) mm and (\S+) deg; or snap=0 to keep",
+        r"\((\S+) rad\) rounds them, .* up to (\S+) mm and (\S+) deg; a snap of 0 keeps",
         str(asked.value),
     )
     snap, off, turned = (float(word) for word in said.groups())
@@ -296,7 +296,7 @@ def test_bodies_are_where_the_links_are(tmp_path):
     c4 = robot("staubli_tx60").geometry["c4"]
     np.testing.assert_allclose(bodies["tool0"].pose[:3, 3], [0, 0, c4 + 0.25], atol=1e-12)
     (tmp_path / "my_robot" / "meshes" / "arm.stl").unlink()
-    with pytest.raises(InputError, match=r"link 'link_1': the mesh .* was not found; .*packages="):
+    with pytest.raises(InputError, match=r"link 'link_1': the mesh .* was not found; .*packages"):
         Robot.from_urdf(path)
     assert Robot.from_urdf(path, meshes=False).bodies == ()
 

@@ -80,7 +80,8 @@ def axis_3_of(
     if counted:
         return _given(arm, maker, limits, counted, shown)
     if shown is not None:
-        raise InputError('axis_3_limits=: expected them with axis_3="horizontal", got no axis_3=')
+        said = 'axis_3_limits: expected them with axis_3 = "horizontal", got no axis_3'
+        raise InputError(said, parameter="axis_3_limits")
     return _looked_up(arm, maker)
 
 
@@ -121,22 +122,26 @@ def _given(arm: Arm, maker: str, limits: RobotLimits, given: str, shown: ArrayLi
     if given not in expected:
         raise InputError(
             f"axis_3: expected {' or '.join(map(repr, expected))}, the convention of controllers "
-            f"by {maker or 'any maker'}, got {given!r}"
+            f"by {maker or 'any maker'}, got {given!r}",
+            parameter="axis_3",
         )
     found = _looked_up(arm, maker)
     if found.counted not in ("", given):
-        raise InputError(f"axis_3: expected {found.counted!r}, got {given!r}. {found.notes[0]}")
+        said = f"axis_3: expected {found.counted!r}, got {given!r}. {found.notes[0]}"
+        raise InputError(said, parameter="axis_3")
     if (given == "horizontal") != (shown is not None):
         raise InputError(
-            'axis_3_limits=: expected the two limits of axis 3 with "horizontal", and none with '
-            f'"serial", got {"none" if shown is None else "them"} with {given!r}'
+            'axis_3_limits: expected the two limits of axis 3 with "horizontal", and none with '
+            f'"serial", got {"none" if shown is None else "them"} with {given!r}',
+            parameter="axis_3_limits",
         )
     if shown is None:
         return Axis3(counted=given, couplings=limits.couplings)
     if arm.kinematics != "opw":
         raise InputError(
             f'axis_3: expected "serial", because an arm of family {arm.kinematics!r} has no '
-            "upper arm between axes 3 and 4 that a parallel rod could hold, got 'horizontal'"
+            "upper arm between axes 3 and 4 that a parallel rod could hold, got 'horizontal'",
+            parameter="axis_3",
         )
     low, high = floats(shown, "axis_3_limits", (2,))
     row, shift = _level(arm, maker)
@@ -150,8 +155,9 @@ def _given(arm: Arm, maker: str, limits: RobotLimits, given: str, shown: ArrayLi
         if ends[1] <= one.lower or ends[0] >= one.upper:
             allowed = np.degrees(ends + shift).round(2).tolist()
             raise InputError(
-                f"axis_3_limits=: {np.degrees([low, high]).round(2).tolist()} deg is outside the "
-                f"range of axis 3 that the limits of joints 2 and 3 allow, {allowed} deg"
+                f"axis_3_limits: {np.degrees([low, high]).round(2).tolist()} deg is outside the "
+                f"range of axis 3 that the limits of joints 2 and 3 allow, {allowed} deg",
+                parameter="axis_3_limits",
             )
     return Axis3(counted=given, couplings=(one,))
 

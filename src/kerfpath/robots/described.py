@@ -52,15 +52,16 @@ def read_description(path: str | Path, snap: float | None, keywords: ChainKeywor
     off, turned = _moved(found, whole)
     raise InputError(
         f"{found.path} ({found.base} to {found.tip}): the arm as written belongs to no family "
-        "with a closed form, but it does with its angles rounded to 15 deg. Use "
-        f"snap={least:g} to round them, which moves the tip by up to {off * 1e3:.2g} mm and "
-        f"{np.degrees(turned):.2g} deg"
+        "with a closed form, but it does with its angles rounded to 15 deg. A snap of "
+        f"{np.degrees(least):.1g} deg ({least:g} rad) rounds them, which moves the tip by up to "
+        f"{off * 1e3:.2g} mm and {np.degrees(turned):.2g} deg"
         + (
-            "; or snap=0 to keep the angles as a general arm, whose solver may need minutes to "
+            "; a snap of 0 keeps the angles as a general arm, whose solver may need minutes to "
             "prepare"
             if len(found.joints) == 6
             else ""
-        )
+        ),
+        parameter="snap",
     )
 
 
@@ -119,13 +120,14 @@ def _ranges(description: Description, given: LimitKeywords) -> tuple[Array, Arra
         if joint.kind == "continuous" or free[i]:
             continue
         if (joint.lower is None and lower is None) or (joint.upper is None and upper is None):
-            raise _lacks(description, joint.name, "has no position limits", "lower= and upper=")
+            raise _lacks(description, joint.name, "has no position limits", "lower", "upper")
         if joint.lower == joint.upper and (lower is None or upper is None):
             raise _lacks(
                 description,
                 joint.name,
                 f"has the same lower and upper limit, {joint.lower:g} rad, so it cannot move",
-                "lower= and upper=",
+                "lower",
+                "upper",
             )
         low[i], high[i] = joint.lower or 0.0, joint.upper or 0.0
     return (
@@ -162,21 +164,22 @@ def _require_positive(
     for joint, value in zip(description.joints, found, strict=True):
         if value is not None and value <= 0:
             what = f"has the {name} limit {value:g} {unit}, so it cannot move"
-            raise _lacks(description, joint.name, what, f"{name}=")
+            raise _lacks(description, joint.name, what, name)
 
 
 def _velocity(description: Description) -> Array:
     for joint in description.joints:
         if joint.velocity is None:
-            raise _lacks(description, joint.name, "has no velocity limit", "velocity=")
+            raise _lacks(description, joint.name, "has no velocity limit", "velocity")
         if joint.velocity <= 0:
             what = f"has the velocity limit {joint.velocity:g} rad/s, so it cannot move"
-            raise _lacks(description, joint.name, what, "velocity=")
+            raise _lacks(description, joint.name, what, "velocity")
     return np.array([joint.velocity for joint in description.joints], dtype=float)
 
 
-def _lacks(description: Description, joint: str, what: str, keys: str) -> InputError:
+def _lacks(description: Description, joint: str, what: str, *parameters: str) -> InputError:
     return InputError(
-        f"{description.path}: joint {joint!r} {what}; give {keys} for all "
-        f"{len(description.joints)} joints (rad, rad/s)"
+        f"{description.path}: joint {joint!r} {what}; give {' and '.join(parameters)} for all "
+        f"{len(description.joints)} joints",
+        parameter=parameters[0],
     )

@@ -108,11 +108,11 @@ class KnownAxis:
             value, known = given[key], getattr(self, key)
             if value is None and known is None:
                 what = f"its {key} is not known from {self.source}"
-                raise InputError(f"{axis.name}: {what}; give {key}= ({axis.unit}{per})")
+                raise InputError(f"{axis.name}: {what}; give {key}", parameter=key)
             if value is None and per and not known > 0:
                 what = f"its {key} is {known:g} {axis.unit}{per} in {self.source}"
                 raise InputError(
-                    f"{axis.name}: {what}, so it cannot move; give {key}= ({axis.unit}{per})"
+                    f"{axis.name}: {what}, so it cannot move; give {key}", parameter=key
                 )
             values[key] = known if value is None else value
         if values["lower"] == values["upper"] and (
@@ -120,7 +120,8 @@ class KnownAxis:
         ):
             raise InputError(
                 f"{axis.name}: its lower and upper limit are both {values['lower']:g} {axis.unit} "
-                f"in {self.source}, so it cannot move; give lower= and upper= ({axis.unit})"
+                f"in {self.source}, so it cannot move; give lower and upper",
+                parameter="lower",
             )
         return axis, {
             "lower": values["lower"],

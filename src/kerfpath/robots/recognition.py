@@ -122,7 +122,7 @@ def recognise(chain: KinematicChain, *, as_written: bool = False) -> tuple[Arm, 
         raise InputError(
             f"nearly an {words}, but it differs by {miss:.1e} (m and rad, at most {EXACT:g} is "
             "allowed); write its axes and lengths with more digits"
-            + (", or read the arm as written with snap=0" if n == 6 else "")
+            + (", or read the arm as written with a snap of 0" if n == 6 else "")
         )
     if n == 7:
         raise InputError(

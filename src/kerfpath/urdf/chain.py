@@ -108,7 +108,7 @@ def under_part(tree: Tree, base: str, part: str | None, chain: Sequence[Joint]) 
     if link not in ground:
         raise InputError(
             f"{tree.path}: part: link {part!r} is not connected to what base {base!r} is fixed to; "
-            "choose base= above both of them"
+            "choose base above both of them"
         )
     if all(joint.kind == "fixed" for joint in joints):
         raise InputError(

@@ -122,8 +122,9 @@ def _mesh_file(
         raise InputError(f"{where}: the mesh {name!r} is not a local file")
     if not name or not file.is_file():
         raise InputError(
-            f"{where}: the mesh {name!r} was not found; give the folder of its package with "
-            'packages={"NAME": "FOLDER"}, or read only the kinematics with meshes=False'
+            f"{where}: the mesh {name!r} was not found; give the folder of its package in "
+            "packages, or read only the kinematics, without meshes",
+            parameter="packages",
         )
     return file
 
@@ -535,7 +536,7 @@ def _require_revolute(tree: Tree, joint: Joint) -> None:
     if joint.kind not in ("revolute", "continuous"):
         raise InputError(
             f"{tree.path}: joint {joint.name!r} between base and tip is {joint.kind}; an arm must "
-            "have revolute joints only; choose base= or tip= on this side of it"
+            "have revolute joints only; choose base or tip on this side of it"
         )
     if joint.mimics:
         raise InputError(

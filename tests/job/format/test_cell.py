@@ -495,7 +495,7 @@ def test_weights_are_one_for_every_joint(folder):
 def test_a_description_without_speeds_asks_for_them_in_the_job_s_words(folder, arm):
     described(folder, arm, inside='<limit lower="-3" upper="3" effort="1"/>')
     robot = '[robot]\nurdf = "arm.urdf"\nacceleration_deg_s2 = [1, 1, 1, 1, 1, 1]\n'
-    with pytest.raises(InputError, match=r"robot\.urdf: .*velocity_deg_s .*\(deg, deg/s\)"):
+    with pytest.raises(InputError, match=r"robot\.velocity_deg_s: .*give velocity for all 6"):
         read_job(job(folder, free(robot)))
 
 

@@ -263,12 +263,14 @@ def test_a_fault_of_a_joint_is_said_in_one_line(tables, keys, message, tmp_path)
         read_job(described_job(tmp_path, tables, keys))
 
 
-def test_a_joint_that_cannot_move_is_said_in_the_keys_of_a_job(tmp_path):
+def test_a_joint_that_cannot_move_is_refused_at_the_key_that_it_needs(tmp_path):
     path = described_job(tmp_path, RAIL_JOINT + TILT_JOINT)
     description = tmp_path / "cell.urdf"
     text = description.read_text()
     description.write_text(text.replace('velocity="1.5"', 'velocity="0"', 1))
-    with pytest.raises(InputError, match=r"velocity is 0 m/s .* cannot move; give velocity_mm_s$"):
+    with pytest.raises(
+        InputError, match=r"velocity_mm_s: rail: its velocity is 0 m/s .*; give velo"
+    ):
         read_job(path)
 
 

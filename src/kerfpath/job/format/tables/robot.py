@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -38,7 +38,6 @@ from kerfpath.job.format.values import (
 )
 from kerfpath.robots import (
     FAMILIES,
-    SNAPS,
     Arm,
     ExternalAxis,
     KnownAxis,
@@ -51,30 +50,6 @@ from kerfpath.robots import (
     robot_ids,
 )
 from kerfpath.urdf import Description, read_urdf
-
-# -----------------------------------------------------------------------------
-# Messages that advise Python arguments, translated into the keys of a job.
-
-IN_KEYS = {
-    "lower= and upper=": "lower_deg and upper_deg",
-    "velocity=": "velocity_deg_s",
-    "(rad, rad/s)": "(deg, deg/s)",
-    **{f"snap={snap:g}": f"snap_deg = {np.degrees(snap):.1g}" for snap in (*SNAPS, 0.0)},
-    'packages={"NAME": "FOLDER"}, or read only the kinematics with meshes=False': (
-        'packages = { NAME = "FOLDER" }'
-    ),
-    "choose base= or tip=": "choose base or tip",
-    "axis_3_limits=": "axis_3_deg",
-}
-"""Python arguments in messages about descriptions, and the keys of a job in their place."""
-
-
-def in_keys(said: str, words: Mapping[str, str] = IN_KEYS) -> str:
-    """Return a message with keys of a job file in place of Python arguments."""
-    for python, ours in words.items():
-        said = said.replace(python, ours)
-    return said
-
 
 # -----------------------------------------------------------------------------
 # The [[robot.external]] tables: rails, turntables and tilts that move with the robot.
@@ -91,8 +66,6 @@ KEYS = {
 """Keys of each kind: range, speed, acceleration, step of a grid, home."""
 FACTORS = {"linear": 1e-3, "rotary": float(np.pi / 180)}
 """Factor from the unit of these keys to m or rad."""
-WORDS = ("lower=", "upper=", "velocity=", "acceleration=")
-"""The Python arguments that messages name in place of the first of these keys."""
 NAME = r"^[A-Za-z][A-Za-z0-9_]{0,15}$"
 WHOLE = ("kind", "carries", "axis", "point_mm", "xyz_mm", "rpy_deg")
 """Keys that define an axis and its place; a joint of a description has all of them."""
@@ -214,9 +187,9 @@ class ExternalTable(Table):
                 step=step,
             )
         except InputError as error:
-            words = dict(zip(WORDS, KEYS[kind], strict=False))
-            said = re.sub(r" \(\S+\)$", "", in_keys(f"{error}", words))  # the unit is in the key
-            raise fault_in_words(said, ("joint",)) from None
+            about = error.parameter or "joint"
+            where = next((name for name in KEYS[kind] if name.startswith(about)), "joint")
+            raise fault_in_words(f"{error}", (where,)) from None
         ends, home = (travel["lower"], travel["upper"]), self.home
         least, most = (f"{end / factor:g}" for end in ends)
         if not ends[0] <= ends[1]:
@@ -380,6 +353,12 @@ SOURCES = {
 }
 """The three ways to name the robot, and the keys that belong to each."""
 LIMITS = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2")
+KEY_OF = {
+    "lower": "lower_deg", "velocity": "velocity_deg_s", "acceleration": "acceleration_deg_s2",
+    "jerk": "jerk_deg_s3", "snap": "snap_deg", "packages": "packages", "axis_3": "axis_3",
+    "axis_3_limits": "axis_3_deg",
+}  # fmt: skip
+"""The key for each parameter of `Robot.from_urdf` that its errors are about."""
 
 
 class RobotTable(Table):
@@ -505,10 +484,9 @@ class RobotTable(Table):
             self._require_for_each_joint(self.joints(folder))
             known = self._known(folder)
         except InputError as error:
-            said = in_keys(str(error))
-            keys = "axis_3_deg", "axis_3", "urdf" if self.urdf else "geometry_mm"
-            where = next((k for k in keys[:2] if said.startswith(f"{k}: ")), keys[2])
-            raise fault_in_words(said.removeprefix(f"{where}: "), (where,)) from None
+            where = KEY_OF.get(error.parameter, "urdf" if self.urdf else "geometry_mm")
+            said = f"{error}".removeprefix(f"{error.parameter}: ")
+            raise fault_in_words(said, (where,)) from None
         if len(given(self, "acceleration_deg_s2", "acceleration_ratio")) == 2:
             expected = "acceleration_deg_s2 or acceleration_ratio"
             raise fault(expected, "both", "remove one", ("acceleration_ratio",))
