@@ -421,15 +421,15 @@ def _positions(
     limits = plan.robot.joint_limits()
     left = np.zeros(plan.q.shape) if rounding is None else rounding.q
     left = np.maximum(left[:-1], left[1:])
-    arm, bound = plan.robot.family.joints, ~plan.robot.endless
-    rows, own = [], slice(arm)
-    for i, axis in enumerate(plan.robot.externals, arm):
+    first, bound = plan.robot.arm.joints, ~plan.robot.endless  # the first external axis
+    rows, own = [], slice(first)
+    for i, axis in enumerate(plan.robot.externals, first):
         if bound[i]:
             x = motion.q[..., i]
             over = np.maximum(limits.lower[i] - x, x - limits.upper[i]).max(axis=1)
             title = f"excess over the limits of {axis.name}"
             rows.append(check_worst("external-limits", title, over, LIMIT_SLACK, axis.unit))
-    bound[arm:] = False
+    bound[first:] = False
     if bound.any():
         n = len(bound)
         beyond = np.maximum(limits.lower - reached.low[:, :n], reached.high[:, :n] - limits.upper)

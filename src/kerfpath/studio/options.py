@@ -185,8 +185,8 @@ def options_message(robot: Robot | None, external: Sequence[str] = ()) -> Option
 
 def _external(robot: Robot, names: Sequence[str]) -> Iterator[OptionField]:
     """Yield the fields of external axes, with the keys of their kinds."""
-    arm = len(robot.endless) - len(robot.externals)
-    axes = {axis.name: (axis, robot.endless[arm + i]) for i, axis in enumerate(robot.externals)}
+    n = robot.arm.joints
+    axes = {axis.name: (axis, robot.endless[n + i]) for i, axis in enumerate(robot.externals)}
     for i, name in enumerate(names):
         axis, endless = axes[name]
         unit = "deg" if axis.kind == "rotary" else "mm"

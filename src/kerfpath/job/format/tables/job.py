@@ -354,11 +354,11 @@ class JobFile(Table):
     def _one_for_every_joint(self, info: ValidationInfo) -> JobFile:
         home = None if self.sequence is None else self.sequence.home_deg
         given = {("plan", "weights"): self.plan.weights, ("sequence", "home_deg"): home}
-        arm, more = self.robot.joints(folder_of(info)), len(self.robot.axes(folder_of(info)))
+        n, more = self.robot.joints(folder_of(info)), len(self.robot.axes(folder_of(info)))
         for where, numbers in given.items():
-            joints = arm + more * (where[1] == "weights")
+            joints = n + more * (where[1] == "weights")
             if numbers is not None and len(numbers) != joints:
-                axes = f", {more} of them for external axes" if joints > arm else ""
+                axes = f", {more} of them for external axes" if joints > n else ""
                 expected = f"{joints} numbers, one for every joint{axes}"
                 raise fault(expected, f"{len(numbers)}", "give as many", where)
         return self
