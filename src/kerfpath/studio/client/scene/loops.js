@@ -1,9 +1,10 @@
 /** The loops of the part that are not cut: thin lines, some highlighted, and the one pointed at. */
 
-import { Group, Raycaster, Vector2, Vector3 } from "three";
+import { Group, Raycaster, Vector2 } from "three";
 
 import { fill, line, paintLines } from "./paths.js";
 
+/** @import { Intersection, Object3D } from "three" */
 /** @typedef {import("../messages.js").LoopEntry} Loop */
 /** @typedef {import("../messages.js").PartMessage} PartMessage */
 /** @typedef {import("./stage.js").Stage} Stage */
@@ -20,6 +21,7 @@ export class Loops {
     /** @type {Loop[]} those that are shown */
     this.shown = [];
     this.ray = new Raycaster();
+    Object.assign(this.ray.params, { Line2: { threshold: 2 * REACH } }); // px, on both sides together
   }
 
   /** Take the colours and the text size of the theme. */
@@ -39,17 +41,21 @@ export class Loops {
   }
 
   /**
-   * Return the first hit under a place of the canvas, and its distance; null: nothing.
+   * Return what is hit under a place of the canvas, the nearest first.
    * @param {Stage} stage
    * @param {number} x  px
    * @param {number} y  px
-   * @param {import("three").Object3D} among
+   * @param {Object3D} among
    */
-  struck(stage, x, y, among) {
-    const { size, camera } = stage;
+  hits({ size, camera }, x, y, among) {
+    camera.updateMatrixWorld();
     this.ray.setFromCamera(new Vector2((2 * x) / size.x - 1, 1 - (2 * y) / size.y), camera);
-    const hits = this.ray.intersectObject(among, true);
-    return hits.find(({ object }) => "isMesh" in object) ?? null;
+    return this.ray.intersectObject(among, true);
+  }
+
+  /** @type {(stage: Stage, x: number, y: number, among: Object3D) => Intersection | null} a mesh */
+  struck(stage, x, y, among) {
+    return this.hits(stage, x, y, among).find(({ object }) => "isMesh" in object) ?? null;
   }
 
   /**
@@ -60,31 +66,29 @@ export class Loops {
    * @param {number} deepest  m from the camera, beyond which what is hit hides it
    */
   pointed(stage, x, y, deepest) {
-    const { camera, size } = stage;
-    camera.updateMatrixWorld();
-    const seen = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse);
-    const m = seen.multiply(this.group.matrix).elements;
-    const at = new Vector3();
     /** @type {{loop: Loop, away: number} | null} */
     let best = null;
-    for (const loop of this.shown) {
-      const { points } = loop;
-      let [px, py, behind] = [0, 0, true];
-      for (let i = 0; i < points.length; i += 3) {
-        const [a, b, c] = [points[i], points[i + 1], points[i + 2]];
-        const w = m[3] * a + m[7] * b + m[11] * c + m[15];
-        const sx = (((m[0] * a + m[4] * b + m[8] * c + m[12]) / w + 1) / 2) * size.x;
-        const sy = ((1 - (m[1] * a + m[5] * b + m[9] * c + m[13]) / w) / 2) * size.y;
-        const away = behind ? Infinity : toSegment(x, y, px, py, sx, sy);
-        [px, py, behind] = [sx, sy, w <= 0];
-        if (away >= (best?.away ?? REACH)) continue;
-        at.set(a, b, c).applyMatrix4(this.group.matrix);
-        if (at.distanceTo(camera.position) > deepest + THICK) continue;
-        best = { loop, away };
-      }
+    for (const { faceIndex, pointOnLine, distance } of this.hits(stage, x, y, this.all)) {
+      const loop = owner(this.shown, ({ points }) => points.length / 3 - 1, faceIndex ?? -1);
+      if (!loop || !pointOnLine || distance > deepest + THICK) continue;
+      const seen = stage.project(pointOnLine);
+      const away = Math.hypot(seen.x - x, seen.y - y);
+      if (away < (best?.away ?? REACH)) best = { loop, away };
     }
     return best;
   }
+}
+
+/**
+ * Return the entry that a segment or triangle belongs to, from how many each entry has.
+ * @template T
+ * @param {T[]} entries
+ * @param {(entry: T) => number} count
+ * @param {number} index
+ */
+function owner(entries, count, index) {
+  let end = 0;
+  return entries.find((each) => index < (end += count(each)));
 }
 
 /**
@@ -92,28 +96,5 @@ export class Loops {
  * @param {PartMessage} part
  * @param {number} triangle
  */
-export function faceOf(part, triangle) {
-  let end = 0;
-  for (const { name, triangles } of part.faces) {
-    end += triangles;
-    if (triangle < end) return name;
-  }
-  return "";
-}
-
-/**
- * Return the distance of a point from a segment.
- * @param {number} x
- * @param {number} y
- * @param {number} ax
- * @param {number} ay
- * @param {number} bx
- * @param {number} by
- */
-function toSegment(x, y, ax, ay, bx, by) {
-  const [dx, dy] = [bx - ax, by - ay];
-  const square = dx * dx + dy * dy;
-  const share = square ? ((x - ax) * dx + (y - ay) * dy) / square : 0;
-  const u = Math.min(1, Math.max(0, share));
-  return Math.hypot(x - ax - u * dx, y - ay - u * dy);
-}
+export const faceOf = ({ faces }, triangle) =>
+  owner(faces, ({ triangles }) => triangles, triangle)?.name ?? "";
