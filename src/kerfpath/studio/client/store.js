@@ -303,9 +303,9 @@ export class Store extends Messages {
   /**
    * Return a key of the options that decide the meaning of a plan's cost.
    * @param {PlanMessage} plan
+   * @param {{metric?: string, objective?: string}} [options]  default: of the job
    */
-  question(plan) {
-    const { metric, objective } = this.job?.values?.plan ?? {};
+  question(plan, { metric, objective } = this.job?.values?.plan ?? {}) {
     return `${metric} ${objective} ${plan.weights.map((weight) => weight.toPrecision(6))}`;
   }
 

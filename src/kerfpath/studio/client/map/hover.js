@@ -161,13 +161,11 @@ export class Hover {
   /** @param {import("../messages.js").PoseMessage} pose */
   answered(pose) {
     const { cell, chart, grid } = this;
-    if (!cell || !chart.grid || pose.contour !== grid.message.contour || pose.node !== cell.node)
-      return;
-    if (
-      grid.sampleAt(pose.gamma) !== cell.sample ||
-      pose.posture !== grid.layers[chart.layer].posture
-    )
-      return;
+    if (!cell || !chart.grid) return;
+    const { posture } = grid.layers[chart.layer];
+    const here = [grid.message.contour, cell.node, cell.sample, posture].join(" ");
+    const there = [pose.contour, pose.node, grid.sampleAt(pose.gamma), pose.posture].join(" ");
+    if (here !== there) return;
     this.haunt(pose.q, pose.admitted);
     const [head, rest] = pose.reason.split(/: (.*)/s);
     const numbers = rest ?? this.numbers(head, pose.q);

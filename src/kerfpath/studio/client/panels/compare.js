@@ -144,13 +144,10 @@ function comparison({ entry, plans }, live, view) {
 }
 
 /** @type {(entry: KeptEntry, then: PlanMessage[], now: PlanMessage[]) => unknown} */
-function figures({ name, metric, objective, cycle }, then, now) {
+function figures(entry, then, now) {
+  const { name, cycle } = entry;
   const { outcome } = store;
-  const options = store.job?.values?.plan ?? {};
-  const weights = (/** @type {PlanMessage[]} */ plans) =>
-    plans[0].weights.map((each) => each.toPrecision(6)).join(" ");
-  const alike =
-    metric === options.metric && objective === options.objective && weights(then) === weights(now);
+  const alike = store.question(then[0], entry) === store.question(now[0]);
   const known = outcome && !store.stale(outcome) ? outcome.cycle : null;
   const axes = axesOf(store.scene?.robot);
   const more = { alike, axes };
