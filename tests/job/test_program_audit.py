@@ -373,7 +373,7 @@ def test_planning_again_keeps_speed_postures_and_limits(folder, circle, arm, too
 
 def test_bad_arguments_are_refused(folder, written):
     (folder / "x.mod").write_bytes(b"\xff\xfe\x00MODULE")
-    assert "cannot be read as text" in refused(
+    assert "must not contain the character U+0000" in refused(
         "audit", str(folder / "x.mod"), "--job", str(folder / "job.toml")
     )
     assert "a program is compared with its job" in refused("audit", str(folder / "out/job.mod"))

@@ -300,7 +300,7 @@ def test_preflight_refuses_a_speed_beyond_that_of_the_settings(program):
         (AIR, "///TOOL 0", "///TOOL 1", "line 5: expected '///TOOL 0', got '///TOOL 1'"),
         (AIR, "C00000=", "C00001=", "expected position C00000"),
         (AIR, "SC,RW", "SC,RW,RJ", "expected '///ATTR SC,RW'"),
-        (AIR, "VJ=25.00", "VJ=25", "not expected here: 'MOVJ"),
+        (AIR, "VJ=25.00", "VJ=25,0", "not expected here: 'MOVJ"),
         (AIR, "MOVJ C00000", "MOVJ C00001", "C00001 is missing"),
         (AIR, "MOVJ C00000 VJ=25.00", "MOVL C00000 V=25.0", "needs a position in the user frame"),
         (AIR, "PL=0", "PL=2", "expected PL=0 or PL=1, got PL=2"),

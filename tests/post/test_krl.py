@@ -250,8 +250,7 @@ def test_preflight_refuses_a_joint_move_that_rounds_its_corner(program):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("&ACCESS RVP\r\n", "", "cut_skin_outer.src, line 1: not expected here: '&REL 1'"),
-        ("&REL 1\r\n", "", "line 2: expected &REL 1 before"),
+        ("&ACCESS RVP\r\n", "$OUT[5]=TRUE\r\n", "cut_skin_outer.src, line 1: not expected here"),
         ("DEF cut_skin_outer()", "DEF other()", "line 3: the first routine must have the name"),
         ("END\r\n\r\nDEF", "END\r\n\r\nHALT\r\nDEF", "not expected here: 'HALT'"),
         ("BAS(#INITMOV,0)\r\n", "", "line 13: not expected here: '$ADVANCE=5'"),

@@ -33,6 +33,10 @@ COARSEST = np.radians(45.0)
 """Largest sweep between nodes on an arc, rad, if its contour is known."""
 
 
+ENCODINGS = ("utf-8-sig", "cp1252")
+"""Encodings of programs: ours, and that of European controllers in remarks."""
+
+
 class _Folder(Mapping[str, str]):
     """The text files of a folder by name, read when they are asked for."""
 
@@ -42,12 +46,25 @@ class _Folder(Mapping[str, str]):
     def __getitem__(self, name: str) -> str:
         path = self.folder / name
         if not path.is_file():
-            raise KeyError(name)
+            path = self.folder / self._spelled(name)
         try:
-            return path.read_bytes().decode("utf-8-sig")
-        except (OSError, UnicodeDecodeError) as error:
+            text = path.read_bytes()
+        except OSError as error:
             why = " ".join(str(error).split())
-            raise InputError(f"{path}: cannot be read as text ({why})") from None
+            raise InputError(f"{path}: cannot be read ({why})") from None
+        for encoding in ENCODINGS:
+            try:
+                return text.decode(encoding)
+            except UnicodeDecodeError:
+                continue
+        raise InputError(f"{path}: expected text in {' or '.join(ENCODINGS)}; write it again")
+
+    def _spelled(self, name: str) -> str:
+        """Return the name of the one file whose name differs in its case alone."""
+        alike = [each for each in self if each.lower() == name.lower()]
+        if len(alike) != 1:
+            raise KeyError(name)
+        return alike[0]
 
     def __iter__(self) -> Iterator[str]:
         return (path.name for path in self.folder.iterdir())

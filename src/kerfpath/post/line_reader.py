@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from kerfpath.errors import InputError
 from kerfpath.post.flow import section_of
+from kerfpath.post.harmless import CASELESS, LinePattern, compact, harmless_lines, without_remark
 from kerfpath.post.languages import LanguageSettings, handshakes
 from kerfpath.post.program import (
     Await,
@@ -46,12 +47,12 @@ NOT_TEXT = re.compile(r"[\0-\x08\v\f\x0e-\x1f\x7f-\x9f\u2028\u2029]|\r(?!\n)")
 """Control characters and separators of lines, without the tab and the ends of lines."""
 
 
-def patterns(by_kind: Mapping[str, str]) -> dict[str, re.Pattern[str]]:
-    """Return regular expressions of lines by their kind, compiled; digits and letters are ASCII."""
-    return {kind: re.compile(pattern, re.ASCII) for kind, pattern in by_kind.items()}
+def patterns(by_kind: Mapping[str, str], *, caseless: bool = False) -> dict[str, LinePattern]:
+    """Return the patterns of lines by their kind."""
+    return {kind: LinePattern(pattern, caseless=caseless) for kind, pattern in by_kind.items()}
 
 
-def only(by_kind: Mapping[str, re.Pattern[str]], *kinds: str) -> dict[str, re.Pattern[str]]:
+def only(by_kind: Mapping[str, LinePattern], *kinds: str) -> dict[str, LinePattern]:
     """Return the regular expressions of some kinds of lines."""
     return {kind: by_kind[kind] for kind in kinds}
 
@@ -83,10 +84,13 @@ def program_lines(file: str, text: str, first: int = 1) -> list[str]:
     return text.splitlines()
 
 
-def statements(lines: Iterable[str], comment: str, first: int = 1) -> list[tuple[int, str]]:
-    """Return the lines that are neither blank nor comments, stripped, with their numbers."""
-    numbered = ((number, line.strip()) for number, line in enumerate(lines, first))
-    return [(n, line) for n, line in numbered if line and not line.startswith(comment)]
+def statements(lines: Iterable[str], mark: str, first: int = 1) -> list[tuple[int, str]]:
+    """Return the lines that are not empty without their remarks, with their numbers.
+
+    A remark goes from `mark` to the end of its line.
+    """
+    numbered = ((n, without_remark(line, mark).strip(" \t")) for n, line in enumerate(lines, first))
+    return [(n, line) for n, line in numbered if line]
 
 
 class LineReader:
@@ -104,6 +108,10 @@ class LineReader:
     """
 
     settings: Any
+    language = ""
+    """Name of the language, whose harmless lines are ignored, and case if it is in `CASELESS`."""
+    words: Sequence[str] = ()
+    """Names and words of the language in the spelling that methods get."""
     too_early = "the text ends too early"
 
     def __init__(
@@ -114,8 +122,14 @@ class LineReader:
         rows: Sequence[tuple[int, str]] = (),
     ) -> None:
         self.file, self.robot, self.settings = file, robot, settings
-        self.rows, self.row = rows, -1
+        self.harmless = harmless_lines(self.language)
+        self.rows = [(line, row) for line, row in rows if not self.harmless.fullmatch(row)]
+        self.row = -1
         self.line, self.text = 0, ""
+        self.spellings = {word.lower(): word for word in self.words}
+        for value in dict(settings).values():
+            if isinstance(value, str):
+                self.spellings.setdefault(value.lower(), value)
         self.steps: list[FlowStep] = []
         """Steps of the routine that is being read."""
         self.asked_before: Sequence[Handshake] = ()
@@ -124,7 +138,7 @@ class LineReader:
         """Lines at which the loops begin that are being read, the innermost last."""
         self.required: list[str] = []
         """Lines that must come next, exactly."""
-        self.flow_lines: Mapping[str, re.Pattern[str]] | None = None
+        self.flow_lines: Mapping[str, LinePattern] | None = None
         """Patterns of those lines, see `require_next`."""
 
     # Lines.
@@ -154,7 +168,7 @@ class LineReader:
             raise self.fault(self.too_early)
         return row
 
-    def take(self, pattern: re.Pattern[str], what: str) -> tuple[str, ...]:
+    def take(self, pattern: LinePattern | re.Pattern[str], what: str) -> tuple[str, ...]:
         """Return the groups of this row, which must match, and go to the next one."""
         match = pattern.fullmatch(self.text)
         if match is None:
@@ -163,7 +177,7 @@ class LineReader:
         return match.groups()
 
     def expect(
-        self, lines: Iterable[str], flow_lines: Mapping[str, re.Pattern[str]] | None = None
+        self, lines: Iterable[str], flow_lines: Mapping[str, LinePattern] | None = None
     ) -> None:
         """Pass over lines that must come here, exactly; `flow_lines` is that of `require_next`."""
         for line in lines:
@@ -173,35 +187,69 @@ class LineReader:
             self.advance()
 
     def require_next(
-        self, lines: Iterable[str], flow_lines: Mapping[str, re.Pattern[str]] | None = None
+        self, lines: Iterable[str], flow_lines: Mapping[str, LinePattern] | None = None
     ) -> None:
         """Require these lines to come next, exactly.
 
         If they have a flow of control, `flow_lines` has the patterns of them all by the method here
         that reads them; "" has those that do nothing to it.
         """
-        self.required, self.flow_lines = list(lines), flow_lines
+        self.required = [line for line in lines if not self.harmless.fullmatch(line)]
+        self.flow_lines = flow_lines
+
+    def plain(self, row: str) -> str:
+        """Return a row as it is compared: without needless blanks."""
+        return compact(row)
+
+    def same(self, row: str, expected: str) -> bool:
+        """Return whether two rows are the same for the controller."""
+        if row == expected:
+            return True
+        one, other = self.plain(row), self.plain(expected)
+        if self.language in CASELESS and one.isascii():
+            return one.lower() == other.lower()
+        return one == other
+
+    def spelled(self, word: str) -> str:
+        """Return a name as it was spelled first, if case makes no difference."""
+        if self.language not in CASELESS or not word.isidentifier():
+            return word
+        return self.spellings.setdefault(word.lower(), word)
 
     def require_line(self, row: str, expected: str) -> None:
         """Refuse a row that is not the expected one."""
-        if row != expected:
+        if not self.same(row, expected):
             raise self.fault(f"expected {expected!r}, got {row[:SHOWN]!r}")
 
-    def read(self, row: str, kinds: Mapping[str, re.Pattern[str]]) -> None:
+    def read(self, row: str, kinds: Mapping[str, LinePattern]) -> None:
         """Read a row with the method of its kind, unless it is a required row."""
-        if self.required:
+        if self.required and not self.harmless.fullmatch(row):
             self.require_line(row, self.required.pop(0))
             if self.flow_lines is not None:
                 self.follow(row, self.flow_lines)
             return
-        for kind, pattern in kinds.items():
-            if match := pattern.fullmatch(row):
-                self.admit(kind)
-                getattr(self, kind)(*match.groups())
-                return
-        raise self.fault(f"not expected here: {row[:SHOWN]!r}")
+        kind, match = self.kind_of(row, kinds)
+        if match is None and not self.harmless.fullmatch(row):
+            raise self.fault(f"not expected here: {row[:SHOWN]!r}")
+        if match is not None:
+            self.admit(kind)
+            words = (word and self.spelled(word) for word in match.groups())
+            getattr(self, kind)(*words)
 
-    def follow(self, row: str, flow_lines: Mapping[str, re.Pattern[str]]) -> None:
+    def kind_of(
+        self, row: str, kinds: Mapping[str, LinePattern]
+    ) -> tuple[str, re.Match[str] | None]:
+        """Return the kind of a row and its match: first of rows as they are written here."""
+        for kind, pattern in kinds.items():
+            if match := pattern.as_written.fullmatch(row):
+                return kind, match
+        plain = self.plain(row)
+        for kind, pattern in kinds.items():
+            if match := pattern.compacted.fullmatch(plain):
+                return kind, match
+        return "", None
+
+    def follow(self, row: str, flow_lines: Mapping[str, LinePattern]) -> None:
         """Add the steps of the flow of control on a required row.
 
         Raises
@@ -209,12 +257,12 @@ class LineReader:
         InputError
             It is not known what the row does to the flow of control.
         """
-        for kind, pattern in flow_lines.items():
-            if match := pattern.fullmatch(row):
-                if kind:
-                    said = (int(word) if word.isdecimal() else word for word in match.groups())
-                    getattr(self, kind)(*said)
-                return
+        kind, match = self.kind_of(row, flow_lines)
+        if match is not None:
+            if kind:
+                said = (int(word) if word.isdecimal() else word for word in match.groups())
+                getattr(self, kind)(*said)
+            return
         raise self.fault(f"it is not known where the program goes on after {row[:SHOWN]!r}")
 
     def admit(self, kind: str) -> None:

@@ -91,9 +91,9 @@ def _time_early(
 
 
 _NUMBER = r"(-?\d*\.\d+)"
-_END = rf"(\d+)(cm/min|mm/sec) (?:(FINE)|CNT(\d+)|CR(\d+))({WRIST})?( COORD)?"
+_END = rf"(\d+)(cm/min|mm/sec) (?:(FINE)|CNT(\d+)|CR(\d+))({WRIST})?( COORD)?(?: ACC100)?"
 _TB = r"((?: TB +\d*\.\d\dsec,DO\[\d+\]=O(?:N|FF))*)"
-_SWITCH = re.compile(r" TB +(\d*\.\d\d)sec,DO\[(\d+)\]=(ON|OFF)")
+_SWITCH = re.compile(r" ?TB *(\d*\.\d\d)sec,DO\[(\d+)\]=(ON|OFF)", re.ASCII)
 _MAIN = patterns(
     {
         "frame_value": rf"  !(UFRAME|UTOOL) (\d+) ([XYZWPR]) {_NUMBER}",
@@ -106,7 +106,7 @@ _MAIN = patterns(
 _SECTION = patterns(
     {
         "linear": rf"L P\[(\d+)\] {_END}{_TB}",
-        "joint": r"J P\[(\d+)\] (\d+)% (?:(FINE)|CNT(\d+))",
+        "joint": r"J P\[(\d+)\] (\d+)% (?:(FINE)|CNT(\d+))(?: ACC100)?",
         "circular": rf"C P\[(\d+)\] *:  P\[(\d+)\] {_END}{_TB}",
         "remark": r"  !.*",
         "wait": r"  WAIT +(\d*\.\d\d)\(sec\)",
@@ -124,7 +124,7 @@ _WITHOUT_ANSWER = patterns(
     }
 )
 _POSITION = re.compile(
-    r"P\[(\d+)\]\{\n\s*GP1:\n\s*UF : (\d+), UT : (\d+),\s*(?:"
+    r"P\[(\d+)(?::[^\]\n]*)?\]\{\n\s*GP1:\n\s*UF : (\d+), UT : (\d+),\s*(?:"
     r"CONFIG : '([NF]) ([UD]) ([TB]), (-?\d+), (-?\d+), (-?\d+)',\s*"
     + r",\s*".join(rf"{k} = *{_NUMBER} +mm" for k in "XYZ")
     + r",\s*"

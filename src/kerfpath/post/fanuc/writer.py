@@ -34,6 +34,7 @@ from kerfpath.post.fanuc.controller import (
     turns,
     unit,
 )
+from kerfpath.post.harmless import LinePattern, compact
 from kerfpath.post.languages import number, outputs
 from kerfpath.post.line_reader import LineReader, program_lines
 from kerfpath.post.places import CalledFormatter
@@ -66,13 +67,16 @@ _ATTRIBUTE = re.compile(
 _GROUPS = re.compile(r"DEFAULT_GROUP\s*= ([1*](?:,[1*]){4,7});")
 _COUNT = re.compile(r"LINE_COUNT\s*= (\d+);")
 _NUMBERED = re.compile(r" *(\d+):(.*?) *;")
-_VIA = re.compile(r" *\d+:C P\[\d+\] *")
+_VIA = re.compile(r" *\d+:C P\[\d+(?::[^\]]*)?\] *")
+_ITEM = re.compile(r"\b(P|DI|DO|UO|LBL)\[(\d+):[^\]]*\]")
+"""An item with a comment, which the pendant shows beside its number."""
 
 
 class Listing(LineReader):
     """One program: attributes, then numbered lines."""
 
     settings: FanucSettings
+    language = "fanuc"
     too_early = "the listing ends too early; /END is missing"
 
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
@@ -80,14 +84,14 @@ class Listing(LineReader):
         super().__init__(file, robot, settings, rows)
         self.name = ""
 
-    def body(self, kinds: Mapping[str, re.Pattern[str]], group: str) -> None:
+    def body(self, kinds: Mapping[str, LinePattern], group: str) -> None:
         """Read the attributes and the numbered lines, up to /POS.
 
         `group` has the motion groups that the program must have; controllers may list more.
         """
         match = re.fullmatch(r"/PROG  ([A-Z][A-Z0-9_]*)", self.next_row())
         self.name = match[1] if match else ""
-        if f"{self.name}.ls" != self.file.rpartition("/")[2]:
+        if f"{self.name}.ls".lower() != self.file.rpartition("/")[2].lower():
             raise self.fault(f"expected /PROG and the name of the file, got {self.text[:60]!r}")
         if (row := self.next_row()) != "/ATTR":
             raise self.fault(f"expected /ATTR, got {row[:60]!r}")
@@ -99,7 +103,7 @@ class Listing(LineReader):
                 if match[1].rstrip("*,") != group.rstrip("*,"):
                     raise self.fault(f"expected DEFAULT_GROUP = {group}, got {match[1]}")
                 moved = True
-            elif not _ATTRIBUTE.fullmatch(row):
+            elif not _ATTRIBUTE.fullmatch(row) and row != "/APPL":
                 raise self.fault(f"not an attribute: {row[:60]!r}")
         if not moved:
             raise self.fault(f"expected DEFAULT_GROUP = {group} before this line")
@@ -115,8 +119,14 @@ class Listing(LineReader):
         if counted != number:
             raise self.fault(f"LINE_COUNT is {counted}, but there are {number} lines")
 
+    def plain(self, row: str) -> str:
+        """Return a row as it is compared: without needless blanks and comments on items."""
+        if row.lstrip().startswith("!"):
+            return row
+        return compact(_ITEM.sub(r"\1[\2]", row))
+
     def require_next(
-        self, lines: Iterable[str], flow_lines: Mapping[str, re.Pattern[str]] | None = None
+        self, lines: Iterable[str], flow_lines: Mapping[str, LinePattern] | None = None
     ) -> None:
         super().require_next((line.removesuffix(" ;").rstrip() for line in lines), flow_lines)
 

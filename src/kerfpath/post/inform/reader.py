@@ -12,6 +12,7 @@ from kerfpath.arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import faceplate, from_euler, world
 from kerfpath.post.flow import section_of
+from kerfpath.post.harmless import LinePattern, compact, without_remark
 from kerfpath.post.inform.controller import (
     ExternalPulses,
     InformSettings,
@@ -37,23 +38,24 @@ _NUMBER, _WHOLE = r"(-?\d+\.\d+)", r"(-?\d+)"
 _POSE = re.compile(rf"C(\d{{5}})={','.join([_NUMBER] * 6)}", re.ASCII)
 _PULSES = re.compile(rf"C(\d{{5}})={','.join([_WHOLE] * 6)}", re.ASCII)
 _TYPE = re.compile(r"///RCONF ([01](?:,[01])*)", re.ASCII)
+_DATE = re.compile(r"///DATE \d{4}/\d\d/\d\d \d\d:\d\d", re.ASCII)
 _COUNT = re.compile(r"///NPOS ((\d+)(?:,\d+){5})", re.ASCII)
 _MAIN = patterns(
     {
-        "remark": r"' .*",
         "frame_value": rf"'(UFRAME|TOOL) (\d+) (R?[XYZ]) {_NUMBER}",
+        "remark": r"'.*",
         "call": r"CALL JOB:([A-Z][A-Z0-9_]*)",
     }
 )
 _JOB = patterns(
     {
-        "linear": r"MOVL C(\d{5}) V=(\d+\.\d) PL=(\d)",
-        "arc": r"MOVC C(\d{5}) V=(\d+\.\d)(?: PL=(\d))?",
-        "part": r"MOVL C(\d{5}) V=(\d+\.\d)",
-        "joint": r"MOVJ C(\d{5}) VJ=(\d+\.\d\d) PL=(\d)",
+        "linear": r"MOVL C(\d{5}) V=(\d+(?:\.\d)?) PL=(\d)",
+        "arc": r"MOVC C(\d{5}) V=(\d+(?:\.\d)?)(?: PL=(\d))?",
+        "part": r"MOVL C(\d{5}) V=(\d+(?:\.\d)?)",
+        "joint": r"MOVJ C(\d{5}) VJ=(\d+(?:\.\d+)?) PL=(\d)",
         "switch": r"DOUT OT#\((\d+)\) (ON|OFF)",
         "wait": r"TIMER T=(\d+\.\d\d)",
-        "remark": r"' .*",
+        "remark": r"'.*",
         "wait_for": r"\*WAIT(\d+)",
     }
 )
@@ -99,6 +101,7 @@ class _Text(LineReader):
     """The lines of one job."""
 
     settings: InformSettings
+    language = "inform"
     too_early = "the job ends too early; END is missing"
 
     def __init__(self, file: str, text: str, robot: Robot, settings: InformSettings) -> None:
@@ -106,6 +109,22 @@ class _Text(LineReader):
         super().__init__(file, robot, settings, rows)
         self.name = file.rpartition("/")[2].removesuffix(SUFFIX)
         self.external = ExternalPulses(robot, settings)
+
+    def plain(self, row: str) -> str:
+        """Return a row as it is compared: without needless blanks and the remark after a move."""
+        if row.startswith("'"):
+            return row
+        return compact(without_remark(row, "//") if row.startswith("MOV") else row)
+
+    def same(self, row: str, expected: str) -> bool:
+        """Return whether two rows are the same for the controller, which sets dates itself."""
+        if _DATE.fullmatch(expected):
+            return bool(_DATE.fullmatch(row))
+        if expected.startswith("///ATTR "):
+            return sorted(row.removeprefix("///ATTR ").split(",")) == sorted(
+                expected.removeprefix("///ATTR ").split(",")
+            )
+        return super().same(row, expected)
 
     def require_rows(self, expected: Sequence[str]) -> None:
         """Require these rows to come next, and read them."""
@@ -122,14 +141,14 @@ class _Text(LineReader):
             raise self.fault(f"expected the number of positions, ///NPOS {expected}")
         return int(match[2])
 
-    def instructions(self, kinds: Mapping[str, re.Pattern[str]]) -> None:
+    def instructions(self, kinds: Mapping[str, LinePattern]) -> None:
         """Read instructions to END."""
         while (row := self.next_row()) != "END":
             try:
-                row = self.external.plain(row)
+                plain = self.external.plain(self.plain(row) if self.robot.externals else row)
             except InputError as error:
                 raise self.fault(str(error)) from None
-            self.read(row, kinds)
+            self.read(plain, kinds)
         self.require_complete()
         if any(row for _, row in self.rows[self.line :]):
             self.line += 1

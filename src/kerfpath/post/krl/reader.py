@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,6 +11,7 @@ from kerfpath.errors import InputError
 from kerfpath.post.arcs import from_euler
 from kerfpath.post.build import carrier_frame
 from kerfpath.post.flow import section_of
+from kerfpath.post.harmless import LinePattern
 from kerfpath.post.krl.controller import AXES, KrlSettings, coupled, joints_from_axes, read_fields
 from kerfpath.post.krl.writer import (
     ANGLES,
@@ -30,9 +30,9 @@ from kerfpath.post.read_program import FlowStep, MoveKind, ReadProgram, ReadSect
 from kerfpath.robots import Robot
 
 _NAME = r"([A-Za-z]\w*)"
-_NUMBER = r"(-?\d+(?:\.\d+)?)"
+_NUMBER = r"(-?(?:\d+\.?\d*|\.\d+))"
 _POINT = ",".join(f"{field} {_NUMBER}" for field in "XYZABC")
-_EXTERNAL = r"((?:,E\d -?\d+(?:\.\d+)?)*)"
+_EXTERNAL = r"((?:,E\d -?(?:\d+\.?\d*|\.\d+))*)"
 _MACHINE = r"MACHINE_DEF\[(\d+)\]"
 _LINES = patterns(
     {
@@ -55,7 +55,8 @@ _LINES = patterns(
         "tool": rf"\$TOOL={{{_POINT}}}",
         "base": rf"\$BASE={{{_POINT}}}",
         "coupled_base": rf"\$BASE=EK\({_MACHINE}\.ROOT,{_MACHINE}\.MECH_TYPE,{{{_POINT}}}\)",
-    }
+    },
+    caseless=True,
 )
 
 _OUTSIDE = only(_LINES, "routine")
@@ -75,9 +76,10 @@ _WITHOUT_ANSWER = patterns(
         "ask_again": r"\$OUT\[(\d+)\]=TRUE",
         "wait_again": r"WAIT FOR \$IN\[(\d+)\]",
         "end_loop": "ENDWHILE",
-    }
+    },
+    caseless=True,
 )
-_FIRST = re.compile(rf"INT {FIRST}=(\d+)", re.ASCII)
+_FIRST = LinePattern(rf"INT {FIRST}=(\d+)", caseless=True)
 
 
 def read(main: str, files: Mapping[str, str], robot: Robot, settings: KrlSettings) -> ReadProgram:
@@ -105,10 +107,18 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: KrlSetting
     )
 
 
+class _Data(LineReader):
+    """One .dat."""
+
+    language = "krl"
+
+
 class _File(LineReader):
     """One .src; the main file is the one with an opening."""
 
     settings: KrlSettings
+    language = "krl"
+    words = ("TRUE", "FALSE", FIRST, PASSED, SWITCH_OFF)
 
     def __init__(
         self,
@@ -123,7 +133,7 @@ class _File(LineReader):
         lines = program_lines(file, files[file])
         super().__init__(file, robot, settings, statements(lines, ";"))
         self.files, self.name = files, file.removesuffix(".src")
-        self.is_main, self.opening, self.head = bool(opening), opening, list(HEAD)
+        self.is_main, self.opening = bool(opening), opening
         self.routines: list[str] = []
         self.inside = False
         self.calls: dict[str, int] = {}
@@ -141,13 +151,12 @@ class _File(LineReader):
             raise self.fault("END is missing")
 
     def read_line(self, line: str) -> None:
-        for rest in (self.head, self.opening if self.inside else []):
-            if not self.required and rest and line == rest[0]:
-                del rest[0]
-                return
+        if self.inside and not self.required and self.opening and self.same(line, self.opening[0]):
+            del self.opening[0]
+            return
         self.read(line, self.expected())
 
-    def expected(self) -> dict[str, re.Pattern[str]]:
+    def expected(self) -> dict[str, LinePattern]:
         if not self.inside:
             return _OUTSIDE
         if len(self.routines) > 1:
@@ -169,19 +178,17 @@ class _File(LineReader):
         if self.is_main and SWITCH_OFF not in self.routines:
             raise self.fault(f"{SWITCH_OFF} is missing")
         data = f"{self.name}.dat"
-        lines = [line.strip() for line in program_lines(data, self.files[data])]
-        first = next((m[1] for line in lines if (m := _FIRST.fullmatch(line))), "0")
+        rows = statements(program_lines(data, self.files[data]), ";")
+        lists = _Data(data, self.robot, self.settings, rows)
+        first = next((m[1] for _, row in lists.rows if (m := _FIRST.fullmatch(row))), "0")
         begin = int(first) if self.is_main else None
-        for number, line in enumerate(data_list(self.name, others, begin)[:-1], 1):
-            if lines[number - 1 : number] != [line]:
-                raise InputError(f"{data}, line {number}: expected {line!r}")
-        if len(lines) > number:
-            raise InputError(f"{data}, line {number + 1}: nothing may follow ENDDAT")
+        lists.advance()
+        lists.expect(row for row in data_list(self.name, others, begin) if row not in (*HEAD, ""))
+        if lists.row < len(lists.rows):
+            raise lists.fault("nothing may follow ENDDAT")
         return int(first)
 
     def routine(self, name: str, passed: str) -> None:
-        if self.head:
-            raise self.fault(f"expected {self.head[0]} before this line")
         if not self.routines and name != self.name:
             raise self.fault(f"the first routine must have the name of the file, {self.name}")
         if name in self.routines:
@@ -241,14 +248,13 @@ class _File(LineReader):
 
     def wait_for(self, timeout_ms: str) -> None:
         here, (_, below) = self.text, (*self.rows[self.row + 2 : self.row + 3], (0, ""))[0]
-        said = re.match(r"WAIT FOR \$IN\[(\d+)\]", below)
+        said = LinePattern(r"WAIT FOR \$IN\[(\d+)\].*", caseless=True).fullmatch(below)
         if said is None:
             raise self.fault("expected the wait for an input two lines below")
         port, timeout = int(said[1]), float(timeout_ms) * 1e-3
         awaited = Await(partner=self.partner(port, "input"), timeout=timeout)
         first, *others = wait_lines(awaited, self.asked(), self.settings)
-        if here != first:
-            raise self.fault(f"expected {first!r}")
+        self.require_line(here, first)
         self.add_handshake(awaited)
         self.require_next(others, _WITHOUT_ANSWER)
 

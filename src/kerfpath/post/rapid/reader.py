@@ -43,6 +43,8 @@ from kerfpath.robots import Robot
 class Aggregates(LineReader):
     """Reader of aggregates on the lines of a file."""
 
+    language = "rapid"
+
     def values(self, text: str, count: int) -> list[Any]:
         """Return the `count` parts of an aggregate; RAPID writes it almost as JSON does."""
         try:
@@ -75,7 +77,7 @@ class Aggregates(LineReader):
 # Patterns of the RAPID lines that are read, by their kind, and where each kind may occur.
 
 _NAME = r"([A-Za-z]\w*)"
-_POSE = r"(\[\[.*?9E9\]\])"
+_POSE = r"(\[\[.*?9E\+?0?9\]\])"
 _TRIGGERS = r"([A-Za-z]\w*(?:\\T\d:=[A-Za-z]\w*)*)"
 _FRAMES = rf"{_NAME}\\WObj:={_NAME}"
 _LINES = patterns(
@@ -105,7 +107,8 @@ _LINES = patterns(
         "circular_move": rf"MoveC {_POSE},{_POSE},{_NAME},{_NAME},{_FRAMES};",
         "switching_move": rf"TriggL (\[.*\]),{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
         "switching_arc": rf"TriggC {_POSE},{_POSE},{_NAME},{_TRIGGERS},{_NAME},{_FRAMES};",
-    }
+    },
+    caseless=True,
 )
 DECLARED = ("tool", "work_object", "speed", "zone", "trigger", "first")
 
@@ -134,7 +137,8 @@ _ON_ERROR = patterns(
         "off": r"SetDO (\w+),0;",
         "": rf"{SWITCH_OFF};|StopMove;|UNDO|ENDPROC|ERROR",
         "end_program": "RAISE;",
-    }
+    },
+    caseless=True,
 )
 """What is done at an error: main calls the routine that switches off, and stops."""
 ERROR = "ERROR"
@@ -161,6 +165,7 @@ class _Reader(Aggregates):
     """Reader of modules, line by line."""
 
     settings: RapidSettings
+    words = ("main", "fine", "Act", "Deact", FIRST, SWITCH_OFF)
 
     def __init__(
         self, main: str, files: Mapping[str, str], robot: Robot, settings: RapidSettings
@@ -202,7 +207,8 @@ class _Reader(Aggregates):
         if self.ended:
             raise self.fault("nothing may follow ENDMODULE")
         in_main = self.routine_name == "main"
-        if in_main and not self.required and not self.number and line == ending_lines()[0].strip():
+        ends = in_main and not self.required and not self.number
+        if ends and self.same(line, ending_lines()[0]):
             rows = (row.strip() for row in ending_lines()[1:])
             self.steps = self.on_error
             self.require_next([*rows, "ENDPROC"], _ON_ERROR)
@@ -444,7 +450,8 @@ class _Reader(Aggregates):
 
     def add_triggers(self, text: str) -> None:
         """Add the switches of the triggers of a move; `text` names the triggers."""
-        first, *_ = names = re.split(r"\\T\d:=", text)
+        words = re.split(r"\\T\d:=", text, flags=re.IGNORECASE)
+        first, *_ = names = [self.spelled(word) for word in words]
         for name in names:
             switch = self.triggers.get(name)
             if switch is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from kerfpath.arrays import Array, freeze
 from kerfpath.post.build import offset_near
 from kerfpath.post.flow import section_of
+from kerfpath.post.harmless import LinePattern
 from kerfpath.post.languages import outputs
 from kerfpath.post.line_reader import END_OF_FILE, LineReader, patterns, program_lines, statements
 from kerfpath.post.program import SIGNALS, Switch
@@ -37,17 +37,17 @@ def read(
 DIGIT = 1e-6
 """Rounding error of an acceleration, m/s^2 or rad/s^2."""
 
-_NUMBER = r"(-?\d+\.\d+)"
+_NUMBER = r"(-?(?:\d+\.?\d*|\.\d+))"
 _SIX = ", ".join([_NUMBER] * 6)
 _POSE = rf"p\[{_SIX}\]"
 _MOTION = rf"a={_NUMBER}, v={_NUMBER}, r={_NUMBER}"
 _TARGET = rf"pose_trans\(part_frame, {_POSE}\)"
 _SIGNAL = "(laser|gas)"
-_DEFINITION = re.compile(r"def ([A-Za-z]\w*)\(\):", re.ASCII)
-_CALL = re.compile(r"([A-Za-z]\w*)\(\)", re.ASCII)
-_FIRST = re.compile(rf"global {FIRST} = (\d{{1,6}})", re.ASCII)
-_TOOL = re.compile(rf"set_tcp\({_POSE}\)", re.ASCII)
-_PART = re.compile(rf"global part_frame = {_POSE}", re.ASCII)
+_DEFINITION = LinePattern(r"def ([A-Za-z]\w*)\(\):")
+_CALL = LinePattern(r"([A-Za-z]\w*)\(\)")
+_FIRST = LinePattern(rf"global {FIRST} = (\d{{1,6}})")
+_TOOL = LinePattern(rf"set_tcp\({_POSE}\)")
+_PART = LinePattern(rf"global part_frame = {_POSE}")
 _STEPS = patterns(
     {
         "linear": rf"movel\({_TARGET}, {_MOTION}\)",
@@ -75,6 +75,7 @@ class _Reader(LineReader):
     """Reader of a script, one part after the other."""
 
     settings: URScriptSettings
+    language = "urscript"
 
     def __init__(self, file: str, text: str, robot: Robot, settings: URScriptSettings) -> None:
         super().__init__(file, robot, settings, statements(program_lines(file, text), "#"))
@@ -91,13 +92,13 @@ class _Reader(LineReader):
         part = _pose(self.take(_PART, "global part_frame = p[...]"))
         begin = int(self.take(_FIRST, f"global {FIRST} = 1")[0])
         self.expect(stop_lines(outputs(self.settings)))
-        self.can_wait = self.text == wait_lines([])[0]
+        self.can_wait = self.same(self.text, wait_lines([])[0])
         if self.can_wait:
             self.expect(wait_lines(outputs(self.settings)), _WITHOUT_ANSWER)
         exits = {WAITING: tuple(self.steps)}
         signals = self.signals
         for known in SIGNALS.values():
-            if self.text != f"global {known}_waits = False":
+            if not self.same(self.text, f"global {known}_waits = False"):
                 continue
             output = getattr(self.settings, f"{known}_output")
             if output is None:
@@ -113,7 +114,7 @@ class _Reader(LineReader):
         for signal in signals:
             self.expect([f"{signal}_set(False)", f"{signal}_run = run {signal}_thread()"])
         calls: list[str] = []
-        while self.text == f"if {FIRST} <= {len(calls) + 1}:":
+        while self.same(self.text, f"if {FIRST} <= {len(calls) + 1}:"):
             self.advance()
             calls += self.take(_CALL, "the call of a contour")
             self.expect(["end"])

@@ -13,6 +13,7 @@ from kerfpath.arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import faceplate, from_euler, world
 from kerfpath.post.flow import section_of
+from kerfpath.post.harmless import LinePattern, compact
 from kerfpath.post.line_reader import LineReader, patterns, program_lines, statements
 from kerfpath.post.program import PARTNERS, SIGNALS, Await, Partner, Switch
 from kerfpath.post.read_program import FlowStep, MoveKind, ReadMove, ReadOff, ReadProgram
@@ -25,6 +26,7 @@ from kerfpath.post.val3.writer import (
     PORTS,
     PROGRAM,
     PROJECT,
+    STACK_SIZE,
     TYPES,
     Element,
     closing_lines,
@@ -185,7 +187,7 @@ def _poses(values: list[Element], father: str) -> Array:
 # The reader of programs.
 
 _NAME = r"([A-Za-z]\w*)"
-_CALL = re.compile(rf"call (?:{_NAME}:)?{_NAME}\(\)", re.ASCII)
+_CALL = LinePattern(rf"call (?:{_NAME}:)?{_NAME}\(\)")
 _LINES = patterns(
     {
         "linear": r"movel\(pPath\[(\d+)\],tLaser,mPath\[(\d+)\]\)",
@@ -195,7 +197,7 @@ _LINES = patterns(
         "switch": r"(dioLaser|dioGas)=(true|false)",
         "request": r"(do[A-Z]\w*)=(true|false)",
         "wait_for": r"while watch\((di\w+)==true,(\d+\.\d+)\)==false",
-        "wait": r"delay\((\d+\.\d+)\)",
+        "wait": r"delay\((\d+\.?\d*|\.\d+)\)",
     }
 )
 _WITHOUT_ANSWER = patterns(
@@ -257,7 +259,9 @@ class _Project:
         head, programs, database, libraries = root.only(
             "Parameters", "Programs", "Database", "Libraries"
         )
-        head.take(**parameters(settings))
+        size = head.attributes.get("stackSize", "")
+        larger = size.isascii() and size.isdecimal() and int(size) > STACK_SIZE
+        head.take(**parameters(settings) | ({"stackSize": size} if larger else {}))
         self.programs = self._programs(programs)
         (data,) = database.only("Data")
         data.take(file=f"{self.name}.dtx")
@@ -318,12 +322,13 @@ class _Project:
         return code
 
     def statements(self, code: Element) -> list[tuple[int, str]]:
-        """Return the lines of a routine without comments, with their numbers."""
-        return statements(program_lines(code.file, code.text, code.line)[1:-1], "//", code.line + 1)
+        """Return the lines of a routine without remarks, with their numbers."""
+        lines = program_lines(code.file, code.text, code.line)[1:-1]
+        return statements(lines, "//", code.line + 1)
 
     def calls(self, start: Element) -> list[tuple[int, str, str]]:
         """Return what start() calls: line, alias of the library or nothing, routine."""
-        rows = self.statements(start)
+        rows = [(number, compact(row)) for number, row in self.statements(start)]
         begin, end = opening_lines(self.settings), closing_lines()
         count = len(rows) - len(begin) - len(end)
         for number, row in enumerate(begin):
@@ -345,7 +350,7 @@ class _Project:
     def require_stop(self) -> None:
         """Check that stop() switches everything off."""
         stop = self.routine("stop")
-        if [row for _, row in self.statements(stop)] != stop_lines(self.settings):
+        if [compact(row) for _, row in self.statements(stop)] != stop_lines(self.settings):
             raise stop.fault(f"expected {' and '.join(stop_lines(self.settings))} in stop()")
 
     def steps(self, name: str) -> list[FlowStep]:
@@ -355,6 +360,8 @@ class _Project:
 
 class _Routine(LineReader):
     """The statements of one routine."""
+
+    language = "val3"
 
     def __init__(self, project: _Project, code: Element) -> None:
         super().__init__(code.file, project.robot, project.settings, project.statements(code))

@@ -184,9 +184,13 @@ DATA_OF_A_STEP = 3
 """Largest number of data of a step: two points and a speed of a circular move."""
 
 
+STACK_SIZE = 5000
+"""Bytes that a project reserves; more do no harm."""
+
+
 def parameters(settings: Val3Settings) -> dict[str, str]:
     """Return the parameters of a project."""
-    return {"version": settings.version, "stackSize": "5000", "millimeterUnit": "true"}
+    return {"version": settings.version, "stackSize": str(STACK_SIZE), "millimeterUnit": "true"}
 
 
 def links(settings: Val3Settings) -> dict[str, str]:

@@ -1,0 +1,266 @@
+"""Edits that change nothing of what a program does are accepted; their neighbours are not."""
+
+import re
+
+import pytest
+from tests.post.test_handshakes import ASKED, program, settings
+
+from kerfpath import InputError
+from kerfpath.post import deviations, language, post, read_program, unsafe_paths
+from kerfpath.post.harmless import HARMLESS as HARMLESS_LINES
+from kerfpath.post.harmless import LinePattern, compact, without_remark
+
+
+def files_of(name):
+    return post(program(name, ("one", "two"), handshakes=ASKED), name, settings(name))
+
+
+def why_refused(files, name):
+    """Return why a text is refused, "" if it is accepted."""
+    made, options = program(name, ("one", "two"), handshakes=ASKED), settings(name)
+    try:
+        read = read_program(files, name, made.robot, options)
+    except InputError as error:
+        return str(error)
+    return "; ".join(
+        map(str, deviations(made, read, language(name), options) or unsafe_paths(read))
+    )
+
+
+# Each edit is a pattern in a file (by the end of its name) and what it becomes.
+HARMLESS = {
+    "krl": [
+        (".src", "&REL 1", "&REL 57"),
+        (".dat", "&REL 1", "&REL 57"),
+        (".src", "&REL 1", "&REL 1\r\n&COMMENT cut of the pillar"),
+        (".src", "&REL 1", r"&REL 1\r\n&PARAM EDITMASK = *"),
+        (".src", "&REL 1", r"&REL 1\r\n&PARAM TEMPLATE = C:\\KRC\\Roboter\\Template\\vorgabe"),
+        (".src", "&ACCESS RVP", "&ACCESS RVO"),
+        (".src", "&ACCESS RVP\r\n&REL 1", "&REL 3\r\n&ACCESS RVP"),
+        (".src", r"DEF one\(\)", "DEF one ( )"),
+        (".src", r"DEF one\(\)", "def ONE()"),
+        (".src", r"one\(\)\r\nENDIF", "One()\r\nEndIf"),
+        (".src", r"\$OUT\[3\]=TRUE", "$OUT [ 3 ] = true"),
+        (".src", r"\$VEL\.CP=0\.100000", "$VEL.CP = 0.1"),
+        (".src", r"LIN \{X ", "  LIN  { X  "),
+        (".src", r"(LIN \{.*\})\r", r"\1  ; the first corner, für J. Müller\r"),
+        (".src", r"WAIT SEC 0\.100", "WAIT SEC 0.1"),
+        (".src", r"DEF one\(\)\r\n", "DEF one()\r\n;FOLD cut %{PE}\r\n\r\n;ENDFOLD\r\n"),
+        (".src", r"HALT\r\n", "halt\r\n"),
+        (
+            ".src",
+            r"(\$TOOL=\{.*\})\r\n",
+            r"\1\r\n$LOAD={M 12.0,CM {X 10.0,Y 0.0,Z 90.0,A 0.0,B 0.0,C 0.0},"
+            r"J {X 0.1,Y 0.1,Z 0.1}}\r\n",
+        ),
+        (".dat", r"ENDDAT\r\n", "ENDDAT"),
+        (".src", r"END\r\n$", "END"),
+    ],
+    "rapid": [
+        (".mod", "MODULE cut_one", "%%%\n  VERSION:1\n  LANGUAGE:ENGLISH\n%%%\nMODULE cut_one"),
+        (".mod", r"PROC one\(\)", "proc ONE ( )"),
+        (".mod", r"SetDO x3,1;", "SetDO  x3 , 1 ;"),
+        (".mod", r"SetDO x3,1;", "setdo X3,1;"),
+        (".mod", r"WaitTime 0\.100;", "WaitTime 0.1;"),
+        (".mod", r"WaitTime 0\.100;", "WaitTime .1; ! pierce"),
+        (".mod", r"MoveL \[\[", "MoveL  [ ["),
+        (".mod", r"(MoveL .*;)", r"\1 ! the first corner, für J. Müller"),
+        (".mod", r"PROC one\(\)\n", 'PROC one()\n    TPWrite "contour one";\n'),
+        (".mod", r"PROC one\(\)\n", "PROC one()\n\n\n    ! remark\n"),
+        (".mod", r"    SetDO x3,1;\n", "\tSetDO x3,1;\n"),
+        (".mod", r"\[-1,\[0,0,0\],\[1,0,0,0\],0,0,0\]", "[12,[10,0,90],[1,0,0,0],0.1,0.1,0.1]"),
+        (".mod", "9E9", "9E+09"),
+        (".mod", r"ENDMODULE\n", "ENDMODULE"),
+        (".mod", r"\n", "\r\n"),
+        (".mod", r"PROC one\(\)\n", "PROC one()\n    ClkReset clock1;\n    ClkStart clock1;\n"),
+    ],
+    "fanuc": [
+        ("ONE.ls", "MNEDITOR", "OPERATOR"),
+        ("ONE.ls", 'COMMENT\t\t= "kerfpath"', 'COMMENT\t\t= "für Müller"'),
+        ("ONE.ls", "DATE 00-01-01  TIME 00:00:00", "DATE 26-11-28  TIME 10:07:00"),
+        ("ONE.ls", "PROG_SIZE\t= 0", "PROG_SIZE\t= 4711"),
+        ("ONE.ls", r"J P\[1\]", "J P[1:over the corner]"),
+        ("ONE.ls", r"P\[2\]\{", 'P[2:"corner"]{'),
+        ("ONE.ls", r"DO\[3\]=ON", "DO[3:shutter]=ON"),
+        ("ONE.ls", r"DI\[5\]=ON", "DI[5:source ready]=ON"),
+        ("ONE.ls", r"WAIT    \.10\(sec\)", "WAIT   0.10(sec)"),
+        ("ONE.ls", r"TB    \.20sec", "TB .20sec"),
+        ("ONE.ls", r"/MN\r\n", "/APPL\r\n/MN\r\n"),
+        ("ONE.ls", r"(CNT100)    ;", r"\1 ;"),
+        ("ONE.ls", r"\r\n", "\n"),
+        ("ONE.ls", r"(FINE) ( *;)", r"\1 ACC100\2"),
+        ("ONE.ls", r"/MN\r\n", "/MN\r\n   1:  TIMER[1]=START ;\r\n"),
+        ("ONE.ls", r"/MN\r\n", "/MN\r\n   1:  MESSAGE[contour one] ;\r\n"),
+        ("ONE.ls", r"/MN\r\n", "/MN\r\n   1:   ;\r\n"),
+    ],
+    "inform": [
+        ("ONE.JBI", "///DATE 2000/01/01 00:00", "///DATE 2026/11/28 10:07"),
+        (
+            "ONE.JBI",
+            "///DATE 2000/01/01 00:00",
+            "///COMM the first contour\r\n///DATE 2026/11/28 10:07",
+        ),
+        ("ONE.JBI", "SC,RW,RJ", "RW,SC,RJ"),
+        ("ONE.JBI", r"///GROUP1 RB1\r\n", "///GROUP1 RB1\r\n///LVARS 0,0,0,0,0,0,0,0\r\n"),
+        ("ONE.JBI", r"V=100\.0", "V=100"),
+        ("ONE.JBI", r"(MOVL C00001.*PL=1)", r"\1 //the first corner"),
+        ("ONE.JBI", r"NOP\r\n", "NOP\r\n'MSG for J. Müller\r\n"),
+        ("ONE.JBI", r"MOVL C00001 V", "MOVL  C00001  V"),
+        ("ONE.JBI", r"\r\n", "\n"),
+        ("ONE.JBI", r"END\r\n$", "END"),
+        ("ONE.JBI", r"NOP\r\n", 'NOP\r\nMSG "contour one"\r\n'),
+    ],
+    "urscript": [
+        (".script", r"def one\(\):", "def one ( ) :"),
+        (".script", r"def one\(\):\n", "def one():\n\n    # remark\n"),
+        (".script", r"    sleep\(0\.100\)", "\tsleep(0.1)"),
+        (".script", r"(    movel\(.*\))", r"\1  # the first corner"),
+        (".script", r"def one\(\):\n", 'def one():\n    textmsg("contour one")\n'),
+        (".script", r"set_standard_digital_out\(3, True\)", "set_standard_digital_out( 3,True )"),
+        (".script", r"end\n$", "end"),
+        (".script", r"\n", "\r\n"),
+        (".script", r"def one\(\):\n", '  $ 12 "contour one"\n  def one():\n'),
+    ],
+    "val3": [
+        ("one.pgx", r"begin\n", "begin\n  // for J. Müller\n\n"),
+        ("one.pgx", r"delay\(0\.100\)", "delay( 0.1 )"),
+        ("one.pgx", r"(  movel\(pPath\[1\].*\))", r"\1 // the first corner"),
+        ("one.pgx", r"doShutter=true", "doShutter = true"),
+        ("one.pgx", r"\n", "\r\n"),
+        ("one.pgx", r"begin\n", 'begin\n  logMsg("contour one")\n'),
+        (".pjx", 'stackSize="5000"', 'stackSize="8000"'),
+        ("one.pgx", r'name="one" access="public"', 'access="public" name="one"'),
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "number"), [(name, k) for name, edits in HARMLESS.items() for k in range(len(edits))]
+)
+def test_an_edit_without_effect_is_accepted(name, number):
+    end, old, new = HARMLESS[name][number]
+    files = files_of(name)
+    (file, *_) = [f for f, text in files.items() if f.endswith(end) and re.search(old, text)]
+    many = "\\n" in (old, old[-2:]) and old in (r"\n", r"\r\n")
+    text = re.sub(old, new, files[file], count=0 if many else 1)
+    if name == "fanuc":
+        text = renumbered(text)
+    assert text != files[file] or old == new
+    assert why_refused(files | {file: text}, name) == ""
+
+
+def renumbered(listing):
+    numbers = iter(range(1, 10**4))
+    text = re.sub(r"(?m)^ *\d+:", lambda _: f"{next(numbers):4d}:", listing)
+    return re.sub(r"LINE_COUNT\t= \d+", f"LINE_COUNT\t= {next(numbers) - 1}", text)
+
+
+HARMFUL = {
+    "krl": [
+        (".src", r"\$OUT\[1\]=FALSE\r\n", ";$OUT[1]=FALSE\r\n"),
+        (".src", r"(TRIGGER .* DO \$OUT\[1\]=FALSE)", r"; \1"),
+        (".src", r"\$OUT\[4\]=FALSE\r\n\$OUT\[3\]", "; x $OUT[4]=FALSE\r\n$OUT[3]"),
+        (".src", r"(LIN \{.*\})\r", r"\1 $OUT[1]=TRUE\r"),
+        (".src", r"WAIT SEC 0\.100", "WAIT SEC 0.1.00"),
+        (".src", r"WAIT SEC 0\.100", "WAITSEC 0.100"),
+        (".src", r"HALT", "HA LT"),
+        (".src", r"FALSE\r\nEND\r\n", "FAL\u017fE\r\nEND\r\n"),
+        (".src", r"HALT", "\uff28ALT"),
+        (".src", r"DEF one\(\)\r\n", "DEF one()\r\n&$OUT[1]=TRUE\r\n"),
+        (".src", r"DEF one\(\)\r\n", "DEF one()\r\n$LOAD={M 1} $OUT[1]=TRUE\r\n"),
+        (".src", r"DEF one\(\)\r\n", "DEF one()\r\n$LOAD=LOAD_DATA[1]\r\n"),
+    ],
+    "rapid": [
+        (".mod", r"    SetDO x4,0;\n", "!   SetDO x4,0;\n"),
+        (".mod", r"    SetDO x4,0;\n", '    TPWrite "SetDO x4,0;";\n'),
+        (".mod", r"(MoveL .*);", r"\1;SetDO x1,1;"),
+        (".mod", r"(MoveL .*);", r"\1 ! ;"),
+        (".mod", r"PROC one\(\)\n", 'PROC one()\n    TPWrite "a" SetDO x1,1;\n'),
+        (".mod", r"PROC one\(\)\n", 'PROC one()\n    TPWrite "a";SetDO x1,1;TPWrite "b";\n'),
+        (".mod", r"WaitTime 0\.100;", "WaitTime 0.100"),
+        (".mod", r"WaitTime 0\.100;", "Wait Time 0.100;"),
+        (".mod", r"PROC one\(\)\n", "PROC one()\n    WaitUntil ClkRead(clock1)>5;\n"),
+        (".mod", r"SetDO x3,1;", "SetDO x\u0663,1;"),
+        (".mod", r"PROC main\(\)", "PROC TPWrite(string x)\n SetDO x1,1;\n ENDPROC\n PROC main()"),
+    ],
+    "fanuc": [
+        ("ONE.ls", r":  DO\[1\]=OFF", ":  !DO[1]=OFF"),
+        ("ONE.ls", r":  DO\[1\]=OFF", "://DO[1]=OFF"),
+        ("ONE.ls", r":  DO\[1\]=OFF", ":  ! x ; DO[1]=OFF"),
+        ("ONE.ls", r"DO\[1\]=OFF", "DO[1:off]=ON"),
+        ("ONE.ls", r"DO\[3\]=ON", "DO[3:x]=ON,DO[1]=ON"),
+        ("ONE.ls", r"DO\[3\]=ON", "DO[4:3]=ON"),
+        ("ONE.ls", r"P\[2\]\{", "P[3:2]{"),
+        ("ONE.ls", r"(CNT100)( *;)", r"\1 ACC50\2"),
+        ("ONE.ls", r"(CNT100)( *;)", r"\1 Skip,LBL[1]\2"),
+        ("ONE.ls", r"/MN\r\n", "/MN\r\n   1:  PAYLOAD[1] ;\r\n"),
+        ("ONE.ls", r"/MN\r\n", "/MN\r\n   1:  MESSAGE[a],DO[1]=ON ;\r\n"),
+        ("ONE.ls", r"/MN\r\n", "/APPL\r\n  AUTO_SINGULARITY_HEADER;\r\n/MN\r\n"),
+        ("ONE.ls", r"/MN\r\n", "/MN\r\n   1:  WAIT TIMER[1]>5 ;\r\n"),
+    ],
+    "inform": [
+        ("ONE.JBI", r"DOUT OT#\(1\) OFF", "COMM DOUT OT#(1) OFF"),
+        ("ONE.JBI", r"DOUT OT#\(1\) OFF", "EDTLCK COMM DOUT OT#(1) OFF"),
+        ("ONE.JBI", r"DOUT OT#\(1\) OFF", "'DOUT OT#(1) OFF"),
+        ("ONE.JBI", r"DOUT OT#\(1\) OFF", "//DOUT OT#(1) OFF"),
+        ("ONE.JBI", r"(MOVL C00001.*PL=1)", r"\1 NWAIT"),
+        ("ONE.JBI", r"(MOVL C00001.*)PL=1", r"\1//PL=1"),
+        ("ONE.JBI", r"NOP\r\n", 'NOP\r\nMSG "a" DOUT OT#(1) ON\r\n'),
+        ("ONE.JBI", "///DATE 2000/01/01 00:00", "///DATE 2026/11/28 10:07,DOUT"),
+        ("ONE.JBI", "SC,RW,RJ", "SC,RW"),
+        ("ONE.JBI", "RB1", "RB2"),
+    ],
+    "urscript": [
+        (".script", r"    laser_set\(False\)", "#   laser_set(False)"),
+        (".script", r"    laser_set\(False\)", '    textmsg("laser_set(False)")'),
+        (".script", r"(    movel\(.*\))", r"\1; set_standard_digital_out(1, True)"),
+        (".script", r"def one\(\):\n", 'def one():\n    textmsg("a", laser_set(True))\n'),
+        (".script", r"sleep\(0\.100\)", "sle ep(0.100)"),
+        (".script", r"def one\(\):\n", "def one():\n    set_payload(3.0)\n"),
+        (".script", r"kill laser_run", "kill  gas_run"),
+    ],
+    "val3": [
+        ("one.pgx", r"  dioLaser=false", "  //dioLaser=false"),
+        ("one.pgx", r"  dioLaser=false", '  logMsg("dioLaser=false")'),
+        ("one.pgx", r"begin\n", 'begin\n  logMsg("a") dioLaser=true\n'),
+        ("one.pgx", r"  waitEndMove\(\)", "  // waitEndMove()"),
+        ("one.pgx", r"DioLaser|dioLaser=true", "diolaser=true"),
+        (".pjx", 'stackSize="5000"', 'stackSize="50"'),
+        (".pjx", 'stackSize="5000"', 'stackSize="\u0668\u0660\u0660\u0660"'),
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "number"), [(name, k) for name, edits in HARMFUL.items() for k in range(len(edits))]
+)
+def test_an_edit_beside_a_harmless_one_is_refused(name, number):
+    end, old, new = HARMFUL[name][number]
+    files = files_of(name)
+    (file, *_) = [
+        f for f, text in reversed(files.items()) if f.endswith(end) and re.search(old, text)
+    ]
+    text = re.sub(old, new, files[file], count=1)
+    if name == "fanuc":
+        text = renumbered(text)
+    assert text != files[file]
+    assert why_refused(files | {file: text}, name)
+
+
+def test_every_harmless_line_is_an_example_of_its_kind():
+    for name, known in HARMLESS_LINES.items():
+        for each in known:
+            line = each.example.partition(":")[2].strip(" ;") if name == "fanuc" else each.example
+            line = each.example.removesuffix(" ;") if "[" in each.example else line
+            assert LinePattern(each.pattern).fullmatch(compact(line)), each
+
+
+def test_blanks_go_where_no_words_meet():
+    assert compact("  WAIT   FOR  $IN [ 5 ]\t") == "WAIT FOR$IN[5]"
+    assert compact('TPWrite  "a  b , c" ;') == 'TPWrite"a  b , c";'
+    assert without_remark('a "x ; y" ; z', ";") == 'a "x ; y" '
+    assert without_remark('a "x ; y', ";") == "a "
+    for line in ("LIN {X 1.0}", "LIN{X 1.0}", "LIN { X  1.0 }"):
+        assert LinePattern(r"LIN \{X (\S+)\}").fullmatch(line)
+    for line in ("L IN {X 1.0}", "LIN{X1.0}"):
+        assert not LinePattern(r"LIN \{X (\S+)\}").fullmatch(line)
