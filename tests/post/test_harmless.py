@@ -6,6 +6,7 @@ import pytest
 from tests.post.test_handshakes import ASKED, program, settings
 
 from kerfpath import InputError
+from kerfpath.job.program_file import TextFolder
 from kerfpath.post import deviations, language, post, read_program, unsafe_paths
 from kerfpath.post.harmless import HARMLESS as HARMLESS_LINES
 from kerfpath.post.harmless import LinePattern, compact, without_remark
@@ -15,11 +16,11 @@ def files_of(name):
     return post(program(name, ("one", "two"), handshakes=ASKED), name, settings(name))
 
 
-def why_refused(files, name):
+def why_refused(files, name, main=None):
     """Return why a text is refused, "" if it is accepted."""
     made, options = program(name, ("one", "two"), handshakes=ASKED), settings(name)
     try:
-        read = read_program(files, name, made.robot, options)
+        read = read_program(files, name, made.robot, options, main=main)
     except InputError as error:
         return str(error)
     return "; ".join(
@@ -264,3 +265,19 @@ def test_blanks_go_where_no_words_meet():
         assert LinePattern(r"LIN \{X (\S+)\}").fullmatch(line)
     for line in ("L IN {X 1.0}", "LIN{X1.0}"):
         assert not LinePattern(r"LIN \{X (\S+)\}").fullmatch(line)
+
+
+def test_files_may_have_capitals_and_the_umlauts_of_a_pendant(tmp_path):
+    for file, text in files_of("krl").items():
+        edited = text.replace("\r\n", "\r\n; f\u00fcr M\u00fcller\r\n", 1)
+        (tmp_path / file.upper()).write_bytes(edited.encode("cp1252"))
+    assert why_refused(TextFolder(tmp_path), "krl", main="CUT_ONE.SRC") == ""
+
+
+def test_text_in_another_encoding_is_refused_plainly(tmp_path):
+    path, files = tmp_path / "a.src", TextFolder(tmp_path)
+    path.write_bytes("DEF a()".encode("utf-16"))
+    found = "a.src, line 1: a program must not contain the character U+0000"
+    assert why_refused(files, "krl", main="a.src").startswith(found)
+    path.write_bytes(b"DEF a() ; \x81")
+    assert "a.src: expected text in utf-8-sig or cp1252" in why_refused(files, "krl", main="a.src")

@@ -37,7 +37,7 @@ ENCODINGS = ("utf-8-sig", "cp1252")
 """Encodings of programs: ours, and that of European controllers in remarks."""
 
 
-class _Folder(Mapping[str, str]):
+class TextFolder(Mapping[str, str]):
     """The text files of a folder by name, read when they are asked for."""
 
     def __init__(self, folder: Path) -> None:
@@ -103,7 +103,7 @@ def program_on_disk(path: Path, job: Job) -> ReadProgram:
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file; give the path of a program or a plan.json")
-    options, files = job.program, _Folder(path.parent)
+    options, files = job.program, TextFolder(path.parent)
     return read_program(files, options.language, job.robot, options.settings, main=path.name)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -107,7 +108,7 @@ class _Text(LineReader):
     def __init__(self, file: str, text: str, robot: Robot, settings: InformSettings) -> None:
         rows = [(n, row.rstrip()) for n, row in enumerate(program_lines(file, text), 1)]
         super().__init__(file, robot, settings, rows)
-        self.name = file.rpartition("/")[2].removesuffix(SUFFIX)
+        self.name = PurePosixPath(file).stem
         self.external = ExternalPulses(robot, settings)
 
     def plain(self, row: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
 
 import numpy as np
 
@@ -132,7 +133,7 @@ class _File(LineReader):
     ) -> None:
         lines = program_lines(file, files[file])
         super().__init__(file, robot, settings, statements(lines, ";"))
-        self.files, self.name = files, file.removesuffix(".src")
+        self.files, self.name = files, PurePosixPath(file).stem
         self.is_main, self.opening = bool(opening), opening
         self.routines: list[str] = []
         self.inside = False
@@ -189,7 +190,7 @@ class _File(LineReader):
         return int(first)
 
     def routine(self, name: str, passed: str) -> None:
-        if not self.routines and name != self.name:
+        if not self.routines and name.lower() != self.name.lower():
             raise self.fault(f"the first routine must have the name of the file, {self.name}")
         if name in self.routines:
             raise self.fault(f"{name} is defined twice")
