@@ -107,6 +107,8 @@ class OptionField(Message):
     """What it takes, in words."""
     needs: str | None = None
     """A key without which this one has no meaning."""
+    required: bool = False
+    """Whether a job cannot be without it."""
     table: str | None = None
     """A table that requires this key and is removed with it."""
     companion: Companion | None = None
@@ -125,9 +127,9 @@ class Sampling(Message):
     """One of the ways to place the nodes of a contour."""
 
     label: str
-    unit: str
+    field: OptionField
+    """Its required key, the first one of all."""
     keys: list[str]
-    """Its keys; the first one is required."""
     usual: float
 
 

@@ -170,7 +170,7 @@ def options_message(robot: Robot | None, external: Sequence[str] = ()) -> Option
         samplings=[
             Sampling(
                 label=label,
-                unit=_unit(keys[0]),
+                field=_field(f"contour.{keys[0]}", "Nodes by", required=True),
                 keys=[f"contour.{key}" for key in keys],
                 usual=float((_declaration(f"contour.{keys[0]}").examples or ["1"])[0]),
             )

@@ -60,6 +60,8 @@ export interface OptionField {
   help: string;
   /** A key without which this one has no meaning. */
   needs: string | null;
+  /** Whether a job cannot be without it. */
+  required: boolean;
   /** A table that requires this key and is removed with it. */
   table: string | null;
   companion: Companion | null;
@@ -76,8 +78,8 @@ export interface OptionGroup {
 /** One of the ways to place the nodes of a contour. */
 export interface Sampling {
   label: string;
-  unit: string;
-  /** Its keys; the first one is required. */
+  /** Its required key, the first one of all. */
+  field: OptionField;
   keys: string[];
   usual: number;
 }

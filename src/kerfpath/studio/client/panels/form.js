@@ -62,9 +62,9 @@ function set({ key, table, companion }, value) {
   return setKeys([key, value]);
 }
 
-/** @param {{field: OptionField}} props */
-function Row({ field }) {
-  const { key, label, unit, help, needs } = field;
+/** @param {{field: OptionField, ways?: unknown}} props  ways: a choice beside the label */
+function Row({ field, ways }) {
+  const { key, label, unit, help, needs, required } = field;
   const id = `key-${key.replaceAll(".", "-")}`;
   const disabled = !store.live || (needs !== null && !valueOf(needs));
   const fault = faultOf(key);
@@ -79,10 +79,11 @@ function Row({ field }) {
   };
   const control = CONTROLS[field.kind](field, common, () => refuse(store.job));
   // A key that is not in the job has nothing to reset.
-  const reset = { visibility: isGiven(key) && !disabled ? "visible" : "hidden" };
+  const reset = { visibility: isGiven(key) && !disabled && !required ? "visible" : "hidden" };
+  const name = html`<label for=${id}>${label}</label>`;
   return html`
     <div class="option" title=${help || null}>
-      <label for=${id}>${label}</label>
+      ${ways ? html`<span>${name} ${ways}</span>` : name}
       <span class="value">
         ${control}
         <span class="unit">${unit}</span>
@@ -104,7 +105,7 @@ const CONTROLS = { number, choice, switch: onOff, table: presence, list, joints 
 function number(field, common) {
   const take = (/** @type {string} */ text) => {
     if (text !== "") set(field, Number(text));
-    else if (isGiven(field.key)) set(field, null);
+    else if (isGiven(field.key) && !field.required) set(field, null);
   };
   const value = String(valueOf(field.key) ?? "");
   return html`<${Input} ...${NUMBER} ...${common} min=${field.low} max=${field.high} placeholder="none" value=${value} onSet=${take} />`;
@@ -188,30 +189,15 @@ function samplingRow(title, samplings) {
       .map((key) => /** @type {[string, unknown]} */ ([key, null]));
     setKeys(...removed, [to.keys[0], to.usual]);
   };
-  const put = (/** @type {string} */ text) => text !== "" && setKeys([now.keys[0], Number(text)]);
-  const value = String(valueOf(now.keys[0]) ?? "");
-  const disabled = !store.live;
   const choices = samplings.map(({ keys, label }) => ({ value: keys[0], label }));
+  const ways = html`
+    <select aria-label="Nodes by" value=${now.keys[0]} disabled=${!store.live} onChange=${choose}>
+      ${options(choices)}
+    </select>`;
+  const words = samplings.flatMap(({ label, keys }) => [label, ...keys]);
   return {
-    shown: found(
-      title,
-      "nodes by sampling",
-      ...samplings.flatMap(({ label, keys }) => [label, ...keys]),
-    ),
+    shown: found(title, "nodes by sampling", ...words),
     given: false,
-    content: html`
-      <div class="option">
-        <span>
-          <label for="key-sampling">Nodes by </label>
-          <select aria-label="Nodes by" value=${now.keys[0]} disabled=${disabled} onChange=${choose}>
-            ${options(choices)}
-          </select>
-        </span>
-        <span class="value">
-          <${Input} id="key-sampling" ...${NUMBER} value=${value} disabled=${disabled} onSet=${put} />
-          <span class="unit">${now.unit}</span>
-          <span class="reset tool" aria-hidden="true" />
-        </span>
-      </div>`,
+    content: html`<${Row} key="sampling" field=${now.field} ways=${ways} />`,
   };
 }
