@@ -164,6 +164,8 @@ HARMFUL = {
         (".src", r"(LIN \{.*\})\r", r"\1 $OUT[1]=TRUE\r"),
         (".src", r"WAIT SEC 0\.100", "WAIT SEC 0.1.00"),
         (".src", r"WAIT SEC 0\.100", "WAITSEC 0.100"),
+        (".src", r"WAIT SEC 0\.100", "WAIT SEC 0. 100"),
+        (".src", r"WAIT SEC 0\.100", "WAIT SEC.100"),
         (".src", r"HALT", "HA LT"),
         (".src", r"FALSE\r\nEND\r\n", "FAL\u017fE\r\nEND\r\n"),
         (".src", r"HALT", "\uff28ALT"),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +93,7 @@ HARMLESS: dict[str, tuple[Harmless, ...]] = {
 class LinePattern:
     """A regular expression of a line, in which a blank stands for blanks, if any are needed.
 
-    Between two letters, digits or underscores there must be one; elsewhere there may be any.
+    Between two letters, digits, underscores or points there must be one, elsewhere may be any.
     Letters, digits and blanks are ASCII.
 
     Parameters
@@ -105,13 +106,14 @@ class LinePattern:
     def __init__(self, pattern: str, *, caseless: bool = False) -> None:
         self.as_written = re.compile(pattern, re.ASCII)
         flags = re.ASCII | (re.IGNORECASE if caseless else re.NOFLAG)
-        self.compacted = re.compile(pattern.replace(" ", r"(?: |(?<!\w)|(?!\w))"), flags)
+        self.compacted = re.compile(pattern.replace(" ", r"(?: |(?<![\w.])|(?![\w.]))"), flags)
 
     def fullmatch(self, line: str) -> re.Match[str] | None:
         """Return the match of a line, written with any blanks."""
         return self.as_written.fullmatch(line) or self.compacted.fullmatch(compact(line))
 
 
+@cache
 def harmless_lines(language: str) -> re.Pattern[str]:
     """Return a regular expression of all lines of a language that do nothing, with any blanks."""
     known = (f"(?:{each.pattern})" for each in HARMLESS.get(language, ()))
@@ -120,7 +122,7 @@ def harmless_lines(language: str) -> re.Pattern[str]:
     return re.compile(rf"[ \t]*(?:{pattern or '(?!)'})[ \t]*", flags)
 
 
-_BLANKS = re.compile(r'(?P<quoted>"[^"]*")|(?P<between>(?<=\w)[ \t]+(?=\w))|[ \t]+', re.ASCII)
+_BLANKS = re.compile(r'(?P<quoted>"[^"]*")|(?P<between>(?<=[\w.])[ \t]+(?=[\w.]))|[ \t]+', re.ASCII)
 
 
 def compact(line: str) -> str:

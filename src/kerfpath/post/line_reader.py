@@ -53,7 +53,7 @@ def patterns(by_kind: Mapping[str, str], *, caseless: bool = False) -> dict[str,
 
 
 def only(by_kind: Mapping[str, LinePattern], *kinds: str) -> dict[str, LinePattern]:
-    """Return the regular expressions of some kinds of lines."""
+    """Return the patterns of some kinds of lines."""
     return {kind: by_kind[kind] for kind in kinds}
 
 
@@ -223,18 +223,19 @@ class LineReader:
 
     def read(self, row: str, kinds: Mapping[str, LinePattern]) -> None:
         """Read a row with the method of its kind, unless it is a required row."""
-        if self.required and not self.harmless.fullmatch(row):
+        if self.harmless.fullmatch(row):
+            return
+        if self.required:
             self.require_line(row, self.required.pop(0))
             if self.flow_lines is not None:
                 self.follow(row, self.flow_lines)
             return
         kind, match = self.kind_of(row, kinds)
-        if match is None and not self.harmless.fullmatch(row):
+        if match is None:
             raise self.fault(f"not expected here: {row[:SHOWN]!r}")
-        if match is not None:
-            self.admit(kind)
-            words = (word and self.spelled(word) for word in match.groups())
-            getattr(self, kind)(*words)
+        self.admit(kind)
+        words = (word and self.spelled(word) for word in match.groups())
+        getattr(self, kind)(*words)
 
     def kind_of(
         self, row: str, kinds: Mapping[str, LinePattern]
@@ -258,12 +259,11 @@ class LineReader:
             It is not known what the row does to the flow of control.
         """
         kind, match = self.kind_of(row, flow_lines)
-        if match is not None:
-            if kind:
-                said = (int(word) if word.isdecimal() else word for word in match.groups())
-                getattr(self, kind)(*said)
-            return
-        raise self.fault(f"it is not known where the program goes on after {row[:SHOWN]!r}")
+        if match is None:
+            raise self.fault(f"it is not known where the program goes on after {row[:SHOWN]!r}")
+        if kind:
+            words = (int(word) if word.isdecimal() else word for word in match.groups())
+            getattr(self, kind)(*words)
 
     def admit(self, kind: str) -> None:
         """Refuse a kind of line that must not come here; each language overrides this."""

@@ -146,10 +146,10 @@ class _Text(LineReader):
         """Read instructions to END."""
         while (row := self.next_row()) != "END":
             try:
-                plain = self.external.plain(self.plain(row) if self.robot.externals else row)
+                row = self.external.plain(row)
             except InputError as error:
                 raise self.fault(str(error)) from None
-            self.read(plain, kinds)
+            self.read(row, kinds)
         self.require_complete()
         if any(row for _, row in self.rows[self.line :]):
             self.line += 1
