@@ -1,6 +1,7 @@
 """Edits that change nothing of what a program does are accepted; their neighbours are not."""
 
 import re
+from functools import cache
 
 import pytest
 from tests.post.test_handshakes import ASKED, program, settings
@@ -12,13 +13,19 @@ from kerfpath.post.harmless import HARMLESS as HARMLESS_LINES
 from kerfpath.post.harmless import LinePattern, compact, without_remark
 
 
+@cache
+def made_of(name):
+    return program(name, ("one", "two"), handshakes=ASKED)
+
+
+@cache
 def files_of(name):
-    return post(program(name, ("one", "two"), handshakes=ASKED), name, settings(name))
+    return post(made_of(name), name, settings(name))
 
 
 def why_refused(files, name, main=None):
     """Return why a text is refused, "" if it is accepted."""
-    made, options = program(name, ("one", "two"), handshakes=ASKED), settings(name)
+    made, options = made_of(name), settings(name)
     try:
         read = read_program(files, name, made.robot, options, main=main)
     except InputError as error:
