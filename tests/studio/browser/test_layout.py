@@ -104,7 +104,7 @@ def test_the_part_is_moved_by_numbers_and_what_is_out_of_reach_is_said(opened):
     ]:
         page.get_by_label(label).focus()
         page.keyboard.press("Control+a")
-        page.keyboard.type(keys)
+        page.keyboard.type(keys, delay=60)  # the page is drawn again between the keys
         before = part_of(page)
         page.keyboard.press("Enter")
         until(page, lambda now=before: part_of(page) != now)

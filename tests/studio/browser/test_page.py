@@ -269,7 +269,7 @@ def test_what_is_out_of_date_is_marked_until_its_plan_comes(page, studio, first,
     studio.say(first[0] | {"revision": 2})
     studio.say({"type": "progress", "busy": True, "label": "planning slot", "done": 0, "total": 2})
     page.locator(".result.stale").wait_for()
-    assert page.locator(".badge", has_text="planning again").is_visible()
+    page.locator(".badge", has_text="planning again").wait_for()
     page.get_by_role("button", name="Cancel").click()
     until(page, lambda: sent(studio, "cancel"))
     plan = messages["plan"][0]

@@ -188,14 +188,15 @@ export function layoutSheet(placing) {
 function Place({ label, short, unit, step, value, moved, put, commit }) {
   const input = useRef(/** @type {HTMLInputElement | null} */ (null));
   const places = unit === "mm" ? 2 : 3;
+  const given = () => (input.current?.value ?? "") !== "";
   useLayoutEffect(() => {
     const { current } = input;
     if (!current) return;
-    const typing = document.activeElement === current && current.value !== "";
-    const other = Math.abs(Number(current.value) - value) > 10 ** -places && !moved;
+    // An empty field with the focus waits for digits; a sign alone counts as empty, too.
+    const typing = document.activeElement === current;
+    const other = Math.abs(Number(current.value) - value) > 10 ** -places && !moved && given();
     if (!typing || other) current.value = String(Number(value.toFixed(places)) + 0);
   });
-  const given = () => (input.current?.value ?? "") !== "";
   return html`
     <label>
       <span>${short}</span>
