@@ -12,7 +12,14 @@ import pytest
 from conftest import ROOT
 from kerfpath import InputError, robot
 from kerfpath.contour import KINDS
-from kerfpath.post import build_program, deviations, language, post, read_program
+from kerfpath.post import (
+    build_program,
+    deviations,
+    language,
+    post,
+    read_program,
+    unsafe_paths,
+)
 from programs import arc, assert_at, codes, edited, frames, hand_plan
 
 DATA = ROOT / "tests" / "data"
@@ -40,6 +47,23 @@ def kinds_of(text):
 
 def no_words(rear, down, minus):
     return ()
+
+
+def refusal(files, name, made, options, main=None):
+    """Why a text is refused by reader, comparison or flow; "" if it is accepted."""
+    try:
+        read = read_program(files, name, made.robot, options, main=main)
+    except InputError as error:
+        return str(error)
+    found = deviations(made, read, language(name), options) or unsafe_paths(read)
+    return "; ".join(map(str, found))
+
+
+def renumbered(listing):
+    """A listing with its lines numbered from 1 and counted, as a FANUC controller does."""
+    numbers = iter(range(1, 10**4))
+    text = re.sub(r"(?m)^ *\d+:", lambda _: f"{next(numbers):4d}:", listing)
+    return re.sub(r"LINE_COUNT\t= \d+", f"LINE_COUNT\t= {next(numbers) - 1}", text)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from tests.post.cases import ARMS
+from tests.post.cases import ARMS, refusal, renumbered
 from tests.post.test_handshakes import ASKED, program, settings
 
 from kerfpath import InputError
@@ -21,10 +21,7 @@ from kerfpath.post import (
     ReadProgram,
     Request,
     Switch,
-    deviations,
-    language,
     post,
-    read_program,
     unsafe_paths,
 )
 from kerfpath.post.flow import section_of
@@ -270,15 +267,6 @@ def test_the_verdict_is_that_of_all_paths_one_by_one():
 # Texts.
 
 
-def refused(files, name, made, options):
-    """Return whether a text is refused: by the reader, the comparison or the machine."""
-    try:
-        read = read_program(files, name, made.robot, options)
-        return bool(deviations(made, read, language(name), options) or unsafe_paths(read))
-    except InputError:
-        return True
-
-
 HANDSHAKE = {
     "rapid": r" +(SetDO x[34],1;|WaitDI)",
     "krl": r"\$OUT\[\d\]=|\$TIMER|WAIT FOR|WHILE|HALT|ENDWHILE",
@@ -293,7 +281,7 @@ HANDSHAKE = {
 def test_no_line_of_a_handshake_can_be_left_out_or_doubled(name):
     made, options = program(name, handshakes=ASKED), settings(name)
     files = post(made, name, options)
-    assert not refused(files, name, made, options)
+    assert not refusal(files, name, made, options)
     tried = 0
     for file, text in files.items():
         lines = text.split("\n")
@@ -304,16 +292,8 @@ def test_no_line_of_a_handshake_can_be_left_out_or_doubled(name):
                     edited = "\n".join([*lines[:k], *others, *lines[k + 1 :]])
                     if name == "fanuc":
                         edited = renumbered(edited)
-                    assert refused(files | {file: edited}, name, made, options), (file, k, line)
+                    assert refusal(files | {file: edited}, name, made, options), (file, k, line)
     assert tried >= 4
-
-
-def renumbered(listing):
-    """Return a listing with its lines numbered from 1 and counted, as a controller does."""
-    numbers = iter(range(1, 10**4))
-    pattern = re.compile(r"^ *\d+:", re.MULTILINE)
-    text = pattern.sub(lambda _: f"{next(numbers):4d}:", listing)
-    return re.sub(r"LINE_COUNT\t= \d+", f"LINE_COUNT\t= {next(numbers) - 1}", text)
 
 
 @pytest.mark.parametrize("moved", [True, False])
@@ -329,7 +309,7 @@ def test_the_end_of_a_listing_cannot_be_moved_into_its_cut(moved):
     for at in range(first, begin):
         edited = [*rest[:at], *block, *rest[at:]] if moved else [*lines[:at], *block, *lines[at:]]
         text = renumbered("\r\n".join(edited))
-        assert refused(files | {"ONE.ls": text}, "fanuc", made, options), lines[at]
+        assert refusal(files | {"ONE.ls": text}, "fanuc", made, options), lines[at]
 
 
 @pytest.mark.parametrize("name", ["krl", "inform", "val3"])
@@ -358,4 +338,4 @@ def test_handshakes_in_two_places_are_asked_for_again_from_the_first(name):
         sections=(type(made.sections[0])(name="one", steps=tuple(twice)),),
     )  # fmt: skip
     files = post(both, name, settings(name))
-    assert not refused(files, name, both, settings(name))
+    assert not refusal(files, name, both, settings(name))

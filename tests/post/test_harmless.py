@@ -4,11 +4,11 @@ import re
 from functools import cache
 
 import pytest
+from tests.post.cases import refusal, renumbered
 from tests.post.test_handshakes import ASKED, program, settings
 
-from kerfpath import InputError
 from kerfpath.job.program_file import TextFolder
-from kerfpath.post import deviations, language, post, read_program, unsafe_paths
+from kerfpath.post import post
 from kerfpath.post.harmless import HARMLESS as HARMLESS_LINES
 from kerfpath.post.harmless import LinePattern, compact, without_remark
 
@@ -24,15 +24,7 @@ def files_of(name):
 
 
 def why_refused(files, name, main=None):
-    """Return why a text is refused, "" if it is accepted."""
-    made, options = made_of(name), settings(name)
-    try:
-        read = read_program(files, name, made.robot, options, main=main)
-    except InputError as error:
-        return str(error)
-    return "; ".join(
-        map(str, deviations(made, read, language(name), options) or unsafe_paths(read))
-    )
+    return refusal(files, name, made_of(name), settings(name), main)
 
 
 # Each edit is a pattern in a file (by the end of its name) and what it becomes.
@@ -155,12 +147,6 @@ def test_an_edit_without_effect_is_accepted(name, number):
         text = renumbered(text)
     assert text != files[file] or old == new
     assert why_refused(files | {file: text}, name) == ""
-
-
-def renumbered(listing):
-    numbers = iter(range(1, 10**4))
-    text = re.sub(r"(?m)^ *\d+:", lambda _: f"{next(numbers):4d}:", listing)
-    return re.sub(r"LINE_COUNT\t= \d+", f"LINE_COUNT\t= {next(numbers) - 1}", text)
 
 
 HARMFUL = {

@@ -225,9 +225,9 @@ def program_from_file(
     if frame is not None:
         file, again = _at_measured(file, frame, options.retract)
         notes += [*again, MEASURED_NOTE, *([MEASURED_MOVES_NOTE] if file.moves else [])]
-    there = "" if frame is None else " at the measured placement"
+    there, tolerances = "" if frame is None else " at the measured placement", file.tolerances
     for p in file.plans:
-        if (failed := _first_failed(file.tolerances.checks(p))) is not None:
+        if (failed := _first_failed(tolerances.checks(p))) is not None:
             raise AuditFailed(
                 f"no program: contour {p.name!r} fails its audit{there}: {failed.issue()}"
             )
@@ -307,9 +307,9 @@ def _at_measured(
 
     A contour that would fail its audit there is planned again; a note names it.
     """
-    plans, notes = [], []
+    tolerances, plans, notes = file.tolerances, [], []
     for p in file.plans:
-        moved, why = _moved(p, frame, file.tolerances)
+        moved, why = _moved(p, frame, tolerances)
         if why:
             try:
                 moved = planned_again(p, frame.T_base_part)

@@ -119,7 +119,7 @@ def section_of(name: str, flow: Sequence[FlowStep]) -> ReadSection:
         if at in passed:
             raise InputError(f"{step.place}: the routine comes back to this line for ever")
         passed.add(at)
-        if isinstance(step, ReadMove | ReadWait | ReadHandshake):
+        if isinstance(step, ReadStep):
             steps.append(step)
         ways = list(routine.following(at, state))
     return ReadSection(name=name, steps=tuple(steps), flow=tuple(flow))

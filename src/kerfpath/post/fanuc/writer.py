@@ -95,17 +95,17 @@ class Listing(LineReader):
             raise self.fault(f"expected /PROG and the name of the file, got {self.text[:60]!r}")
         if (row := self.next_row()) != "/ATTR":
             raise self.fault(f"expected /ATTR, got {row[:60]!r}")
-        counted, moved = None, False
+        counted, grouped = None, False
         while (row := self.next_row()) != "/MN":
             if match := _COUNT.fullmatch(row):
                 counted = int(match[1])
             elif match := _GROUPS.fullmatch(row):
                 if match[1].rstrip("*,") != group.rstrip("*,"):
                     raise self.fault(f"expected DEFAULT_GROUP = {group}, got {match[1]}")
-                moved = True
+                grouped = True
             elif not _ATTRIBUTE.fullmatch(row) and row != "/APPL":
                 raise self.fault(f"not an attribute: {row[:60]!r}")
-        if not moved:
+        if not grouped:
             raise self.fault(f"expected DEFAULT_GROUP = {group} before this line")
         number = 0
         while (row := self.next_row()) != "/POS":

@@ -122,9 +122,8 @@ class _Text(LineReader):
         if _DATE.fullmatch(expected):
             return bool(_DATE.fullmatch(row))
         if expected.startswith("///ATTR "):
-            return sorted(row.removeprefix("///ATTR ").split(",")) == sorted(
-                expected.removeprefix("///ATTR ").split(",")
-            )
+            words, known = (each.removeprefix("///ATTR ").split(",") for each in (row, expected))
+            return sorted(words) == sorted(known)
         return super().same(row, expected)
 
     def require_rows(self, expected: Sequence[str]) -> None:
