@@ -165,6 +165,7 @@ HARMFUL = {
         (".src", r"DEF one\(\)\r\n", "DEF one()\r\n&$OUT[1]=TRUE\r\n"),
         (".src", r"DEF one\(\)\r\n", "DEF one()\r\n$LOAD={M 1} $OUT[1]=TRUE\r\n"),
         (".src", r"DEF one\(\)\r\n", "DEF one()\r\n$LOAD=LOAD_DATA[1]\r\n"),
+        (".src", r"DEF one\(\)\r\n", "DEF one()\r\n$LOAD={M 1} $BASE={X 1}\r\n"),
     ],
     "rapid": [
         (".mod", r"    SetDO x4,0;\n", "!   SetDO x4,0;\n"),
@@ -191,6 +192,7 @@ HARMFUL = {
         ("ONE.ls", r"(CNT100)( *;)", r"\1 Skip,LBL[1]\2"),
         ("ONE.ls", r"/MN\r\n", "/MN\r\n   1:  PAYLOAD[1] ;\r\n"),
         ("ONE.ls", r"/MN\r\n", "/MN\r\n   1:  MESSAGE[a],DO[1]=ON ;\r\n"),
+        ("ONE.ls", r"/MN\r\n", "/MN\r\n   1:  MESSAGE[a],DO[1]=DI[2] ;\r\n"),
         ("ONE.ls", r"/MN\r\n", "/APPL\r\n  AUTO_SINGULARITY_HEADER;\r\n/MN\r\n"),
         ("ONE.ls", r"/MN\r\n", "/MN\r\n   1:  WAIT TIMER[1]>5 ;\r\n"),
     ],

@@ -40,7 +40,7 @@ HARMLESS: dict[str, tuple[Harmless, ...]] = {
             why="the controller counts changes and notes who may see and edit the file",
         ),
         Harmless(
-            pattern=r"\$LOAD = \{.*\}",
+            pattern=r"\$LOAD = \{[^=$]*\}",
             example="$LOAD={M 12.0,CM {X 10.0,...},...}",
             why="the load that the head of the program asks to complete; the path stays the same",
         ),
@@ -65,7 +65,7 @@ HARMLESS: dict[str, tuple[Harmless, ...]] = {
             example="TIMER[1]=START",
             why="a timer that nothing waits for",
         ),
-        Harmless(pattern=r"MESSAGE \[.*\]", example="MESSAGE[one]", why="it only shows text"),
+        Harmless(pattern=r"MESSAGE \[[^\]]*\]", example="MESSAGE[one]", why="it only shows text"),
     ),
     "inform": (
         Harmless(
