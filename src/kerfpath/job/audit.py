@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import ValidationError
 from scipy.spatial import cKDTree
 
 from kerfpath import __version__
@@ -38,6 +35,7 @@ from kerfpath.job.audit_report import (
     count,
     count_at,
 )
+from kerfpath.job.comparison import compare, compare_jobs
 from kerfpath.job.expected import (
     SAME_VALUE,
     Expected,
@@ -55,7 +53,6 @@ from kerfpath.job.expected import (
 from kerfpath.job.format import (
     Candidate,
     Job,
-    JobFile,
     prepare,
     read_job,
 )
@@ -84,7 +81,6 @@ from kerfpath.post import (
     LinearMove,
     ReadProgram,
     Rules,
-    differences,
     unsafe_paths,
 )
 from kerfpath.transfer import End, TransferMove, back_off
@@ -233,187 +229,6 @@ def _fits(expected: Expected, move: TransferMove, ends: tuple[Array, Array]) -> 
 def _way_row(row: Check) -> Check:
     title = f"in approach and retract: {row.title}"
     return replace(row, code=f"approach-{row.code}", title=title, node=row.node // 2)
-
-
-# -----------------------------------------------------------------------------
-# Compare a plan.json with the values that follow from its job and its joints.
-
-CLAIMS = {
-    r"kerfpath$": "the version that wrote the file",
-    r"(proof|optimal|grid_cost|bound|gap)$": "claims about motions that are not in the file",
-    r"certificate(/|$)": "the proof of a bound, which the audit checks separately",
-    r"counts(/|$)": "poses that were dropped in planning",
-    r"audit/checks/\d+/(title|advice|node)$": "words and places of the audit made in planning",
-    r"sequence/(optimal|at_least_s)$": "claims about orders that are not in the file",
-}
-"""Places that are not compared, and what they hold; none of them defines the motion."""
-DISTANCE = 1e-6
-"""Accuracy of distances between convex solids, m; those of a record may differ by it."""
-SHOWN = 60
-"""Most characters of a value that a message shows."""
-PROGRAM = ("program", "audit", "layout")
-"""Tables of a job that do not define the motion."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Difference:
-    """One value that differs: where, and what both sides have."""
-
-    path: tuple[str | int, ...]
-    expected: Any
-    found: Any
-
-    @property
-    def node(self) -> int:
-        """The node that it belongs to; 0 where it belongs to all."""
-        node = self.path[1 + (self.path[0] == "nodes")] if len(self.path) > 2 else 0
-        return node if isinstance(node, int) and self.path[0] == "nodes" else 0
-
-    def __str__(self) -> str:
-        where = ".".join(str(step) for step in self.path)
-        return f"{where}: expected {_shown(self.expected)}, found {_shown(self.found)}"
-
-
-def compare_values(
-    expected: Any, found: Any, whose: str, under: tuple[str | int, ...] = ()
-) -> list[Check]:
-    """Return a check for each kind of place at which `found` differs from what is expected.
-
-    The title has the first difference of the kind; without any, a single check passes.
-
-    Parameters
-    ----------
-    expected, found : JSON values
-    whose : str
-        Whose values are expected, in words.
-    under : tuple
-        Place of both values in the document.
-    """
-    groups: dict[tuple[str, ...], list[_Difference]] = {}
-    for each in _differences(expected, found, under):
-        kind = tuple(step for step in each.path if isinstance(step, str))
-        groups.setdefault(kind, []).append(each)
-    checks = []
-    for alike in groups.values():
-        first = alike[0]
-        many = "" if len(alike) == 1 else f" (and {len(alike) - 1} more such)"
-        checks.append(
-            count(
-                "agrees", f"values that differ from {whose}: {first}{many}", len(alike), first.node
-            )
-        )
-    return checks or [count("agrees", f"values that differ from {whose}", 0)]
-
-
-def compare_jobs(job: Job, source: Mapping[str, Any]) -> list[Check]:
-    """Return the checks of the job that a plan.json repeats, compared by the values it means.
-
-    Tables that do not define the motion have a separate check.
-    """
-    title = "values of the job in the plan that differ from the job"
-    if _same(job.source, source):
-        return [count("job", title, 0)]
-    context = {"folder": job.path.parent}
-    try:
-        then = JobFile.model_validate(source, context=context).model_dump(mode="json")
-    except (ValidationError, ValueError, TypeError, OverflowError) as error:
-        said = " ".join(str(error).split())[:SHOWN]
-        return [count("job", f"{title}: it is not a valid job ({said}...)", 1)]
-    now = JobFile.model_validate(job.source, context=context).model_dump(mode="json")
-    found = list(_differences(now, then, ("job",)))
-    rows = []
-    for code, mine in (
-        ("job", [each for each in found if each.path[1] not in PROGRAM]),
-        ("job-program", [each for each in found if each.path[1] in PROGRAM]),
-    ):
-        many = f" (and {len(mine) - 1} more)" if len(mine) > 1 else ""
-        rows.append(count(code, f"{title}: {mine[0]}{many}" if mine else title, len(mine)))
-    return rows
-
-
-def _differences(one: Any, two: Any, path: tuple[str | int, ...]) -> Iterator[_Difference]:
-    where = "/".join(str(step) for step in path)
-    if any(re.match(pattern, where) for pattern in CLAIMS):
-        return
-    if isinstance(one, dict) and isinstance(two, dict):
-        for key in sorted(one.keys() | two.keys()):
-            if key not in one or key not in two:
-                a, b = (side.get(key, _Absent) for side in (one, two))
-                yield _Difference((*path, key), a, b)
-            else:
-                yield from _differences(one[key], two[key], (*path, key))
-    elif isinstance(one, list | tuple) and isinstance(two, list | tuple):
-        if len(one) != len(two):
-            yield _Difference((*path,), f"{len(one)} of them", f"{len(two)} of them")
-            return
-        numbers = _numbers(one), _numbers(two)
-        if numbers[0] is not None and numbers[1] is not None:
-            yield from _far(*numbers, path)
-            return
-        for i, (a, b) in enumerate(zip(one, two, strict=True)):
-            yield from _differences(a, b, (*path, i))
-    elif _is_number(one) and _is_number(two):
-        if not abs(one - two) <= _allowed(path, one):
-            yield _Difference(path, one, two)
-    elif type(one) is not type(two) or one != two:
-        yield _Difference(path, one, two)
-
-
-def _far(
-    one: NDArray[np.float64] | None, two: NDArray[np.float64] | None, path: tuple[str | int, ...]
-) -> Iterator[_Difference]:
-    """Yield the numbers of two arrays that differ, the largest difference first."""
-    assert one is not None
-    assert two is not None
-    if one.shape != two.shape:
-        yield _Difference(path, f"{one.shape} numbers", f"{two.shape} numbers")
-        return
-    off = np.abs(one - two) / np.maximum(1.0, np.abs(one))
-    far = np.argwhere(~(off <= SAME_VALUE))
-    for index in far[np.argsort([-off[tuple(i)] for i in far], kind="stable")]:
-        at = tuple(int(i) for i in index)
-        yield _Difference((*path, *at), float(one[at]), float(two[at]))
-
-
-def _allowed(path: tuple[str | int, ...], value: float) -> float:
-    """Return how far a number may be from `value`."""
-    if path[:2] == ("audit", "checks") and path[-1] == "value":
-        return DISTANCE
-    return SAME_VALUE * max(1.0, abs(value))
-
-
-def _numbers(values: Any) -> NDArray[np.float64] | None:
-    """Return an array of numbers, of any depth; None if it holds anything else."""
-    try:
-        found = np.array(values)
-    except ValueError:  # rows of unlike lengths
-        return None
-    return found.astype(np.float64) if found.dtype.kind in "iuf" and found.size else None
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _same(one: Any, two: Any) -> bool:
-    """Return whether two documents are the same, types included."""
-    if type(one) is not type(two):
-        return False
-    if isinstance(one, dict):
-        return one.keys() == two.keys() and all(_same(one[key], two[key]) for key in one)
-    if isinstance(one, list):
-        return len(one) == len(two) and all(map(_same, one, two))
-    return bool(one == two)
-
-
-class _Absent:
-    """Marks a value that one of the two documents lacks."""
-
-
-def _shown(value: Any) -> str:
-    text = "nothing" if value is _Absent else str(value)
-    text = "".join(c if c.isprintable() else "?" for c in text)
-    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
 # -----------------------------------------------------------------------------
@@ -741,7 +556,7 @@ class Audit:
             judged.append(entry)
             table += made
             table += _claims(each.plan)
-            table += compare_values(entry, entries[each.name], JOB)
+            table += compare(entry, entries[each.name], of=JOB)
         rows += compare_jobs(job, file.job)
         paths = [p.contour for p in file.plans]
         rows += check_sequence(expected, [each.number for each in planned], paths)
@@ -799,7 +614,8 @@ class Audit:
             row if row.ok else replace(row, node=steps[row.node])
             for row in check_order(job.sequence, self.expected.inner_first, done)
         ]
-        tables[name] += _compared(job, followed, home, read)
+        if followed:
+            tables[name] += _as_expected(job, followed, home, read)
         tables[_new_title("air", tables)] = _air(
             job, cuts, home, cell if job.sequence is not None else None
         )
@@ -826,10 +642,11 @@ class Audit:
                 continue  # compared elsewhere, or not at all
             if key == "sequence" and len(plans) < len(planned):
                 continue  # a contour is refused already, and its times are not known
-            rows += [row for row in compare_values(whole[key], own[key], JOB, (key,)) if not row.ok]
+            found = compare(whole[key], own[key], of=JOB, under=(key,))
+            rows += [row for row in found if not row.ok]
         if job.sequence is not None and data["sequence"] is None:
             rows.append(count("moves", "missing moves between contours", 1))
-        return rows or compare_values({}, {}, JOB)
+        return rows or compare({}, {}, of=JOB)
 
 
 def _entry(plan: Plan, said: PlanData, made: Sequence[Check], file: PlanFile) -> PlanData:
@@ -889,7 +706,7 @@ def _by_itself(file: PlanFile) -> AuditReport:
         entry = _entry(own, said, made, file)
         follow = {key: value for key, value in entry["nodes"].items() if key in OWN_NODES}
         entry["audit"], entry["nodes"] = said["audit"], cast(NodesData, said["nodes"] | follow)
-        tables[p.name] = [*made, *_claims(own), *compare_values(entry, said, FILE)]
+        tables[p.name] = [*made, *_claims(own), *compare(entry, said, of=FILE)]
     if not file.plans and not file.missing:
         tables[file.path.name] = [count("contours", "missing plans: the file has none", 1)]
     if file.moves and file.plans:
@@ -916,20 +733,6 @@ NEAR = 5e-3
 """Median distance (m) from a contour of the job beyond which a cut is not of that contour."""
 SAME_FRAME = 1e-6
 """Tolerance (m, sine) of tool and part against those of the job."""
-FOLLOWED = ("postures",)
-"""Codes of differences that follow from the path that was read, and are checked with it."""
-WHAT = {
-    "added": "moves",
-    "removed": "moves",
-    "targets": "targets beside the cut",
-    "joints": "joint targets",
-    "external": "external axes",
-    "times": "times of moves",
-    "zones": "corners and stops",
-    "switches": "laser and gas",
-    "kinds": "kinds of moves",
-}
-"""What differs, by the code of the difference."""
 
 
 def _check_paths(read: ReadProgram) -> Check:
@@ -944,36 +747,16 @@ def _new_title(title: str, tables: Mapping[str, object]) -> str:
     return title if title not in tables else _new_title(f"{title}, again", tables)
 
 
-def _compared(
+def _as_expected(
     job: Job, followed: Sequence[tuple[ReadCut, TargetNodes, Plan]], home: Array, read: ReadProgram
 ) -> list[Check]:
-    """Compare a program with the one that the job would have along the same paths.
-
-    Each kind of difference is a check, with the number of moves and the place of the largest.
-    """
-    if not followed:
-        return []
+    """Compare a program with the one that the job would have along the same paths."""
     try:
-        expected = expect_program(job, followed, home)
+        expected = add_tips(expect_program(job, followed, home), job)
     except InputError as error:
         said = f"the program of the job cannot be made along these paths ({error})"
         return [count("asked", said, 1)]
-    rules = job.program.rules
-    expected = add_tips(expected, job)
-    found = differences(expected, read, rules=(rules,), names=("the job", "the text"), strict=True)
-    places = [step.place for step in read.steps]
-    rows = [
-        count(
-            f"asked-{each.code}",
-            f"different from the job, {WHAT.get(each.code, each.code)}: {each.message}"
-            + (f" (from {each.said_at})" if each.said_at else ""),
-            each.count,
-            places.index(each.place) if each.place in places else 0,
-        )
-        for each in found
-        if each.code not in FOLLOWED
-    ]
-    return rows or [count("asked", "differences from the job", 0)]
+    return compare(expected, read, of="the job", rules=(job.program.rules,))
 
 
 def _closest(cut: ReadCut, contours: Sequence[ExpectedContour]) -> tuple[float, int, int]:
