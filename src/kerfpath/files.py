@@ -3,61 +3,157 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
+import secrets
 import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from threading import Lock
+from threading import RLock
+from time import monotonic, sleep
 
-_WRITING = Lock()
+_WRITING = RLock()
+_locked: set[Path] = set()
+"""Folders that this process has locked; only the thread that holds `_WRITING` looks at it."""
 
 OTHER_KINDS = {
     stat.S_IFDIR: "a folder",
+    stat.S_IFLNK: "a link",
     stat.S_IFIFO: "a FIFO",
     stat.S_IFSOCK: "a socket",
     stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
 }
 """What may lie at a path instead of a regular file."""
+TEMPORARY = ".kerfpath.*.tmp"
+"""Names of temporary files; the asterisk stands for random digits."""
+PATIENCE = 10.0
+"""Longest wait for another process that writes into the same folder, s."""
 
 
-def write_whole(files: Mapping[Path, bytes]) -> None:
-    """Write all files or none: first to temporary files beside them, then renamed in order.
+def write_whole(files: Mapping[Path, bytes | None]) -> None:
+    """Write all files or none: first to temporary files, then renamed in order.
 
-    Only regular files are replaced, not a FIFO or a device.
+    Only regular files are replaced, and each keeps its permissions; links, FIFOs, devices and
+    read-only files are refused. The temporary files are in the folder of the first file, as
+    `only_writer` of it, or beside a file that is not inside that.
+
+    Parameters
+    ----------
+    files : mapping of Path to bytes or None
+        The content of each file, in the order of the renames; None removes the file.
 
     Raises
     ------
     OSError
-        A file cannot be written or replaced; `filename` is its path. No temporary file is left.
+        A file cannot be written, replaced or removed; `filename` is its path. No temporary file is
+        left.
     """
-    beside = {path: path.with_name(f".{path.name}.{os.getpid()}.tmp") for path in files}
-    with _WRITING:
+    if not files:
+        return
+    folder = next(iter(files)).parent
+    beside = {
+        path: (folder if folder in path.parents else path.parent)
+        / TEMPORARY.replace("*", secrets.token_hex(8))
+        for path, content in files.items()
+        if content is not None
+    }
+    with only_writer(folder):
         try:
             for path in files:
                 _require_replaceable(path)
-            for path, content in files.items():
+            for path, temporary in beside.items():
                 with _about(path):
-                    beside[path].write_bytes(content)
+                    _write_new(temporary, files[path] or b"", like=path)
             for path in files:
                 with _about(path):
-                    beside[path].replace(path)
+                    if path in beside:
+                        beside[path].replace(path)
+                    else:
+                        path.unlink(missing_ok=True)
         finally:
-            for path in files:
+            for temporary in beside.values():
                 with suppress(OSError):
-                    beside[path].unlink(missing_ok=True)
+                    temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def only_writer(folder: Path) -> Iterator[None]:
+    """Let no other thread or process write into a folder meanwhile.
+
+    Temporary files that killed processes have left in it are removed.
+
+    Raises
+    ------
+    OSError
+        Another process is writing there and does not end.
+    """
+    with _WRITING:
+        if folder in _locked:
+            yield
+            return
+        try:
+            number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        except OSError:  # writing will tell
+            yield
+            return
+        try:
+            if _lock(number, folder):
+                for left in folder.glob(TEMPORARY):
+                    with suppress(OSError):
+                        left.unlink()
+            _locked.add(folder)
+            yield
+        finally:
+            _locked.discard(folder)
+            os.close(number)
 
 
 def _require_replaceable(path: Path) -> None:
-    """Raise OSError if something other than a regular file lies at the path."""
+    """Raise OSError if something other than a writable regular file lies at the path."""
     try:
-        kind = stat.S_IFMT(path.stat().st_mode)
+        mode = path.lstat().st_mode
     except OSError:  # nothing is there, or writing will tell
         return
-    if kind != stat.S_IFREG:
-        what = OTHER_KINDS.get(kind, "something else")
+    if not stat.S_ISREG(mode):
+        what = OTHER_KINDS.get(stat.S_IFMT(mode), "something else")
         raise OSError(errno.EINVAL, f"it is {what}, not a file", str(path))
+    if not mode & stat.S_IWUSR or not os.access(path, os.W_OK):  # root may write everything
+        raise OSError(errno.EACCES, "it is read-only", str(path))
+
+
+def _write_new(path: Path, content: bytes, *, like: Path) -> None:
+    """Write a new file to the disk, with the permissions of another file if that exists."""
+    with path.open("xb") as file:
+        file.write(content)
+        with suppress(FileNotFoundError):
+            os.fchmod(file.fileno(), stat.S_IMODE(like.lstat().st_mode) & 0o777)
+        file.flush()
+        os.fsync(file.fileno())  # a power cut after the rename must not leave an empty file
+
+
+def _lock(number: int, folder: Path) -> bool:
+    """Lock an open folder; return False if its file system has no locks.
+
+    Raises
+    ------
+    OSError
+        Another process keeps it locked.
+    """
+    end = monotonic() + PATIENCE
+    while True:
+        try:
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if monotonic() > end:
+                said = "another process is writing there"
+                raise OSError(errno.EAGAIN, said, str(folder)) from None
+            sleep(0.02)
+        except OSError:
+            return False
+        else:
+            return True
 
 
 @contextmanager

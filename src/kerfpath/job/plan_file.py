@@ -45,7 +45,7 @@ from kerfpath.job.format import AuditTable, ProgramTable, Tolerances
 from kerfpath.options import PlanOptions
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof
-from kerfpath.post import ProgramOptions
+from kerfpath.post import ProgramOptions, require_one_set
 from kerfpath.robots import Arm, Coupling, ExternalAxis, Robot, RobotLimits
 from kerfpath.sequence import PartPlan
 from kerfpath.setting import settings
@@ -847,10 +847,12 @@ def read_plan_file(path: str | Path) -> PlanFile:
     ------
     InputError
         The file does not exist, is not JSON or has another schema; a key is missing, unknown or
-        twice in an object; or a value has the wrong type.
+        twice in an object; a value has the wrong type; or files beside it are left of an earlier
+        run.
     """
     path = Path(path)
     data = read_document(path)
+    require_one_set(path)
     try:
         robot = add_externals(data["external_axes"], _read_robot(data["robot"], data["limits"]))
         entries = planned_entries(data)

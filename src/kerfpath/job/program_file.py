@@ -23,6 +23,7 @@ from kerfpath.post import (
     languages,
     not_compared,
     read_program,
+    require_one_set,
     with_tips,
 )
 from kerfpath.robots import Robot, base_in_part
@@ -99,10 +100,12 @@ def program_on_disk(path: Path, job: Job) -> ReadProgram:
     Raises
     ------
     InputError
-        The file cannot be read, or was not written by kerfpath; the message names the line.
+        The file cannot be read, or was not written by kerfpath; the message names the line. Files
+        beside it are left of an earlier run.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file; give the path of a program or a plan.json")
+    require_one_set(path)
     options, files = job.program, TextFolder(path.parent)
     return read_program(files, options.language, job.robot, options.settings, main=path.name)
 

@@ -21,8 +21,10 @@ from kerfpath.post.flow import unsafe_paths as unsafe_paths
 from kerfpath.post.folder import MANIFEST as MANIFEST
 from kerfpath.post.folder import FolderChanges as FolderChanges
 from kerfpath.post.folder import replace_program as replace_program
+from kerfpath.post.folder import require_one_set as require_one_set
 from kerfpath.post.folder import write_files as write_files
 from kerfpath.post.folder import write_program as write_program
+from kerfpath.post.folder import write_set as write_set
 from kerfpath.post.joint_trajectory import joint_trajectory as joint_trajectory
 from kerfpath.post.languages import ENTRY_POINTS as ENTRY_POINTS
 from kerfpath.post.languages import PLAIN as PLAIN

@@ -133,7 +133,7 @@ class Document:
                 f"{self.path}: the file has been changed since it was read; save over it, or take "
                 "a copy and open the job again"
             )
-        _write(self.path, self.text)
+        _write(self.path.resolve(), self.text)  # a job may be a link, which stays
         self._on_disk = self.text
         self._keep()
 

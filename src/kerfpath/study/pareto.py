@@ -34,7 +34,7 @@ from kerfpath.front import (
 )
 from kerfpath.job import Job, JobResult, cell_of_job, make_folder, prepare, run_prepared
 from kerfpath.plans import Plan
-from kerfpath.post import write_files
+from kerfpath.post import require_one_set, write_set
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import FrontAxis, FrontPlan, render_front
 from kerfpath.robots import Robot
@@ -268,7 +268,7 @@ def write_pareto(found: JobFront, folder: Path) -> list[Path]:
     """
     make_folder(folder)
     data = json.dumps(_entries(found), indent=1, allow_nan=False) + "\n"
-    return write_files(folder, {"pareto.json": data, "pareto.html": _page(found, folder)})
+    return write_set(folder, {"pareto.json": data, "pareto.html": _page(found, folder)})
 
 
 def _entries(found: JobFront) -> dict[str, object]:
@@ -417,9 +417,10 @@ def read_pick(folder: Path, job_file: Path, which: str) -> Pick:
     ------
     InputError
         The folder has no front, the front is from another version or another state of the job, or
-        it has no such plan.
+        it has no such plan; its page is left of an earlier study.
     """
     path = folder / "pareto.json"
+    require_one_set(path)
     again = f"run kerfpath pareto {job_file} --out {folder} first"
     try:
         data = json.loads(path.read_text(encoding="utf-8"))

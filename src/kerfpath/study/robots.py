@@ -18,7 +18,7 @@ from kerfpath.front import follows_courses
 from kerfpath.graph import LayeredGraph
 from kerfpath.job import Job, prepare, read_job
 from kerfpath.planner import FINER
-from kerfpath.post import write_files
+from kerfpath.post import write_set
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import render_table
 from kerfpath.robots import Robot, acceleration_ratios, postures_named, robot, robot_ids
@@ -453,7 +453,7 @@ def write_robots(
         job_text=job.path.read_text(encoding="utf-8-sig"),
     )
     texts = {"robots.json": json.dumps(whole, indent=1, allow_nan=False), "robots.html": page}
-    return write_files(folder, texts)
+    return write_set(folder, texts)
 
 
 def robot_rows(found: Sequence[RobotSpeed]) -> list[list[str]]:

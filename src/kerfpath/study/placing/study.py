@@ -20,7 +20,7 @@ from kerfpath.errors import InputError
 from kerfpath.front import follows_courses
 from kerfpath.job import Goal, Job, LayoutTable, cell_of_job, make_folder
 from kerfpath.planner import require_rates_alone
-from kerfpath.post import write_files
+from kerfpath.post import write_set
 from kerfpath.progress import Progress, no_progress
 from kerfpath.report import LayoutEntry, render_layout
 from kerfpath.study.evaluator import SampledContour, sample_contours
@@ -572,7 +572,7 @@ def write_layout(found: Layout, folder: Path) -> list[Path]:
         files["placed.toml"] = placed_text(
             found.job, found.numbers, folder.resolve(), _remark(found.job.path, found.best.offsets)
         )
-    return write_files(folder, files)
+    return write_set(folder, files)
 
 
 def _remark(job: Path, offsets: Mapping[str, float]) -> str:
