@@ -22,7 +22,9 @@ from kerfpath.post import (
     Request,
     Switch,
     post,
+    read_program,
     unsafe_paths,
+    unsafe_restarts,
 )
 from kerfpath.post.flow import section_of
 
@@ -177,6 +179,7 @@ def slow_paths(steps, most=60) -> Iterator[list[tuple[int, dict]]]:
             elif isinstance(step, ReadOff):
                 after["out", step.output] = False
             dropped = isinstance(step, ReadHandshake) and not step.what.on
+            dropped |= isinstance(step, ReadMove) and step.kind == "joint"
             if dropped or (isinstance(step, ReadOff) and step.output != "laser"):
                 after |= {key: False for key in after if key[0] == "answer"}
             yield from go(at + 1, after, path)
@@ -261,6 +264,108 @@ def test_the_verdict_is_that_of_all_paths_one_by_one():
         verdicts.append(not found)
         assert verdicts[-1] == slow_verdict(steps), steps
     assert 30 < sum(verdicts) < 570  # both happen
+
+
+# -----------------------------------------------------------------------------
+# Begun at another line, or continued after everything went off.
+
+
+def laser_lacks(steps, begin):
+    """Return what the laser lacks where it first comes on, begun at a step with everything off.
+
+    Slow and obvious: the planned path is walked twice, once from its beginning.
+    """
+    planned = [step for step in steps if not isinstance(step, ReadLabel | ReadOff | ReadPause)]
+
+    def outputs_at_the_laser(of):
+        outputs = set()
+        for at, step in of:
+            if isinstance(step, ReadHandshake):
+                name = ("answer" if isinstance(step.what, Await) else "output", step.what.partner)
+                if isinstance(step.what, Await) or step.what.on:
+                    outputs.add(name)
+                else:
+                    outputs = {n for n in outputs if n[0] != "answer"} - {name}
+            elif step.kind == "joint":
+                outputs = {n for n in outputs if n[0] != "answer"}
+            for switch in getattr(step, "switches", ()):
+                (outputs.add if switch.on else outputs.discard)(("signal", switch.signal))
+                if switch.signal == "laser" and switch.on and at >= begin:
+                    return outputs
+        return set()
+
+    numbered = list(enumerate(planned))
+    return outputs_at_the_laser(numbered) - outputs_at_the_laser(numbered[begin:])
+
+
+def random_contour(rng):
+    flow = Flow().move("joint")
+    gas, pulse = (Switch(signal="gas", on=on) for on in (True, False)), rng.integers(3)
+    gas_on, gas_off = gas
+    for partner in ("shutter", "height")[: rng.integers(3)]:
+        flow.ask(partner)
+    for partner in ("ready", "interlock")[: rng.integers(3)]:
+        flow.wait(partner, "late")
+    early = rng.integers(2)
+    if early:
+        flow.move(switches=(gas_on,))
+    flow.move(switches=ON if early else (gas_on, *ON))
+    for _ in range(pulse):  # micro joints
+        flow.move().move(switches=OFF).move(switches=ON)
+    flow.move().move(switches=(*OFF, gas_off)).move()
+    for partner in ("height", "shutter"):
+        if any(getattr(s, "what", None) == Request(partner=partner, on=True) for s in flow.steps):
+            flow.ask(partner, on=False)
+    return flow
+
+
+def test_unsafe_restarts_are_the_lines_from_which_the_laser_lacks_something():
+    rng, told = np.random.default_rng(38), 0
+    off = Flow().off("laser", "gas", "shutter", "height").add(ReadEnd, of_program=True)
+    for _ in range(200):
+        steps = random_contour(rng).steps
+        program_read = ReadProgram(
+            name="a", sections=(section_of("a", steps),), exits={"late": tuple(off.steps)}
+        )
+        assert unsafe_paths(program_read) == []
+        unsafe = set()
+        for issue in unsafe_restarts(program_read):
+            first, last = (int(n) for n in (*re.findall(r"line (\d+)", str(issue)), 0)[:2])
+            unsafe |= set(range(first, max(first, last) + 1))
+        assert unsafe == {k + 1 for k in range(len(steps)) if laser_lacks(steps, k)}
+        told += bool(unsafe)
+    assert 100 < told < 200
+
+
+def test_a_contour_that_asks_for_nothing_is_refused_at_its_first_line():
+    """The second contour would be safe only after the first."""
+    asked = Flow().move("joint").ask("shutter").cut()
+    (issue,) = issues(asked, Flow().move("joint").cut().ask("shutter", on=False))
+    assert "begun here" in issue.message
+    assert "without the output of shutter" in issue.message
+    assert messages(asked.ask("shutter", on=False), Flow().move("joint").cut()) == []
+
+
+def test_answers_hold_for_one_contour():
+    flow = Flow().move("joint").wait("ready", "late").cut()
+    off = Flow().off("laser", "gas").add(ReadEnd, of_program=True)
+    assert messages(flow, flow, late=off) == []
+
+
+@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("asked", [ASKED[:1], ASKED[2:], (ASKED[0], ASKED[2]), ASKED], ids=str)
+@pytest.mark.parametrize("contours", [("one",), ("one", "two")], ids=len)
+def test_all_handshakes_of_all_languages_end_safe_and_ask_again(name, asked, contours):
+    """Time-outs, pauses and ends are followed by `unsafe_paths`; all other lines are begun at."""
+    made, options = program(name, contours, handshakes=asked), settings(name)
+    read = read_program(post(made, name, options), name, made.robot, options)
+    assert unsafe_paths(read) == []
+    stretches = unsafe_restarts(read)
+    assert len(stretches) == len(contours)
+    for section in read.sections:  # no contour is unsafe at its first line
+        if section.moves[0].kind == "joint":
+            first = section.moves[0].place
+            assert all(not str(issue).startswith(f"{first}:") for issue in stretches)
 
 
 # -----------------------------------------------------------------------------

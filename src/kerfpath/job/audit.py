@@ -82,6 +82,7 @@ from kerfpath.post import (
     ReadProgram,
     Rules,
     unsafe_paths,
+    unsafe_restarts,
 )
 from kerfpath.transfer import End, TransferMove, back_off
 
@@ -620,8 +621,8 @@ class Audit:
             job, cuts, home, cell if job.sequence is not None else None
         )
         missing = tuple(name for i, name in enumerate(names) if i not in done)
-        note = collision_note(cell, moves_too=job.sequence is not None)
-        return AuditReport(tables=tables, missing=missing, note=note, places=places)
+        note = f"{collision_note(cell, moves_too=job.sequence is not None)} {_restart_note(read)}"
+        return AuditReport(tables=tables, missing=missing, note=note.strip(), places=places)
 
     def _whole(
         self, file: PlanFile, judged: Sequence[PlanData], planned: Sequence[ExpectedPlan]
@@ -740,6 +741,15 @@ def _check_paths(read: ReadProgram) -> Check:
     found = unsafe_paths(read)
     row = count("paths", "steps that are not safe on some path, after a missing answer", len(found))
     return replace(row, advice=str(found[0])) if found else row
+
+
+def _restart_note(read: ReadProgram) -> str:
+    """Return where the program must not be begun or continued after everything went off."""
+    found = unsafe_restarts(read)
+    if not found:
+        return ""
+    more = f" (and {len(found) - 1} more such stretches)" if len(found) > 1 else ""
+    return f"After a stop begin a contour at its first line: {found[0]}{more}."
 
 
 def _new_title(title: str, tables: Mapping[str, object]) -> str:

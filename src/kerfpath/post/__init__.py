@@ -18,6 +18,7 @@ from kerfpath.post.comparison import deviations as deviations
 from kerfpath.post.comparison import differences as differences
 from kerfpath.post.comparison import not_compared as not_compared
 from kerfpath.post.flow import unsafe_paths as unsafe_paths
+from kerfpath.post.flow import unsafe_restarts as unsafe_restarts
 from kerfpath.post.folder import MANIFEST as MANIFEST
 from kerfpath.post.folder import FolderChanges as FolderChanges
 from kerfpath.post.folder import replace_program as replace_program

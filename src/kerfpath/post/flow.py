@@ -3,7 +3,8 @@
 Readers turn the texts of all languages into the same few steps, so that the rules stand here once.
 A path leaves the planned one where a partner does not answer in time, and may come back to it after
 a pause, when the operator continues. Every path is followed, with the outputs that are on and the
-answers that were given at each of its steps.
+answers that were given at each of its steps. The operator may also begin at another line, or go on
+after everything went off.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from kerfpath.errors import InputError
 from kerfpath.post.program import Await, ProgramIssue, Request
@@ -62,6 +64,8 @@ class _Routine:
         A step is an index, or the name of an error exit of the program. Nothing follows an end.
         """
         match self.flow[at]:
+            case ReadMove(kind="joint"):  # the way to another contour, which asks anew
+                yield at + 1, _without_answers(state)
             case ReadMove(switches=switches):
                 for switch in switches:
                     name = _output(switch.signal)
@@ -90,8 +94,10 @@ class _Routine:
 def _switched_off(state: State, output: str) -> State:
     """Return the state without an output; what partners answered to a request holds no longer."""
     state -= {_output(output)}
-    if output in ("laser", "gas"):
-        return state
+    return state if output in ("laser", "gas") else _without_answers(state)
+
+
+def _without_answers(state: State) -> State:
     return frozenset(name for name in state if not name.startswith(ANSWER))
 
 
@@ -129,6 +135,48 @@ def section_of(name: str, flow: Sequence[FlowStep]) -> ReadSection:
 # The program: every path is followed.
 
 
+def unsafe_restarts(program: ReadProgram) -> list[ProgramIssue]:
+    """Return where a program must not be begun or continued while everything is off.
+
+    From there, the laser would come on without an output or an answer that it has on the planned
+    path. Each issue has a stretch of lines, by the place of its first one.
+
+    Parameters
+    ----------
+    program : ReadProgram
+        As in `unsafe_paths`.
+
+    Raises
+    ------
+    InputError
+        A wait leads to a label that is missing.
+    """
+    return [
+        ProgramIssue("warning", "restart", stretch.message, stretch.first)
+        for stretch in _Machine(program).unsafe_stretches()
+    ]
+
+
+class _Stretch(NamedTuple):
+    """Steps of the planned path from which the laser comes on without what it needs."""
+
+    steps: tuple[tuple[int | str, int], ...]
+    """Routine and index of each; the last one switches the laser on."""
+    first: str
+    last: str
+    """File and line of both ends."""
+    missing: State
+
+    @property
+    def message(self) -> str:
+        """What happens if the program is begun there."""
+        until = f" or later, up to {self.last}," if self.last != self.first else ""
+        return (
+            f"begun here{until} with everything off, the laser comes on without "
+            f"{_listed(self.missing)}"
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class _Visit:
     """A step on a path: the routine by its number or the error exit by its name, and the index."""
@@ -146,7 +194,8 @@ def unsafe_paths(program: ReadProgram) -> list[ProgramIssue]:
     The laser is off wherever the robot waits for a partner, moves by its joints, pauses or ends.
     Everything is off at a pause, and where the program ends for want of an answer. A path that
     comes back to the planned one finds the same outputs on and the same answers given: what was
-    asked for before a pause is asked for again. Every motion belongs to the planned path.
+    asked for before a pause is asked for again. Every motion belongs to the planned path. A contour
+    that is begun at its first line has all that it needs, see `unsafe_restarts`.
 
     Parameters
     ----------
@@ -159,7 +208,7 @@ def unsafe_paths(program: ReadProgram) -> list[ProgramIssue]:
         A wait leads to a label that is missing.
     """
     machine = _Machine(program)
-    issues = [*machine.issues, *machine.never_reached()]
+    issues = [*machine.issues, *machine.never_reached(), *machine.unsafe_beginnings()]
     queue, seen = deque(machine.branches), set[_Visit]()
     while queue:
         visit = queue.popleft()
@@ -224,6 +273,45 @@ class _Machine:
                     message = "the program never comes to this motion"
                     yield ProgramIssue("error", "flow", message, step.place)
                     break
+
+    def unsafe_stretches(self) -> list[_Stretch]:
+        """Return the steps after the one that gives what the laser needs, up to the laser itself.
+
+        Stretches that begin with the same step are one.
+        """
+        path = [at for at in self.planned if self.step(_Visit(*at)) is not None]
+        given: dict[str, int] = {}  # the step that gave what is on
+        found: dict[int, tuple[int, State]] = {}
+        for number, (routine, at) in enumerate(path):
+            flow = self.routines[routine]
+            before, step = self.planned[routine, at], flow.flow[at]
+            _, after = next(flow.following(at, before), (0, ALL_OFF))
+            _, gives = next(flow.following(at, ALL_OFF), (0, ALL_OFF))
+            given = {name: given.get(name, number) for name in after}
+            given |= dict.fromkeys(gives & after, number)
+            if isinstance(step, ReadMove) and LASER in gives:
+                earlier = {name: at for name, at in given.items() if at < number}
+                if earlier:
+                    begin = min(earlier.values()) + 1
+                    missing = found.get(begin, (0, ALL_OFF))[1] | earlier.keys()
+                    found[begin] = number, missing
+        stretches = []
+        for begin, (end, missing) in found.items():
+            steps = tuple(path[begin : end + 1])
+            first, laser = (self.routines[r].flow[at] for r, at in (steps[0], steps[-1]))
+            assert isinstance(laser, ReadMove)
+            last = laser.elsewhere.get("switches", laser.place)
+            stretches.append(_Stretch(steps, first.place, last, missing))
+        return stretches
+
+    def unsafe_beginnings(self) -> Iterator[ProgramIssue]:
+        """Yield an issue for each contour that must not even be begun at its first line."""
+        for stretch in self.unsafe_stretches():
+            for routine, at in stretch.steps:
+                flow = self.routines[routine].flow
+                moves = [step for step in flow if isinstance(step, ReadMove)]
+                if at == 0 and moves and moves[0].kind == "joint":
+                    yield ProgramIssue("error", "flow", stretch.message, flow[0].place)
 
     def check(self, visit: _Visit) -> Iterator[ProgramIssue]:
         """Yield an issue for each rule that a step breaks in this state."""

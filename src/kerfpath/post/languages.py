@@ -34,6 +34,7 @@ from kerfpath.post.program import (
     Signal,
     Step,
     Wait,
+    asked_in,
     still_asked,
 )
 from kerfpath.post.read_program import Reader
@@ -337,8 +338,7 @@ class Formatter(ABC):
         self.asked = list(self.asked_before(section))
         for step in section.steps:
             yield from self.step(step)
-            if isinstance(step, Request | Await):
-                self.asked = still_asked([*self.asked, step])
+            self.asked = still_asked([*self.asked, *asked_in([step])])
 
     def asked_before(self, section: Section) -> Sequence[Handshake]:
         """Return the handshakes that hold where a section begins."""

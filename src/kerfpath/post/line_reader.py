@@ -312,8 +312,12 @@ class LineReader:
 
     def asked(self) -> list[Handshake]:
         """Return the handshakes that hold here: those before the routine, and its own."""
-        steps = section_of("", self.steps).steps
-        own = (step.what for step in steps if isinstance(step, ReadHandshake))
+        own: list[Handshake | None] = []
+        for step in section_of("", self.steps).steps:
+            if isinstance(step, ReadHandshake):
+                own.append(step.what)
+            elif isinstance(step, ReadMove) and step.kind == "joint":
+                own.append(None)
         return still_asked([*self.asked_before, *own])
 
     # Flow of control.

@@ -236,18 +236,30 @@ def switches_of(step: Step) -> tuple[Switch, ...]:
     return step.switches if isinstance(step, LinearMove) else ()
 
 
-def still_asked(handshakes: Iterable[Handshake]) -> list[Handshake]:
-    """Return the requests and waits that hold after `handshakes`.
+def still_asked(handshakes: Iterable[Handshake | None]) -> list[Handshake]:
+    """Return the requests and waits that hold after `handshakes`; None stands for a joint move.
 
-    A request that is taken back ends the answers, too: partners give them for all requests.
+    A request that is taken back ends the answers, too: partners give them for all requests. So does
+    a joint move: it leads to another contour.
     """
     held: list[Handshake] = []
     for step in handshakes:
-        if isinstance(step, Await) or step.on:
+        if step is None:
+            held = [s for s in held if isinstance(s, Request)]
+        elif isinstance(step, Await) or step.on:
             held.append(step)
         else:
             held = [s for s in held if isinstance(s, Request) and s.partner != step.partner]
     return held
+
+
+def asked_in(steps: Iterable[Step]) -> Iterator[Handshake | None]:
+    """Yield the handshakes among steps, and None for each joint move, as for `still_asked`."""
+    for step in steps:
+        if isinstance(step, Request | Await):
+            yield step
+        elif isinstance(step, JointMove):
+            yield None
 
 
 PathMove = LinearMove | CircularMove

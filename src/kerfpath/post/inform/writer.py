@@ -39,6 +39,7 @@ from kerfpath.post.program import (
     Section,
     Step,
     Wait,
+    asked_in,
     still_asked,
     stop_to_switch,
 )
@@ -176,8 +177,7 @@ class Inform(CalledFormatter):
         held: list[Handshake] = []
         for section in self.program.sections:
             found[section.name] = held
-            own = (step for step in section.steps if isinstance(step, Request | Await))
-            held = still_asked([*held, *own])
+            held = still_asked([*held, *asked_in(section.steps)])
         return found
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
