@@ -362,6 +362,9 @@ def test_all_handshakes_of_all_languages_end_safe_and_ask_again(name, asked, con
     assert unsafe_paths(read) == []
     stretches = unsafe_restarts(read)
     assert len(stretches) == len(contours)
+    for issue in stretches:
+        lines = re.findall(r"(\S+), line (\d+)", str(issue))
+        assert lines == sorted(lines, key=lambda line: (line[0] != lines[0][0], int(line[1])))
     for section in read.sections:  # no contour is unsafe at its first line
         if section.moves[0].kind == "joint":
             first = section.moves[0].place

@@ -222,6 +222,12 @@ def unsafe_paths(program: ReadProgram) -> list[ProgramIssue]:
     return issues
 
 
+def _switched_at(move: ReadMove) -> str:
+    """Return the line that switches at the end of a move: its own, or one after it."""
+    said = move.elsewhere.get("switches", move.place)
+    return said if int(said.rpartition(" ")[2]) > move.line else move.place
+
+
 class _Machine:
     """A program, the state at each step of its planned path, and the branches from it."""
 
@@ -300,8 +306,7 @@ class _Machine:
             steps = tuple(path[begin : end + 1])
             first, laser = (self.routines[r].flow[at] for r, at in (steps[0], steps[-1]))
             assert isinstance(laser, ReadMove)
-            last = laser.elsewhere.get("switches", laser.place)
-            stretches.append(_Stretch(steps, first.place, last, missing))
+            stretches.append(_Stretch(steps, first.place, _switched_at(laser), missing))
         return stretches
 
     def unsafe_beginnings(self) -> Iterator[ProgramIssue]:
