@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from tests.post.cases import ARMS
+from tests.post.cases import ARMS, refusal
 
 from kerfpath import InputError, robot
 from kerfpath.post import (
@@ -67,8 +67,51 @@ def test_every_language_reads_its_handshakes_back(name):
     found = [step.what for step in read.steps if isinstance(step, ReadHandshake)]
     assert found == [step for step in made.steps if isinstance(step, Request | Await)]
     without = post(program(name), name, options)
-    (difference,) = differences(read, read_program(without, name, made.robot, options))
-    assert difference.code == "handshakes"
+    found = {
+        each.code for each in differences(read, read_program(without, name, made.robot, options))
+    }
+    assert found == ({"handshakes"} if name == "inform" else {"handshakes", "switches"})
+
+
+NEEDS = {
+    "rapid": (
+        "IF DOutput(x2)=1 AND DOutput(x3)=1 AND DOutput(x4)=1 SetDO x1,1;",
+        " AND DOutput(x{})=1",
+    ),
+    "krl": ("$OUT[1]=$OUT[2] AND $OUT[3] AND $OUT[4]", " AND $OUT[{}]"),
+    "fanuc": ("IF (DO[2] AND DO[3] AND DO[4]),DO[1]=(ON) ;", " AND DO[{}]"),
+    "val3": ("dioLaser=dioGas and doShutter and doHeight", " and do{}"),
+    "urscript": (
+        "laser_set(get_standard_digital_out(2) and get_standard_digital_out(3) and "
+        "get_standard_digital_out(4))",
+        " and get_standard_digital_out({})",
+    ),
+}
+"""The line that switches the laser on, and one of the outputs that it needs."""
+
+
+@pytest.mark.parametrize("name", NEEDS)
+def test_the_laser_goes_on_only_with_gas_and_requests(name):
+    made, options = program(name, handshakes=ASKED), settings(name)
+    files = post(made, name, options)
+    line, needed = NEEDS[name]
+    (file,) = [f for f, text in files.items() if line in text]
+    ports = ("Shutter", "Height") if name == "val3" else (3, 4)
+    edits = [line.replace(needed.format(port), "") for port in ports]
+    edits += [line.replace(needed.format(ports[1]), needed.format(ports[0]))]
+    edits += [line.replace("x4" if name == "rapid" else "4", "x1" if name == "rapid" else "1")]
+    for edited in edits:
+        if edited != line:
+            assert refusal(files | {file: files[file].replace(line, edited)}, name, made, options)
+
+
+def test_a_laser_with_a_lead_time_is_switched_by_the_motion_alone():
+    made = program("krl", handshakes=ASKED)
+    late = build_program(
+        [hand_plan(arc("one"), made.robot, *frames())], lead_time=0.05, handshakes=ASKED
+    )
+    on = [s for move in late.moves for s in getattr(move, "switches", ()) if s.on]
+    assert [s.needs for s in on] == [()]
 
 
 EDITS = {

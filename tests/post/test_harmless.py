@@ -222,7 +222,7 @@ HARMFUL = {
         ("one.pgx", r"  dioLaser=false", '  logMsg("dioLaser=false")'),
         ("one.pgx", r"begin\n", 'begin\n  logMsg("a") dioLaser=true\n'),
         ("one.pgx", r"  waitEndMove\(\)", "  // waitEndMove()"),
-        ("one.pgx", r"DioLaser|dioLaser=true", "diolaser=true"),
+        ("one.pgx", r"DioLaser|dioLaser=(true|dioGas[^\n]*)", "diolaser=true"),
         (".pjx", 'stackSize="5000"', 'stackSize="50"'),
         (".pjx", 'stackSize="5000"', 'stackSize="\u0668\u0660\u0660\u0660"'),
     ],

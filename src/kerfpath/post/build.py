@@ -25,6 +25,7 @@ from kerfpath.post.program import (
     Program,
     Request,
     Section,
+    Signal,
     Step,
     Switch,
     Wait,
@@ -352,7 +353,7 @@ def _steps(plan: Plan, way: Iterable[JointMove], options: ProgramOptions) -> Ite
     _require_on_contour(plan)
     T = plan.T_part_tip
     q = plan.unwrapped
-    starts: tuple[Switch, ...] = (_laser(options, on=True),)
+    starts: tuple[Switch, ...] = (_start(options),)
     if options.gas_lead is not None:
         starts = (Switch(signal="gas", on=True, lead_time=options.gas_lead), *starts)
     yield Comment(
@@ -371,6 +372,18 @@ def _steps(plan: Plan, way: Iterable[JointMove], options: ProgramOptions) -> Ite
     for step in reversed(options.handshakes):
         if isinstance(step, Request) and step.on:
             yield replace(step, on=False)
+
+
+def _start(options: ProgramOptions) -> Switch:
+    """Return the switch at the start; where partners were asked, the laser needs all that is on.
+
+    With a lead time the controller switches while the robot moves, and cannot look at outputs.
+    """
+    on = [step.partner for step in options.handshakes if isinstance(step, Request) and step.on]
+    if not on or options.lead_time > 0:
+        return _laser(options, on=True)
+    gas: tuple[Signal, ...] = () if options.gas_lead is None else ("gas",)
+    return replace(_laser(options, on=True), needs=(*gas, *on))
 
 
 def _laser(options: ProgramOptions, *, on: bool) -> Switch:

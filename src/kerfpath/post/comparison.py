@@ -604,7 +604,7 @@ def _speed(move: ReadMove) -> str:
 
 def _switches(a: ReadMove, b: ReadMove, digits: _Digits) -> bool:
     """Return whether two moves switch different signals, or at different times."""
-    ours, theirs = ([(s.signal, s.on) for s in move.switches] for move in (a, b))
+    ours, theirs = ([(s.signal, s.on, s.needs) for s in move.switches] for move in (a, b))
     return ours != theirs or any(
         abs(one.lead_time - two.lead_time) > digits.lead
         for one, two in zip(a.switches, b.switches, strict=True)
@@ -697,7 +697,11 @@ def handshake_in_words(what: Handshake) -> str:
 
 def switches_in_words(switches: Iterable[Switch]) -> str:
     """Return switches in words."""
-    words = [f"{s.signal} {'on' if s.on else 'off'} {s.lead_time:g} s ahead" for s in switches]
+    words = [
+        f"{s.signal} {'on' if s.on else 'off'} {s.lead_time:g} s ahead"
+        + (f", only with {' and '.join(s.needs)}" if s.needs else "")
+        for s in switches
+    ]
     return " and ".join(words) or "nothing"
 
 

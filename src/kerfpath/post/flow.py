@@ -69,7 +69,8 @@ class _Routine:
             case ReadMove(switches=switches):
                 for switch in switches:
                     name = _output(switch.signal)
-                    state = state | {name} if switch.on else state - {name}
+                    acts = all(_output(each) in state for each in switch.needs)
+                    state = state | {name} if switch.on and acts else state - {name}
                 yield at + 1, state
             case ReadEnd():
                 return

@@ -20,6 +20,7 @@ from kerfpath.errors import InputError
 from kerfpath.names import LONGEST_NAME, identifiers
 from kerfpath.post.program import (
     PARTNERS,
+    SIGNALS,
     Await,
     CircularMove,
     Comment,
@@ -33,6 +34,7 @@ from kerfpath.post.program import (
     Section,
     Signal,
     Step,
+    Switch,
     Wait,
     asked_in,
     still_asked,
@@ -396,6 +398,13 @@ class Formatter(ABC):
                 f"with {signal}_output"
             )
         return name
+
+    def needed(self, switch: Switch) -> list[Any]:
+        """Return the outputs that must be on for a switch to act."""
+        return [
+            self.output(SIGNALS[name]) if name in SIGNALS else self.port(PARTNERS[name], "output")
+            for name in switch.needs
+        ]
 
     def port(self, partner: Partner, way: Literal["input", "output"]) -> Any:
         """Return the input by which a partner answers, or the output by which it is asked."""

@@ -93,6 +93,11 @@ def statements(lines: Iterable[str], mark: str, first: int = 1) -> list[tuple[in
     return [(n, line) for n, line in numbered if line]
 
 
+def numbers_in(text: str) -> list[int]:
+    """Return the whole numbers in a text, in order."""
+    return [int(digits) for digits in re.findall(r"\d+", text, re.ASCII)]
+
+
 class LineReader:
     """Reader of one text; a subclass has a method for each kind of line of its language.
 
@@ -391,10 +396,25 @@ class LineReader:
         self.require_output(output, self.settings.laser_output)
         return "laser"
 
+    def gas_port(self) -> object:
+        """Return the output of the gas as the text names it."""
+        return self.settings.gas_output
+
     def require_output(self, output: object, expected: object) -> None:
         """Refuse an output that is not the expected one."""
         if output != expected:
             raise self.fault(f"expected the output {expected} to be switched, got {output}")
+
+    def add_needing(self, needed: Iterable[object]) -> None:
+        """Add that the laser goes on after the last move, if the outputs `needed` are on."""
+        last = self.last_on_path()
+        if last is None or last.zone != 0:
+            raise self.fault("the laser may go on here only after a motion of the path that stops")
+        gas = self.gas_port()
+        needs: tuple[Signal | Partner, ...] = ()
+        for port in needed:
+            needs += ("gas" if port == gas else self.partner(port, "output"),)
+        self.add_switch(last, Switch(signal="laser", on=True, needs=needs), self.place)
 
     def last_on_path(self) -> ReadMove | None:
         """Return the last step, if it is a move of the path."""

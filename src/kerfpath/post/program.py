@@ -66,11 +66,15 @@ class Switch:
     on : bool
     lead_time : float s
         Time before the tip arrives there; it compensates for the delay of output and source.
+    needs : tuple of {"gas", "ready", "shutter", "height"}
+        Outputs, of the gas or of requests to partners, without which it stays off. After a stop
+        they may be off. Only where the robot stops, without a lead time.
     """
 
     signal: Signal
     on: bool
     lead_time: float = 0.0
+    needs: tuple[Signal | Partner, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

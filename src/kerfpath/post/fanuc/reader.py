@@ -35,7 +35,7 @@ from kerfpath.post.fanuc.writer import (
     watch_lines,
 )
 from kerfpath.post.flow import section_of
-from kerfpath.post.line_reader import patterns
+from kerfpath.post.line_reader import numbers_in, patterns
 from kerfpath.post.places import off_name
 from kerfpath.post.program import Await, Switch
 from kerfpath.post.read_program import (
@@ -111,6 +111,7 @@ _SECTION = patterns(
         "remark": r"  !.*",
         "wait": r"  WAIT +(\d*\.\d\d)\(sec\)",
         "switch": r"  DO\[(\d+)\]=(ON|OFF)",
+        "guarded": r"  IF \((DO\[\d+\](?: AND DO\[\d+\])*)\),DO\[(\d+)\]=\(ON\)",
         "timeout": r"  \$WAITTMOUT=(\d+)",
         "answer": r"  WAIT DI\[(\d+)\]=ON TIMEOUT,LBL\[1\]",
         "aborting": r"  END",
@@ -285,6 +286,10 @@ class _Section(Listing):
         if last is None or last.zone != 0:
             raise self.fault("an output may only be switched here after a path motion with FINE")
         self.add_switch(last, switch, self.place)
+
+    def guarded(self, needed: str, output: str) -> None:
+        self.require_output(int(output), self.settings.laser_output)
+        self.add_needing(numbers_in(needed))
 
     def timeout(self, hundredths: str) -> None:
         if self.timeout_s is not None:

@@ -308,7 +308,10 @@ class Fanuc(CalledFormatter):
         yield from (f"  {self._set(switch)} ;" for switch in split_switches(move).before)
 
     def _after(self, move: LinearMove) -> Iterator[str]:
-        yield from (f"  {self._set(switch)} ;" for switch in split_switches(move).after)
+        for switch in split_switches(move).after:
+            needed = " AND ".join(f"DO[{port}]" for port in self.needed(switch))
+            output = self.output(switch.signal)
+            yield f"  IF ({needed}),DO[{output}]=(ON) ;" if needed else f"  {self._set(switch)} ;"
 
     def _set(self, switch: Switch) -> str:
         return f"DO[{self.output(switch.signal)}]={'ON' if switch.on else 'OFF'}"

@@ -2,13 +2,12 @@
 
 from kerfpath.post.inform.controller import InformSettings as InformSettings
 from kerfpath.post.inform.controller import axes_from_joints as axes_from_joints
-from kerfpath.post.inform.controller import check, is_reserved, missing, posture, rules
+from kerfpath.post.inform.controller import check, is_reserved, missing, posture, rules, sayable
 from kerfpath.post.inform.controller import joints_from_axes as joints_from_axes
 from kerfpath.post.inform.controller import manipulator_type as manipulator_type
 from kerfpath.post.inform.reader import read
 from kerfpath.post.inform.writer import Inform as Inform
 from kerfpath.post.languages import Language
-from kerfpath.post.program import stop_to_switch
 
 INFORM = Language(
     name="inform",
@@ -23,7 +22,7 @@ INFORM = Language(
     is_reserved=is_reserved,
     posture=posture,
     check=check,
-    sayable=stop_to_switch,
+    sayable=sayable,
     ahead=False,
     assumed={"laser_output": 1},
     externals=missing,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 from typing import Annotated, Literal
 
@@ -33,10 +34,14 @@ from kerfpath.post.languages import (
 from kerfpath.post.program import (
     Await,
     JointMove,
+    LinearMove,
     Program,
     ProgramIssue,
     Section,
+    Step,
     Wait,
+    stop_to_switch,
+    switches_of,
     warn_of_late_switches,
 )
 from kerfpath.robots import MOST_EXTERNAL, Robot
@@ -366,6 +371,20 @@ TURNING = {3: "R", 5: "T", 0: "S"}
 WHOLE_TURN_DEG = 360.0
 
 
+def sayable(program: Program, settings: InformSettings) -> Program:
+    """Return the program with a stop at each switch, which depends on no other output."""
+    sections = tuple(
+        replace(section, steps=tuple(map(_without_needs, section.steps)))
+        for section in stop_to_switch(program, settings).sections
+    )
+    return replace(program, sections=sections)
+
+
+def _without_needs(step: Step) -> Step:
+    switches = tuple(replace(switch, needs=()) for switch in switches_of(step))
+    return replace(step, switches=switches) if isinstance(step, LinearMove) else step
+
+
 def check(program: Program, settings: InformSettings) -> Iterator[ProgramIssue]:
     """Yield the issues that only this language has."""
     pulses = program.robot.externals or settings.pulses_per_deg is not None
@@ -379,6 +398,14 @@ def check(program: Program, settings: InformSettings) -> Iterator[ProgramIssue]:
         )
     for section in program.sections:
         yield from warn_of_late_switches(section, "INFORM")
+        if any(switch.needs for step in section.steps for switch in switches_of(step)):
+            yield ProgramIssue(
+                "warning",
+                "restart",
+                "a DOUT cannot depend on other outputs: after a stop in the approach begin the "
+                "contour again, or the laser comes on without what was asked for",
+                section.name,
+            )
         yield from _check_times(section)
         yield from _check_turns(program, section, settings)
 

@@ -25,7 +25,14 @@ from kerfpath.post.krl.writer import (
     switch_off_lines,
     wait_lines,
 )
-from kerfpath.post.line_reader import LineReader, only, patterns, program_lines, statements
+from kerfpath.post.line_reader import (
+    LineReader,
+    numbers_in,
+    only,
+    patterns,
+    program_lines,
+    statements,
+)
 from kerfpath.post.program import Await, Switch
 from kerfpath.post.read_program import FlowStep, MoveKind, ReadProgram, ReadSection
 from kerfpath.robots import Robot
@@ -50,6 +57,7 @@ _LINES = patterns(
         "end_condition": "ENDIF",
         "again": rf"{FIRST}=1",
         "request": r"\$OUT\[(\d+)\]=(TRUE|FALSE)",
+        "switch": r"\$OUT\[(\d+)\]=(\$OUT\[\d+\](?: AND \$OUT\[\d+\])*)",
         "wait_for": r"\$TIMER\[\d+\]=-(\d+)",
         "end": "END",
         "routine": rf"DEF {_NAME}\((|{PASSED} :IN)\)",
@@ -65,7 +73,7 @@ _IN_FIRST = only(_LINES, "condition", "call", "end_condition", "end")
 _IN_MAIN = only(_LINES, "tool", "base", "coupled_base", "again") | _IN_FIRST
 _IN_ROUTINE = only(
     _LINES,
-    "linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "request",
+    "linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "request", "switch",
     "wait_for", "end",
 )  # fmt: skip
 _WITHOUT_ANSWER = patterns(
@@ -246,6 +254,10 @@ class _File(LineReader):
 
     def request(self, output: str, state: str) -> None:
         self.ask(int(output), on=state == "TRUE")
+
+    def switch(self, output: str, needed: str) -> None:
+        self.require_output(int(output), self.settings.laser_output)
+        self.add_needing(numbers_in(needed))
 
     def wait_for(self, timeout_ms: str) -> None:
         here, (_, below) = self.text, (*self.rows[self.row + 2 : self.row + 3], (0, ""))[0]

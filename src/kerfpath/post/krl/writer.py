@@ -231,10 +231,16 @@ class Krl(Formatter):
         if move.zone > 0:
             yield from self._hold("zone", f"$APO.CDIS={number(move.zone * 1e3, 3)}")
         for switch in move.switches:
+            if switch.needs:
+                continue
             ahead_ms, state = round(switch.lead_time * 1e3), "TRUE" if switch.on else "FALSE"
             output = self.output(switch.signal)
             yield f"TRIGGER WHEN PATH=0 DELAY={-ahead_ms} DO $OUT[{output}]={state}"
         yield f"{word} {self._target[move]}{' C_DIS' if move.zone > 0 else ''}"
+        for switch in move.switches:
+            if switch.needs:
+                needed = " AND ".join(f"$OUT[{port}]" for port in self.needed(switch))
+                yield f"$OUT[{self.output(switch.signal)}]={needed}"
 
     def _hold(self, what: str, line: str) -> Iterator[str]:
         """Yield a line that sets a value from there on, if the value changes."""

@@ -38,6 +38,7 @@ from kerfpath.post.program import (
     Section,
     Switch,
     Wait,
+    switches_of,
     targets_of,
 )
 from kerfpath.post.rapid.controller import (
@@ -90,7 +91,7 @@ class Rapid(Formatter):
         self.zone = _number_names(
             "zCorner", (zone_data(move.zone) for move in moves if move.zone > 0)
         )
-        switches = [s for m in moves if isinstance(m, LinearMove) for s in m.switches]
+        switches = [s for m in moves for s in switches_of(m) if not s.needs]
         self.trigger: dict[Switch, str] = {}
         for signal, prefix in (("laser", "tr"), ("gas", "trGas")):
             for on, suffix in ((True, "On"), (False, "Off")):
@@ -216,6 +217,10 @@ class Rapid(Formatter):
         word, triggers = self._switched("L", move)
         target = self.target[move][-1]
         yield f"{word} {target},{self.speed(move)}{triggers},{self.end(move)};"
+        for switch in move.switches:
+            if switch.needs:
+                needed = " AND ".join(f"DOutput({port})=1" for port in self.needed(switch))
+                yield f"IF {needed} SetDO {self.output(switch.signal)},1;"
 
     def circular_move(self, move: CircularMove) -> Iterator[str]:
         """Yield a MoveC, or a TriggC where something is switched."""
@@ -276,7 +281,7 @@ class Rapid(Formatter):
         return self.linear_speed[self._laser_on[move], linear_speed_data(move.speed, self._fast)]
 
     def _switched(self, path: str, move: LinearMove) -> tuple[str, str]:
-        names = [self.trigger[s] for s in move.switches]
+        names = [self.trigger[s] for s in move.switches if not s.needs]
         later = "".join(rf"\T{i}:={name}" for i, name in enumerate(names[1:], 2))
         return (f"Trigg{path}", f",{names[0]}{later}") if names else (f"Move{path}", "")
 

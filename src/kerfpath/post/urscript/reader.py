@@ -12,7 +12,14 @@ from kerfpath.post.build import offset_near
 from kerfpath.post.flow import section_of
 from kerfpath.post.harmless import LinePattern
 from kerfpath.post.languages import outputs
-from kerfpath.post.line_reader import END_OF_FILE, LineReader, patterns, program_lines, statements
+from kerfpath.post.line_reader import (
+    END_OF_FILE,
+    LineReader,
+    numbers_in,
+    patterns,
+    program_lines,
+    statements,
+)
 from kerfpath.post.program import SIGNALS, Switch
 from kerfpath.post.read_program import FlowStep, MoveKind, ReadProgram, ReadSection
 from kerfpath.post.urscript.writer import (
@@ -43,6 +50,7 @@ _POSE = rf"p\[{_SIX}\]"
 _MOTION = rf"a={_NUMBER}, v={_NUMBER}, r={_NUMBER}"
 _TARGET = rf"pose_trans\(part_frame, {_POSE}\)"
 _SIGNAL = "(laser|gas)"
+_OUTPUT = r"get_standard_digital_out\(\d\)"
 _DEFINITION = LinePattern(r"def ([A-Za-z]\w*)\(\):")
 _CALL = LinePattern(r"([A-Za-z]\w*)\(\)")
 _FIRST = LinePattern(rf"global {FIRST} = (\d{{1,6}})")
@@ -55,6 +63,7 @@ _STEPS = patterns(
         "joint": rf"movej\(\[{_SIX}\], a={_NUMBER}, v={_NUMBER}, (?:t={_NUMBER}, )?r={_NUMBER}\)",
         "switch_ahead": rf"{_SIGNAL}_ahead\({_POSE}, {_NUMBER}, (True|False)\)",
         "switch": rf"{_SIGNAL}_set\((True|False)\)",
+        "guarded": rf"laser_set\(({_OUTPUT}(?: and {_OUTPUT})*)\)",
         "wait": rf"sleep\({_NUMBER}\)",
         "request": r"set_standard_digital_out\((\d), (True|False)\)",
         "wait_for": rf"await_input\((\d), {_NUMBER}\)",
@@ -201,6 +210,12 @@ class _Reader(LineReader):
         place = move.elsewhere.get("switches", self.ahead_at.pop(signal, self.place))
         switch = Switch(signal=SIGNALS[signal], on=on == "True", lead_time=lead)
         self.add_switch(move, switch, place)
+
+    def guarded(self, needed: str) -> None:
+        self.require_signal("laser")
+        if self.ahead or "laser" in self.leads:
+            raise self.fault("the laser must not be switched ahead if it needs other outputs")
+        self.add_needing(numbers_in(needed))
 
     def request(self, port: str, on: str) -> None:
         self.ask(int(port), on=on == "True")

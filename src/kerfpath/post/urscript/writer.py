@@ -309,7 +309,8 @@ class URScript(Formatter):
                 yield f"{switch.signal}_ahead({target}, {number(near, 9)}, {switch.on})"
         yield line
         for switch in move.switches:
-            yield f"{switch.signal}_set({switch.on})"
+            needed = (f"get_standard_digital_out({port})" for port in self.needed(switch))
+            yield f"{switch.signal}_set({' and '.join(needed) or switch.on})"
 
     def _targets(self, move: LinearMove) -> str:
         return ", ".join(f"pose_trans(part_frame, {target})" for target in self.target[move])

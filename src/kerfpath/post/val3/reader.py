@@ -195,6 +195,7 @@ _LINES = patterns(
         "joint": r"movej\(jAir\[(\d+)\],tLaser,mAir\[(\d+)\]\)",
         "stand": r"waitEndMove\(\)",
         "switch": r"(dioLaser|dioGas)=(true|false)",
+        "guarded": r"dioLaser=(d\w+(?: and d\w+)*)",
         "request": r"(do[A-Z]\w*)=(true|false)",
         "wait_for": r"while watch\((di\w+)==true,(\d+\.\d+)\)==false",
         "wait": r"delay\((\d+\.?\d*|\.\d+)\)",
@@ -417,6 +418,14 @@ class _Routine(LineReader):
             raise self.fault(f"{name} is not declared")
         switch = Switch(signal="laser" if name == "dioLaser" else "gas", on=state == "true")
         self.add_switch(last, switch, self.place)
+
+    def guarded(self, needed: str) -> None:
+        if not self.stands:
+            raise self.fault("a switch must follow a move of the path and waitEndMove()")
+        self.add_needing(needed.split(" and "))
+
+    def gas_port(self) -> str:
+        return OUTPUTS["gas"]
 
     def request(self, name: str, state: str) -> None:
         self.ask(name, on=state == "true")

@@ -28,6 +28,8 @@ from kerfpath.post.languages import (
     rename_sections,
 )
 from kerfpath.post.program import (
+    PARTNERS,
+    SIGNALS,
     Await,
     CircularMove,
     Handshake,
@@ -37,6 +39,7 @@ from kerfpath.post.program import (
     Program,
     Request,
     Section,
+    Switch,
     Wait,
     stop_to_switch,
     targets_of,
@@ -363,7 +366,15 @@ class Val3(Formatter):
         for switch in move.switches:
             yield from self.standing()
             self.output(switch.signal)
-            yield f"{OUTPUTS[switch.signal]}={'true' if switch.on else 'false'}"
+            state = " and ".join(self.needed(switch)) or ("true" if switch.on else "false")
+            yield f"{OUTPUTS[switch.signal]}={state}"
+
+    def needed(self, switch: Switch) -> list[str]:
+        """Return the variables of the outputs that must be on for a switch to act."""
+        return [
+            OUTPUTS[SIGNALS[name]] if name in SIGNALS else PORTS[PARTNERS[name], "output"]
+            for name in switch.needs
+        ]
 
     def _project(
         self, name: str, sections: Sequence[Section], calls: Sequence[str] | None
