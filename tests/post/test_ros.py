@@ -247,7 +247,7 @@ def test_more_points_than_a_file_may_have_are_refused(program):
         (".yaml", "joint_2", "joint_x", "line 8: expected 'joint_names: ["),
         (".yaml", "- {positions", "- {places", "line 10: not a point of a trajectory"),
         (".yaml", "positions: [0.", "positions: [0, 0.", "line 10: expected 6 numbers"),
-        (".yaml", "positions: [0.", "positions: [0.1.", "line 10: expected 6 numbers"),
+        (".yaml", "positions: [0.", "positions: [0.1.", "line 10: not a point of a trajectory"),
         (".yaml", "nanosec: 20000000}", "nanosec: 0}", "expected a time after that of the point"),
         (".yaml", "[0.12333", "[0.12334", "the velocities do not follow from the positions"),
         (".events.yaml", "cut_skin_outer.yaml", "x.yaml", "got those of x.yaml"),

@@ -331,7 +331,7 @@ START, STOP = f"{NAME}/start.pgx", f"{NAME}/stop.pgx"
     ("file", "old", "new", "message"),
     [
         (PJX, "Project/3", "Project/2", "line 2: <Project> is not expected"),
-        (PJX, "<Project", "<!DOCTYPE Project []><Project", "line 2: a document type or"),
+        (PJX, "<Project", "<!DOCTYPE Project []><Project", "pjx, line 2: a document type, a"),
         (PJX, "</Project>", "", "not XML"),
         (PJX, 's7.3.1"', 's8"', "line 3: expected <Parameters version='s7.3.1'"),
         (PJX, 'millimeterUnit="true"', 'millimeterUnit="false"', "expected <Parameters"),

@@ -8,9 +8,14 @@ from reference.markdown import code, table
 __all__ = ["page"]
 
 
+WHERE = {"": "", "head": "before the program", "data": "in the `.dat`"}
+
+
 def page() -> str:
     """Return a table with an example of each kind of line and the reason."""
     rows = [
-        (name, code(each.example), each.why) for name, known in HARMLESS.items() for each in known
+        (name, code(each.example), WHERE[each.where], each.why)
+        for name, known in HARMLESS.items()
+        for each in known
     ]
-    return table(("language", "lines like", "why"), rows)
+    return table(("language", "lines like", "where", "why"), rows)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from kerfpath.post import (
     Rules,
     differences,
     groups_of,
+    language,
     languages,
     not_compared,
     read_program,
@@ -34,35 +36,44 @@ COARSEST = np.radians(45.0)
 """Largest sweep between nodes on an arc, rad, if its contour is known."""
 
 
-ENCODINGS = ("utf-8-sig", "cp1252")
-"""Encodings of programs: ours, and that of European controllers in remarks."""
-
-
 class TextFolder(Mapping[str, str]):
-    """The text files of a folder by name, read when they are asked for."""
+    """The text files of a folder by name, read when they are asked for.
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    Parameters
+    ----------
+    folder : Path
+    encodings : sequence of str
+        Encodings in the order in which they are tried, as those of a `Language`.
+    """
+
+    def __init__(self, folder: Path, encodings: Sequence[str]) -> None:
+        self.folder, self.encodings = folder, encodings
 
     def __getitem__(self, name: str) -> str:
         path = self.folder / name
         if not path.is_file():
             path = self.folder / self._spelled(name)
         try:
-            text = path.read_bytes()
+            data = path.read_bytes()
         except OSError as error:
             why = " ".join(str(error).split())
             raise InputError(f"{path}: cannot be read ({why})") from None
-        for encoding in ENCODINGS:
+        if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) or 0 in data[:2]:
+            raise InputError(f"{path}: expected {self._names}, got UTF-16; save it as UTF-8")
+        for encoding in self.encodings:
             try:
-                return text.decode(encoding)
+                return data.decode(encoding)
             except UnicodeDecodeError:
                 continue
-        raise InputError(f"{path}: expected text in {' or '.join(ENCODINGS)}; write it again")
+        raise InputError(f"{path}: expected text in {self._names}; write it again")
+
+    @property
+    def _names(self) -> str:
+        return " or ".join(name.removesuffix("-sig") for name in self.encodings)
 
     def _spelled(self, name: str) -> str:
         """Return the name of the one file whose name differs in its case alone."""
-        alike = [each for each in self if each.lower() == name.lower()]
+        alike = [each for each in self if each.isascii() and each.lower() == name.lower()]
         if len(alike) != 1:
             raise KeyError(name)
         return alike[0]
@@ -106,7 +117,8 @@ def program_on_disk(path: Path, job: Job) -> ReadProgram:
     if not path.is_file():
         raise InputError(f"{path}: no such file; give the path of a program or a plan.json")
     require_one_set(path)
-    options, files = job.program, TextFolder(path.parent)
+    options = job.program
+    files = TextFolder(path.parent, language(options.language).encodings)
     return read_program(files, options.language, job.robot, options.settings, main=path.name)
 
 

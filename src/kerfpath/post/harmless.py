@@ -9,6 +9,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cache
+from typing import Literal
+
+Where = Literal["", "head", "data"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,27 +25,44 @@ class Harmless:
     example : str
     why : str
         Why it makes no difference.
+    where : {"", "head", "data"}
+        Where they stand: anywhere; before the program; among its data, apart from its routines.
+
+    A group `mass` (kg) or `schedule` of the pattern says a load, which the reader checks.
     """
 
     pattern: str
     example: str
     why: str
+    where: Where = ""
 
 
 CASELESS = ("krl", "rapid")
 """Languages that do not distinguish capital and small letters."""
-_TEXT = r'"[^"]*"'
+_TEXT = r'"[^"\\]{0,80}"'
+_NUMBER = r"-?(?:\d+\.?\d*|\.\d+)"
+_MASS = rf"(?P<mass>{_NUMBER})"
+_LOAD = "the load on the flange, up to that of the job; the path stays the same"
 HARMLESS: dict[str, tuple[Harmless, ...]] = {
     "krl": (
         Harmless(
             pattern=r"&(?:ACCESS R[VO]?[OP]?\d?|REL \d+|COMMENT.*|PARAM \w+ = .*)",
             example="&REL 57",
             why="the controller counts changes and notes who may see and edit the file",
+            where="head",
         ),
         Harmless(
-            pattern=r"\$LOAD = \{[^=$]*\}",
-            example="$LOAD={M 12.0,CM {X 10.0,...},...}",
-            why="the load that the head of the program asks to complete; the path stays the same",
+            pattern=rf"\$LOAD = \{{ M {_MASS}"
+            rf"(?: , CM \{{ (?:[XYZABC] {_NUMBER} ,? ){{1,6}}\}})?"
+            rf"(?: , J \{{ (?:[XYZ] {_NUMBER} ,? ){{1,3}}\}})? \}}",
+            example="$LOAD={M 12.0,CM {X 10.0,Y 0.0,Z 90.0}}",
+            why=_LOAD,
+        ),
+        Harmless(
+            pattern=r"DECL (?:E6POS X|E6AXIS X|FDAT F|LDAT L|PDAT P)\w+ = \{.*\}",
+            example="DECL E6POS XP1={X 10.0,Y 0.0,Z 90.0,A 0.0,B 0.0,C 0.0}",
+            why="data of the pendant's forms, which no line uses",
+            where="data",
         ),
     ),
     "rapid": (
@@ -50,6 +70,7 @@ HARMLESS: dict[str, tuple[Harmless, ...]] = {
             pattern=r"%%%|VERSION : \d+|LANGUAGE : \w+",
             example="%%%",
             why="controllers write these lines before a module",
+            where="head",
         ),
         Harmless(pattern=rf"TPWrite {_TEXT} ;", example='TPWrite "one";', why="it only shows text"),
         Harmless(
@@ -66,6 +87,11 @@ HARMLESS: dict[str, tuple[Harmless, ...]] = {
             why="a timer that nothing waits for",
         ),
         Harmless(pattern=r"MESSAGE \[[^\]]*\]", example="MESSAGE[one]", why="it only shows text"),
+        Harmless(
+            pattern=r"PAYLOAD \[ (?P<schedule>\d+)(?: : [^\]]*)? \]",
+            example="PAYLOAD[1]",
+            why="`payload_schedule` says that it holds the load on the flange",
+        ),
     ),
     "inform": (
         Harmless(
@@ -77,6 +103,12 @@ HARMLESS: dict[str, tuple[Harmless, ...]] = {
     ),
     "urscript": (
         Harmless(pattern=rf"textmsg \( {_TEXT} \)", example='textmsg("one")', why="a log entry"),
+        Harmless(
+            pattern=rf"set_(?:target_)?payload \( {_MASS}"
+            rf"(?: , \[ {_NUMBER} , {_NUMBER} , {_NUMBER} \])? \)",
+            example="set_payload(12.0, [0.0, 0.0, 0.09])",
+            why=_LOAD,
+        ),
         Harmless(
             pattern=rf"\$ \d+ {_TEXT}",
             example='$ 12 "one"',
@@ -114,9 +146,13 @@ class LinePattern:
 
 
 @cache
-def harmless_lines(language: str) -> re.Pattern[str]:
-    """Return a regular expression of all lines of a language that do nothing, with any blanks."""
-    known = (f"(?:{each.pattern})" for each in HARMLESS.get(language, ()))
+def harmless_lines(language: str, where: Where = "") -> re.Pattern[str]:
+    """Return a regular expression of all lines of a language that do nothing, with any blanks.
+
+    `where` adds those that do nothing in one place alone.
+    """
+    here = (each for each in HARMLESS.get(language, ()) if each.where in ("", where))
+    known = (f"(?:{each.pattern})" for each in here)
     pattern = "|".join(known).replace(" ", r"[ \t]*")
     flags = re.ASCII | (re.IGNORECASE if language in CASELESS else re.NOFLAG)
     return re.compile(rf"[ \t]*(?:{pattern or '(?!)'})[ \t]*", flags)
@@ -131,8 +167,9 @@ def compact(line: str) -> str:
 
 
 def without_remark(line: str, mark: str) -> str:
-    """Return a line without the remark that begins with `mark` outside quoted text."""
-    if mark not in line:
-        return line
-    match = re.match(rf'(?:"[^"]*"|(?!{re.escape(mark)})[^"])*', line)
+    """Return a line without the remark that begins with `mark` outside quoted text.
+
+    Text whose quote is not closed goes to the end of the line.
+    """
+    match = re.match(rf'(?:"[^"]*(?:"|$)|(?!{re.escape(mark)})[^"])*', line)
     return match[0] if match else line

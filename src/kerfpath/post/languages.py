@@ -574,6 +574,10 @@ class Language:
     externals : callable, optional
         (robot, settings) -> what is missing or wrong in the settings for the robot's external axes
         and coordinated motion, as sentences. None: the language has no external axes.
+    encodings : tuple of str
+        Encodings of its texts, in the order in which they are tried. Only remarks differ.
+    longest_line : int
+        Characters of the longest line that is read.
     read : Reader, optional
         Reader of the text; without one a program cannot be audited.
     """
@@ -594,6 +598,8 @@ class Language:
     zones: bool = True
     assumed: Mapping[str, Any] = field(default_factory=dict)
     externals: Callable[[Robot, Any], Iterator[str]] | None = None
+    encodings: tuple[str, ...] = ("utf-8-sig",)
+    longest_line: int = 2000
     read: Reader | None = None
     axis_3: tuple[str, ...] = AXIS_3
 

@@ -11,7 +11,14 @@ from typing import Any, Literal
 
 from kerfpath.errors import InputError
 from kerfpath.post.flow import section_of
-from kerfpath.post.harmless import CASELESS, LinePattern, compact, harmless_lines, without_remark
+from kerfpath.post.harmless import (
+    CASELESS,
+    LinePattern,
+    Where,
+    compact,
+    harmless_lines,
+    without_remark,
+)
 from kerfpath.post.languages import LanguageSettings, handshakes
 from kerfpath.post.program import (
     Await,
@@ -43,8 +50,14 @@ SHOWN = 60
 """Characters of a line that a message shows."""
 END_OF_FILE = "the end of the file"
 """Text of the row after the last one."""
-NOT_TEXT = re.compile(r"[\0-\x08\v\f\x0e-\x1f\x7f-\x9f\u2028\u2029]|\r(?!\n)")
-"""Control characters and separators of lines, without the tab and the ends of lines."""
+NOT_TEXT = re.compile(
+    r"[\0-\x08\v\f\x0e-\x1f\x7f-\x9f\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
+    r"\ud800-\udfff\U000e0000-\U000e007f]|\r(?!\n)"
+)
+"""Control characters, separators of lines and characters without a glyph, as those that change the
+direction of writing; not the tab and the ends of lines."""
+BLANK = " \t"
+"""Blanks of all languages; further ones, as U+00A0, are no blanks for a controller."""
 
 
 def patterns(by_kind: Mapping[str, str], *, caseless: bool = False) -> dict[str, LinePattern]:
@@ -89,7 +102,7 @@ def statements(lines: Iterable[str], mark: str, first: int = 1) -> list[tuple[in
 
     A remark goes from `mark` to the end of its line.
     """
-    numbered = ((n, without_remark(line, mark).strip(" \t")) for n, line in enumerate(lines, first))
+    numbered = ((n, without_remark(line, mark).strip(BLANK)) for n, line in enumerate(lines, first))
     return [(n, line) for n, line in numbered if line]
 
 
@@ -118,6 +131,8 @@ class LineReader:
     words: Sequence[str] = ()
     """Names and words of the language in the spelling that methods get."""
     too_early = "the text ends too early"
+    where: Where = ""
+    """Which harmless lines are ignored once the text has begun, see `Harmless`."""
 
     def __init__(
         self,
@@ -127,8 +142,12 @@ class LineReader:
         rows: Sequence[tuple[int, str]] = (),
     ) -> None:
         self.file, self.robot, self.settings = file, robot, settings
-        self.harmless = harmless_lines(self.language)
-        self.rows = [(line, row) for line, row in rows if not self.harmless.fullmatch(row)]
+        self.begun = False
+        """Whether a line that does something has been read."""
+        self.rows: list[tuple[int, str]] = []
+        for self.line, row in rows:
+            if not self.ignores(row):
+                self.rows.append((self.line, row))
         self.row = -1
         self.line, self.text = 0, ""
         self.spellings = {word.lower(): word for word in self.words}
@@ -199,8 +218,40 @@ class LineReader:
         If they have a flow of control, `flow_lines` has the patterns of them all by the method here
         that reads them; "" has those that do nothing to it.
         """
-        self.required = [line for line in lines if not self.harmless.fullmatch(line)]
+        harmless = harmless_lines(self.language)
+        self.required = [
+            line for line in lines if not (harmless.fullmatch(line) or self.is_remark(line))
+        ]
         self.flow_lines = flow_lines
+
+    def ignores(self, row: str) -> bool:
+        """Return whether a row does nothing; refuse it if it says a load that is not the job's."""
+        where = self.where if self.begun else "head"
+        found = harmless_lines(self.language, where).fullmatch(row)
+        self.begun = self.begun or found is None
+        if found is None:
+            return False
+        said = found.groupdict()
+        if said.get("mass"):
+            self.require_load(float(said["mass"]))
+        if said.get("schedule") and int(said["schedule"]) != self.settings.payload_schedule:
+            raise self.fault(
+                f"it is not known what PAYLOAD[{said['schedule']}] holds; name the schedule of the "
+                "load on the flange with payload_schedule"
+            )
+        return True
+
+    def is_remark(self, row: str) -> bool:
+        """Return whether a row is a remark that the rows still have; languages override this."""
+        return False
+
+    def require_load(self, mass: float) -> None:
+        """Refuse a load (kg) above that of the job; without one, above what the robot carries."""
+        load = self.robot.dynamics.load
+        most = self.robot.payload if load is None else load.mass
+        if most is not None and mass > most:
+            what = "mass_kg of [tool]" if load else "the robot's payload"
+            raise self.fault(f"expected a load up to {most:g} kg, {what}, got {mass:g} kg")
 
     def plain(self, row: str) -> str:
         """Return a row as it is compared: without needless blanks."""
@@ -228,7 +279,7 @@ class LineReader:
 
     def read(self, row: str, kinds: Mapping[str, LinePattern]) -> None:
         """Read a row with the method of its kind, unless it is a required row."""
-        if self.harmless.fullmatch(row):
+        if self.ignores(row) or (self.required and self.is_remark(row)):
             return
         if self.required:
             self.require_line(row, self.required.pop(0))
@@ -444,14 +495,26 @@ REMARK = re.compile(r"\s*(?:\d+:\s*)?(?:!|;|//|'|#) ", re.ASCII)
 
 
 class CheckedTexts(Mapping[str, str]):
-    """Texts by name; a control character or a number too large is refused with its line."""
+    """Texts by name; a character, line or number that no program has is refused with its line.
 
-    def __init__(self, files: Mapping[str, str]) -> None:
-        self.files = files
+    Parameters
+    ----------
+    files : mapping of str to str
+    longest_line : int
+        Characters of the longest line.
+    """
+
+    def __init__(self, files: Mapping[str, str], longest_line: int) -> None:
+        self.files, self.longest_line = files, longest_line
 
     def __getitem__(self, name: str) -> str:
         text = self.files[name]
         for number, line in enumerate(program_lines(name, text), start=1):
+            if len(line) > self.longest_line:
+                raise InputError(
+                    f"{name}, line {number}: expected at most {self.longest_line} characters, of "
+                    f"which a controller reads all, got {len(line)}"
+                )
             if not LONG.search(line) or REMARK.match(line):
                 continue
             for found in NUMBER.finditer(line):

@@ -150,7 +150,7 @@ def read_program(
             raise InputError(f"{main}: {unsaid[0]}")
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            read = chosen.read(main, CheckedTexts(files), robot, settings)
+            read = chosen.read(main, CheckedTexts(files, chosen.longest_line), robot, settings)
             return replace(read, externals=robot.externals)
     except KeyError as missing:
         raise InputError(f"{main}: the file {missing.args[0]!r} is missing") from None

@@ -20,6 +20,7 @@ from kerfpath.robots import Robot
 
 _NUMBER = re.compile(r"-?\d+\.\d+", re.ASCII)
 _EVENT = re.compile(r"(laser|gas) (on|off) (\d+\.\d+) s ahead", re.ASCII)
+_NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _KINDS = (*MOVE_KINDS, "via", "wait")
 
 
@@ -62,6 +63,8 @@ class _Reader(LineReader):
             raise self.fault(f"expected {len(self.columns)} fields, got {len(fields)}")
         name, kind, time, *rest = fields
         target, (speed, share, zone, events) = rest[:-4], rest[-4:]
+        if _NAME.fullmatch(name) is None:
+            raise self.fault(f"section: expected letters, digits and _, got {name[:20]!r}")
         if kind not in _KINDS:
             raise self.fault(f"kind: expected {', '.join(_KINDS)}, got {kind[:20]!r}")
         if self.via is not None and kind != "circular":

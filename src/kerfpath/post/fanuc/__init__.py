@@ -26,6 +26,8 @@ FANUC = Language(
     sayable=sayable,
     assumed={"laser_output": 1},
     externals=no_settings_needed,
+    encodings=("utf-8-sig", "cp1252"),
+    longest_line=250,
     read=read,
 )
 """The language as registered."""

@@ -76,6 +76,10 @@ class FanucSettings(PortSettings, output=Output, input=Input):
     fastest_mm_s: Annotated[
         float, setting("the largest speed of linear moves, in mm/s", "4000.0", ge=1, le=20_000)
     ] = 2000.0
+    payload_schedule: Annotated[
+        int | None,
+        setting("a payload schedule, 1 to 10, that holds the load on the flange", "1", ge=1, le=10),
+    ] = None
     corner: Annotated[
         Literal["CNT", "CR"], setting("CNT, or CR where the controller has it", '"CR"')
     ] = "CNT"

@@ -132,7 +132,8 @@ _POSITION = re.compile(
     + r",\s*".join(rf"{k} = *{_NUMBER} deg" for k in "WPR")
     + "|"
     + r",\s*".join(rf"J{k}= *{_NUMBER} deg" for k in range(1, 7))
-    + rf"){EXTENDED}{GROUP_2}\n\}};\n"
+    + rf"){EXTENDED}{GROUP_2}\n\}};\n",
+    re.ASCII,
 )
 
 
@@ -309,7 +310,7 @@ class _Section(Listing):
 
     def positions(self) -> None:
         """Read the positions, each a block of rows."""
-        rows = [row for _, row in self.rows[self.line :]]
+        rows = [row for _, row in self.rows[self.row + 1 :]]
         last = rows.index("/END") if "/END" in rows else len(rows)
         text, at = "\n".join([*rows[:last], ""]), 0
         while at < len(text) and last:
@@ -317,9 +318,9 @@ class _Section(Listing):
             if not match:
                 raise self.fault("expected a position after this line")
             number, user, tool, *said, extended, user_2, tool_2, leading = match.groups()
-            self.said_at[int(number)] = f"{self.file}, line {self.line + 1}"
+            self.said_at[int(number)] = f"{self.file}, line {self.rows[self.row + 1][0]}"
             self.row += match[0].count("\n")
-            self.line += match[0].count("\n")
+            self.line = self.rows[self.row][0]
             self.require_frames(user, tool)
             self.require_frames(user_2 or user, tool_2 or tool)
             self.read_external(int(number), extended, leading or "")

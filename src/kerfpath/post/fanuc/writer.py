@@ -36,7 +36,7 @@ from kerfpath.post.fanuc.controller import (
 )
 from kerfpath.post.harmless import LinePattern, compact
 from kerfpath.post.languages import number, outputs
-from kerfpath.post.line_reader import LineReader, program_lines
+from kerfpath.post.line_reader import BLANK, LineReader, program_lines
 from kerfpath.post.places import CalledFormatter
 from kerfpath.post.program import (
     Await,
@@ -61,14 +61,16 @@ from kerfpath.robots import Robot
 
 _ATTRIBUTE = re.compile(
     r"(?:(?:OWNER|COMMENT|PROG_SIZE|CREATE|MODIFIED|FILE_NAME|VERSION|MEMORY_SIZE|PROTECT|"
-    r"CONTROL_CODE|LOCAL_REGISTERS)\s*=[^;]*;|"
-    r"(?:TCD:)?\s+[A-Z_]+\s*= \d+[,;])"
+    r"CONTROL_CODE|LOCAL_REGISTERS)[ \t]*=[^;]*;|"
+    r"(?:TCD:)?[ \t]+(?:(?:STACK_SIZE|TIME_SLICE|BUSY_LAMP_OFF)[ \t]*= \d+|"
+    r"TASK_PRIORITY[ \t]*= 50|(?:ABORT|PAUSE)_REQUEST[ \t]*= 0)[,;])",
+    re.ASCII,
 )
-_GROUPS = re.compile(r"DEFAULT_GROUP\s*= ([1*](?:,[1*]){4,7});")
-_COUNT = re.compile(r"LINE_COUNT\s*= (\d+);")
-_NUMBERED = re.compile(r" *(\d+):(.*?) *;")
-_VIA = re.compile(r" *\d+:C P\[\d+(?::[^\]]*)?\] *")
-_ITEM = re.compile(r"\b(P|DI|DO|UO|LBL)\[(\d+):[^\]]*\]")
+_GROUPS = re.compile(r"DEFAULT_GROUP[ \t]*= ([1*](?:,[1*]){4,7});")
+_COUNT = re.compile(r"LINE_COUNT[ \t]*= (\d+);", re.ASCII)
+_NUMBERED = re.compile(r" *(\d*):(.*?) *;", re.ASCII)
+_VIA = re.compile(r" *\d*:C P\[\d+(?::[^\]]*)?\] *", re.ASCII)
+_ITEM = re.compile(r"\b(P|DI|DO|UO|LBL)\[(\d+):[^\]]*\]", re.ASCII)
 """An item with a comment, which the pendant shows beside its number."""
 
 
@@ -80,8 +82,9 @@ class Listing(LineReader):
     too_early = "the listing ends too early; /END is missing"
 
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
-        rows = [(n, row.rstrip()) for n, row in enumerate(program_lines(file, text), 1)]
-        super().__init__(file, robot, settings, rows)
+        rows = [(n, row.rstrip(BLANK)) for n, row in enumerate(program_lines(file, text), 1)]
+        super().__init__(file, robot, settings)
+        self.rows = [(n, row) for n, row in rows if row]
         self.name = ""
 
     def body(self, kinds: Mapping[str, LinePattern], group: str) -> None:
@@ -89,7 +92,7 @@ class Listing(LineReader):
 
         `group` has the motion groups that the program must have; controllers may list more.
         """
-        match = re.fullmatch(r"/PROG  ([A-Z][A-Z0-9_]*)", self.next_row())
+        match = re.fullmatch(r"/PROG +([A-Z][A-Z0-9_]*)", self.next_row())
         self.name = match[1] if match else ""
         if f"{self.name}.ls".lower() != self.file.rpartition("/")[2].lower():
             raise self.fault(f"expected /PROG and the name of the file, got {self.text[:60]!r}")
@@ -107,23 +110,27 @@ class Listing(LineReader):
                 raise self.fault(f"not an attribute: {row[:60]!r}")
         if not grouped:
             raise self.fault(f"expected DEFAULT_GROUP = {group} before this line")
-        number = 0
+        number, numbers = 0, set[bool]()
         while (row := self.next_row()) != "/POS":
             number += 1
             if _VIA.fullmatch(row):
                 row += self.next_row()
             match = _NUMBERED.fullmatch(row)
-            if not match or int(match[1]) != number:
+            if not match or match[1] not in ("", str(number)):
                 raise self.fault(f"expected line number {number}, got {self.text[:60]!r}")
+            numbers.add(match[1] == "")
             self.read(match[2], kinds)
+        if len(numbers) > 1:
+            raise self.fault("expected either all lines to be numbered, or none")
         if counted != number:
             raise self.fault(f"LINE_COUNT is {counted}, but there are {number} lines")
 
     def plain(self, row: str) -> str:
         """Return a row as it is compared: without needless blanks and comments on items."""
-        if row.lstrip().startswith("!"):
-            return row
-        return compact(_ITEM.sub(r"\1[\2]", row))
+        return row if self.is_remark(row) else compact(_ITEM.sub(r"\1[\2]", row))
+
+    def is_remark(self, row: str) -> bool:
+        return row.lstrip(BLANK).startswith("!")
 
     def require_next(
         self, lines: Iterable[str], flow_lines: Mapping[str, LinePattern] | None = None
@@ -133,7 +140,7 @@ class Listing(LineReader):
     def end(self) -> None:
         """Read the end of the listing."""
         self.require_complete()
-        if self.next_row() != "/END" or any(row for _, row in self.rows[self.line :]):
+        if self.next_row() != "/END" or self.row + 1 < len(self.rows):
             raise self.fault(f"expected /END and nothing after it, got {self.text[:60]!r}")
 
     def require_frames(self, user: str, tool: str) -> None:

@@ -26,6 +26,8 @@ INFORM = Language(
     ahead=False,
     assumed={"laser_output": 1},
     externals=missing,
+    encodings=("utf-8-sig", "cp932", "cp1252"),
+    longest_line=250,
     read=read,
 )
 """The language as registered."""

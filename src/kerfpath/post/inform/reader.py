@@ -29,12 +29,14 @@ from kerfpath.post.inform.writer import (
     switch_off_lines,
     wait_lines,
 )
-from kerfpath.post.line_reader import LineReader, patterns, program_lines
+from kerfpath.post.line_reader import BLANK, LineReader, patterns, program_lines
 from kerfpath.post.places import off_name
 from kerfpath.post.program import Await, Handshake, Switch
 from kerfpath.post.read_program import MoveKind, ReadProgram
 from kerfpath.robots import Robot
 
+RCONF_VALUES = (6, 8, 24)
+"""How many values controllers write for the type of a position; from the seventh on they are 0."""
 _NUMBER, _WHOLE = r"(-?\d+\.\d+)", r"(-?\d+)"
 _POSE = re.compile(rf"C(\d{{5}})={','.join([_NUMBER] * 6)}", re.ASCII)
 _PULSES = re.compile(rf"C(\d{{5}})={','.join([_WHOLE] * 6)}", re.ASCII)
@@ -106,16 +108,17 @@ class _Text(LineReader):
     too_early = "the job ends too early; END is missing"
 
     def __init__(self, file: str, text: str, robot: Robot, settings: InformSettings) -> None:
-        rows = [(n, row.rstrip()) for n, row in enumerate(program_lines(file, text), 1)]
+        rows = [(n, row.rstrip(BLANK)) for n, row in enumerate(program_lines(file, text), 1)]
         super().__init__(file, robot, settings, rows)
         self.name = PurePosixPath(file).stem
         self.external = ExternalPulses(robot, settings)
 
     def plain(self, row: str) -> str:
-        """Return a row as it is compared: without needless blanks and the remark after a move."""
-        if row.startswith("'"):
-            return row
-        return compact(without_remark(row, "//") if row.startswith("MOV") else row)
+        """Return a row as it is compared: without needless blanks."""
+        return row if self.is_remark(row) else compact(row)
+
+    def is_remark(self, row: str) -> bool:
+        return row.startswith("'")
 
     def same(self, row: str, expected: str) -> bool:
         """Return whether two rows are the same for the controller, which sets dates itself."""
@@ -143,15 +146,17 @@ class _Text(LineReader):
 
     def instructions(self, kinds: Mapping[str, LinePattern]) -> None:
         """Read instructions to END."""
-        while (row := self.next_row()) != "END":
+        while (row := self.next_row().lstrip(BLANK)) != "END":
+            if re.match("S?MOV|IMOV", row):
+                row = without_remark(row, "//").rstrip(BLANK)
             try:
                 row = self.external.plain(row)
             except InputError as error:
                 raise self.fault(str(error)) from None
             self.read(row, kinds)
         self.require_complete()
-        if any(row for _, row in self.rows[self.line :]):
-            self.line += 1
+        if any(row for _, row in self.rows[self.row + 1 :]):
+            self.advance()
             raise self.fault("nothing may follow END")
 
 
@@ -215,7 +220,7 @@ class _Job(_Text):
         self.arc_poses: list[Array] = []
         self.stands = False
         count = self.begin()
-        pulses = "///POSTYPE PULSE" in [row for _, row in self.rows[self.line + 1 : self.line + 2]]
+        pulses = "///POSTYPE PULSE" in [row for _, row in self.rows[self.row + 2 : self.row + 3]]
         if robot.externals and not pulses:
             raise self.fault("with external axes positions must be in pulses")
         before, after = middle("pulse" if pulses else "user", settings, self.external)
@@ -257,10 +262,9 @@ class _Job(_Text):
             row = self.next_row()
             if match := _TYPE.fullmatch(row):
                 bits = tuple(int(bit) for bit in match[1].split(","))
-                if len(bits) != self.settings.rconf_values or any(bits[6:]):
-                    raise self.fault(
-                        f"expected {self.settings.rconf_values} values, 0 from the seventh on"
-                    )
+                if len(bits) not in RCONF_VALUES or any(bits[6:]):
+                    counts = ", ".join(map(str, RCONF_VALUES))
+                    raise self.fault(f"expected {counts} values, 0 from the seventh on")
                 continue
             rows.append(self._position(_POSE, row, len(rows)))
             if bits is None:
@@ -341,8 +345,8 @@ class _Job(_Text):
         self.add_switch(last, Switch(signal=self.signal(int(output)), on=on), self.place)
 
     def wait_for(self, label: str) -> None:
-        _, below = (*self.rows[self.line : self.line + 1], (0, ""))[0]
-        said = re.match(r"WAIT IN#\((\d+)\)=ON T=(\d+\.\d\d)$", below)
+        _, below = (*self.rows[self.row + 1 : self.row + 2], (0, ""))[0]
+        said = re.fullmatch(r"WAIT IN#\((\d+)\)=ON T=(\d+\.\d\d)", below, re.ASCII)
         if said is None:
             raise self.fault("expected the wait for an input after the label")
         partner = self.partner(int(said[1]), "input")

@@ -24,6 +24,8 @@ KRL = Language(
     check=check,
     assumed={"laser_output": 1},
     externals=missing,
+    encodings=("utf-8-sig", "cp1252"),
+    longest_line=250,
     read=read,
 )
 """The language as registered."""

@@ -120,6 +120,7 @@ class _Data(LineReader):
     """One .dat."""
 
     language = "krl"
+    where = "data"
 
 
 class _File(LineReader):

@@ -22,6 +22,7 @@ RAPID = Language(
     is_reserved=is_reserved,
     posture=posture,
     externals=missing,
+    encodings=("utf-8-sig", "cp1252"),
     read=read,
 )
 """The language as registered."""

@@ -14,7 +14,7 @@ from kerfpath.arrays import Array
 from kerfpath.post.arcs import pose_of
 from kerfpath.post.build import carrier_frame
 from kerfpath.post.flow import section_of
-from kerfpath.post.line_reader import LineReader, only, patterns, program_lines, statements
+from kerfpath.post.line_reader import SHOWN, LineReader, only, patterns, program_lines, statements
 from kerfpath.post.program import Switch
 from kerfpath.post.rapid.controller import (
     SWITCH_OFF,
@@ -40,6 +40,11 @@ from kerfpath.robots import Robot
 # Read RAPID aggregates: values in brackets.
 
 
+_AGGREGATE = re.compile(r'(?:[-+.,\[\] \t\dEe]|TRUE|FALSE|"\w*")*', re.ASCII | re.IGNORECASE)
+_BARE_POINT = re.compile(r"(?<![-\w.])(?P<sign>-?)(?=\.\d)", re.ASCII)
+_TRUTH = re.compile("TRUE|FALSE", re.ASCII | re.IGNORECASE)
+
+
 class Aggregates(LineReader):
     """Reader of aggregates on the lines of a file."""
 
@@ -47,9 +52,13 @@ class Aggregates(LineReader):
 
     def values(self, text: str, count: int) -> list[Any]:
         """Return the `count` parts of an aggregate; RAPID writes it almost as JSON does."""
+        if not _AGGREGATE.fullmatch(text):
+            raise self.fault(f"not an aggregate: {text[:SHOWN]!r}")
+        text = _BARE_POINT.sub(r"\g<sign>0", text)
+        text = _TRUTH.sub(lambda found: found[0].lower(), text)
         try:
-            values = json.loads(text.replace("TRUE", "true").replace("FALSE", "false"))
-        except json.JSONDecodeError as error:
+            values = json.loads(text)
+        except (json.JSONDecodeError, RecursionError) as error:
             raise self.fault(f"not an aggregate: {error}") from None
         if not isinstance(values, list) or len(values) != count:
             raise self.fault(f"expected {count} values, got {text[:60]!r}")
@@ -196,7 +205,7 @@ class _Reader(Aggregates):
         self.active: list[str] = []
 
     def read_module(self, file: str) -> None:
-        self.file, self.ended, self.name = file, False, ""
+        self.file, self.ended, self.begun, self.name = file, False, False, ""
         lines = program_lines(file, self.files[file])
         for self.line, line in statements(lines, "!"):
             self.read_line(line)
@@ -259,6 +268,10 @@ class _Reader(Aggregates):
         held, pose, load = self.values(text, 3)
         if held is not True or not isinstance(load, list) or len(load) != 6:
             raise self.fault("expected a tool held by the robot, with its load")
+        mass, centre, axes, *inertia = load
+        self.require_load(float(self.numbers([mass, *inertia], 4)[0]))
+        self.numbers(centre, 3)
+        self.numbers(axes, 4)
         self.declare("tool", name, self.pose(pose))
 
     def work_object(self, name: str, text: str) -> None:

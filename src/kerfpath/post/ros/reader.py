@@ -11,7 +11,7 @@ from kerfpath.arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import pose_of
 from kerfpath.post.flow import section_of
-from kerfpath.post.line_reader import LineReader, patterns, program_lines
+from kerfpath.post.line_reader import BLANK, LineReader, patterns, program_lines
 from kerfpath.post.program import SIGNALS, Switch
 from kerfpath.post.read_program import FlowStep, ReadProgram
 from kerfpath.post.ros.writer import SECOND, RosSettings, head, joint_names, rates
@@ -24,13 +24,16 @@ TIP_OFF_LINE = 2e-6
 DIGITS = 1e-9
 """Generous rounding error (rad) of a difference of positions."""
 
-_NUMBERS = r"\[([-\d., ]*)\]"
+_WHOLE = r"(?:0|[1-9]\d*)"
+"""A whole number; YAML may read one that begins with 0 as octal."""
+_NUMBER = rf"-?{_WHOLE}(?:\.\d+)?"
+_NUMBERS = rf"\[({_NUMBER}(?:, *{_NUMBER})*)\]"
 _POINT = re.compile(
     rf"- {{positions: {_NUMBERS}, velocities: {_NUMBERS}, accelerations: {_NUMBERS}, effort: \[\], "
-    r"time_from_start: {sec: (\d+), nanosec: (\d{1,9})}}",
+    rf"time_from_start: {{sec: ({_WHOLE}), nanosec: ({_WHOLE})}}}}",
     re.ASCII,
 )
-_TIME = r"- {time: (-?\d+\.\d{9}), "
+_TIME = rf"- {{time: (-?{_WHOLE}\.\d{{9}}), "
 _NAME = re.compile(r"trajectory: ([A-Za-z]\w*)\.yaml", re.ASCII)
 _FRAMES = {
     what: re.compile(rf"{what}: {_NUMBERS}", re.ASCII) for what in ("tip_in_flange", "part_in_base")
@@ -52,9 +55,10 @@ def read(main: str, files: Mapping[str, str], robot: Robot, settings: RosSetting
 
 
 def _lines(file: str, text: str) -> list[tuple[int, str]]:
-    """Return lines with their numbers, without empty lines and comments."""
-    numbered = [(n, line.rstrip()) for n, line in enumerate(program_lines(file, text), 1)]
-    return [(n, line) for n, line in numbered if line and not line.startswith("#")]
+    """Return lines with their numbers, without empty lines and comments, which follow a blank."""
+    numbered = enumerate(program_lines(file, text), 1)
+    plain = [(n, re.sub(r"(?:^|[ \t])#.*", "", line).rstrip(BLANK)) for n, line in numbered]
+    return [(n, line) for n, line in plain if line]
 
 
 def _numbers(text: str, count: int, place: str) -> list[float]:

@@ -14,7 +14,7 @@ from kerfpath.errors import InputError
 from kerfpath.post.arcs import faceplate, from_euler, world
 from kerfpath.post.flow import section_of
 from kerfpath.post.harmless import LinePattern, compact
-from kerfpath.post.line_reader import LineReader, patterns, program_lines, statements
+from kerfpath.post.line_reader import BLANK, LineReader, patterns, program_lines, statements
 from kerfpath.post.program import PARTNERS, SIGNALS, Await, Partner, Switch
 from kerfpath.post.read_program import FlowStep, MoveKind, ReadMove, ReadOff, ReadProgram
 from kerfpath.post.val3.controller import SAME, Val3Settings, joints_from_axes
@@ -26,6 +26,7 @@ from kerfpath.post.val3.writer import (
     PORTS,
     PROGRAM,
     PROJECT,
+    SPACE,
     STACK_SIZE,
     TYPES,
     Element,
@@ -49,6 +50,8 @@ _WORDS = {
     "elbow": ("epositive", "enegative", SAME[1]),
     "wrist": ("wpositive", "wnegative", SAME[2]),
 }
+_UNUSED_TYPES = ("num", "bool", "string", "pointRx", "jointRx", "trsf", "mdesc", "config")
+"""Types of data that may be declared although no routine uses them."""
 _JOINTS = tuple(f"j{i}" for i in range(1, 7))
 _BOUNDS = {"accel": "100", "decel": "100", "rmax": "99999"}
 
@@ -71,9 +74,12 @@ class Val3Data:
         seen = set()
         for datum in root.only("Datas")[0].each("Data"):
             name = datum.attributes.get("name", "")
-            if name not in _DATA or name in seen:
+            unused = name not in _DATA and datum.attributes.get("type") in _UNUSED_TYPES
+            if name in seen or not (unused or name in _DATA):
                 raise datum.fault(f"not expected here: {datum.shown()}")
             seen.add(name)
+            if unused:  # routines have no names but those of _DATA
+                continue
             values = datum.each("Value")
             kind, reader = _DATA[name]
             datum.take(
@@ -316,15 +322,17 @@ class _Project:
         program.take(name=name, access="public")
         (code,) = program.only("Code")
         code.take()
-        lines = program_lines(file, code.text, code.line)  # XML may spell out any character
-        ends = [line.strip() for line in (*lines[:1], *lines[-1:])]
+        if len(code.quoted) != 1 or code.text.strip(SPACE):
+            raise code.fault("expected the code in one <![CDATA[...]]>, and nothing else")
+        lines = program_lines(file, code.quoted[0], code.line)
+        ends = [line.strip(BLANK) for line in (*lines[:1], *lines[-1:])]
         if code.children or ends != ["begin", "end"]:
             raise code.fault("expected code from begin to end")
         return code
 
     def statements(self, code: Element) -> list[tuple[int, str]]:
         """Return the lines of a routine without remarks, with their numbers."""
-        lines = program_lines(code.file, code.text, code.line)[1:-1]
+        lines = program_lines(code.file, code.quoted[0], code.line)[1:-1]
         return statements(lines, "//", code.line + 1)
 
     def calls(self, start: Element) -> list[tuple[int, str, str]]:

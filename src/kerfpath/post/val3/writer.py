@@ -49,13 +49,15 @@ from kerfpath.post.val3.controller import LONGEST_NAME, Val3Settings, axes_from_
 # -----------------------------------------------------------------------------
 # XML read with the line of every element; a document type is refused.
 
+SPACE = " \t\r\n"
+"""White space of XML."""
 SCHEMA = "http://www.w3.org/2001/XMLSchema-instance"
 """Namespace of the attributes with the prefix xsi: here."""
 
 
 @dataclass(slots=True, kw_only=True)
 class Element:
-    """One element: its place, tag, attributes and content."""
+    """One element: its place, tag, attributes and content; `quoted` has its CDATA sections."""
 
     file: str
     line: int
@@ -63,6 +65,7 @@ class Element:
     attributes: dict[str, str]
     children: list[Element] = field(default_factory=list)
     text: str = ""
+    quoted: list[str] = field(default_factory=list)
 
     __repr__ = short_repr
 
@@ -77,7 +80,7 @@ class Element:
 
     def only(self, *tags: str) -> list[Element]:
         """Return the children, which must have these tags in this order."""
-        if [child.tag for child in self.children] != list(tags) or self.text.strip():
+        if [child.tag for child in self.children] != list(tags) or self.text.strip(SPACE):
             raise self.fault(f"expected {' and '.join(tags) or 'nothing'} in {self.shown()}")
         return self.children
 
@@ -86,7 +89,7 @@ class Element:
         for child in self.children:
             if child.tag != tag:
                 raise child.fault(f"expected <{tag}>, got {child.shown()}")
-        if self.text.strip():
+        if self.text.strip(SPACE):
             raise self.fault(f"text is not expected in {self.shown()}")
         return self.children
 
@@ -104,14 +107,18 @@ def parse(file: str, text: str, tag: str, namespace: str) -> Element:
         The text is not XML, has a document type, a processing instruction, or another root.
     """
     top = Element(file=file, line=1, tag="", attributes={})
-    stack = [top]
+    stack, inside = [top], False
     parser = expat.ParserCreate(namespace_separator=" ")
     parser.buffer_text = True
+    data = text.encode("utf-8", "surrogatepass")
 
     def start(name: str, attributes: dict[str, str]) -> None:
         space, _, local = name.rpartition(" ")
         if space != namespace:
             raise InputError(f"{file}, line {parser.CurrentLineNumber}: <{local}> is not expected")
+        at = parser.CurrentByteIndex
+        if b"&#" in data[at : data.find(b"<", at + 1)]:
+            refuse()
         plain = {key.replace(f"{SCHEMA} ", "xsi:"): value for key, value in attributes.items()}
         made = Element(file=file, line=parser.CurrentLineNumber, tag=local, attributes=plain)
         stack[-1].children.append(made)
@@ -121,19 +128,34 @@ def parse(file: str, text: str, tag: str, namespace: str) -> Element:
         stack.pop()
 
     def characters(data: str) -> None:
-        stack[-1].text += data
+        if inside:
+            stack[-1].quoted[-1] += data
+        else:
+            stack[-1].text += data
+
+    def quote() -> None:
+        nonlocal inside
+        inside = True
+        stack[-1].quoted.append("")
+
+    def unquote() -> None:
+        nonlocal inside
+        inside = False
 
     def refuse(*_: object) -> None:
         raise InputError(
-            f"{file}, line {parser.CurrentLineNumber}: a document type or a processing instruction "
-            "is not expected in a project"
+            f"{file}, line {parser.CurrentLineNumber}: a document type, a processing instruction "
+            "or a character by its number is not expected in a project"
         )
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = characters
+    parser.StartCdataSectionHandler, parser.EndCdataSectionHandler = quote, unquote
     parser.StartDoctypeDeclHandler = parser.ProcessingInstructionHandler = refuse
     try:
-        parser.Parse(text.encode("utf-8", "surrogatepass"), True)
+        parser.Parse(data, True)
+    except InputError:
+        raise
     except expat.ExpatError as error:
         raise InputError(f"{file}, line {error.lineno}: not XML ({error})") from None
     except (ValueError, LookupError) as error:  # an encoding that the parser does not have
