@@ -28,6 +28,7 @@ NAMES = (
     "part",
     "programs",
     "program_edits",
+    "handshakes",
     "plan_edits",
     "pareto",
     "sweeps",
@@ -121,6 +122,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import program_edits
 
         return [program_edits.run(quick=quick)]
+    if name == "handshakes":
+        from benchmarks import handshakes
+
+        return [handshakes.run(quick=quick)]
     if name == "plan_edits":
         from benchmarks import plan_edits
 
