@@ -1,12 +1,14 @@
-"""Large STEP files: time and memory of reading, beside OCCT's own reader."""
+"""Large STEP and DXF files: time and memory of reading."""
 
 from __future__ import annotations
 
 import math
 import tempfile
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from statistics import median
+from time import process_time
 
 from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import (
@@ -21,7 +23,7 @@ from OCP.Message import Message
 from OCP.STEPControl import STEPControl_Reader, STEPControl_StepModelType, STEPControl_Writer
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
 
-from benchmarks._figures import Figure, Report, in_turn
+from benchmarks._figures import Figure, Report, in_turn, peak_megabytes
 from kerfpath import isolated
 from kerfpath.cad import read, reading
 
@@ -33,6 +35,8 @@ SIDE = 7
 """Number of holes along a side of a plate: round holes and hexagons alternate."""
 PLATES = (8, 32, 116)
 """Numbers of plates in the assembly; the last gives 82 MB."""
+ENTITIES = (12_500, 25_000, 50_000, 100_000)
+"""Numbers of entities of DXF drawings; more are refused."""
 RATIO, GIGABYTES = 2.0, 3.0
 """Allowed time of reading, as a multiple of OCCT's, and allowed memory, GB."""
 
@@ -41,7 +45,9 @@ An assembly of plates of 180 faces, each with {holes} holes, round ones and hexa
 OCCT as STEP. "OCCT" reads the file and makes its shapes, no more, in this process; "kerfpath"
 is `cad.read`: OCCT in a process of its own, which is started before, then the loops of all
 faces, skins and sides of sheets. In turn, in one run. The memory is the larger of both
-processes at its peak."""
+processes at its peak.
+
+DXF drawings of circles in rows, and of squares of four lines, in text, read in this process."""
 
 
 def run(*, quick: bool = False) -> Report:
@@ -69,7 +75,44 @@ def run(*, quick: bool = False) -> Report:
                 f"{of}: {ratio:.2f} times as long as OCCT alone, {peak:.1f} GB: {verdict} "
                 f"{RATIO:g} times and {GIGABYTES:g} GB"
             )
+        for count in ENTITIES[:1] if quick else ENTITIES:
+            for shape, text in (("circles", _circles(count)), ("lines of squares", _lines(count))):
+                path = Path(folder) / "drawing.dxf"
+                path.write_text(text, encoding="ascii")
+                start = process_time()
+                peak = peak_megabytes(partial(read, path, "mm")) / 1e3
+                each = (process_time() - start) * 1e5 / count
+                report.figures.append(
+                    Figure(
+                        what=f"{count} {shape} in DXF",
+                        values=[each],
+                        unit="s of processor per 100 000 entities",
+                        note=f"{path.stat().st_size * 1e-6:.0f} MB, {peak:.1f} GB",
+                    )
+                )
     return report
+
+
+def _circles(count: int) -> str:
+    side = math.isqrt(count)
+    return _dxf(
+        f"0\nCIRCLE\n8\n0\n10\n{k % side * 20}\n20\n{k // side * 20}\n40\n5\n" for k in range(count)
+    )
+
+
+def _lines(count: int) -> str:
+    side = math.isqrt(count // 4)
+    ends = ((0, 0, 9, 0), (9, 0, 9, 9), (9, 9, 0, 9), (0, 9, 0, 0))
+    return _dxf(
+        f"0\nLINE\n8\n0\n10\n{x + a}\n20\n{y + b}\n11\n{x + c}\n21\n{y + d}\n"
+        for k in range(count // 4)
+        for x, y in [(k % side * 20, k // side * 20)]
+        for a, b, c, d in ends
+    )
+
+
+def _dxf(entities: Iterable[str]) -> str:
+    return f"0\nSECTION\n2\nENTITIES\n{''.join(entities)}0\nENDSEC\n0\nEOF\n"
 
 
 def _bare(path: Path) -> None:

@@ -25,11 +25,11 @@ from typing import Any, TypeVar
 
 from kerfpath.errors import InputError
 
-SECONDS = 20.0
+SECONDS = 15.0
 """Processor time allowed for any file, s."""
-SECONDS_PER_MB = 20.0
+SECONDS_PER_MB = 10.0
 """Processor time allowed in addition for each megabyte of the file, s."""
-MEMORY = 2 * 1024**3
+MEMORY = 3 * 1024**3 // 2
 """Bytes allowed for any file, beside those of the libraries themselves."""
 MEMORY_PER_BYTE = 100
 """Bytes allowed in addition for each byte of the file."""
@@ -71,7 +71,7 @@ def call_apart(function: Callable[..., _T], *arguments: object, size: int) -> _T
     Exception
         Whatever the function raised.
     """
-    seconds = math.ceil(SECONDS + SECONDS_PER_MB * size / 1e6)
+    seconds = seconds_for(size)
     memory = MEMORY + MEMORY_PER_BYTE * size
     request = pickle.dumps((function, arguments, seconds, memory))
     with _lock:
@@ -80,11 +80,24 @@ def call_apart(function: Callable[..., _T], *arguments: object, size: int) -> _T
         return value  # type: ignore[no-any-return]  # what the function returned, pickled
     if isinstance(value, MemoryError):
         raise InputError(
-            f"reading it takes more than {memory / 1024**3:.0f} GB of memory; it is damaged, or "
-            "contains much more than the part to cut: export it again"
+            f"reading it takes more than {memory / 1024**3:.1f} GB of memory; it is damaged, or "
+            "contains much more than the part to cut: export that part alone"
         )
     assert isinstance(value, BaseException)
     raise value
+
+
+def seconds_for(size: int) -> int:
+    """Return the processor time (s) allowed for reading a file of `size` bytes."""
+    return math.ceil(SECONDS + SECONDS_PER_MB * size / 1e6)
+
+
+def too_slow(seconds: int) -> InputError:
+    """Return the error of a file that takes more than `seconds`; it does not name the file."""
+    return InputError(
+        f"reading it takes more than {seconds} s; it is damaged, or contains much more than the "
+        "part to cut: export that part alone"
+    )
 
 
 def stand_by(module: str | None = None) -> None:
@@ -106,29 +119,22 @@ def _answer(request: bytes, seconds: int) -> tuple[str, Any]:
             with suppress(BrokenPipeError, ConnectionResetError):  # it left just now, and said so
                 worker.ours.send_bytes(request)
             if not worker.ours.poll(PATIENCE * seconds):
-                raise _too_slow(seconds)
+                raise too_slow(seconds)
             done = worker.ours.recv()
         except (EOFError, ConnectionResetError):
             number = -worker.process.wait()
             if number == signal.SIGXCPU:
-                raise _too_slow(seconds) from None
+                raise too_slow(seconds) from None
             name = signal.Signals(number).name if number > 0 else f"exit code {-number}"
             raise InputError(
-                f"the library that reads it crashed ({name}), so it is damaged; copy or export "
-                "it again"
+                f"the library that reads it crashed ({name}): it is damaged, or takes too much "
+                "memory; export the part to cut again, alone"
             ) from None
         finally:
             if done[0] == _LEAVES or isinstance(done[1], MemoryError):
                 worker.end()
                 _worker = None
     return done
-
-
-def _too_slow(seconds: int) -> InputError:
-    return InputError(
-        f"reading it takes more than {seconds} s; it is damaged, or contains much more than the "
-        "part to cut: export it again"
-    )
 
 
 class _Worker:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -39,18 +40,36 @@ CHORD = 1e-4
 """Deviation (mm) of chords from the curves that are compared."""
 MOST_COMPARED = 100
 """Largest number of points of a line that are compared with the other."""
+MOST_COINCIDENT = 10_000
+"""Largest number of pairs of lines that are compared, which takes milliseconds for each."""
 
 
 def coincident_pairs(traces: Sequence[Trace]) -> Iterator[tuple[int, int]]:
-    """Yield pairs (i, j) of traces with i < j that lie on each other."""
+    """Yield pairs (i, j) of traces with i < j that lie on each other.
+
+    Raises
+    ------
+    InputError
+        Far too many of them.
+    """
     if len(traces) < 2:
         return
     facts = np.array(
         [[*trace.bounds().ravel().tolist(), float(trace.lengths.sum())] for trace in traces]
     )
-    for i, j in sorted(cKDTree(facts).query_pairs(COINCIDENT, p=np.inf)):
+    tree = cKDTree(facts)
+    if _pair_count(tree, tree, COINCIDENT) > 2 * MOST_COINCIDENT + len(traces):
+        raise InputError(
+            f"more than {MOST_COINCIDENT} pairs of lines lie on each other; draw each line once"
+        )
+    for i, j in sorted(tree.query_pairs(COINCIDENT, p=np.inf)):
         if _lies_on(traces[i].around, traces[j]) and _lies_on(traces[j].around, traces[i]):
             yield i, j
+
+
+def _pair_count(one: cKDTree, other: cKDTree, within: float, p: float = np.inf) -> int:
+    """Return how many pairs of a point of each tree are near each other; they are not listed."""
+    return int(one.count_neighbors(other, within, p=p))
 
 
 def _lies_on(points: Array, trace: Trace) -> bool:
@@ -77,6 +96,12 @@ SAMPLED = 0.05
 """Chord error of curves for enclosed regions, as a share of that distance."""
 ANGLE_SAMPLES = 257
 """Number of points on a curve among which the one at that distance is searched."""
+MOST_CHORDS = 5_000_000
+"""Largest number of chords of curves for enclosed regions."""
+MOST_CROSSED = 400_000_000
+"""Largest number of pairs of a point and a chord at its height; they take about 20 s."""
+AT_ONCE = 1_000_000
+"""Number of these pairs that are looked at together."""
 
 
 def continuations(
@@ -100,55 +125,83 @@ def continuations(
     for end, where in enumerate(place.tolist()):
         at.setdefault(where, []).append(end)
     is_even = all(len(ends) % 2 == 0 for ends in at.values())
-    crowded = is_even and any(len(ends) > 2 for ends in at.values())
-    chords = _chords(strokes) if crowded else (np.empty((0, 3)), np.empty((0, 3)))
-    found: dict[int, int] = {}
-    for ends in at.values():
-        if len(ends) == 2:
-            pairs = [(ends[0], ends[1])]
-        else:
-            pairs = _continuations_at(strokes, alike, place, ends, chords) if is_even else []
-        for a, b in pairs:
-            found[a], found[b] = b, a
-    return found
+    crowds = [
+        _Crowd(strokes, alike, place, ends) for ends in at.values() if len(ends) > 2 and is_even
+    ]
+    pairs = [(ends[0], ends[1]) for ends in at.values() if len(ends) == 2]
+    if crowds:
+        points = np.array([crowd.point for crowd in crowds])
+        p, q = _chords(strokes)
+        crossed = np.zeros(len(crowds), dtype=np.int64)
+        for k, _ in ray_crossings(points, p, q):
+            crossed += np.bincount(k, minlength=len(crowds))
+        for crowd, is_filled in zip(crowds, (crossed % 2).tolist(), strict=True):
+            pairs += crowd.pairs(bool(is_filled))
+    return dict([*pairs, *((b, a) for a, b in pairs)])
 
 
 def _chords(strokes: Sequence[Sequence[Curve]]) -> tuple[Array, Array]:
-    """Return the chords of all curves, from (K, 3) to (K, 3), which bound the regions."""
+    """Return the chords of all curves, from (K, 3) to (K, 3), which bound the regions.
+
+    Raises
+    ------
+    InputError
+        Far too many, as a curve is tiny beside others.
+    """
     curves = [curve for stroke in strokes for curve in stroke]
     chord = SAMPLED * PROBE * min(curve.length for curve in curves)
-    lines = [sample_curve(curve, chord, np.pi)[1] for curve in curves]
+    lines, count = list[Array](), 0
+    for curve in curves:
+        lines.append(sample_curve(curve, chord, np.pi)[1])
+        count += len(lines[-1])
+        if count > MOST_CHORDS:
+            raise InputError(
+                f"its shortest curve, of {chord / SAMPLED / PROBE:.3g} mm, is too short beside the "
+                "others to tell which lines bound a hole; remove it, or draw each loop as one "
+                "polyline"
+            )
     return np.vstack([line[:-1] for line in lines]), np.vstack([line[1:] for line in lines])
 
 
-def _continuations_at(
-    strokes: Sequence[Sequence[Curve]],
-    alike: Sequence[int],
-    place: Ints,
-    ends: Sequence[int],
-    chords: tuple[Array, Array],
-) -> list[tuple[int, int]]:
-    """Return the pairs of ends at a place that have a filled region between them."""
-    curves = {end: strokes[end // 2][-1 if end % 2 else 0] for end in ends}
-    at = np.mean([curve.ends[end % 2] for end, curve in curves.items()], axis=0)
-    near = PROBE * min(curve.length for curve in curves.values())
-    angle_of: dict[tuple[int, bool], float] = {}
-    keys = {}
-    for end, curve in curves.items():
-        # Strokes that lie on each other have opposite orders at their two ends.
-        starts_here = bool(place[end] < place[end ^ 1])
-        line = alike[end // 2], starts_here
-        angle = angle_of.setdefault(line, _departure_angle(curve, end % 2, at, near))
-        keys[end] = angle, end if starts_here else -end
-    around = sorted(ends, key=keys.__getitem__)
-    angles = np.array([keys[end][0] for end in around])
-    wide = np.diff(np.append(angles, angles[0] + 2 * np.pi))
-    widest, count = int(np.argmax(wide)), len(around)
-    middle = angles[widest] + wide[widest] / 2
-    point = at + near * np.array([np.cos(middle), np.sin(middle), 0.0])
-    is_filled = _ray_crossings(chords[0] - point, chords[1] - point) % 2 == 1
-    first = widest if is_filled else widest + 1
-    return [(around[k % count], around[(k + 1) % count]) for k in range(first, first + count, 2)]
+class _Crowd:
+    """More than two ends at one place, in their order around it.
+
+    Between the two that are furthest apart is a point near the place, (3,) mm.
+    """
+
+    def __init__(
+        self,
+        strokes: Sequence[Sequence[Curve]],
+        alike: Sequence[int],
+        place: Ints,
+        ends: Sequence[int],
+    ) -> None:
+        curves = {end: strokes[end // 2][-1 if end % 2 else 0] for end in ends}
+        at = np.mean([curve.ends[end % 2] for end, curve in curves.items()], axis=0)
+        near = PROBE * min(curve.length for curve in curves.values())
+        angle_of: dict[tuple[int, bool], float] = {}
+        keys = {}
+        for end, curve in curves.items():
+            # Strokes that lie on each other have opposite orders at their two ends.
+            starts_here = bool(place[end] < place[end ^ 1])
+            line = alike[end // 2], starts_here
+            if line not in angle_of:
+                angle_of[line] = _departure_angle(curve, end % 2, at, near)
+            keys[end] = angle_of[line], end if starts_here else -end
+        self._around = sorted(ends, key=keys.__getitem__)
+        angles = np.array([keys[end][0] for end in self._around])
+        wide = np.diff(np.append(angles, angles[0] + 2 * np.pi))
+        self._widest = int(np.argmax(wide))
+        middle = angles[self._widest] + wide[self._widest] / 2
+        self.point = at + near * np.array([np.cos(middle), np.sin(middle), 0.0])
+
+    def pairs(self, is_filled: bool) -> list[tuple[int, int]]:
+        """Return the pairs of ends with a filled region between them, as the point is or not."""
+        first, count = self._widest if is_filled else self._widest + 1, len(self._around)
+        return [
+            (self._around[k % count], self._around[(k + 1) % count])
+            for k in range(first, first + count, 2)
+        ]
 
 
 def _departure_angle(curve: Curve, is_end: int, at: Array, near: float) -> float:
@@ -160,12 +213,6 @@ def _departure_angle(curve: Curve, is_end: int, at: Array, near: float) -> float
     part = np.clip((near - away[k - 1]) / max(away[k] - away[k - 1], 1e-300), 0.0, 1.0)
     x, y, _ = points[k - 1] + part * (points[k] - points[k - 1])
     return float(np.arctan2(y, x))
-
-
-def encloses(polygon: Array, point: Array) -> bool:
-    """Return whether a point (3,) lies within a polygon (K, 3), both seen from above."""
-    around = polygon - point
-    return _ray_crossings(around, np.roll(around, -1, axis=0)) % 2 == 1
 
 
 def interior_point(polygon: Array) -> Array:
@@ -183,16 +230,44 @@ def interior_point(polygon: Array) -> Array:
     return np.array([(x[k] + x[k + 1]) / 2, level, polygon[0, 2]])
 
 
-def _ray_crossings(p: Array, q: Array) -> int:
-    """Return how many of the segments p q (K, 3) the ray from 0 along x crosses."""
-    crosses = (p[:, 1] > 0) != (q[:, 1] > 0)
-    (x, y), (x1, y1) = p[crosses, :2].T, q[crosses, :2].T
-    return int(np.count_nonzero(x - y * (x1 - x) / (y1 - y) > 0))
+def ray_crossings(points: Array, p: Array, q: Array) -> Iterator[tuple[Ints, Ints]]:
+    """Yield which rays from `points` (N, 3) along x cross which segments p q (K, 3), from above.
+
+    Yields
+    ------
+    point, segment : (M,) int
+        Their numbers; a few at a time.
+
+    Raises
+    ------
+    InputError
+        Far too many points lie at the height of segments.
+    """
+    order = np.argsort(points[:, 1])
+    levels = points[order, 1]
+    first = np.searchsorted(levels, np.minimum(p[:, 1], q[:, 1]))
+    count = np.searchsorted(levels, np.maximum(p[:, 1], q[:, 1])) - first
+    upto = np.cumsum(count)
+    if upto[-1] > MOST_CROSSED:
+        raise InputError(
+            "holds too many lines beside and around each other; leave out what is not to be cut"
+        )
+    bounds = np.searchsorted(upto, np.arange(0, upto[-1] + AT_ONCE, AT_ONCE), side="right")
+    for low, high in pairwise(np.unique([*bounds, len(p)]).tolist()):
+        segment = np.repeat(np.arange(low, high), count[low:high])
+        before = upto[low:high] - count[low:high]
+        within = np.arange(len(segment)) - np.repeat(before - before[0], count[low:high])
+        point = order[first[segment] + within]
+        (x, y), (x1, y1) = ((end[segment, :2] - points[point, :2]).T for end in (p, q))
+        crosses = x - y * (x1 - x) / (y1 - y) > 0
+        yield point[crosses], segment[crosses]
 
 
 # -----------------------------------------------------------------------------
 # Chain the curves to loops.
 
+MOST_NEAR = 5_000_000
+"""Largest number of pairs of ends at different places that may be one."""
 MOST_REPORTED = 3
 """Number of open lines whose ends are reported, those with the nearest next end."""
 LARGER = 1.05
@@ -236,12 +311,12 @@ def part_of_strokes(
     if not chains:
         why = f"; {left_out[0]}" if left_out else ""
         raise InputError(f"holds nothing to cut: no line, arc, polyline, ellipse or spline{why}")
-    depth = iter(_nesting_depths([chain for _, chain in chains if chain.is_closed]))
+    holes = iter(_are_holes([chain for _, chain in chains if chain.is_closed]))
     kinds: list[Kind] = []
     for k, (style, chain) in enumerate(chains):
         kind: Kind = "open"
         if chain.is_closed:
-            kind = "inner" if next(depth) % 2 else "outer"
+            kind = "inner" if next(holes) else "outer"
             if (chain.area[2] > 0) != (kind == "outer"):
                 other_way = tuple(backwards(curve) for curve in chain.edges[::-1])
                 chains[k] = style, EdgeChain(edges=other_way)
@@ -301,19 +376,23 @@ def _chained(strokes: Sequence[Stroke], gap: float, R: Array) -> tuple[list[Chai
     chains = [EdgeChain(edges=stroke) for stroke in kept if _is_closed(stroke)]
     loose = [stroke for stroke in kept if not _is_closed(stroke)]
     next_end = _OpenEnds(loose, gap, R)
-    for own, on_others in _connected_groups(loose, spare, gap):
-        if _all_junctions_even(own, gap):
-            chains += _trace_chains(own, gap, next_end)
-            for _, together in _connected_groups([], on_others, gap):
-                if _all_junctions_even(together, gap):
-                    chains += _trace_chains(together, gap, next_end)
+    for own, place, on_others in _connected_groups(loose, spare, gap):
+        if _is_even(place):
+            chains += _trace_chains(own, place, next_end)
+            for together, its, _ in _connected_groups(on_others, [], gap):
+                if _is_even(its):
+                    chains += _trace_chains(together, its, next_end)
                 else:
                     left += together
-        elif _all_junctions_even([*own, *on_others], gap):
-            chains += _trace_chains([*own, *on_others], gap, next_end)
-        else:
+            continue
+        if on_others:
+            together = [*own, *on_others]
+            its = _junctions(_ends(together), gap)
+            if _is_even(its):
+                chains += _trace_chains(together, its, next_end)
+                continue
             left += on_others
-            chains += _trace_chains(own, gap, next_end)
+        chains += _trace_chains(own, place, next_end)
     again = {j for _, j in coincident_pairs(chains)}
     repaired = []
     if count := _count_curves(strokes) - _count_curves(drawn):
@@ -380,31 +459,44 @@ def _ends(strokes: Sequence[Stroke]) -> Array:
 
 def _connected_groups(
     loose: Sequence[Stroke], spare: Sequence[Stroke], gap: float
-) -> Iterator[tuple[list[Stroke], list[Stroke]]]:
-    """Yield each connected group of strokes, with the spare strokes that end where they do."""
+) -> Iterator[tuple[list[Stroke], Ints, list[Stroke]]]:
+    """Yield each connected group of strokes, with the spare strokes that end where they do.
+
+    Between the two are the numbers of the junctions (2 K,) at the ends of the K strokes.
+    """
     places = [_junctions(_ends(strokes), gap) for strokes in (loose, spare)]
     first = len(loose) + len(spare)  # the first number of a place
     links = [[end // 2, first + at] for end, at in enumerate(places[0].tolist())]
     first += len(places[0])
     links += [[len(loose) + end // 2, first + at] for end, at in enumerate(places[1].tolist())]
     if loose and spare:
-        pairs = cKDTree(_ends(spare)).query_ball_tree(cKDTree(_ends(loose)), gap)
-        links += [[len(loose) + k // 2, end // 2] for k, near in enumerate(pairs) for end in near]
+        links += [[len(loose) + k // 2, end // 2] for k, end in _meeting(spare, loose, gap)]
     group = label_connected(np.array(links, dtype=np.int64), first + len(places[1])).tolist()
-    together: dict[int, tuple[list[Stroke], list[Stroke]]] = {}
-    for k, stroke in enumerate([*loose, *spare]):
-        together.setdefault(group[k], ([], []))[k >= len(loose)].append(stroke)
-    yield from together.values()
+    together: dict[int, tuple[list[int], list[Stroke]]] = {}
+    for k in range(len(loose)):
+        together.setdefault(group[k], ([], []))[0].append(k)
+    for k, stroke in enumerate(spare, start=len(loose)):
+        together.setdefault(group[k], ([], []))[1].append(stroke)
+    for own, others in together.values():
+        yield [loose[k] for k in own], places[0].reshape(-1, 2)[own].ravel(), others
 
 
-def _all_junctions_even(strokes: Sequence[Stroke], gap: float) -> bool:
-    """Return whether every junction has even degree."""
-    return not (np.bincount(_junctions(_ends(strokes), gap)) % 2).any()
+def _meeting(spare: Sequence[Stroke], loose: Sequence[Stroke], gap: float) -> Iterator[list[int]]:
+    """Yield an end of a spare and one of a loose stroke for each two places where they meet."""
+    ends = [np.unique(_ends(strokes), axis=0, return_index=True) for strokes in (spare, loose)]
+    tree, other = (cKDTree(places) for places, _ in ends)
+    _require_few(_pair_count(tree, other, gap, 2), gap)
+    for k, near in enumerate(tree.query_ball_tree(other, gap)):
+        yield from ([int(ends[0][1][k]), int(ends[1][1][its])] for its in near)
 
 
-def _trace_chains(strokes: Sequence[Stroke], gap: float, next_end: _OpenEnds) -> Iterator[Chain]:
-    """Yield the chains of connected open strokes."""
-    place = _junctions(_ends(strokes), gap)
+def _is_even(place: Ints) -> bool:
+    """Return whether an even number of ends meet at every junction."""
+    return not any(count % 2 for count in Counter(place.tolist()).values())
+
+
+def _trace_chains(strokes: Sequence[Stroke], place: Ints, next_end: _OpenEnds) -> Iterator[Chain]:
+    """Yield the chains of connected open strokes; `place` numbers the junctions of their ends."""
     marks: dict[tuple[Mark, ...], int] = {}
     alike = [
         marks.setdefault(tuple(sorted(curve.mark for curve in s)), len(marks)) for s in strokes
@@ -466,12 +558,27 @@ def _junctions(ends: Array, gap: float) -> Ints:
     """
     if not len(ends):
         return np.empty(0, dtype=np.int64)
-    touching = cKDTree(ends).query_pairs(NOTHING, output_type="ndarray")
-    alone = np.setdiff1d(np.arange(len(ends)), touching)
+    places, at, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    touching = _near_pairs(places, NOTHING)
+    alone = np.setdiff1d(np.flatnonzero(count == 1), touching)
     if alone.size:
-        bridged = alone[cKDTree(ends[alone]).query_pairs(gap, output_type="ndarray")]
-        touching = np.vstack([touching, bridged])
-    return label_connected(touching, len(ends))
+        touching = np.vstack([touching, alone[_near_pairs(places[alone], gap)]])
+    return label_connected(touching, len(places))[at.ravel()]
+
+
+def _near_pairs(points: Array, within: float) -> Ints:
+    """Return the pairs (M, 2) of points (K, 3) mm that are near each other."""
+    tree = cKDTree(points)
+    _require_few((_pair_count(tree, tree, within, 2) - len(points)) // 2, within)
+    return np.asarray(tree.query_pairs(within, output_type="ndarray"))
+
+
+def _require_few(pairs: int, within: float) -> None:
+    if pairs > MOST_NEAR:
+        raise InputError(
+            f"too many curves end within {within:g} mm of each other; give a smaller gap, or leave "
+            "out what is not to be cut"
+        )
 
 
 class _OpenEnds:
@@ -510,21 +617,25 @@ class _OpenEnds:
         return min(breaks)
 
 
-def _nesting_depths(chains: Sequence[Chain]) -> list[int]:
-    """Return how many of the others enclose each closed chain.
+def _are_holes(chains: Sequence[Chain]) -> list[bool]:
+    """Return for each closed chain whether an odd number of the others enclose it.
 
     Chains may touch or coincide, so a point inside each decides.
     """
-    boxes = np.array([chain.bounds() for chain in chains]).reshape(-1, 2, 3)
+    if not chains:
+        return []
+    boxes = np.array([chain.bounds() for chain in chains])
     areas = np.array([abs(chain.area[2]) for chain in chains])
-    depths = []
-    for k, chain in enumerate(chains):
-        point = interior_point(chain.around)
-        larger = np.stack([boxes[k, 0] - boxes[:, 0], boxes[:, 1] - boxes[k, 1]])
-        is_around = (larger > -COINCIDENT).all(axis=(0, 2))
+    points = np.array([interior_point(chain.around) for chain in chains])
+    owner = np.repeat(np.arange(len(chains)), [len(chain.around) for chain in chains])
+    p = np.vstack([chain.around for chain in chains])
+    q = np.vstack([np.roll(chain.around, -1, axis=0) for chain in chains])
+    crossed = np.zeros(len(chains), dtype=np.int64)
+    for k, segment in ray_crossings(points, p, q):
+        j = owner[segment]
+        larger = np.concatenate([boxes[k, 0] - boxes[j, 0], boxes[j, 1] - boxes[k, 1]], axis=1)
         # Of two chains in one box, such as a circle and an inscribed one, the larger is around.
-        is_around &= (larger > COINCIDENT).any(axis=(0, 2)) | (areas > LARGER * areas[k])
-        is_around[k] = False
-        around = np.flatnonzero(is_around).tolist()
-        depths.append(sum(encloses(chains[j].around, point) for j in around))
-    return depths
+        is_around = (larger > -COINCIDENT).all(axis=1) & (j != k)
+        is_around &= (larger > COINCIDENT).any(axis=1) | (areas[j] > LARGER * areas[k])
+        crossed += np.bincount(k[is_around], minlength=len(chains))
+    return [bool(count % 2) for count in crossed]

@@ -401,6 +401,10 @@ class _Flat(ABC):
         return float(np.abs(half[:, 0]) @ (speed @ GAUSS[1]))
 
     def bounds(self) -> Array:
+        return self._box
+
+    @cached_property
+    def _box(self) -> Array:
         points = self.at(self.extremes())
         return np.stack([points.min(axis=0), points.max(axis=0)])
 

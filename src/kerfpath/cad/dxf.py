@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from io import BytesIO
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
 
 import numpy as np
@@ -123,6 +123,14 @@ MARKED = re.compile(
     % b"|".join(MARKERS),
     re.MULTILINE | re.DOTALL,
 )
+MOST = 100_000
+"""Most curves, spans of splines and other entities in a drawing, blocks wherever inserted."""
+TOO_MUCH = (
+    f"at most {MOST} are read; save only what is to be cut, as a drawing of its own, or draw "
+    "polylines and arcs instead of short lines"
+)
+MOST_TAGS = 3_000_000
+"""Most pairs of a code and a value in a file; ezdxf takes 10 s and 0.5 GB for each million."""
 COMMON = frozenset(map(str, (
     5, 6, 8, 48, 60, 62, 67, 92, 100, 102, 160, 284, 310, 330, 347, 348, 360, 370, 390, 410, 420,
     430, 440,
@@ -139,12 +147,23 @@ def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, 
 
     Raises
     ------
+    InputError
+        A file that is too large to be a part.
     one of DAMAGED
         Not a DXF, or one that cannot be repaired.
     """
     is_binary = content.startswith(BINARY)
     if not (is_binary or b"SECTION" in content[:4096]):
         raise DXFError(f"expected SECTION at its start, got {content[:32]!r}")
+    stand = Counter(kind.decode() for kind in STANDS.findall(content))
+    if stand.total() > MOST:
+        raise InputError(f"holds {stand.total()} lines, {TOO_MUCH}")
+    tags = len(content) // 10 if is_binary else content.count(b"\n") // 2
+    if tags > MOST_TAGS:
+        raise InputError(
+            f"holds {tags / 1e6:.1f} million values, at most {MOST_TAGS / 1e6:g} million are read; "
+            "save only what is to be cut, as a drawing of its own"
+        )
     with _overheard() as logged:
         if is_binary:
             document = Drawing.load(binary_tags_loader(content))
@@ -153,7 +172,7 @@ def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, 
             document, auditor = recover.read(BytesIO(MARKED.sub(_with_markers, content)))
     faults = [*logged, *(fault.message for fault in (*auditor.fixes, *auditor.errors))]
     faults = [" ".join(fault.split())[:200] for fault in faults]
-    return document, faults, _lost(document, content, faults)
+    return document, faults, _lost(document, stand, faults)
 
 
 def _with_markers(entity: re.Match[bytes]) -> bytes:
@@ -173,10 +192,9 @@ def _with_markers(entity: re.Match[bytes]) -> bytes:
     return head + b"".join(pairs)
 
 
-def _lost(document: Drawing, content: bytes, faults: list[str]) -> Counter[tuple[str, str]]:
-    """Return which lines of the file are not in the drawing."""
+def _lost(document: Drawing, stand: Counter[str], faults: list[str]) -> Counter[tuple[str, str]]:
+    """Return which lines of the file, `stand` by kind, are not in the drawing."""
     kept = Counter(entity.dxftype() for entity in document.entitydb.values() if entity.is_alive)
-    stand = Counter(kind.decode() for kind in STANDS.findall(content))
     lost: Counter[tuple[str, str]] = Counter()
     for fault in faults:
         dropped = DROPPED.match(fault)
@@ -227,8 +245,6 @@ LOOSE = ("0", "white")
 """Layer and colour of entities outside blocks."""
 DEEPEST = 32
 """Deepest nesting of blocks; more means that a block contains itself."""
-MOST = 200_000
-"""Most curves and blocks in a drawing; more is an error in the rows and columns of a block."""
 FLAT = 1e-6
 """How far (mm) a curve may leave the drawing plane, as writers round numbers."""
 NEVER_CUT = frozenset([
@@ -254,6 +270,8 @@ def read_dxf(
     try:
         document, repairs, lost = document_of(content)
         insunits = int(document.header.get("$INSUNITS", 0))
+    except InputError:
+        raise
     except DAMAGED as error:
         raise InputError(
             f"not a DXF file, or a damaged one ({_reason(error)}); save the drawing as DXF again"
@@ -287,6 +305,11 @@ def read_dxf(
         axis=axis,
     )  # fmt: skip
     return replace(part, frames={str(ucs.dxf.name): _frame(ucs, scale) for ucs in document.ucs})
+
+
+def _size(curve: Curve) -> int:
+    """Return how much work a curve is, in lines."""
+    return len(curve.breaks()) - 1 if isinstance(curve, Spline) else 1
 
 
 def _frame(ucs: UCSTableEntry, scale: float) -> Array:
@@ -340,6 +363,7 @@ class _Sheet:
         if depth > DEEPEST:
             raise InputError(f"blocks nest deeper than {DEEPEST}: one contains itself; repair it")
         for entity in entities:
+            self._counted(1)  # whatever it is: a block may repeat it
             kind = entity.dxftype()
             try:
                 self._entity(entity, kind, T, inside, depth)
@@ -358,10 +382,10 @@ class _Sheet:
         if isinstance(entity, Insert):
             self._insert(entity, T, look, depth)
             return
-        curves = list(curves_of(entity, T))
+        curves = list(islice(curves_of(entity, T), MOST + 1))
         if not curves:
             self.left_out[kind, "not a line to cut"] += 1
-        self._counted(len(curves))
+        self._counted(max(0, sum(map(_size, curves)) - 1))
         for curve in curves:
             self._require_flat(curve, kind, look[0])
         if curves:
@@ -385,8 +409,8 @@ class _Sheet:
         rows = max(insert.dxf.row_count, 1) if insert.dxf.row_spacing else 1
         columns = max(insert.dxf.column_count, 1) if insert.dxf.column_spacing else 1
         if rows * columns > MOST:
-            raise InputError(f"a block is inserted {rows * columns} times (at most {MOST})")
-        self._counted(rows * columns)
+            raise InputError(f"a block is inserted {rows * columns} times, {TOO_MUCH}")
+        self._counted(rows * columns - 1)
         for row, column in product(range(rows), range(columns)):
             place = Vec3(column * insert.dxf.column_spacing, row * insert.dxf.row_spacing)
             step = np.eye(4)
@@ -396,7 +420,7 @@ class _Sheet:
     def _counted(self, more: int) -> None:
         self.count += more
         if self.count > MOST:
-            raise InputError(f"more than {MOST} curves and blocks; leave out what is not to be cut")
+            raise InputError(f"holds more than {MOST} curves and blocks, {TOO_MUCH}")
 
     def _look(self, entity: DXFGraphic, inside: Style) -> Style:
         layer = inside[0] if entity.dxf.layer == "0" else str(entity.dxf.layer)

@@ -28,7 +28,14 @@ from kerfpath.cad.curves import Arc, Curve, Line, Spline
 from kerfpath.cad.left_out import LeftOut, counted, nothing_drawn
 from kerfpath.cad.loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad.part import Loop, Part
-from kerfpath.cad.shape import NamedFace, NamedShape, list_shapes, triangulate, unique
+from kerfpath.cad.shape import (
+    NamedFace,
+    NamedShape,
+    list_shapes,
+    triangulate,
+    triangulate_apart,
+    unique,
+)
 from kerfpath.cad.skins import Skin, skins_of
 from kerfpath.cad.units import MM
 from kerfpath.errors import InputError
@@ -60,6 +67,7 @@ def part_of_shape(
     outer_towards: tuple[float, float, float] | None,
     axis: Array | None,
     progress: Progress,
+    size: int | None = None,
 ) -> Part:
     """Return the part that faces make up, or if there are none, lines cut along an axis.
 
@@ -74,6 +82,8 @@ def part_of_shape(
     axis : (3,), optional
         The tool axis of all lines.
     progress : callable
+    size : int, optional
+        Bytes of the file that it comes from: its mesh is made in another process, with limits.
 
     Raises
     ------
@@ -86,7 +96,9 @@ def part_of_shape(
         return _part_of_lines(path, drawn, gap, axis)
     if axis is not None:
         raise InputError("axis: expected a drawing of lines, got one of faces")
-    return _part_of_faces(path, drawn, gap, outer_towards, progress)
+    mesh = triangulate if size is None else partial(triangulate_apart, size=size)
+    part = _part_of_faces(path, drawn, gap, outer_towards, progress)
+    return replace(part, _triangulate=lru_cache(MESHES)(partial(mesh, drawn.shape)))
 
 
 # -----------------------------------------------------------------------------
@@ -128,7 +140,6 @@ def _part_of_faces(
         left_out=left_out,
         frames=drawn.frames,
         _gap=gap,
-        _triangulate=lru_cache(MESHES)(partial(triangulate, drawn.shape)),
         _face_names=_in_order(drawn, faces, [piece_of[f] or name for f, name in enumerate(names)]),
     )
 

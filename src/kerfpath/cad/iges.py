@@ -18,7 +18,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath.cad.left_out import LOST, LeftOut, counted, kind_of
 from kerfpath.cad.sewing import sewn_shape
-from kerfpath.cad.shape import NamedFace, NamedShape, failures, list_shapes, occt
+from kerfpath.cad.shape import NamedFace, NamedShape, failures, list_shapes, occt, require_few_faces
 from kerfpath.cad.units import UNITS_MM
 from kerfpath.errors import InputError
 
@@ -99,6 +99,8 @@ def _read(path: Path, unit: str | None, gap: float) -> NamedShape:
         )
     reader.TransferRoots()
     shape = reader.OneShape()
+    if shape is not None:
+        require_few_faces(shape)
     left_out += _lost_faces(reader)
     loose = [] if shape is None else list_shapes(shape, TopAbs_ShapeEnum.TopAbs_FACE)
     has_names = any(entity.HasName() for entity in _faces(reader))

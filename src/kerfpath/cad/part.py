@@ -18,7 +18,7 @@ from kerfpath.cad.departure import ON_CURVE, Departure, departure
 from kerfpath.cad.left_out import LeftOut
 from kerfpath.cad.units import MM
 from kerfpath.contour import Contour
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, about
 from kerfpath.operations import Ribbon, Surface
 
 # -----------------------------------------------------------------------------
@@ -435,11 +435,17 @@ class Part:
         ----------
         deflection : float m
             Largest distance between triangles and faces.
+
+        Raises
+        ------
+        InputError
+            It takes more time or memory than any sound part; a coarser mesh takes less.
         """
         size = scalar(deflection, "deflection", unit="m", above=0.0)
         if self._triangulate is None:
             return freeze(np.empty((0, 3))), freeze(np.empty((0, 3), dtype=np.int64))
-        vertices, triangles, _ = self._triangulate(size / MM)
+        with about(self.path):
+            vertices, triangles, _ = self._triangulate(size / MM)
         return freeze(vertices * MM), freeze(triangles)
 
     def mesh_faces(self, deflection: float = 5e-4) -> tuple[tuple[str, int], ...]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from os import PathLike
 from pathlib import Path
+from time import thread_time
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -19,7 +20,7 @@ from kerfpath.cad.table import TableCells, cells_of
 from kerfpath.cad.units import GAP, MM, UNITS_MM, require_unit
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
-from kerfpath.isolated import call_apart, stand_by
+from kerfpath.isolated import call_apart, seconds_for, stand_by, too_slow
 from kerfpath.progress import Progress, no_progress
 
 if TYPE_CHECKING:
@@ -199,7 +200,9 @@ def _translated(
         try:
             drawn = call_apart(translate, path.absolute(), unit, gap, size=len(content))
             with occt(), uncollected():
-                part = _part_of(path, drawn, options, progress)
+                part = _part_of(
+                    path, drawn, options, _patient(progress, len(content)), size=len(content)
+                )
         except InputError:
             if kind == "STEP" and b"END-ISO-10303-21;" in content:
                 require_grammar(content)  # a fault of the grammar explains the failure better
@@ -226,12 +229,31 @@ def _read_shape(shape: object, options: _ReadOptions, progress: Progress) -> Par
         raise InputError(f"shape: {error}") from None
 
 
-def _part_of(path: Path, drawn: NamedShape, options: _ReadOptions, progress: Progress) -> Part:
+def _patient(progress: Progress, size: int) -> Progress:
+    """Return a `Progress` that raises InputError after the time allowed for a file of `size`."""
+    seconds = seconds_for(size)
+    until = thread_time() + seconds
+
+    def show(what: str, done: int, total: int) -> None:
+        progress(what, done, total)
+        if done % 64 == 0 and thread_time() > until:
+            raise too_slow(seconds)
+
+    return show
+
+
+def _part_of(
+    path: Path,
+    drawn: NamedShape,
+    options: _ReadOptions,
+    progress: Progress,
+    size: int | None = None,
+) -> Part:
     from kerfpath.cad.from_shape import part_of_shape
 
     return part_of_shape(
         path, drawn, options.gap, outer_towards=options.outer_towards,
-        axis=None if options.axis is None else np.array(options.axis), progress=progress,
+        axis=None if options.axis is None else np.array(options.axis), progress=progress, size=size,
     )  # fmt: skip
 
 

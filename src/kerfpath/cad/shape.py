@@ -18,6 +18,7 @@ from OCP.BinTools import BinTools
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
+from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
 from OCP.Interface import Interface_CheckIterator
 from OCP.Message import Message
 from OCP.Standard import Standard_Failure
@@ -29,6 +30,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Iterator, To
 from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.cad.left_out import LeftOut
 from kerfpath.errors import InputError
+from kerfpath.isolated import call_apart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,6 +163,32 @@ def list_shapes(
     return list(_each(TopExp_Explorer(shape, kind, avoid)))
 
 
+MOST_FACES = 30_000
+"""Most faces and loose curves of a part; what an assembly repeats counts each time."""
+
+
+def require_few_faces(shape: TopoDS_Shape) -> None:
+    """Raise InputError if there are too many faces; repeated components take no longer."""
+    known = ShapeMap()
+    counts: list[int] = []
+
+    def count(shape: TopoDS_Shape) -> int:
+        if shape.ShapeType() in (TopAbs_ShapeEnum.TopAbs_FACE, TopAbs_ShapeEnum.TopAbs_EDGE):
+            return 1
+        alone = shape.Located(TopLoc_Location())
+        if not known.Contains(alone):
+            found = sum(map(count, children(shape)))
+            known.Add(alone)
+            counts.append(found)
+        return counts[known.FindIndex(alone) - 1]
+
+    if (found := count(shape)) > MOST_FACES:
+        raise InputError(
+            f"contains {found} faces and loose curves, at most {MOST_FACES} are read; export the "
+            "part to cut alone"
+        )
+
+
 def failures(checks: Interface_CheckIterator) -> Iterator[tuple[int, str]]:
     """Yield the number of each entity that fails a check, 0 for the file as a whole, and why."""
     checks.Start()
@@ -196,11 +224,32 @@ def unique(names: list[str]) -> list[str]:
 # -----------------------------------------------------------------------------
 # Triangulate a shape for pictures.
 
+Mesh = tuple[Array, Ints, Ints]
 ANGLE = 0.35
 """Largest angle (rad) between neighbouring triangles: small holes still look round."""
 
 
-def triangulate(shape: TopoDS_Shape, deflection: float) -> tuple[Array, Ints, Ints]:
+def triangulate_apart(shape: TopoDS_Shape, deflection: float, *, size: int) -> Mesh:
+    """Return what `triangulate` returns, made in another process, as OCCT may take for ever.
+
+    Raises
+    ------
+    InputError
+        It takes more time or memory than allowed for a file of `size` bytes.
+    """
+    stream = BytesIO()
+    BinTools.Write_s(shape, stream)
+    return call_apart(_triangulate_copy, stream.getvalue(), deflection, size=size)
+
+
+def _triangulate_copy(stream: bytes, deflection: float) -> Mesh:
+    shape = TopoDS_Shape()
+    BinTools.Read_s(shape, BytesIO(stream))
+    with occt():
+        return triangulate(shape, deflection)
+
+
+def triangulate(shape: TopoDS_Shape, deflection: float) -> Mesh:
     """Return vertices (V, 3) mm and outward triangles (F, 3), within `deflection` mm.
 
     The third array (f,) has the number of triangles of each face, in their order.

@@ -26,7 +26,15 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 
 from kerfpath.cad.left_out import nothing_drawn
 from kerfpath.cad.sewing import sewn_shape
-from kerfpath.cad.shape import NamedFace, NamedShape, children, occt, uncollected, unique
+from kerfpath.cad.shape import (
+    NamedFace,
+    NamedShape,
+    children,
+    occt,
+    require_few_faces,
+    uncollected,
+    unique,
+)
 from kerfpath.cad.step_model import (
     Entities,
     Origins,
@@ -241,6 +249,7 @@ def _read(path: Path, content: bytes, unit: str | None, gap: float) -> NamedShap
     left_out += lost_faces(reader, entities)
     if shape is None or shape.IsNull():
         raise nothing_drawn(left_out)
+    require_few_faces(shape)
     styles = styles_in(entities) if has_styles else ({}, {})
     faces = list(_faces(Origins(reader, entities), shape, *styles))
     drawn = sewn_shape(unit or header, shape, faces, gap=gap, notes=notes, left_out=left_out)
