@@ -18,6 +18,16 @@ MODULE cut_skin_outer
 
   PROC main()
     ConfL\Off;
+    ConfJ\Off;
+    SingArea\Off;
+    PDispOff;
+    EOffsOff;
+    VelSet 100,vmax.v_tcp;
+    SpeedRefresh 100;
+    AccSet 100,100;
+    PathAccLim FALSE,FALSE;
+    WorldAccLim \Off;
+    SoftDeact;
     switchOff;
     TriggIO trOn,0.0200\Time\DOp:=doLaser,1;
     TriggIO trOff,0.0200\Time\DOp:=doLaser,0;

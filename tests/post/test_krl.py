@@ -253,7 +253,7 @@ def test_preflight_refuses_a_joint_move_that_rounds_its_corner(program):
         ("&ACCESS RVP\r\n", "$OUT[5]=TRUE\r\n", "cut_skin_outer.src, line 1: not expected here"),
         ("DEF cut_skin_outer()", "DEF other()", "line 3: the first routine must have the name"),
         ("END\r\n\r\nDEF", "END\r\n\r\nHALT\r\nDEF", "not expected here: 'HALT'"),
-        ("BAS(#INITMOV,0)\r\n", "", "line 13: not expected here: '$ADVANCE=5'"),
+        ("BAS(#INITMOV,0)\r\n", "", "line 13: not expected here: '$OV_PRO=100'"),
         (
             "INTERRUPT ON 20\r\n",
             "INTERRUPT ON 20\r\n$BASE={X 0,Y 0,Z 0,A 0,B 0,C 0}\r\n",
@@ -269,7 +269,7 @@ def test_preflight_refuses_a_joint_move_that_rounds_its_corner(program):
         ("first_contour<=1", "first_contour<=2", "called for contours up to 2, not 1"),
         ("IF first_contour<=1 THEN\r\n", "", "must be called alone under a condition"),
         ("ENDIF\r\n", "", "must be set once, after all calls"),
-        ("$ADVANCE=5", "$ADVANCE=3", "line 14: not expected here"),
+        ("$ADVANCE=5", "$ADVANCE=3", "line 16: not expected here"),
         ("$CIRC_TYPE=#BASE", "$CIRC_TYPE=#PATH", "not expected here"),
         ("$TOOL={", "; $TOOL={", "expected $TOOL before"),
         ("$BASE={", "$TOOL={", "expected no tool here"),

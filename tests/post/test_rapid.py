@@ -263,7 +263,7 @@ def test_what_preflight_refuses_is_not_written(program):
         ("speeddata vCut", "speeddata vAir", "vAir is declared twice"),
         ("speeddata vCut", "speeddata VAIR", "line 13: vAir is declared twice"),
         ("zonedata zCorner", "zonedata VCut", "line 14: vCut is declared twice"),
-        ("PROC skin_outer()", "PROC vcut()", "line 38: vCut is declared twice"),
+        ("PROC skin_outer()", "PROC vcut()", "line 48: vCut is declared twice"),
         ("SetDO doLaser", "SetDO doOther", "expected 'SetDO doLaser,0;'"),
         ("TriggIO trOff", "TriggIO trOn", "set once"),
         ("9E9]],vAir", "0]],vAir", "the robot has no such axis"),

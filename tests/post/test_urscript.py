@@ -208,7 +208,7 @@ def test_a_program_longer_than_a_file_may_be_is_refused(program):
         ("def cut_skin_outer", "sec cut_skin_outer", "expected def NAME():"),
         ("set_tcp(p[0.05", "set_tcp(p[x0.05", "expected set_tcp"),
         ("_out(0, on)", "_out(3, on)", "expected 'set_standard_digital_out(0, on)', got"),
-        ("_out(1, value)", "_out(0, value)", "line 60: expected 'set_standard"),
+        ("_out(1, value)", "_out(0, value)", "line 62: expected 'set_standard"),
         ("enter_critical", "enter_limbo", "expected 'enter_critical'"),
         ("movel(", "movep(", "not expected here: 'movep(pose"),
         ("sleep(0.300)", "sleep(0.300)\n    stopl(1)", "not expected here: 'stopl(1)'"),

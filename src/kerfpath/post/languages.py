@@ -253,6 +253,41 @@ class Rules:
     __repr__ = short_repr
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inherited:
+    """A state of the controller that another program may have left.
+
+    Parameters
+    ----------
+    state : str
+    lines : tuple of str
+        Lines that set it when a program begins, exactly; none if nothing does.
+    why : str
+        What the lines do, or why there are none.
+    """
+
+    state: str
+    why: str
+    lines: tuple[str, ...] = ()
+
+    __repr__ = short_repr
+
+
+def reset_lines(states: Iterable[Inherited]) -> list[str]:
+    """Return the lines that set inherited states, in their order."""
+    return [line for state in states for line in state.lines]
+
+
+OverrideSetting = Annotated[
+    Literal["full", "operator"],
+    setting("full, or operator to keep the speed override of the operator", '"operator"'),
+]
+
+
+def _nothing_inherited(settings: object) -> tuple[Inherited, ...]:
+    return ()
+
+
 # -----------------------------------------------------------------------------
 # The base of all formatters, which turn the steps of a program into lines.
 
@@ -578,6 +613,8 @@ class Language:
         Encodings of its texts, in the order in which they are tried. Only remarks differ.
     longest_line : int
         Characters of the longest line that is read.
+    inherited : callable, optional
+        (settings) -> the states that another program may have left, and the lines that set them.
     read : Reader, optional
         Reader of the text; without one a program cannot be audited.
     """
@@ -600,6 +637,7 @@ class Language:
     externals: Callable[[Robot, Any], Iterator[str]] | None = None
     encodings: tuple[str, ...] = ("utf-8-sig",)
     longest_line: int = 2000
+    inherited: Callable[[Any], tuple[Inherited, ...]] = _nothing_inherited
     read: Reader | None = None
     axis_3: tuple[str, ...] = AXIS_3
 

@@ -282,6 +282,8 @@ class LineReader:
         if self.ignores(row) or (self.required and self.is_remark(row)):
             return
         if self.required:
+            if "remark" in kinds and self.kind_of(row, kinds)[0] == "remark":
+                return
             self.require_line(row, self.required.pop(0))
             if self.flow_lines is not None:
                 self.follow(row, self.flow_lines)

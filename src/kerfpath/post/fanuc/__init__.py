@@ -2,7 +2,7 @@
 
 from kerfpath.post.fanuc.controller import FanucSettings as FanucSettings
 from kerfpath.post.fanuc.controller import axes_from_joints as axes_from_joints
-from kerfpath.post.fanuc.controller import is_reserved, rules, sayable
+from kerfpath.post.fanuc.controller import inherited, is_reserved, rules, sayable
 from kerfpath.post.fanuc.controller import joints_from_axes as joints_from_axes
 from kerfpath.post.fanuc.controller import posture as posture
 from kerfpath.post.fanuc.reader import read
@@ -28,6 +28,7 @@ FANUC = Language(
     externals=no_settings_needed,
     encodings=("utf-8-sig", "cp1252"),
     longest_line=250,
+    inherited=inherited,
     read=read,
 )
 """The language as registered."""

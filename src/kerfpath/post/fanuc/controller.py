@@ -23,7 +23,9 @@ from kerfpath.post.build import (
 )
 from kerfpath.post.languages import (
     Controller,
+    Inherited,
     OrientationSetting,
+    OverrideSetting,
     PortSettings,
     Rules,
     number,
@@ -96,11 +98,31 @@ class FanucSettings(PortSettings, output=Output, input=Input):
         int, setting("the decimals of mm and deg in positions, 3 to 6", "3", ge=3, le=6)
     ] = 4
     orientation: OrientationSetting = "two-angle"
+    override: OverrideSetting = "full"
 
 
 def unit(settings: FanucSettings) -> float:
     """Return the step of speeds, m/s."""
     return UNITS[settings.speed_unit]
+
+
+def inherited(settings: FanucSettings) -> tuple[Inherited, ...]:
+    """Return the states that another program may have left."""
+    return (
+        Inherited(
+            state="speed",
+            lines=("OVERRIDE=100%",) if settings.override == "full" else (),
+            why="override; the operator may lower it again, and slower is not as planned",
+        ),
+        Inherited(state="frames", why="each program selects `UFRAME_NUM` and `UTOOL_NUM`"),
+        Inherited(state="displacement", why="no move has `Offset` or `Tool_Offset`"),
+        Inherited(state="acceleration", why="no move has `ACC` but `ACC100`, which is the default"),
+        Inherited(state="motion group", why="`DEFAULT_GROUP` of each program is checked"),
+        Inherited(
+            state="collision detection, soft float, line tracking",
+            why="left to the caller: their instructions are there only with an option",
+        ),
+    )
 
 
 def rules(settings: FanucSettings) -> Rules:

@@ -30,8 +30,8 @@ from kerfpath.post.fanuc.writer import (
     WRIST,
     Listing,
     abort_lines,
+    opening_lines,
     selection_lines,
-    switch_off_lines,
     watch_lines,
 )
 from kerfpath.post.flow import section_of
@@ -98,8 +98,7 @@ _MAIN = patterns(
     {
         "frame_value": rf"  !(UFRAME|UTOOL) (\d+) ([XYZWPR]) {_NUMBER}",
         "remark": r"  !.*",
-        "select": r"  (UFRAME|UTOOL)_NUM=(\d+)",
-        "reset": r"  (DO\[\d+\]=OFF)",
+        "opening": r"  ((?:UFRAME_NUM|UTOOL_NUM|DO|OVERRIDE)\b.*)",
         "call": r"  CALL ([A-Z][A-Z0-9_]*)",
     }
 )
@@ -143,17 +142,11 @@ class _Main(Listing):
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
         super().__init__(file, text, robot, settings)
         self.values: dict[tuple[str, str], float] = {}
-        self.selected: dict[str, str] = {}
+        self.opened = [line.strip(" ;") for line in opening_lines(settings)]
+        """Lines that must come before the first CALL, in any order."""
         self.calls: list[str] = []
-        self.resets: list[str] = []
         self.body(_MAIN, groups(robot))
         self.end()
-        if self.resets != [line.strip(" ;") for line in switch_off_lines(settings)]:
-            raise self.fault("expected one reset of every output that the settings name")
-        for kind in ("UFRAME", "UTOOL"):
-            if kind not in self.selected:
-                raise self.fault(f"{kind}_NUM is not set")
-        self.require_frames(self.selected["UFRAME"], self.selected["UTOOL"])
 
     def frame_value(self, kind: str, number: str, letter: str, value: str) -> None:
         if self.calls:
@@ -166,17 +159,16 @@ class _Main(Listing):
         )
         self.values[kind, letter] = float(value)
 
-    def select(self, kind: str, number: str) -> None:
-        if kind in self.selected or self.calls:
-            raise self.fault(f"{kind}_NUM must be set once, before the first CALL")
-        self.selected[kind] = number
-
-    def reset(self, output: str) -> None:
-        self.resets.append(output)
-        if self.calls:
-            raise self.fault("outputs must be reset before the first CALL")
+    def opening(self, row: str) -> None:
+        found = next((line for line in self.opened if self.same(row, line)), None)
+        if found is None:
+            missing = f"{self.opened[0]!r}" if self.opened else "only calls"
+            raise self.fault(f"expected {missing} here, got {row[:60]!r}")
+        self.opened.remove(found)
 
     def call(self, name: str) -> None:
+        if self.opened:
+            raise self.fault(f"expected {self.opened[0]} before this line")
         if name in self.calls:
             raise self.fault(f"{name} is called twice")
         self.calls.append(name)

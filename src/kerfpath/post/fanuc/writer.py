@@ -27,6 +27,7 @@ from kerfpath.post.fanuc.controller import (
     extended_rows,
     group_2_rows,
     groups,
+    inherited,
     leads,
     posture,
     remarks,
@@ -35,7 +36,7 @@ from kerfpath.post.fanuc.controller import (
     unit,
 )
 from kerfpath.post.harmless import LinePattern, compact
-from kerfpath.post.languages import number, outputs
+from kerfpath.post.languages import number, outputs, reset_lines
 from kerfpath.post.line_reader import BLANK, LineReader, program_lines
 from kerfpath.post.places import CalledFormatter
 from kerfpath.post.program import (
@@ -198,6 +199,12 @@ def selection_lines(settings: FanucSettings) -> list[str]:
     return [f"  UFRAME_NUM={settings.user_frame} ;", f"  UTOOL_NUM={settings.tool_frame} ;"]
 
 
+def opening_lines(settings: FanucSettings) -> list[str]:
+    """Return the lines of the main program before it calls the others."""
+    resets = (f"  {line} ;" for line in reset_lines(inherited(settings)))
+    return [*selection_lines(settings), *resets, *switch_off_lines(settings)]
+
+
 def switch_off_lines(settings: FanucSettings) -> list[str]:
     """Return the lines that switch everything off."""
     return [f"  DO[{output}]=OFF ;" for output in outputs(settings)]
@@ -250,7 +257,7 @@ class Fanuc(CalledFormatter):
             tool=f"UTOOL {settings.tool_frame}",
         )
         calls = [f"  CALL {section.name}{PADDING};" for section in program.sections]
-        return [*lines, *selection_lines(settings), *switch_off_lines(settings), *calls]
+        return [*lines, *opening_lines(settings), *calls]
 
     def lines(self, section: Section) -> Iterator[str]:
         """Yield the lines of all steps of a section, its targets numbered from 1."""

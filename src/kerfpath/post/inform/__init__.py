@@ -2,7 +2,15 @@
 
 from kerfpath.post.inform.controller import InformSettings as InformSettings
 from kerfpath.post.inform.controller import axes_from_joints as axes_from_joints
-from kerfpath.post.inform.controller import check, is_reserved, missing, posture, rules, sayable
+from kerfpath.post.inform.controller import (
+    check,
+    inherited,
+    is_reserved,
+    missing,
+    posture,
+    rules,
+    sayable,
+)
 from kerfpath.post.inform.controller import joints_from_axes as joints_from_axes
 from kerfpath.post.inform.controller import manipulator_type as manipulator_type
 from kerfpath.post.inform.reader import read
@@ -28,6 +36,7 @@ INFORM = Language(
     externals=missing,
     encodings=("utf-8-sig", "cp932", "cp1252"),
     longest_line=250,
+    inherited=inherited,
     read=read,
 )
 """The language as registered."""

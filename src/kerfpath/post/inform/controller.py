@@ -25,6 +25,7 @@ from kerfpath.post.build import (
 )
 from kerfpath.post.languages import (
     Controller,
+    Inherited,
     OrientationSetting,
     PortSettings,
     Rules,
@@ -120,6 +121,21 @@ class InformSettings(PortSettings, output=Output, input=Input):
         Annotated[str, StringConstraints(pattern=r"^\d{4}/\d\d/\d\d \d\d:\d\d$")],
         setting("a date as YYYY/MM/DD HH:MM", '"2026/11/21 10:00"'),
     ] = "2000/01/01 00:00"
+
+
+def inherited(settings: InformSettings) -> tuple[Inherited, ...]:
+    """Return the states that another job may have left."""
+    return (
+        Inherited(state="displacement", lines=("SFTOF",), why="shifted positions, in every job"),
+        Inherited(state="speed", why="each move has `V` or `VJ`"),
+        Inherited(state="acceleration", why="no move has `ACC` or `DEC`: both are full"),
+        Inherited(state="frames", why="`///TOOL`, `///USER` and `///FRAME` of each job"),
+        Inherited(state="motion group", why="`///GROUP1` of each job is checked"),
+        Inherited(
+            state="shock detection, soft servos, speed override",
+            why="left to the caller: they need an option, or are the operator's",
+        ),
+    )
 
 
 def rules(settings: InformSettings) -> Rules:

@@ -17,6 +17,7 @@ from kerfpath.post.harmless import LinePattern, compact, without_remark
 from kerfpath.post.inform.controller import (
     ExternalPulses,
     InformSettings,
+    inherited,
     joints_at,
     joints_from_axes,
 )
@@ -29,6 +30,7 @@ from kerfpath.post.inform.writer import (
     switch_off_lines,
     wait_lines,
 )
+from kerfpath.post.languages import reset_lines
 from kerfpath.post.line_reader import BLANK, LineReader, patterns, program_lines
 from kerfpath.post.places import off_name
 from kerfpath.post.program import Await, Handshake, Switch
@@ -47,6 +49,7 @@ _MAIN = patterns(
     {
         "frame_value": rf"'(UFRAME|TOOL) (\d+) (R?[XYZ]) {_NUMBER}",
         "remark": r"'.*",
+        "reset": "SFTOF",
         "call": r"CALL JOB:([A-Z][A-Z0-9_]*)",
     }
 )
@@ -179,6 +182,7 @@ class _Main(_Text):
         super().__init__(file, text, robot, settings)
         self.frames: dict[tuple[str, str], float] = {}
         self.calls: list[str] = []
+        self.is_reset = False
         if self.begin():
             raise self.fault("the main job must have no positions")
         self.require_rows(middle("main", settings, self.external)[1])
@@ -193,7 +197,17 @@ class _Main(_Text):
             raise self.fault(f"{frame} {number} {word} is given twice")
         self.frames[f"{frame} {number}", word] = float(value)
 
+    def reset(self) -> None:
+        if self.calls or self.is_reset:
+            raise self.fault("states must be reset once, before the first job is called")
+        first, *others = reset_lines(inherited(self.settings))
+        self.require_line(self.text, first)
+        self.require_next(others)
+        self.is_reset = True
+
     def call(self, name: str) -> None:
+        if not self.is_reset:
+            raise self.fault(f"expected {' '.join(reset_lines(inherited(self.settings)))} before")
         if name in self.calls:
             raise self.fault(f"{name} is called twice")
         self.calls.append(name)
@@ -236,6 +250,7 @@ class _Job(_Text):
         else:
             self._read_poses(count)
         self.require_rows(after)
+        self.require_next(reset_lines(inherited(settings)))
         self.instructions(_JOB)
         if self.arc_poses:
             raise self.fault("an arc needs three MOVC, one after the other")

@@ -23,9 +23,10 @@ from kerfpath.post.inform.controller import (
     ExternalPulses,
     InformSettings,
     axes_from_joints,
+    inherited,
     manipulator_type,
 )
-from kerfpath.post.languages import ask_again_lines, handshakes, number, outputs
+from kerfpath.post.languages import ask_again_lines, handshakes, number, outputs, reset_lines
 from kerfpath.post.places import CalledFormatter
 from kerfpath.post.program import (
     Await,
@@ -159,12 +160,14 @@ class Inform(CalledFormatter):
             frame=f"UFRAME {settings.user_frame}",
             tool=f"TOOL {settings.tool_number}",
         )
+        yield from reset_lines(inherited(settings))
         yield f"CALL JOB:{self.off_name}"
         yield from (f"CALL JOB:{section.name}" for section in program.sections)
 
     def lines(self, section: Section) -> Iterator[str]:
         """Yield the instructions of a section, its positions numbered from 0."""
         self._targets, self._labels = [], count(1)
+        yield from reset_lines(inherited(self.settings))
         yield from super().lines(section)
 
     def asked_before(self, section: Section) -> Sequence[Handshake]:

@@ -2,7 +2,7 @@
 
 from kerfpath.post.krl.controller import KrlSettings as KrlSettings
 from kerfpath.post.krl.controller import axes_from_joints as axes_from_joints
-from kerfpath.post.krl.controller import check, is_reserved, missing, posture, rules
+from kerfpath.post.krl.controller import check, inherited, is_reserved, missing, posture, rules
 from kerfpath.post.krl.controller import joints_from_axes as joints_from_axes
 from kerfpath.post.krl.controller import status_and_turn as status_and_turn
 from kerfpath.post.krl.reader import read
@@ -26,6 +26,7 @@ KRL = Language(
     externals=missing,
     encodings=("utf-8-sig", "cp1252"),
     longest_line=250,
+    inherited=inherited,
     read=read,
 )
 """The language as registered."""

@@ -24,8 +24,10 @@ from kerfpath.post.build import (
 )
 from kerfpath.post.languages import (
     Controller,
+    Inherited,
     LinesPerFile,
     OrientationSetting,
+    OverrideSetting,
     PortSettings,
     PositionerFrame,
     Rules,
@@ -152,6 +154,44 @@ class KrlSettings(PortSettings, output=Output, input=Input):
         float, setting("a speed from 1 to 1000, in deg/s ($VEL.ORI1)", "200.0", ge=1, le=1000)
     ] = 200.0
     orientation: OrientationSetting = "two-angle"
+    override: OverrideSetting = "full"
+
+
+def inherited(settings: KrlSettings) -> tuple[Inherited, ...]:
+    """Return the states that another program may have left; BAS comes first, as it sets many."""
+    wrist, turning_deg_s = settings.orientation == "wrist", number(settings.turning_speed_deg_s, 1)
+    return (
+        Inherited(
+            state="speed, acceleration, corners, frames",
+            lines=("BAS(#INITMOV,0)",),
+            why="they get the controller's defaults, and no tool and base",
+        ),
+        Inherited(
+            state="speed",
+            lines=("$OV_PRO=100",) if settings.override == "full" else (),
+            why="override; the operator may lower it again, and slower is not as planned",
+        ),
+        Inherited(
+            state="acceleration", lines=("BAS(#ACC_PTP,100)",), why="of joint moves, as planned"
+        ),
+        Inherited(state="look-ahead", lines=("$ADVANCE=5",), why="corners need the next moves"),
+        Inherited(
+            state="turning",
+            lines=(
+                "$IPO_MODE=#BASE",
+                f"$ORI_TYPE=#{'JOINT' if wrist else 'VAR'}",
+                "$CIRC_TYPE=#BASE",
+                f"$VEL.ORI1={turning_deg_s}",
+                f"$VEL.ORI2={turning_deg_s}",
+            ),
+            why="how, and how fast, the tool turns between targets",
+        ),
+        Inherited(state="tool and base", why="`$TOOL` and `$BASE`, after BAS, are checked"),
+        Inherited(
+            state="path correction, soft servos, asynchronous axes",
+            why="left to the caller: their instructions are there only with an option",
+        ),
+    )
 
 
 def rules(settings: KrlSettings) -> Rules:

@@ -27,6 +27,7 @@ from kerfpath.post.krl.controller import (
     axes_from_joints,
     coupled,
     external_fields,
+    inherited,
     remarks,
     status_and_turn,
 )
@@ -38,6 +39,7 @@ from kerfpath.post.languages import (
     number,
     outputs,
     rename_sections,
+    reset_lines,
 )
 from kerfpath.post.program import (
     Await,
@@ -76,18 +78,11 @@ ANGLES: Final = "ZYX"
 
 def opening_lines(settings: KrlSettings) -> list[str]:
     """Return the statements of a main routine before it calls others, except for frames."""
-    turning_deg_s = number(settings.turning_speed_deg_s, 1)
     numbered = (("TOOL", settings.tool_number), ("BASE", settings.base_number))
     return [
         f"INTERRUPT DECL {INTERRUPT} WHEN $STOPMESS==TRUE DO {SWITCH_OFF}()",
         f"INTERRUPT ON {INTERRUPT}",
-        "BAS(#INITMOV,0)",
-        "$ADVANCE=5",
-        "$IPO_MODE=#BASE",
-        f"$ORI_TYPE=#{'JOINT' if settings.orientation == 'wrist' else 'VAR'}",
-        "$CIRC_TYPE=#BASE",
-        f"$VEL.ORI1={turning_deg_s}",
-        f"$VEL.ORI2={turning_deg_s}",
+        *reset_lines(inherited(settings)),
         *(f"BAS(#{kind},{n})" for kind, n in numbered if n is not None),
         f"{SWITCH_OFF}()",
     ]

@@ -23,6 +23,7 @@ from kerfpath.post.build import (
 )
 from kerfpath.post.languages import (
     Controller,
+    Inherited,
     OrientationSetting,
     PortSettings,
     PositionerFrame,
@@ -166,6 +167,45 @@ def rules(settings: RapidSettings) -> Rules:
         angle_step=ANGLE_STEP,
         controller=Controller(turning_speed=float(TURNING_SPEED), orientation=settings.orientation),
         longest_lead=LONGEST_LEAD,
+    )
+
+
+def inherited(settings: RapidSettings) -> tuple[Inherited, ...]:
+    """Return the states that another routine may have left, which PP to Main alone resets."""
+    singular = "Wrist" if settings.orientation == "wrist" else "Off"
+    return (
+        Inherited(
+            state="configuration",
+            lines=(r"ConfL\Off;", r"ConfJ\Off;"),
+            why="the configuration of a target is not supervised",
+        ),
+        Inherited(
+            state="singularity",
+            lines=(rf"SingArea\{singular};",),
+            why="how the tool turns between targets",
+        ),
+        Inherited(
+            state="displacement",
+            lines=("PDispOff;", "EOffsOff;"),
+            why="of the program, and offsets of external axes",
+        ),
+        Inherited(
+            state="speed",
+            lines=("VelSet 100,vmax.v_tcp;", "SpeedRefresh 100;"),
+            why="overrides of the program; not that of the operator",
+        ),
+        Inherited(
+            state="acceleration",
+            lines=("AccSet 100,100;", "PathAccLim FALSE,FALSE;", r"WorldAccLim \Off;"),
+            why="shares and limits of it",
+        ),
+        Inherited(state="softness", lines=("SoftDeact;",), why="of the servos"),
+        Inherited(state="path correction", why=r"no move has `\Corr`"),
+        Inherited(state="tool and work object", why="each move names them"),
+        Inherited(
+            state="collision detection, independent axes",
+            why="left to the caller: their instructions are there only with an option",
+        ),
     )
 
 

@@ -14,6 +14,7 @@ from kerfpath.arrays import Array
 from kerfpath.post.arcs import pose_of
 from kerfpath.post.build import carrier_frame
 from kerfpath.post.flow import section_of
+from kerfpath.post.languages import reset_lines
 from kerfpath.post.line_reader import SHOWN, LineReader, only, patterns, program_lines, statements
 from kerfpath.post.program import Switch
 from kerfpath.post.rapid.controller import (
@@ -21,12 +22,12 @@ from kerfpath.post.rapid.controller import (
     ExternalSpeeds,
     ExternalUnits,
     RapidSettings,
+    inherited,
     joints_from_axes,
 )
 from kerfpath.post.rapid.writer import (
     FIRST,
     FULL_AIR_SPEED,
-    WRIST,
     air_speed_data,
     ending_lines,
     linear_speed_data,
@@ -323,8 +324,7 @@ class _Reader(Aggregates):
         self.routine_name = name
         self.steps = self.routines[name] = []
         if name == "main":
-            wrist = [WRIST] if self.settings.orientation == "wrist" else []
-            self.require_next([r"ConfL\Off;", *wrist, f"{SWITCH_OFF};"])
+            self.require_next([*reset_lines(inherited(self.settings)), f"{SWITCH_OFF};"])
         if name != "main":
             self.homes[name] = self.file
         elif self.file != self.main:

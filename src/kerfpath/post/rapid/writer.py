@@ -26,6 +26,7 @@ from kerfpath.post.languages import (
     number,
     outputs,
     rename_sections,
+    reset_lines,
 )
 from kerfpath.post.program import (
     Await,
@@ -50,14 +51,13 @@ from kerfpath.post.rapid.controller import (
     RapidSettings,
     axes_from_joints,
     confdata,
+    inherited,
 )
 
 _Key = TypeVar("_Key", bound=Hashable)
 
 FULL_AIR_SPEED = 1.0
 """Tip speed (m/s) that is written for a joint move at full speed, as RAPID has no shares."""
-WRIST = r"SingArea\Wrist;"
-"""Moves the wrist evenly in its joints, instead of the tool from pose to pose."""
 JOINT_TARGET = "[[" + ",".join(["%.6f"] * 6) + "],"
 TARGET = "[[%.4f,%.4f,%.4f],[%.8f,%.8f,%.8f,%.8f],[%d,%d,%d,%d],"
 NO_POSE = np.eye(4)
@@ -172,9 +172,7 @@ class Rapid(Formatter):
 
     def begin(self) -> Iterator[str]:
         """Yield the lines of the main routine before it calls those of the sections."""
-        yield r"ConfL\Off;"
-        if self.settings.orientation == "wrist":
-            yield WRIST
+        yield from reset_lines(inherited(self.settings))
         for s in self.trigger:
             self.output(s.signal)
         yield f"{SWITCH_OFF};"

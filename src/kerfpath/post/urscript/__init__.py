@@ -4,7 +4,7 @@ from kerfpath.post.languages import Language
 from kerfpath.post.urscript.reader import read
 from kerfpath.post.urscript.writer import URScript as URScript
 from kerfpath.post.urscript.writer import URScriptSettings as URScriptSettings
-from kerfpath.post.urscript.writer import check, is_reserved, rules
+from kerfpath.post.urscript.writer import check, inherited, is_reserved, rules
 
 URSCRIPT = Language(
     name="urscript",
@@ -18,6 +18,7 @@ URSCRIPT = Language(
     is_reserved=is_reserved,
     check=check,
     assumed={"laser_output": 0},
+    inherited=inherited,
     read=read,
 )
 """The language as registered."""

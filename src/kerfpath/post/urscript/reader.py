@@ -11,7 +11,7 @@ from kerfpath.arrays import Array, freeze
 from kerfpath.post.build import offset_near
 from kerfpath.post.flow import section_of
 from kerfpath.post.harmless import LinePattern
-from kerfpath.post.languages import outputs
+from kerfpath.post.languages import outputs, reset_lines
 from kerfpath.post.line_reader import (
     END_OF_FILE,
     LineReader,
@@ -26,6 +26,7 @@ from kerfpath.post.urscript.writer import (
     FIRST,
     URScriptSettings,
     full_joint_speed,
+    inherited,
     stop_lines,
     switch_lines,
     time_ahead,
@@ -100,6 +101,7 @@ class _Reader(LineReader):
         tool = _pose(self.take(_TOOL, "set_tcp(p[...])"))
         part = _pose(self.take(_PART, "global part_frame = p[...]"))
         begin = int(self.take(_FIRST, f"global {FIRST} = 1")[0])
+        self.expect(reset_lines(inherited(self.settings)))
         self.expect(stop_lines(outputs(self.settings)))
         self.can_wait = self.same(self.text, wait_lines([])[0])
         if self.can_wait:

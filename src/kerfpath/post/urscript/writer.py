@@ -24,12 +24,14 @@ from kerfpath.post.build import offset_near
 from kerfpath.post.languages import (
     Controller,
     Formatter,
+    Inherited,
     OrientationSetting,
     PortSettings,
     Rules,
     number,
     outputs,
     require_one_file,
+    reset_lines,
     setting,
 )
 from kerfpath.post.program import (
@@ -180,6 +182,24 @@ class URScriptSettings(PortSettings, output=Output, input=Input):
         return self.acceleration_mm_s2 * 1e-3
 
 
+def inherited(settings: URScriptSettings) -> tuple[Inherited, ...]:
+    """Return the states that another program may have left."""
+    return (
+        Inherited(
+            state="softness, contact",
+            lines=("end_force_mode()", "end_freedrive_mode()"),
+            why="the robot follows the path alone",
+        ),
+        Inherited(state="tool", why="`set_tcp` is checked"),
+        Inherited(state="displacement", why="targets name the frame of the part"),
+        Inherited(state="speed, acceleration, corners", why="each move names them"),
+        Inherited(
+            state="payload, gravity, speed slider",
+            why="left to the caller: they are of the installation and the operator",
+        ),
+    )
+
+
 def rules(settings: URScriptSettings) -> Rules:
     """Return the rules of programs in URScript."""
     return Rules(
@@ -229,6 +249,7 @@ class URScript(Formatter):
         yield f"  set_tcp({_pose(tool)})"
         yield f"  global part_frame = {_pose(part)}"
         yield f"  global {FIRST} = 1"
+        yield from (f"  {line}" for line in reset_lines(inherited(self.settings)))
         yield from (f"  {line}" for line in stop_lines(outputs(self.settings)))
         if any(isinstance(step, Await) for step in program.steps):
             yield from (f"  {line}" for line in wait_lines(outputs(self.settings)))

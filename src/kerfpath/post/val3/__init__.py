@@ -4,7 +4,7 @@ from kerfpath.post.languages import Language
 from kerfpath.post.program import stop_to_switch
 from kerfpath.post.val3.controller import Val3Settings as Val3Settings
 from kerfpath.post.val3.controller import axes_from_joints as axes_from_joints
-from kerfpath.post.val3.controller import check, is_reserved, rules
+from kerfpath.post.val3.controller import check, inherited, is_reserved, rules
 from kerfpath.post.val3.controller import configurations as configurations
 from kerfpath.post.val3.controller import joints_from_axes as joints_from_axes
 from kerfpath.post.val3.controller import posture as posture
@@ -27,6 +27,7 @@ VAL3 = Language(
     sayable=stop_to_switch,
     ahead=False,
     assumed={"laser_output": r"BasicIO-1\%Q0"},
+    inherited=inherited,
     read=read,
 )
 """The language as registered."""

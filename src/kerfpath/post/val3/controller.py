@@ -11,7 +11,15 @@ from pydantic import StringConstraints
 
 from kerfpath.arrays import Array, floats
 from kerfpath.post.build import AxisCount, wrist_in_plane
-from kerfpath.post.languages import Controller, OrientationSetting, PortSettings, Rules, setting
+from kerfpath.post.languages import (
+    Controller,
+    Inherited,
+    OrientationSetting,
+    OverrideSetting,
+    PortSettings,
+    Rules,
+    setting,
+)
 from kerfpath.post.program import (
     Program,
     ProgramIssue,
@@ -81,10 +89,30 @@ class Val3Settings(PortSettings, output=Output, input=Input):
         setting("the folder of projects, as the controller calls it", '"Disk://"'),
     ] = "Disk://"
     orientation: OrientationSetting = "slerp"
+    override: OverrideSetting = "full"
+    controller: Annotated[Literal["CS8", "CS9"], setting("CS8 or CS9", '"CS8"')] = "CS9"
     version: Annotated[
-        Annotated[str, StringConstraints(pattern=r"^s[0-9]+(\.[0-9]+){0,3}$")],
+        Annotated[str, StringConstraints(pattern=r"^s[0-9]+(\.[0-9]+){0,3}$")] | None,
         setting("the version of VAL 3 that projects are for", '"s7.3.1"'),
-    ] = "s7.3.1"
+    ] = None
+
+
+VERSIONS = {"CS8": "s7.3.1", "CS9": "s8.0"}
+"""Version of VAL 3 that projects are for, by controller."""
+
+
+def inherited(settings: Val3Settings) -> tuple[Inherited, ...]:
+    """Return the states that another application may have left."""
+    return (
+        Inherited(
+            state="speed",
+            lines=("setMonitorSpeed(100)",) if settings.override == "full" else (),
+            why="override; the operator may lower it again, and slower is not as planned",
+        ),
+        Inherited(state="tool and frame", why="each move and point names them"),
+        Inherited(state="acceleration, corners", why="each move names its `mdesc`"),
+        Inherited(state="displacement", why="points are written in place, not composed"),
+    )
 
 
 def rules(settings: Val3Settings) -> Rules:

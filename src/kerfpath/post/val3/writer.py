@@ -26,6 +26,7 @@ from kerfpath.post.languages import (
     handshakes,
     number,
     rename_sections,
+    reset_lines,
 )
 from kerfpath.post.program import (
     PARTNERS,
@@ -44,7 +45,14 @@ from kerfpath.post.program import (
     stop_to_switch,
     targets_of,
 )
-from kerfpath.post.val3.controller import LONGEST_NAME, Val3Settings, axes_from_joints, posture
+from kerfpath.post.val3.controller import (
+    LONGEST_NAME,
+    VERSIONS,
+    Val3Settings,
+    axes_from_joints,
+    inherited,
+    posture,
+)
 
 # -----------------------------------------------------------------------------
 # XML read with the line of every element; a document type is refused.
@@ -215,7 +223,8 @@ STACK_SIZE = 5000
 
 def parameters(settings: Val3Settings) -> dict[str, str]:
     """Return the parameters of a project."""
-    return {"version": settings.version, "stackSize": str(STACK_SIZE), "millimeterUnit": "true"}
+    version = settings.version or VERSIONS[settings.controller]
+    return {"version": version, "stackSize": str(STACK_SIZE), "millimeterUnit": "true"}
 
 
 def links(settings: Val3Settings) -> dict[str, str]:
@@ -226,7 +235,12 @@ def links(settings: Val3Settings) -> dict[str, str]:
 
 
 def opening_lines(settings: Val3Settings) -> list[str]:
-    """Return the statements that switch everything off, as start() does before it calls others."""
+    """Return the statements of start() before it calls others."""
+    return [*switch_off_lines(settings), *reset_lines(inherited(settings))]
+
+
+def switch_off_lines(settings: Val3Settings) -> list[str]:
+    """Return the statements that switch everything off."""
     inputs = [name for (_, way), name in PORTS.items() if way == "input"]
     return [f"{name}=false" for name in links(settings) if name not in inputs]
 
@@ -240,7 +254,7 @@ def wait_lines(awaited: Await, asked: Sequence[Handshake], settings: Val3Setting
     name = PORTS[awaited.partner, "input"]
     return [
         f"while watch({name}==true,{number(awaited.timeout, 3)})==false",
-        *opening_lines(settings),
+        *switch_off_lines(settings),
         "disablePower()",
         f'logMsg("{awaited.partner}: no answer")',
         "wait(isPowered())",
@@ -256,7 +270,7 @@ def closing_lines() -> list[str]:
 
 def stop_lines(settings: Val3Settings) -> list[str]:
     """Return the statements of stop(), which the controller calls when the project is stopped."""
-    return [*opening_lines(settings), "resetMotion()"]
+    return [*switch_off_lines(settings), "resetMotion()"]
 
 
 @dataclass(slots=True)
