@@ -95,8 +95,10 @@ def _studio(job: Path) -> Iterator[_Page]:
     command = [sys.executable, "-m", "kerfpath", "studio", str(job), "--port", "0", "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
-        address = re.findall(r"http://([^/]+)", process.stdout.readline())[0]
-        with connect(f"ws://{address}/ws", max_size=None, open_timeout=60) as socket:
+        address = re.findall(r"http://(\S+)", process.stdout.readline())[0]
+        with connect(
+            f"ws://{address.replace('/?', '/ws?')}", max_size=None, open_timeout=60
+        ) as socket:
             yield _Page(process, socket)
         process.kill()
 

@@ -85,7 +85,8 @@ class Served:
         )
         assert self.process.stdout is not None
         line = self.process.stdout.readline()
-        self.address = re.findall(r"http://([^/]+)", line)[0]
+        self.address = re.findall(r"http://(\S+)", line)[0]  # with its token
+        self.socket = f"ws://{self.address.replace('/?', '/ws?')}"
         self.said: list[str] = []
         self._reading = Thread(target=self._read, daemon=True)
         self._reading.start()
@@ -200,7 +201,7 @@ def browser_page(address: str) -> Iterator[Page]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=SWITCHES)
         page = browser.new_page(viewport={"width": 1280, "height": 720})
-        page.goto(f"http://{address}/")
+        page.goto(f"http://{address}")
         yield page
         browser.close()
 
@@ -213,7 +214,7 @@ def many_pages(served: Served, *, pages: int, seconds: float, seed: int) -> list
     def work(number: int) -> None:
         rng = np.random.default_rng([seed, number])
         try:
-            with connect(f"ws://{served.address}/ws", max_size=None, open_timeout=60) as socket:
+            with connect(served.socket, max_size=None, open_timeout=60) as socket:
                 while monotonic() < end:
                     share = float(rng.uniform(0.8, 1.0))
                     key = "eta_velocity" if rng.random() < 0.5 else "eta_acceleration"

@@ -470,9 +470,9 @@ def talking(shop: Workshop, job: str) -> Iterator[Page]:
     command = [sys.executable, "-u", "-m", *f"kerfpath studio {job} --no-browser --port 0".split()]
     server = subprocess.Popen(command, cwd=shop.folder, stdout=subprocess.PIPE, text=True)
     try:
-        host = re.search(r"http://([^/\s]+)", server.stdout.readline())[1]
+        host, token = re.search(r"http://([^/\s]+)/(\S*)", server.stdout.readline()).groups()
         patient = {"open_timeout": 300, "ping_interval": None, "max_size": None}
-        with connect(f"ws://{host}/ws", origin=f"http://{host}", **patient) as socket:
+        with connect(f"ws://{host}/ws{token}", origin=f"http://{host}", **patient) as socket:
             yield Page(socket)
     finally:
         server.terminate()

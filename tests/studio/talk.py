@@ -11,7 +11,8 @@ from kerfpath.studio.app import application
 from kerfpath.studio.document import Document
 
 HOST = "127.0.0.1:8087"
-SOCKET = f"ws://{HOST}/ws"
+TOKEN = "a" * 32
+SOCKET = f"ws://{HOST}/ws?token={TOKEN}"
 QUICK = SMALL.replace("[plan]", "[plan]\ncertify = false")
 """Two small contours, of which nothing is proved: that takes seconds."""
 
@@ -28,9 +29,16 @@ def write_job(folder, text=QUICK, name="job.toml"):
 @contextmanager
 def serving(path, **more):
     """A client of the studio at work on a job."""
-    app = application(Document(path), hosts=[HOST], **more)
-    with TestClient(app, base_url=f"http://{HOST}") as client:
+    with client_of(path, **more) as client:
         yield client
+
+
+def client_of(path, **more):
+    """A client with the token, of the studio of a job that is not at work."""
+    app = application(Document(path), hosts=[HOST], token=TOKEN, **more)
+    client = TestClient(app, base_url=f"http://{HOST}")
+    client.get(f"/?token={TOKEN}")
+    return client
 
 
 class Talk:

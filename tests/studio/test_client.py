@@ -6,12 +6,9 @@ import shutil
 import subprocess
 
 import pytest
-from starlette.testclient import TestClient
 
 from conftest import ROOT
-from kerfpath.studio.app import application
-from kerfpath.studio.document import Document
-from studio.talk import HOST
+from studio.talk import client_of
 
 CLIENT = ROOT / "src" / "kerfpath" / "studio" / "client"
 BROWSER = ROOT / "tests" / "studio" / "browser"
@@ -62,8 +59,7 @@ def test_the_page_loads_nothing_but_its_own_files_and_has_all_of_them():
 
 
 def test_the_page_asks_for_all_of_its_modules_at_once_and_after_its_import_map():
-    app = application(Document(CLIENT / "index.html"), hosts=[HOST])
-    client = TestClient(app, base_url=f"http://{HOST}")  # not at work: the page does not wait
+    client = client_of(CLIENT / "index.html")  # not at work: the page does not wait
     text = client.get("/").text
     loaded = re.findall(r'<link rel="modulepreload" href="client/([^"]+)">', text)
     modules = {str(file.relative_to(CLIENT)) for file in CLIENT.rglob("*.js")} - {"early.js"}

@@ -37,11 +37,16 @@ def started(tmp_path):
         process.communicate()
 
 
-def get(address):
+def get(address, path=""):
+    """What is at a path, once the address with its token has been opened."""
     opener = urllib.request.build_opener(
         urllib.request.ProxyHandler({}), urllib.request.HTTPCookieProcessor()
     )
     with opener.open(address, timeout=30) as answer:
+        page = answer.read().decode()
+    if not path:
+        return page
+    with opener.open(address.partition("?")[0] + path, timeout=30) as answer:
         return answer.read().decode()
 
 
@@ -51,7 +56,7 @@ def test_a_job_is_served_until_ctrl_c(started, tmp_path):
     process, address, line = started(job, "--port", 0)
     assert line.startswith(f"{job} at http://127.0.0.1:")
     assert "<html" in get(address)
-    assert get(f"{address}export/job") == job.read_text()
+    assert get(address, "export/job") == job.read_text()
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=30) == 130
     assert process.stderr.read() == "kerfpath: stopped\n"
@@ -61,18 +66,19 @@ def test_a_job_is_served_until_ctrl_c(started, tmp_path):
 def test_without_a_job_a_copy_of_the_demo_is_opened_and_found_again(started, tmp_path):
     process, address, _ = started("--port", 0)
     copied = tmp_path / "kerfpath-studio" / "b_pillar.toml"
-    assert get(f"{address}export/job") == copied.read_text()
+    assert get(address, "export/job") == copied.read_text()
     assert (copied.parent / "b_pillar.step").exists()
     process.kill()
     process.wait()
     copied.write_text("# mine\n" + copied.read_text())
     _, address, _ = started("--port", 0)
-    assert get(f"{address}export/job").startswith("# mine")
+    assert get(address, "export/job").startswith("# mine")
 
 
 @pytest.mark.slow
-def test_another_address_than_this_machines_needs_the_token(started, tmp_path):
-    _, address, _ = started(write_job(tmp_path), "--port", 0, "--host", "0.0.0.0")
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_every_studio_needs_the_token_that_it_prints(started, tmp_path, host):
+    _, address, _ = started(write_job(tmp_path), "--port", 0, "--host", host)
     found = re.fullmatch(r"http://[^/]+:(\d+)/\?token=([\w-]{32})", address)
     port, token = found.groups()
     with pytest.raises(urllib.error.HTTPError, match="403"):
@@ -107,7 +113,7 @@ def test_a_drawing_gets_a_job_to_begin_with_that_can_be_planned(started, tmp_pat
     _, address, line = started(tmp_path / "b_pillar.step", "--port", 0)
     written = tmp_path / "b_pillar.toml"
     assert line.startswith(str(written))
-    text = get(f"{address}export/job")
+    text = get(address, "export/job")
     assert text == written.read_text()
     assert text.count("[[contour]]") == 8
     written.write_text("# mine\n" + text)

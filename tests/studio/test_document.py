@@ -230,3 +230,21 @@ def test_tables_are_made_inside_a_contour_and_taken_out_again():
     assert "# the first" in made
     back = with_values(made, [(("contour", 0, "lead_in"), None), (("sequence",), None)])
     assert tomllib.loads(back) == tomllib.loads(text)
+
+
+def test_what_can_be_undone_is_bounded_in_bytes(tmp_path):
+    """Of large jobs there are fewer steps; the newest are kept, and all of small jobs."""
+    path = tmp_path / "job.toml"
+    path.write_text("a = 0\n")
+    document, large = Document(path), 6_000_000
+    for k in range(20):
+        document.replace(f"a = {k + 1}\n#{'x' * large}\n")
+    steps = 0
+    while document.can_undo:
+        document.undo()
+        steps += 1
+        assert document.text.startswith(f"a = {20 - steps}\n")
+    assert steps == 50_000_000 // large
+    while document.can_redo:
+        document.redo()
+    assert document.text.startswith("a = 20\n")

@@ -8,9 +8,9 @@ from starlette.websockets import WebSocketDisconnect
 
 from kerfpath.studio.app import LONGEST, POLICY, application
 from kerfpath.studio.document import Document
-from studio.talk import HOST, SOCKET, talking, write_job
+from studio.talk import HOST, SOCKET, TOKEN, client_of, talking, write_job
 
-TOKEN = "a" * 32
+TICKET = "b" * 32
 
 
 @pytest.fixture(scope="module")
@@ -21,13 +21,13 @@ def job(tmp_path_factory):
 @pytest.fixture
 def client(job):
     """A client of a studio that is not at work."""
-    return TestClient(application(Document(job), hosts=[HOST]), base_url=f"http://{HOST}")
+    return client_of(job)
 
 
 @pytest.fixture
 def guarded(job):
-    """The same with a token."""
-    app = application(Document(job), hosts=[HOST], token=TOKEN)
+    """The same without the token."""
+    app = application(Document(job), hosts=[HOST], token=TOKEN, ticket=TICKET)
     return TestClient(app, base_url=f"http://{HOST}", follow_redirects=False)
 
 
@@ -78,11 +78,31 @@ def test_nothing_inline_or_evaluated_is_allowed():
     assert "unsafe" not in POLICY
 
 
-@pytest.mark.parametrize("path", [*EVERYWHERE, "/?token=", "/?token=wrong", "/client/?token=a"])
+@pytest.mark.parametrize(
+    "path",
+    [*EVERYWHERE, "/?token=", "/?token=wrong", "/client/?token=a", "/?token=%ff%00", "/?%ff",
+     f"/?token={'9' * 5000}", f"/client/main.js?token={TOKEN}"],
+)  # fmt: skip
 def test_without_the_token_nothing_is_served(guarded, path):
-    assert guarded.get(path).status_code == 403
-    with pytest.raises(WebSocketDisconnect), guarded.websocket_connect(SOCKET):
+    answer = guarded.get(path)
+    assert answer.status_code == 403
+    assert "open the whole address that kerfpath studio has printed" in answer.text
+    assert answer.text.count("\n") == 1
+
+
+@pytest.mark.parametrize("query", ["", "?token=", "?token=wrong", f"?token={TICKET}"])
+def test_without_the_token_no_socket_opens(guarded, query):
+    url = SOCKET.partition("?")[0] + query
+    with pytest.raises(WebSocketDisconnect), guarded.websocket_connect(url):
         pass
+
+
+def test_a_ticket_opens_the_page_once(guarded):
+    assert guarded.get(f"/?token={TICKET}").status_code == 303
+    assert guarded.get("/").status_code == 200
+    guarded.cookies.clear()
+    assert guarded.get(f"/?token={TICKET}").status_code == 403
+    assert guarded.get("/?token=").status_code == 403
 
 
 def test_the_address_with_the_token_opens_the_page_and_is_forgotten(guarded):
@@ -136,9 +156,15 @@ def test_only_kinds_of_files_that_pages_have_are_served(client, tmp_path, monkey
     assert client.get("/client/b.js").status_code == 404
 
 
-@pytest.mark.parametrize("path", ["/mesh/0", "/mesh/../job", "/export/passwd", "/nothing"])
+@pytest.mark.parametrize(
+    "path",
+    ["/mesh/0", "/mesh/../job", "/export/passwd", "/nothing", "/kept/1", f"/kept/{'9' * 5000}",
+     "/kept/%D9%A3", "/kept/-1", f"/mesh/{'9' * 5000}", f"/export/{'9' * 5000}"],
+)  # fmt: skip
 def test_what_there_is_not_is_not_found(client, path):
-    assert client.get(path).status_code == 404
+    answer = client.get(path)
+    assert answer.status_code == 404
+    assert len(answer.text) < 100
 
 
 @pytest.mark.parametrize("path", ["/export/program", "/export/plan.json", "/report"])
@@ -154,7 +180,15 @@ def test_the_job_can_be_taken_along_at_once(client, job):
     assert "job.toml" in answer.headers["content-disposition"]
 
 
-@pytest.mark.parametrize("text", ["nonsense", "{}", '{"type": "edit"}', '{"type": "<b>"}'])
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("nonsense", "{}", '{"type": "edit"}', '{"type": "<b>"}', "[" * 50_000, '"\\ud800"'),
+        '{"type": "forget", "id": %s}' % ("9" * 5000),
+        '{"type": "reason", "contour": "a", "node": 1e999, "gamma": 0, "posture": 0}',
+    ],
+    ids=lambda text: text[:20],
+)
 def test_a_message_that_is_not_understood_is_answered_in_one_line(client, text):
     with talking(client) as page:
         page._socket.send_text(text)

@@ -235,8 +235,8 @@ def studio(
     host: Annotated[
         str,
         typer.Option(
-            help="Address to listen at. If other machines can reach it, the page opens only with "
-            "the token in the printed address, and what is sent can be read on the way."
+            help="Address to listen at. The page opens only with the token in the printed "
+            "address. If other machines can reach it, what is sent can be read on the way."
         ),
     ] = "127.0.0.1",
     browser: Annotated[

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import hmac
+import os
 import re
 from base64 import b64encode
 from collections.abc import AsyncIterator, Iterable
@@ -73,6 +74,15 @@ HEADERS = {
 }
 REFUSED = 4403
 """Close code of a refused WebSocket."""
+NO_TOKEN = (
+    "this studio opens only with its token: open the whole address that kerfpath studio has "
+    "printed in its terminal, with ?token= and what follows; every start has a new one"
+)
+
+
+def _same(text: str, secret: str) -> bool:
+    """Return whether a text is the secret, in a time that does not tell how much of it is right."""
+    return hmac.compare_digest(text.encode(), secret.encode())
 
 
 class Guard:
@@ -86,15 +96,18 @@ class Guard:
     app : ASGI application
     hosts : iterable of str
         Allowed values of the Host header, with ports.
-    token : str or None
-        Token that the first request has in its query, and later ones in a cookie; None if no token
-        is required.
+    token : str
+        Token that the first request, or that for a WebSocket, has in its query, and later ones
+        in a cookie.
+    ticket : str
+        It opens the page once, instead of the token.
     """
 
-    def __init__(self, app: ASGIApp, *, hosts: Iterable[str], token: str | None) -> None:
-        self._app, self._hosts, self._token = app, frozenset(hosts), token
+    def __init__(self, app: ASGIApp, *, hosts: Iterable[str], token: str, ticket: str) -> None:
+        self._app, self._hosts = app, frozenset(hosts)
+        self._token, self._ticket = token, ticket
         # Cookies do not distinguish ports: each server needs a name of its own.
-        own = "" if token is None else hashlib.sha256(token.encode()).hexdigest()[:8]
+        own = hashlib.sha256(token.encode()).hexdigest()[:8]
         self._cookie = f"kerfpath-studio-{own}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -108,15 +121,18 @@ class Guard:
             return
         if not self._knows_token(headers):
             asked = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
-            if scope["type"] == "http" and scope["path"] == "/" and self._is_token(asked):
-                # The cookie now holds the token, so that the address no longer shows it.
-                answer = RedirectResponse("/", status_code=303, headers=HEADERS)
-                answer.set_cookie(self._cookie, asked, httponly=True, samesite="strict")
-                await answer(scope, receive, send)
+            if scope["type"] == "http":
+                if scope["path"] == "/" and (_same(asked, self._token) or self._takes(asked)):
+                    # The cookie now holds the token, so that the address no longer shows it.
+                    answer = RedirectResponse("/", status_code=303, headers=HEADERS)
+                    answer.set_cookie(self._cookie, self._token, httponly=True, samesite="strict")
+                    await answer(scope, receive, send)
+                else:
+                    await self._refuse(scope, receive, send, NO_TOKEN)
                 return
-            why = "a token is needed: open the address that kerfpath studio has printed"
-            await self._refuse(scope, receive, send, why)
-            return
+            if not _same(asked, self._token):
+                await self._refuse(scope, receive, send, NO_TOKEN)
+                return
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -140,16 +156,18 @@ class Guard:
         return ""
 
     def _knows_token(self, headers: Headers) -> bool:
-        if self._token is None:
-            return True
         try:
             cookie = SimpleCookie(headers.get("cookie", "")).get(self._cookie)
         except CookieError:
             return False
-        return cookie is not None and self._is_token(cookie.value)
+        return cookie is not None and _same(cookie.value, self._token)
 
-    def _is_token(self, text: str) -> bool:
-        return self._token is not None and hmac.compare_digest(text.encode(), self._token.encode())
+    def _takes(self, text: str) -> bool:
+        """Return whether a text is the ticket; it is not valid any more then."""
+        is_ticket = bool(self._ticket) and _same(text, self._ticket)
+        if is_ticket:
+            self._ticket = ""
+        return is_ticket
 
     async def _refuse(self, scope: Scope, receive: Receive, send: Send, why: str) -> None:
         if scope["type"] == "websocket":
@@ -198,7 +216,9 @@ REPORT_POLICY = (
 """Policy of a report, which has inline scripts: a sandbox without origin and network access."""
 
 
-def application(document: Document, *, hosts: Iterable[str], token: str | None = None) -> Starlette:
+def application(
+    document: Document, *, hosts: Iterable[str], token: str, ticket: str = ""
+) -> Starlette:
     """Return the application that serves one job.
 
     Parameters
@@ -207,8 +227,10 @@ def application(document: Document, *, hosts: Iterable[str], token: str | None =
         The job.
     hosts : iterable of str
         Allowed values of the Host header, with ports.
-    token : str, optional
+    token : str
         Token that requests must have.
+    ticket : str, optional
+        Opens the page once, instead of the token.
     """
     worker = _Worker(document)
 
@@ -227,12 +249,12 @@ def application(document: Document, *, hosts: Iterable[str], token: str | None =
             Route("/", _index),
             Route("/client/{name:path}", _client),
             Route("/mesh/{name}", _mesh),
-            Route("/kept/{number:int}", _kept),
+            Route("/kept/{number}", _kept),
             Route("/export/{name}", _export),
             Route("/report", _report),
             WebSocketRoute("/ws", _socket),
         ],
-        middleware=[Middleware(Guard, hosts=tuple(hosts), token=token)],
+        middleware=[Middleware(Guard, hosts=tuple(hosts), token=token, ticket=ticket)],
         lifespan=at_work,
     )
     app.state.worker = worker
@@ -305,8 +327,9 @@ async def _mesh(request: Request) -> Response:
 
 async def _kept(request: Request) -> Response:
     session = await _session(request.app)
+    number = request.path_params["number"]
     try:
-        text = session.kept.plans(request.path_params["number"])
+        text = session.kept.plans(int(number) if re.fullmatch("[0-9]{1,9}", number) else -1)
     except KerfpathError as error:
         return PlainTextResponse(f"{error}\n", status_code=404)
     return Response(text, media_type="application/json", headers={"cache-control": "no-store"})
@@ -350,7 +373,7 @@ async def _report(request: Request) -> Response:
 
 def _download(file: File) -> Response:
     named = {
-        "content-disposition": f"attachment; filename*=UTF-8''{quote(file.name)}",
+        "content-disposition": f"attachment; filename*=UTF-8''{quote(os.fsencode(file.name))}",
         "cache-control": "no-store",
     }
     return Response(file.content, media_type=file.kind, headers=named)

@@ -32,6 +32,8 @@ Change = tuple[Key, object]
 
 MOST_STEPS = 300
 """Number of steps that can be undone."""
+MOST_BYTES = 50_000_000
+"""Largest size of all these steps together; of larger jobs fewer steps can be undone."""
 DIGITS = 12
 """Significant digits of a written number: sliders send values like 0.30000000000000004."""
 
@@ -61,12 +63,12 @@ class Document:
         self.path = path
         self.beside = path.with_name(f"{path.stem}.studio.toml")
         self._on_disk = self.text = _read(path)
-        self._before: list[str] = []
-        self._after: list[str] = []
+        self._before: list[bytes] = []
+        self._after: list[bytes] = []
         self._gesture: tuple[str, Key] | None = None
         self.revision = 1
         if self.beside.is_file() and (kept := _read(self.beside)) != self.text:
-            self._before, self.text = [self.text], kept
+            self._before, self.text = [self.text.encode()], kept
 
     @property
     def saved(self) -> bool:
@@ -141,14 +143,16 @@ class Document:
         if text == self.text:
             return
         if not merge or not self._before:
-            self._before = [*self._before[1 - MOST_STEPS :], self.text]
+            self._before = [*self._before[1 - MOST_STEPS :], self.text.encode()]
+        while sum(map(len, self._before)) > MOST_BYTES:
+            del self._before[0]
         self._after.clear()
         self._take(text)
 
-    def _shift(self, back: list[str], forth: list[str]) -> None:
+    def _shift(self, back: list[bytes], forth: list[bytes]) -> None:
         if back:
-            forth.append(self.text)
-            self._take(back.pop())
+            forth.append(self.text.encode())
+            self._take(back.pop().decode())
 
     def _take(self, text: str) -> None:
         self._gesture = None

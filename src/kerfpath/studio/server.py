@@ -35,8 +35,7 @@ def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[st
     path : Path
         Path of the job file.
     host : str
-        Address to listen at. For any address except `HERE`, a token is required; the shown URL
-        contains it.
+        Address to listen at. Requests need a token, which the shown URL contains.
     port : int
         Port to listen at; 0 takes a free one.
     browser : bool
@@ -54,23 +53,22 @@ def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[st
     with _listener(host, port) as listener:
         number = listener.getsockname()[1]
         alone = host in HERE
-        token = None if alone else secrets.token_urlsafe(24)
+        token, ticket = secrets.token_urlsafe(24), secrets.token_urlsafe(24)
         names = LOOPBACK if alone else (*LOOPBACK, _in_url(host), *_names_of_machine())
         hosts = [f"{name}:{number}" for name in names]
         hosts += names if number == WITHOUT_PORT else ()
         reached = socket.gethostname() if host in EVERYWHERE else host
-        address = f"http://{_in_url(reached)}:{number}/"
-        if token is not None:
-            address += f"?token={token}"
-        show(address)
+        address = f"http://{_in_url(reached)}:{number}/?token="
+        show(address + token)
         if browser:
-            # The port is open already: the browser starts and waits for the page.
-            Thread(target=webbrowser.open, args=(address,), daemon=True).start()
-        _run(document, hosts, token, listener)
+            # The port is open already: the browser starts and waits for the page. All users of the
+            # machine may see the arguments of its process, so they have a ticket for one time.
+            Thread(target=webbrowser.open, args=(address + ticket,), daemon=True).start()
+        _run(document, hosts, token, ticket, listener)
 
 
 def _run(
-    document: Document, hosts: Sequence[str], token: str | None, listener: socket.socket
+    document: Document, hosts: Sequence[str], token: str, ticket: str, listener: socket.socket
 ) -> None:
     """Serve a document; this imports modules that take a second to load."""
     import uvicorn
@@ -86,7 +84,7 @@ def _run(
             yield
 
     config = uvicorn.Config(
-        application(document, hosts=hosts, token=token),
+        application(document, hosts=hosts, token=token, ticket=ticket),
         log_level="warning",
         lifespan="on",
         ws="websockets-sansio",

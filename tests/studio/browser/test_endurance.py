@@ -19,7 +19,7 @@ def served(tmp_path):
 
 def test_random_gestures_break_nothing(page, served, tmp_path):
     text = (tmp_path / "job.toml").read_text()
-    page.goto(f"http://{served.address}/")
+    page.goto(f"http://{served.address}")
     until(page, lambda: page.evaluate(NEWEST), seconds=60)
     gestures = Gestures(page, seed=1)
     gestures.go_on(SECONDS, served, text, samples=3)

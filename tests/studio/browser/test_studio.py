@@ -31,9 +31,9 @@ class Server:
             text=True,
         )
         line = self.process.stdout.readline()
-        found = re.search(r"http://127\.0\.0\.1:(\d+)/", line)
+        found = re.search(r"(http://127\.0\.0\.1:(\d+)/)\?token=\S+", line)
         assert found, line
-        self.url, self.port = found[0], int(found[1])
+        self.url, self.origin, self.port = found[0], found[1], int(found[2])
 
     def stop(self):
         self.process.terminate()
@@ -69,7 +69,7 @@ def opened(page, server):
     wrong, elsewhere = [], []
     page.on("console", lambda m: m.type in ("error", "warning") and wrong.append(m.text))
     page.on("pageerror", lambda fault: wrong.append(str(fault)))
-    page.on("request", lambda r: r.url.startswith(server.url) or elsewhere.append(r.url))
+    page.on("request", lambda r: r.url.startswith(server.origin) or elsewhere.append(r.url))
     page.goto(server.url)
     settled(page)
     before = page.evaluate(REVISION)

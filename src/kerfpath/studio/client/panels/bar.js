@@ -191,7 +191,7 @@ function Lost() {
   const seconds = Math.max(1, Math.ceil(((store.retryAt ?? 0) - Date.now()) / 1000));
   const when = store.connection === "lost" ? `Next try in ${seconds} s.` : "Trying now.";
   const what = store.met
-    ? `The studio's server has stopped or cannot be reached. All changes are kept beside the job file; start "kerfpath studio" again to continue.`
+    ? `The studio's server has stopped or cannot be reached. All changes are kept beside the job file; start "kerfpath studio" again and open the address that it prints.`
     : "The studio's server does not answer.";
   const again = html`<button class="plain" onClick=${() => connection.open()}>Try now</button>`;
   return notice("bad", `${what} ${when}`, again);
