@@ -63,14 +63,14 @@ def test_a_first_run_compiles_nothing_that_was_not_compiled_in_advance(kinematic
     )
     assert done.returncode == 0, done.stderr
     assert [line for line in done.stdout.splitlines() if "kerfpath.kernels" in line] == []
-    assert len(list((tmp_path / "cache").glob("*.compiled"))) == len(compiling.STAGES)
+    assert len(list((tmp_path / "cache").glob("*/*.compiled"))) == len(compiling.STAGES)
 
 
 @pytest.fixture
 def stages(monkeypatch, tmp_path):
     """An empty cache, and stages that note their calls."""
     calls = []
-    monkeypatch.setattr(compiling, "CACHE", tmp_path / "cache")
+    monkeypatch.setattr(compiling, "CACHE", tmp_path)
     monkeypatch.setattr(compiling, "STAGES", dict.fromkeys(("poses", "bound"), calls.append))
     return calls
 
@@ -100,6 +100,15 @@ def test_who_wants_all_waits_for_what_was_left_to_compile_later(stages, monkeypa
     compiling.warm_up("opw")
     assert stages == ["opw", "opw"]
     assert compiling.is_compiled("opw")
+
+
+def test_without_a_cache_kernels_compile_as_they_go(stages, monkeypatch, tmp_path):
+    monkeypatch.setattr(compiling, "is_kept", lambda: False)
+    assert compiling.is_compiled("opw")
+    assert not compiling.warm_up("opw")
+    compiling.compile_stage("poses", "opw")  # asked for all the same: it is not noted
+    assert stages == ["opw"]
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_families_without_an_example_compile_as_they_go(stages):

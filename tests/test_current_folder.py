@@ -1,4 +1,4 @@
-"""Nothing is imported from the current folder, whatever lies there, by any process of ours."""
+"""No process of ours imports what lies beside a job, its drawing or its files."""
 
 import os
 import re
@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from jobs import DEMO, SMALL
-from kerfpath.isolated import python_command
+from kerfpath.isolated import clean_environment, python_command
 
 COMMAND = [Path(sys.executable).parent / "kerfpath"]
 MODULE = [sys.executable, "-m", "kerfpath"]
@@ -32,29 +32,43 @@ finally:
 """A module that notes its name, and then does what the module does in whose place it is."""
 
 
+FOLDERS = ("job", "drawing", "out")
+
+
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A folder with a job, and with a module of every name that anyone may import."""
-    folder = tmp_path_factory.mktemp("hostile")
-    for name in filter(str.isidentifier, NAMES):
-        text = HOSTILE.format(mark=str(folder / "imported"), folder=str(folder))
-        (folder / f"{name}.py").write_text(text)
-    shutil.copy(DEMO / "b_pillar.step", folder)
+def place(tmp_path_factory):
+    """Folders of a job, its drawing and its files, with a module of every name that is imported."""
+    place = tmp_path_factory.mktemp("hostile")
+    for folder in (place / name for name in FOLDERS):
+        folder.mkdir()
+        for name in filter(str.isidentifier, NAMES):
+            text = HOSTILE.format(mark=str(place / "imported"), folder=str(folder))
+            (folder / f"{name}.py").write_text(text)
+        # Numba would read it, and then compiled code from that folder.
+        (folder / ".numba_config.yaml").write_text(f"cache_dir: {folder / 'numba'}\n")
+    shutil.copy(DEMO / "b_pillar.step", place / "drawing")
     for name, step in (("small", 6), ("again", 8)):
         text = SMALL.replace("[plan]", "[plan]\ncertify = false")
-        (folder / f"{name}.toml").write_text(text.replace("_deg = 3", f"_deg = {step}"))
-    return folder
+        text = text.replace("b_pillar.step", "../drawing/b_pillar.step")
+        (place / "job" / f"{name}.toml").write_text(text.replace("_deg = 3", f"_deg = {step}"))
+    return place
 
 
 @pytest.fixture
-def imported(folder):
-    """What has been imported from the folder since the last call."""
-    mark = folder / "imported"
+def folder(place):
+    """The folder of the job, to run commands in."""
+    return place / "job"
+
+
+@pytest.fixture
+def imported(place):
+    """What has been imported from the folders since the last call."""
+    mark = place / "imported"
 
     def read():
         names = set(mark.read_text().split()) if mark.exists() else set()
         mark.unlink(missing_ok=True)
-        return names
+        return names | {str(path) for path in place.glob("*/numba")}
 
     read()
     return read
@@ -73,20 +87,25 @@ def done(command, folder):
     return result
 
 
+COMMANDS = [
+    "robots",
+    "contours ../drawing/b_pillar.step",  # read in a process of its own
+    "plan ../job/small.toml --out ../out",
+    "check ../job/small.toml",
+    "audit ../out/plan.json --job ../job/small.toml",
+    "audit ../out/small.mod --job ../job/small.toml",
+    "post ../out/plan.json -o ../out/small.mod",
+    "batch ../job/small.toml ../job/again.toml --out ../out/batch --processes 2",
+]
+"""In an order in which each finds the files of those before."""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "words",
-    [
-        "robots",
-        "contours b_pillar.step",  # read in a process of its own
-        "plan small.toml",
-        "batch small.toml again.toml --out batch --processes 2",
-    ],
-    ids=lambda words: words.split()[0],
-)
-def test_the_command_imports_nothing_from_there(folder, imported, words):
-    done([*COMMAND, *words.split()], folder)
-    assert imported() == set()
+@pytest.mark.parametrize("where", FOLDERS)
+def test_the_commands_import_nothing_from_there(place, imported, where):
+    for words in COMMANDS:
+        done([*COMMAND, *words.split()], place / where)
+        assert imported() == set(), words
 
 
 @pytest.mark.slow
@@ -97,12 +116,12 @@ def test_python_m_imports_no_more_than_python_itself(folder, imported):
     before = imported()
     ours = (folder / "kerfpath.py").rename(folder / "kerfpath.kept")
     try:
-        done([*MODULE, "contours", "b_pillar.step"], folder)
+        done([*MODULE, "contours", "../drawing/b_pillar.step"], folder)
         done([*MODULE, "batch", "small.toml", "--out", "module", "--processes", "1"], folder)
     finally:
         ours.rename(folder / "kerfpath.py")
     assert imported() == before
-    done([sys.executable, "-P", "-m", "kerfpath", "contours", "b_pillar.step"], folder)
+    done([sys.executable, "-P", "-m", "kerfpath", "contours", "../drawing/b_pillar.step"], folder)
     assert imported() == set()
 
 
@@ -127,8 +146,9 @@ def test_the_studio_imports_nothing_from_there(folder, imported):
 
 @pytest.mark.slow
 def test_processes_import_from_where_this_one_does(folder, imported):
-    code = "import multiprocessing, numpy, kerfpath.compiling; print(sys.path)"
-    assert done(python_command(code), folder).stdout == f"{sys.path}\n"
+    code = "import multiprocessing, numpy, kerfpath.compiling; print(*sys.path, sep='\\n')"
+    known = done(python_command(code), folder).stdout.splitlines()
+    assert known == [folder for folder in sys.path if folder in known]
     assert imported() == set()
 
 
@@ -144,3 +164,29 @@ def test_a_sweep_of_a_script_imports_nothing_from_there(folder, imported, tmp_pa
     )
     assert done([sys.executable, script], folder).stdout == "42\n"
     assert imported() == set()
+
+
+def test_a_script_beside_its_drawing_lets_no_process_of_ours_import_from_there(place, imported):
+    """Python itself looks there for what the script imports; what reads the drawing does not."""
+    folder = place / "drawing"
+    script = folder / "script.py"
+    script.write_text(
+        "import sys\n"
+        "here = sys.path.pop(0)\n"
+        "import OCP\n"  # as this process does for what it gets
+        "from kerfpath.cad import read\n"
+        "sys.path.insert(0, here)\n"  # as if the imports had been harmless
+        "print(len(read('b_pillar.step').loops))\n"
+    )
+    imported()
+    assert done([sys.executable, script], folder).stdout == "122\n"
+    assert imported() == set()
+
+
+def test_a_process_has_no_variables_that_run_other_code(monkeypatch):
+    for name in ("PYTHONPATH", "PYTHONSTARTUP", "PYTHONINSPECT"):
+        monkeypatch.setenv(name, "/nowhere")
+    clean = clean_environment()
+    assert clean.keys() & {"PYTHONPATH", "PYTHONSTARTUP", "PYTHONINSPECT"} == set()
+    assert clean["PYTHONSAFEPATH"] == "1"
+    assert os.environ["PYTHONPATH"] == "/nowhere"

@@ -12,8 +12,8 @@ from kerfpath.arrays import freeze
 from kerfpath.certifier import compile_bound
 from kerfpath.contour import FRAME_KINDS, Contour
 from kerfpath.graph import build, gamma_grid
-from kerfpath.isolated import python_command
-from kerfpath.kernels import CACHE
+from kerfpath.isolated import start_python
+from kerfpath.kernels import CACHE, is_kept
 from kerfpath.kernels.metric import MANHATTAN, maximum_distance, total_distance
 from kerfpath.robots import Robot, robot
 from kerfpath.search import compile_search
@@ -72,22 +72,25 @@ def _note(stage: str, kinematics: str) -> Path:
 
 
 def _missing(kinematics: str) -> list[str]:
+    """Return the stages to compile in advance: none without an example or without a cache."""
     if kinematics not in EXAMPLES:
         return []
-    return [stage for stage in STAGES if not _note(stage, kinematics).exists()]
+    missing = [stage for stage in STAGES if not _note(stage, kinematics).exists()]
+    return missing if missing and is_kept() else []
 
 
 def compile_stage(stage: str, kinematics: str) -> None:
     """Compile the kernels of a stage in this process, and mark them as present in the cache."""
     STAGES[stage](kinematics)
-    CACHE.mkdir(parents=True, exist_ok=True)
-    _note(stage, kinematics).touch()
+    if is_kept():
+        _note(stage, kinematics).touch()
 
 
 def is_compiled(kinematics: str = "opw") -> bool:
     """Return whether the kernels of the main job are compiled, or being compiled, for a robot.
 
-    Families that are not in `EXAMPLES` compile their kernels at the first call.
+    Families that are not in `EXAMPLES`, and all kernels if compiled code cannot be kept, are
+    compiled at the first call.
     """
     return all(stage in _running for stage in _missing(kinematics))
 
@@ -116,8 +119,7 @@ def warm_up(kinematics: str = "opw", *, later: Collection[str] = ()) -> bool:
 
 def _started(stage: str, kinematics: str) -> subprocess.Popen[bytes]:
     call = f"import {__name__} as own; own.compile_stage({stage!r}, {kinematics!r})"
-    none = subprocess.DEVNULL
-    return subprocess.Popen(python_command(call), stdin=none, stdout=none, stderr=none)
+    return start_python(call)
 
 
 def finish_compiling(stages: Collection[str] = tuple(STAGES)) -> None:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
 from kerfpath.arrays import short_repr
+from kerfpath.errors import InputError
 
-__all__ = ["Effort", "changed_effort", "current_effort", "set_effort"]
+__all__ = ["Effort", "changed_effort", "current_effort", "set_effort", "thread_count"]
+
+MOST_THREADS = 1024
+"""Largest number of threads that may be asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,3 +91,22 @@ def changed_effort(**limits: Any) -> Iterator[None]:
         yield
     finally:
         set_effort(before)
+
+
+def thread_count() -> int:
+    """Return the number of threads of a search: NUMBA_NUM_THREADS, or one per core.
+
+    Raises
+    ------
+    InputError
+        The variable is not a whole number from 1 on.
+    """
+    asked = os.environ.get("NUMBA_NUM_THREADS", "")
+    if not asked:
+        return os.cpu_count() or 1
+    if not asked.isdecimal() or not 1 <= int(asked) <= MOST_THREADS:
+        raise InputError(
+            f"NUMBA_NUM_THREADS: expected a whole number from 1 to {MOST_THREADS}, got {asked!r}; "
+            "correct or unset it"
+        )
+    return int(asked)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kerfpath.arrays import Array, Bools, Ints, freeze, scalar
+from kerfpath.effort import thread_count
 from kerfpath.errors import InputError
 from kerfpath.kernels.turns import JointLimits, count_admissible, fill_admissible
 from kerfpath.losses import Loss, Reason
@@ -247,8 +247,7 @@ def build(
 
     nodes = max(1, robot.family.poses_at_once // samples)
     firsts = range(0, len(frames), nodes)
-    threads = int(os.environ.get("NUMBA_NUM_THREADS") or os.cpu_count() or 1)
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(thread_count()) as pool:
         pieces = list(pool.map(lambda f: layers_of(f, min(f + nodes, len(frames))), firsts))
     sizes, q, sample, posture, turn = (list(parts) for parts in zip(*pieces, strict=True))
     pieces.clear()

@@ -1,6 +1,7 @@
-"""Calls in a process of their own, for libraries that may crash (C++ readers of damaged files).
+"""Python processes of our own code, and calls in one of them.
 
-One process serves all calls. It is replaced when it dies, and it ends by itself when no call comes
+Calls in another process are for libraries that may crash (C++ readers of damaged files). One
+process serves all calls. It is replaced when it dies, and it ends by itself when no call comes
 for a while.
 """
 
@@ -15,12 +16,14 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+import weakref
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from importlib import import_module
-from multiprocessing import Pipe
+from multiprocessing import Pipe, active_children
 from multiprocessing.connection import Connection
 from pathlib import Path
+from time import sleep
 from typing import Any, TypeVar
 
 from kerfpath.errors import InputError
@@ -37,18 +40,72 @@ PATIENCE = 20.0
 """Wall-clock time allowed, as a multiple of the processor time, for a busy machine."""
 IDLE = 10.0
 """Time without a call after which the process ends, s."""
+CHECKED_EVERY = 0.2
+"""Time between two looks whether the parent process still runs, s."""
 
+_started: weakref.WeakSet[subprocess.Popen[bytes]] = weakref.WeakSet()
 _T = TypeVar("_T")
 _LEAVES = "leaves"
 
 
-def python_command(code: str) -> list[str]:
-    """Return the command of a Python process that runs `code`.
+NOT_INHERITED = ("PYTHONPATH", "PYTHONSTARTUP", "PYTHONINSPECT")
+"""Variables of the environment that could make a Python process run other code than ours."""
 
-    It imports from where this process does, and not from the current folder, which Python puts
-    first for `-c`.
+
+def clean_environment() -> dict[str, str]:
+    """Return the environment of Python processes, which get their import path by other means."""
+    kept = {name: value for name, value in os.environ.items() if name not in NOT_INHERITED}
+    return kept | {"PYTHONSAFEPATH": "1"}
+
+
+def python_command(code: str) -> list[str]:
+    """Return the command of a Python process that runs `code` of kerfpath.
+
+    It imports from where this process does, but not from the current folder or the folder of the
+    script that this process runs, unless kerfpath is there.
     """
-    return [sys.executable, "-P", "-c", f"import sys; sys.path[:] = {sys.path!r}; {code}"]
+    left_out = {"", os.curdir}
+    with suppress(OSError):  # the current folder may have been removed
+        left_out.add(str(Path.cwd()))
+    if script := getattr(sys.modules.get("__main__"), "__file__", None):
+        left_out.add(str(Path(script).absolute().parent))
+    left_out.discard(str(Path(__file__).parents[1]))
+    path = [folder for folder in sys.path if folder not in left_out]
+    return [sys.executable, "-P", "-c", f"import sys; sys.path[:] = {path!r}; {code}"]
+
+
+def start_python(code: str, *, pass_fds: Collection[int] = ()) -> subprocess.Popen[bytes]:
+    """Start a Python process, as `python_command` and `clean_environment` say, without output."""
+    none = subprocess.DEVNULL
+    process = subprocess.Popen(
+        python_command(code),
+        env=clean_environment(),
+        stdin=none,
+        stdout=none,
+        stderr=none,
+        pass_fds=pass_fds,
+    )
+    _started.add(process)
+    return process
+
+
+def end_with(parent: int) -> None:
+    """End this process soon after its parent has ended, even if that was killed meanwhile."""
+
+    def wait() -> None:
+        while os.getppid() == parent:
+            sleep(CHECKED_EVERY)
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def end_processes() -> None:
+    """Kill the processes that this one has started; only its own end may follow."""
+    processes: list[Any] = [*_started, *active_children()]
+    for process in processes:
+        with suppress(OSError):
+            process.kill()
 
 
 def call_apart(function: Callable[..., _T], *arguments: object, size: int) -> _T:
@@ -143,13 +200,9 @@ class _Worker:
     def __init__(self, module: str | None) -> None:
         self.ours, theirs = Pipe()
         number = theirs.fileno()
-        self.process = subprocess.Popen(
-            python_command(
-                f"from kerfpath.isolated import _serve; _serve({number}, {IDLE}, {module!r})"
-            ),
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+        self.process = start_python(
+            f"from kerfpath.isolated import _serve; "
+            f"_serve({number}, {os.getpid()}, {IDLE}, {module!r})",
             pass_fds=[number],
         )
         theirs.close()
@@ -193,9 +246,10 @@ def _forget() -> None:
 os.register_at_fork(after_in_child=_forget)
 
 
-def _serve(fd: int, idle: float, module: str | None) -> None:
-    """Answer requests from a pipe until it is closed or no request comes for `idle` seconds."""
+def _serve(fd: int, parent: int, idle: float, module: str | None) -> None:
+    """Answer requests of a parent from a pipe until it is closed, or idle for some seconds."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with(parent)
     if module is not None:
         with suppress(ImportError):  # a call of a function in it reports the error
             import_module(module)

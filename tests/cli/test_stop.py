@@ -1,4 +1,4 @@
-"""Ctrl-C at any moment: exit code 130, one line, no traceback, no crash, no temporary file."""
+"""Ctrl-C, SIGTERM, SIGHUP at any moment: the exit code, one line, no crash, no temporary file."""
 
 import os
 import shutil
@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,9 @@ TRIES = int(os.environ.get("KERFPATH_STOPS", "8"))
 """More than the suite can wait for are asked for by hand."""
 
 
+STOPS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
+
+
 def started(*arguments, cwd):
     """Start the command so that it hears Ctrl-C, whatever this process does with it."""
 
@@ -27,17 +32,37 @@ def started(*arguments, cwd):
 
     return subprocess.Popen(
         [KERFPATH, *map(str, arguments)], cwd=cwd, text=True, preexec_fn=hears,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
     )  # fmt: skip
 
 
-def assert_stopped(process, folder):
+def assert_stopped(process, folder, number, said="kerfpath: stopped"):
     stdout, stderr = process.communicate(timeout=60)
-    assert process.returncode == 130, stdout + stderr
+    assert process.returncode == STOPS[number], stdout + stderr
     *progress, last = stderr.splitlines()
-    assert last == "kerfpath: stopped"
+    assert last == said
     assert all(line.startswith("kerfpath: ") for line in progress)  # a line every few seconds
     assert not list(folder.rglob("*.tmp"))
+    assert_alone(process)
+
+
+def assert_alone(process):
+    """Assert that the processes that a process has started end with it."""
+    end = time.perf_counter() + 10
+    while processes_of(process):
+        assert time.perf_counter() < end, processes_of(process)
+        time.sleep(0.1)
+
+
+def processes_of(process):
+    """The processes of the session that a process has begun."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            session = (folder / "stat").read_text().rpartition(")")[2].split()[3]
+            if int(session) == process.pid:
+                found.append((folder / "cmdline").read_bytes())
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -62,21 +87,43 @@ def life(job):
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
-def test_ctrl_c_at_any_moment_ends_a_plan_with_one_line(job, life):
+def test_a_signal_at_any_moment_ends_a_plan_with_one_line(job, life):
     rng = np.random.default_rng(71)
     stopped = 0
     # Before some 0.1 s the interpreter starts, and no code of ours runs yet.
-    for at in rng.uniform(0.15, max(0.9 * life, 0.3), TRIES):
+    for number, at in zip(cycle(STOPS), rng.uniform(0.15, max(0.9 * life, 0.3), TRIES)):
         process = started("plan", "small.toml", "--out", f"at-{at:.3f}", cwd=job)
         time.sleep(at)
         if process.poll() is None:
-            process.send_signal(signal.SIGINT)
+            process.send_signal(number)
         if process.wait(60) == 0:  # it was quicker than the one that was clocked
             process.communicate()
             continue
-        assert_stopped(process, job)
+        assert_stopped(process, job, number)
         stopped += 1
     assert stopped > TRIES / 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", STOPS)
+def test_a_signal_ends_a_batch_with_all_its_processes(job, life, number, tmp_path):
+    process = started("batch", "small.toml", "--out", tmp_path, "--processes", 2, cwd=job)
+    while len(processes_of(process)) < 3 and process.poll() is None:
+        time.sleep(0.05)
+    time.sleep(0.5)
+    process.send_signal(number)
+    said = "kerfpath: stopped; the same command continues from the results so far"
+    assert_stopped(process, tmp_path, number, said)
+
+
+@pytest.mark.slow
+def test_kill_ends_the_processes_of_a_command_too(job, life, tmp_path):
+    process = started("batch", "small.toml", "--out", tmp_path, "--processes", 2, cwd=job)
+    while len(processes_of(process)) < 3 and process.poll() is None:
+        time.sleep(0.05)
+    process.kill()
+    process.communicate()
+    assert_alone(process)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")

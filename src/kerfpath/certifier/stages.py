@@ -7,7 +7,6 @@ steps that break (6) are excluded where that is asked for.
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
 from kerfpath.certificate import Stage
 from kerfpath.certifier.cells import CellMaker, CellSet
+from kerfpath.effort import thread_count
 from kerfpath.kernels.bends import cross_back, cross_on
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN
@@ -341,7 +341,7 @@ def _lay(
     start, C = packed.start, len(packed.half)
     count = np.zeros(C, np.int64)
     layers: list[tuple[Ints, Array]] = []
-    threads = int(os.environ.get("NUMBA_NUM_THREADS") or os.cpu_count() or 1)
+    threads = thread_count()
     with ThreadPoolExecutor(threads) as pool:
         for k in range(len(start) - 3, -1, -1):
             first, last = int(start[k]), int(start[k + 1])

@@ -3,22 +3,29 @@
 import sys
 
 from kerfpath.cli.stop import stoppable
+from kerfpath.cli.streams import settle
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
 
 __all__ = ["main"]
 
+NO_MEMORY = "there is not enough memory for this; free some, or raise the limit (ulimit -v)"
+
 
 def main() -> None:
     """Run the command line and exit with its exit code."""
-    with stoppable():  # from the first import on
-        try:
+    try:
+        settle()  # before anything is opened
+        with stoppable():  # from the first import on
             require_extra("programs", "the command line")
-        except InputError as error:
-            print(f"kerfpath: error: {error}", file=sys.stderr)
-            sys.exit(2)
-        from kerfpath.cli import programs, studies
-        from kerfpath.cli.app import run
+            from kerfpath.cli import programs, studies
+            from kerfpath.cli.app import run
 
-        assert programs, studies  # their commands
-        run()
+            assert programs, studies  # their commands
+            run()
+    except InputError as error:
+        print(f"kerfpath: error: {error}", file=sys.stderr)
+        sys.exit(2)
+    except MemoryError:
+        print(f"kerfpath: error: {NO_MEMORY}", file=sys.stderr)
+        sys.exit(2)

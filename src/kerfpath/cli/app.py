@@ -5,7 +5,6 @@ Exit codes are 0 for done, 1 for no feasible plan or a failed audit, 2 for bad i
 
 from __future__ import annotations
 
-import os
 import sys
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -16,6 +15,7 @@ from rich.markup import escape
 
 from kerfpath import __version__
 from kerfpath.cli.show import busy, compile_kernels, errors, out, progress_bars, quiet
+from kerfpath.cli.streams import flush
 from kerfpath.errors import AuditFailed, KerfpathError, NoFeasiblePath
 
 app = typer.Typer(
@@ -27,7 +27,8 @@ app = typer.Typer(
     "Begin with **kerfpath demo**: it plans the shipped part and writes everything. "
     "Then copy its job file, put in your part (see **kerfpath contours**) and your robot "
     "(see **kerfpath robots**), and run **kerfpath plan**.\n\n"
-    "Exit codes: 0 done, 1 no feasible plan or failed audit, 2 bad input.",
+    "Exit codes: 0 done, 1 no feasible plan or failed audit, 2 bad input; stopped by Ctrl-C 130, "
+    "SIGTERM 143, SIGHUP 129.",
 )
 
 
@@ -52,7 +53,10 @@ Strict = Annotated[
 def run() -> None:
     """Run the command line and exit with its exit code."""
     try:
-        app()
+        try:
+            app()
+        finally:
+            flush()
     except (NoFeasiblePath, AuditFailed) as error:
         errors.print(f"kerfpath: {escape(str(error))}")
         sys.exit(1)
@@ -60,10 +64,6 @@ def run() -> None:
         for line in (str(error), *getattr(error, "others", ())):
             errors.print(f"[bold red]kerfpath: error:[/] {escape(line)}")
         sys.exit(2)
-    except BrokenPipeError:
-        # The reader of a pipe has gone, as in `kerfpath robots | head`; leave stdout unflushed.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
 
 
 def _version(asked: bool) -> None:

@@ -1,5 +1,7 @@
 """Ctrl-C: the command prints one line and exits with code 130, whatever it is doing.
 
+SIGTERM and SIGHUP stop it in the same way, with codes 143 and 129.
+
 No exception is raised: inside foreign code (a solver, a CAD kernel, an import) it may be swallowed,
 turn into another exception or crash the interpreter, and so may an exit while threads of a solver
 run. Instead a thread waits for the signal and ends the process.
@@ -12,40 +14,55 @@ import os
 import signal
 import socket
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
 from threading import Thread, current_thread, main_thread
+from typing import Any
 
 from kerfpath.files import finish_writes
+from kerfpath.isolated import end_processes
 
-STOPPED = 130
-"""Exit code of a command that Ctrl-C has stopped."""
+STOPS: dict[int, Any] = {
+    signal.SIGINT: signal.default_int_handler,
+    signal.SIGTERM: signal.SIG_DFL,
+    signal.SIGHUP: signal.SIG_DFL,
+}
+"""Signals that stop a command, and what handles each in a process where nobody has changed that."""
 FILE_SECONDS = 5.0
 """Time in which a file that is being written may be finished, s."""
 
 _in_order = False
-_received = False
+_received = 0
+"""The number of the signal that is stopping the work in order."""
+
+
+def exit_code(number: int) -> int:
+    """Return the exit code of a command that a signal has stopped."""
+    return 128 + number
 
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Exit at Ctrl-C, unless the signal is ignored, as under nohup, or handled by someone else."""
-    plain = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if not plain or current_thread() is not main_thread():
+    """Exit at a signal, unless it is ignored, as under nohup, or handled by someone else."""
+    heard = [number for number, usual in STOPS.items() if signal.getsignal(number) == usual]
+    if not heard or current_thread() is not main_thread():
         yield
         return
     receiver, sender = socket.socketpair()
     sender.setblocking(False)
-    watch = Thread(target=_watch, args=(receiver,), daemon=True)
+    watch = Thread(target=_watch, args=(receiver, heard), daemon=True)
     watch.start()
     before = signal.set_wakeup_fd(sender.fileno(), warn_on_full_buffer=False)
-    signal.signal(signal.SIGINT, _note)
-    # When the interpreter shuts down, the work is done; ignore Ctrl-C while that takes its time.
-    atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
+    for number in heard:
+        signal.signal(number, _note)
+    # When the interpreter shuts down, the work is done; ignore signals while that takes its time.
+    for number in heard:
+        atexit.register(signal.signal, number, signal.SIG_IGN)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        for number in heard:
+            signal.signal(number, STOPS[number])
         signal.set_wakeup_fd(before)
         sender.close()
         watch.join()
@@ -59,7 +76,8 @@ def stop_in_order(line: str) -> Iterator[None]:
     Raises
     ------
     SystemExit
-        Code 130, at Ctrl-C, after printing `line`; another Ctrl-C meanwhile exits at once.
+        Code 130, at Ctrl-C, after printing `line`; another Ctrl-C meanwhile exits at once. Other
+        signals in the same way.
     """
     global _in_order
     _in_order = True
@@ -69,31 +87,34 @@ def stop_in_order(line: str) -> Iterator[None]:
         if not (_received or isinstance(error, KeyboardInterrupt)):
             raise
         _print(line)
-        raise SystemExit(STOPPED) from None
+        raise SystemExit(exit_code(_received or signal.SIGINT)) from None
     finally:
         _in_order = False
 
 
-def _note(*_: object) -> None:
-    """Handle the signal in the main thread, as soon as that runs Python code."""
+def _note(number: int, _frame: object) -> None:
+    """Handle a signal in the main thread, as soon as that runs Python code."""
     global _received
     if _in_order and not _received:
-        _received = True
+        _received = number
         raise KeyboardInterrupt
 
 
-def _watch(receiver: socket.socket) -> None:
-    """Wait for the signal, which the interpreter writes to the socket at any time."""
+def _watch(receiver: socket.socket, heard: Collection[int]) -> None:
+    """Wait for signals, which the interpreter writes to the socket at any time."""
     count = 0
     while signals := receiver.recv(16):
-        count += signals.count(signal.SIGINT)
+        stops = [number for number in signals if number in heard]
+        count += len(stops)
         if count > (1 if _in_order else 0):
             finish_writes(FILE_SECONDS)
+            end_processes()
             _print("kerfpath: stopped")
-            os._exit(STOPPED)
+            os._exit(exit_code(stops[-1]))
 
 
 def _print(line: str) -> None:
     """Write a line to stderr directly: another writer there may have stopped half-way."""
     begin = "\r\x1b[K\x1b[?25h" if sys.stderr.isatty() else ""  # over the bar, and the cursor back
-    os.write(2, f"{begin}{line}\n".encode())
+    with suppress(OSError):  # nobody may read it
+        os.write(2, f"{begin}{line}\n".encode())

@@ -15,9 +15,12 @@ M_dist, M_ind         out_dist and out_before: cost and best predecessor
 ====================  ===============================================================
 """
 
-from kerfpath.kernels.jit import CACHE
+from kerfpath.kernels.alone import config  # before numba is imported elsewhere
+from kerfpath.kernels.cache import CACHE, is_kept
 
-__all__ = ["CACHE", "EQUATIONS"]
+assert config
+
+__all__ = ["CACHE", "EQUATIONS", "is_kept"]
 
 EQUATIONS = {
     1: "kerfpath.contour.contour:Contour.resample",

@@ -1,27 +1,18 @@
-"""Compile the kernels, and keep the compiled code in a cache.
-
-Numba's cache does not notice an edited helper in another file, so the name of the cache folder is
-a hash of all kernels and of the codes that they use: an edit anywhere starts a new folder. It is
-in the user's cache, so that a new version, checkout or environment with the same kernels uses it.
-"""
+"""Compile the kernels, and keep the compiled code in the cache."""
 
 from __future__ import annotations
 
-import hashlib
-import os
 from collections.abc import Callable
-from contextlib import suppress
 from functools import update_wrapper
-from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
-import platformdirs
 from llvmlite import ir
-from numba.core.caching import InTreeCacheLocator
 from numba.cpython.unsafe import numbers
 from numba.extending import intrinsic
+
+from kerfpath.kernels.cache import KernelCache
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -32,42 +23,10 @@ VECTOR_FLAGS = {"nnan", "nsz"}
 the result is the same to the bit at every vector width."""
 
 
-def _cache_folder() -> Path:
-    config: Any = numba.config
-    if config.CACHE_DIR:
-        return Path(config.CACHE_DIR)
-    here = Path(__file__).parent
-    digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
-    for source in (*sorted(here.glob("*.py")), here.parent / "losses.py"):
-        digest.update(source.name.encode() + source.read_bytes())
-    kept = platformdirs.user_cache_path("kerfpath")
-    with suppress(OSError):
-        kept.mkdir(parents=True, exist_ok=True)
-    folder = kept if os.access(kept, os.W_OK) else here / "__pycache__"
-    return folder / f"numba-{digest.hexdigest()[:16]}"
-
-
-CACHE = _cache_folder()
-"""Folder of the compiled kernels of exactly these sources (or NUMBA_CACHE_DIR, if set)."""
-
-
-class Locator(InTreeCacheLocator):
-    """Makes numba keep compiled kernels in `CACHE`, wherever the package is installed."""
-
-    def get_cache_path(self) -> str:
-        """Return the folder."""
-        return str(CACHE)
-
-
 def _compiled(function: Callable[_P, _R], **options: Any) -> Callable[_P, _R]:
-    config: Any = numba.config
-    kept = config.CACHE_LOCATOR_CLASSES
-    config.CACHE_LOCATOR_CLASSES = f"{__name__}.{Locator.__name__}"
-    try:
-        compiled: Callable[_P, _R] = numba.njit(cache=True, nogil=True, **options)(function)
-    finally:
-        config.CACHE_LOCATOR_CLASSES = kept
-    return compiled
+    compiled: Any = numba.njit(nogil=True, **options)(function)
+    compiled._cache = KernelCache(function)
+    return cast("Callable[_P, _R]", compiled)
 
 
 variable = cast("Callable[[int], int]", np.int64)

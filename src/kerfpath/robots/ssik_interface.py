@@ -1,13 +1,14 @@
 """Interface to ssik, the solver of general six-axis arms, in this process or in another.
 
 ssik holds the interpreter lock while it solves, so many poses are solved in a separate process:
-this file run as a program, which imports nothing of kerfpath. Besides the public classes of ssik it
-uses the two functions behind the programs that `ssik build` writes; they are five times faster than
-`Manipulator.solve`.
+this file run as a program, which imports next to nothing of kerfpath. Besides the public classes of
+ssik it uses the two functions behind the programs that `ssik build` writes; they are five times
+faster than `Manipulator.solve`.
 """
 
 from __future__ import annotations
 
+import os
 import pickle
 import subprocess
 import sys
@@ -48,8 +49,13 @@ def solve(arm: SsikArm, T: Array) -> tuple[Array, NDArray[np.int64]]:
     """Return candidates (N, 6) rad for poses T (B, 4, 4) of the end, and the pose of each (N,)."""
     if len(T) < A_PROCESS:
         return _solve(arm, T)
+    from kerfpath.isolated import clean_environment, python_command
+
+    begin = f"from kerfpath.isolated import end_with; end_with({os.getpid()}); "
+    run = f"from runpy import run_path; run_path({__file__!r}, run_name='__main__')"
     done = subprocess.run(
-        [sys.executable, "-P", __file__],
+        python_command(begin + run),
+        env=clean_environment(),
         input=pickle.dumps((*arm, T)),
         stdout=subprocess.PIPE,
         check=True,

@@ -6,7 +6,7 @@ import os
 import pickle
 import signal
 from collections import deque
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
@@ -20,6 +20,7 @@ from kerfpath import __version__
 from kerfpath.effort import current_effort
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
+from kerfpath.isolated import NOT_INHERITED, clean_environment
 from kerfpath.progress import may_stop
 from kerfpath.sweep.task import Failure, Task, TaskOutcome, attempt
 
@@ -124,19 +125,28 @@ def _run_pool(
 
 @contextmanager
 def _starting() -> Iterator[None]:
-    """Let processes start so that Ctrl-C does not reach them, without the current folder.
+    """Let processes start so that Ctrl-C does not reach them, in a clean environment.
 
-    Python would put it first in their `sys.path`, before they take over that of this process.
+    Python would put the current folder first in their `sys.path`, before they take over that of
+    this process.
     """
-    before = os.environ.get("PYTHONSAFEPATH")
-    os.environ["PYTHONSAFEPATH"] = "1"
+    clean = clean_environment()
+    before = {name: os.environ.get(name) for name in (*NOT_INHERITED, *clean)}
+    changed = {name: value for name, value in before.items() if value != clean.get(name)}
+    _set_environment({name: clean.get(name) for name in changed})
     try:
         with _interrupt_blocked():
             yield
     finally:
-        del os.environ["PYTHONSAFEPATH"]
-        if before is not None:
-            os.environ["PYTHONSAFEPATH"] = before
+        _set_environment(changed)
+
+
+def _set_environment(variables: Mapping[str, str | None]) -> None:
+    for name, value in variables.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value
 
 
 @contextmanager
