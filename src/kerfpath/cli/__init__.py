@@ -9,6 +9,8 @@ from kerfpath.extras import require_extra
 
 __all__ = ["main"]
 
+SAID_OF_MEMORY = ("failed to map segment", "annot allocate memory", "can't start new thread")
+"""What errors of libraries, imports and threads say where there is no memory."""
 NO_MEMORY = "there is not enough memory for this; free some, or raise the limit (ulimit -v)"
 
 
@@ -26,6 +28,8 @@ def main() -> None:
     except InputError as error:
         print(f"kerfpath: error: {error}", file=sys.stderr)
         sys.exit(2)
-    except MemoryError:
+    except (MemoryError, ImportError, OSError, RuntimeError) as error:
+        if not isinstance(error, MemoryError) and not any(w in str(error) for w in SAID_OF_MEMORY):
+            raise
         print(f"kerfpath: error: {NO_MEMORY}", file=sys.stderr)
         sys.exit(2)

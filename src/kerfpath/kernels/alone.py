@@ -20,7 +20,7 @@ def _config() -> Any:
     Raises
     ------
     InputError
-        Numba is not to compile anything.
+        Numba is not to compile anything, or refuses a variable of the environment.
     """
     known = {"yaml": sys.modules["yaml"]} if "yaml" in sys.modules else {}
     if "numba" not in sys.modules:
@@ -30,6 +30,9 @@ def _config() -> Any:
             for said in ("A Numba config file is found", "Environment variable 'NUMBA_"):
                 warnings.filterwarnings("ignore", said)
             import numba
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise InputError(f"NUMBA_NUM_THREADS or the like: {said}; correct or unset it") from None
     finally:
         if "yaml" in sys.modules and sys.modules["yaml"] is None:
             del sys.modules["yaml"]
