@@ -77,7 +77,7 @@ def test_variables_of_numba_change_nothing(name, job, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", ["0", "many", "-1", "9" * 400])
 def test_a_number_of_threads_that_is_none_is_one_line(number, job, tmp_path):
-    line = f"kerfpath plan small.toml --out {tmp_path}"
+    line = f"kerfpath --quiet plan small.toml --out {tmp_path}"
     done = shell(line, cwd=job, NUMBA_NUM_THREADS=number)
     assert done.returncode == 2
     assert done.stderr.startswith("kerfpath: error: NUMBA_NUM_THREADS")
