@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["WORDS", "Edit", "Words", "edits"]
+__all__ = ["WORDS", "Edit", "Words", "edits", "idle_at", "is_remark", "numbered"]
 
 NUMBER = re.compile(r"(?<![\w.])-?\d*\.?\d+(?![\w.]|E)")
 FACTORS = (0.0, 0.5, 0.9, 1.1, 2.0, 10.0, 30.0, 100.0)
@@ -138,7 +138,7 @@ def edits(files: Mapping[str, str], language: str, rng: np.random.Generator) -> 
         if made is None:
             continue
         kind, line, changed, idle, said = made
-        text = _numbered(changed, language)
+        text = numbered("\n".join([*changed, ""]), language)
         if text.split() == files[name].split():
             continue
         end = "\r\n" if "\r\n" in files[name] else "\n"
@@ -166,9 +166,8 @@ Made = tuple[str, int, list[str], bool, str] | None
 """Kind of the edit, its line, all lines, whether it is idle, and what was changed in words."""
 
 
-def _numbered(lines: list[str], language: str) -> str:
+def numbered(text: str, language: str) -> str:
     """Return a text as the editor of the controller saves it: FANUC's renumbers the lines."""
-    text = "\n".join([*lines, ""])
     if language != "fanuc":
         return text
     count = 0
@@ -182,7 +181,7 @@ def _numbered(lines: list[str], language: str) -> str:
     return re.sub(r"(LINE_COUNT\s*= )\d+", rf"\g<1>{count}", text)
 
 
-def _is_remark(line: str, words: Words) -> bool:
+def is_remark(line: str, words: Words) -> bool:
     """Return whether a line has no effect, or only through what the reader makes of the moves."""
     whole = (words.remark, *words.held, *(p for p in words.idle if not p.startswith(".*")))
     return any(re.fullmatch(pattern, line) for pattern in whole)
@@ -198,13 +197,13 @@ def _same_kind(one: str, two: str, words: Words) -> bool:
 
 def _delete(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
     k = _line(lines, rng)
-    idle = _is_remark(lines[k], words)
+    idle = is_remark(lines[k], words)
     return "line deleted", k, [*lines[:k], *lines[k + 1 :]], idle, lines[k].strip()
 
 
 def _double(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
     k = _line(lines, rng)
-    idle = _is_remark(lines[k], words) or _same_kind(lines[k], lines[k], words)
+    idle = is_remark(lines[k], words) or _same_kind(lines[k], lines[k], words)
     return "line doubled", k, [*lines[: k + 1], *lines[k:]], idle, lines[k].strip()
 
 
@@ -212,8 +211,8 @@ def _move(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
     k, to = _line(lines, rng), _line(lines, rng)
     rest = [*lines[:k], *lines[k + 1 :]]
     between = rest[min(k, to) : max(k, to)]
-    idle = _is_remark(lines[k], words) or all(
-        _same_kind(lines[k], line, words) or _is_remark(line, words) for line in between
+    idle = is_remark(lines[k], words) or all(
+        _same_kind(lines[k], line, words) or is_remark(line, words) for line in between
     )
     return "line moved", k, [*rest[:to], lines[k], *rest[to:]], idle, lines[k].strip()
 
@@ -221,9 +220,7 @@ def _move(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
 def _swap(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
     k = _line(lines[:-1], rng)
     one, two = lines[k : k + 2]
-    idle = (
-        one == two or _same_kind(one, two, words) or any(_is_remark(x, words) for x in (one, two))
-    )
+    idle = one == two or _same_kind(one, two, words) or any(is_remark(x, words) for x in (one, two))
     return "lines swapped", k, [*lines[:k], two, one, *lines[k + 2 :]], idle, one.strip()
 
 
@@ -231,7 +228,7 @@ def _copy(lines: list[str], words: Words, rng: np.random.Generator) -> Made:
     """Copy a line elsewhere: one more move, wait, switch or call."""
     k, to = _line(lines, rng), _line(lines, rng)
     beside = lines[max(to - 1, 0) : to + 1]
-    idle = _is_remark(lines[k], words) or any(_same_kind(lines[k], x, words) for x in beside)
+    idle = is_remark(lines[k], words) or any(_same_kind(lines[k], x, words) for x in beside)
     return "line inserted", to, [*lines[:to], lines[k], *lines[to:]], idle, lines[k].strip()
 
 
@@ -243,13 +240,13 @@ def _number(
     if not found:
         return None
     match = found[int(rng.integers(len(found)))]
-    return k, match, _idle_at(lines[k], match.start(), words)
+    return k, match, idle_at(lines[k], match.start(), words)
 
 
-def _idle_at(line: str, at: int, words: Words) -> bool:
+def idle_at(line: str, at: int, words: Words) -> bool:
     """Return whether the text at a place of a line has no effect."""
     said = [match for pattern in words.idle if (match := re.fullmatch(pattern, line))]
-    return _is_remark(line, words) or any(m.start(1) <= at < m.end(1) for m in said)
+    return is_remark(line, words) or any(m.start(1) <= at < m.end(1) for m in said)
 
 
 def _with_number(lines: list[str], k: int, match: re.Match[str], value: float) -> list[str]:
@@ -317,7 +314,7 @@ def _taken(
         kind,
         k,
         [*lines[:k], changed, *lines[k + 1 :]],
-        _idle_at(lines[k], match.start(), words),
+        idle_at(lines[k], match.start(), words),
         said,
     )
 

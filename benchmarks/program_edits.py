@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from benchmarks._character_edits import character_edits, harmless_edits
 from benchmarks._figures import Report, Sheet
 from benchmarks._program_edits import edits
 from benchmarks._program_faults import faults
@@ -34,8 +35,8 @@ COLUMNS = (
     "harm: caught", "refused", "passed", "harmless: passed", "not", "not of our making", "either",
 )  # fmt: skip
 """Columns of the tables: edits that do harm, harmless ones, unreadable ones, and undecided ones."""
-EDITS = 300
-"""Number of edits of the text in every language."""
+EDITS, CHARACTERS, HARMLESS = 300, 1000, 60
+"""Numbers of edits of the text, of its characters, and of harmless ones in every language."""
 ARMS = {"inform": "yaskawa_gp25", "urscript": "ur_ur10e"}
 """Robots for languages that cannot express the axes of the one below."""
 ARM = "abb_irb4600_60_205"
@@ -124,7 +125,11 @@ in each language for {arm}, and for {others}. Its program is spoilt in two ways,
 audited by the job. Faults: every fault of `_program_faults` (the laser on with the retract, a wait
 in the cut, an approach from afar, ...) is put into the neutral program and written out, so that it
 is an edit in each language that can say it; each does harm. Edits: {edits} edits of the text by the
-grammar of `_program_edits`, whose oracle says which do harm. Caught: the audit has a finding.
+grammar of `_program_edits`, whose oracle says which do harm. Characters: {characters} edits of
+how the text is spelled (`_character_edits`: control characters, foreign digits, letters and blanks,
+numbers of other languages, lines commented out, quoted, broken, joined or too long); each does harm
+by a model of where remarks begin and end. Harmless: {harmless} edits that people and pendants make
+all the time. Caught: the audit has a finding.
 Refused: no program of the job's making, with file and line. Passed: neither. Not of our making: the
 reader does not take the text, so that the oracle has nothing to judge. Either: another text of the
 same motion, or a move within what the job allows; it may pass."""
@@ -236,6 +241,17 @@ class Tally:
             if files != subject.files:
                 self.add(subject, fault.kind, "", "harmful", files)
 
+    def try_characters(
+        self, subject: Subject, rng: np.random.Generator, count: int, *, harmless: bool = False
+    ) -> None:
+        """Make `count` edits of the characters, which do harm or are `harmless`; audit each."""
+        make = harmless_edits if harmless else character_edits
+        for edit in islice(make(subject.files, subject.language.name, rng), count):
+            said = f"{edit.file}, line {edit.line}: {edit.said[:80]!r}"
+            kind = f"{'harmless' if harmless else 'characters'}: {edit.kind}"
+            judged = "harmless" if harmless else "harmful"
+            self.add(subject, kind, said, judged, edit.files)
+
     def try_edits(self, subject: Subject, rng: np.random.Generator, count: int) -> None:
         """Make `count` edits of the text, and audit each."""
         before = subject.read(subject.files)
@@ -306,17 +322,22 @@ def _draw(path: Path) -> None:
 
 def run(*, quick: bool = False) -> Report:
     """Return the results of faults and edits, by language and by kind."""
-    count = 50 if quick else EDITS
+    share = 0.2 if quick else 1.0
+    edits_made, characters, harmless = (round(share * n) for n in (EDITS, CHARACTERS, HARMLESS))
     others = " and ".join(f"{arm} ({name})" for name, arm in ARMS.items())
     all_of_them, rows = Tally(), []
     with tempfile.TemporaryDirectory() as folder:
         for number, subject in enumerate(subjects(Path(folder))):
-            for what in ("faults", "edits"):
+            for what in ("faults", "edits", "characters", "harmless"):
                 rng, tally = np.random.default_rng(number), Tally()
                 if what == "faults":
                     tally.try_faults(subject, rng)
+                elif what == "edits":
+                    tally.try_edits(subject, rng, edits_made)
+                elif what == "characters":
+                    tally.try_characters(subject, rng, characters)
                 else:
-                    tally.try_edits(subject, rng, count)
+                    tally.try_characters(subject, rng, harmless, harmless=True)
                 rows.append([subject.language.name, what, *map(str, _row(tally))])
                 all_of_them.counts.update(tally.counts)
                 all_of_them.told.update(tally.told)
@@ -325,7 +346,9 @@ def run(*, quick: bool = False) -> Report:
     told = all_of_them.told
     return Report(
         title="Edited programs",
-        how=HOW.format(arm=ARM, others=others, edits=count),
+        how=HOW.format(
+            arm=ARM, others=others, edits=edits_made, characters=characters, harmless=harmless
+        ),
         sheets=[
             Sheet(columns=("language", "what", *COLUMNS), rows=rows, words=2),
             Sheet(

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from benchmarks import program_edits
 
-FAULTS, EDITS = 6, 8
-"""One fault in so many, and so many edits of the text, for each; the benchmark makes all."""
+FAULTS, EDITS, CHARACTERS, HARMLESS = 6, 8, 60, 15
+"""One fault in so many, and so many edits of the text, of its characters, and harmless ones, for
+each; the benchmark makes more."""
 LANGUAGES = ("csv", "fanuc", "inform", "krl", "rapid", "ros", "urscript", "val3")
 RESETS = {
     "rapid": r"SetDO doGas,0;",
@@ -43,6 +44,24 @@ def test_no_fault_and_no_edit_that_does_harm_passes(subjects, language):
     assert tally.of("harmful") > 60 / FAULTS
     tally.try_edits(subject, np.random.default_rng(number), EDITS)
     assert tally.wrong == []
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_no_edit_of_characters_that_does_harm_passes(subjects, language):
+    tally = program_edits.Tally()
+    rng = np.random.default_rng(LANGUAGES.index(language))
+    tally.try_characters(subjects[language], rng, CHARACTERS)
+    assert tally.of("harmful") == CHARACTERS
+    assert tally.wrong == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_edits_that_people_make_all_the_time_pass(subjects, language):
+    tally = program_edits.Tally()
+    rng = np.random.default_rng(LANGUAGES.index(language))
+    tally.try_characters(subjects[language], rng, HARMLESS, harmless=True)
+    assert tally.of("harmless", "passed") == HARMLESS, tally.wrong
 
 
 def without_each(files, pattern):

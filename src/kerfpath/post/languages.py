@@ -451,9 +451,14 @@ def number(value: float, decimals: int) -> str:
     return f"{round(float(value), decimals) + 0.0:.{decimals}f}"
 
 
+LONGEST_TEXT = 200
+"""Characters of a remark; lines of programs are short enough for every controller."""
+
+
 def plain(text: str) -> str:
-    """Return `text` on one line, in the characters that every controller reads."""
-    return re.sub(r"[^ -~]", "?", text)
+    """Return `text` on one line, cut if long, in the characters that every controller reads."""
+    text = re.sub(r"[^ -~]", "?", text)
+    return text if len(text) <= LONGEST_TEXT else f"{text[: LONGEST_TEXT - 3]}..."
 
 
 # -----------------------------------------------------------------------------

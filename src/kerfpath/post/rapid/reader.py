@@ -270,7 +270,10 @@ class _Reader(Aggregates):
         if held is not True or not isinstance(load, list) or len(load) != 6:
             raise self.fault("expected a tool held by the robot, with its load")
         mass, centre, axes, *inertia = load
-        self.require_load(float(self.numbers([mass, *inertia], 4)[0]))
+        said = self.numbers([mass, *inertia], 4)
+        if said[0] < 0 and said[0] != -1:  # which stands for a load not known
+            raise self.fault(f"expected a load of 0 kg or more, got {said[0]:g}")
+        self.require_load(float(said[0]))
         self.numbers(centre, 3)
         self.numbers(axes, 4)
         self.declare("tool", name, self.pose(pose))

@@ -187,7 +187,7 @@ class _Reader(LineReader):
             raise self.fault("speed and acceleration must be above 0")
         self.require_acceleration(a, self.settings.acceleration)
         for signal, (point, near, on) in armed.items():
-            if point != target:
+            if [*map(float, point)] != [*map(float, target)]:
                 raise self.fault(f"the {signal} is switched ahead of another point than the target")
             self.leads[signal] = time_ahead(near, v, a, stops=r == 0), on
         kind: MoveKind = "linear" if via is None else "circular"

@@ -13,7 +13,7 @@ from kerfpath.arrays import Array, freeze
 from kerfpath.errors import InputError
 from kerfpath.post.arcs import faceplate, from_euler, world
 from kerfpath.post.flow import section_of
-from kerfpath.post.harmless import LinePattern, compact
+from kerfpath.post.harmless import LinePattern, compact, harmless_lines
 from kerfpath.post.line_reader import BLANK, LineReader, patterns, program_lines, statements
 from kerfpath.post.program import PARTNERS, SIGNALS, Await, Partner, Switch
 from kerfpath.post.read_program import FlowStep, MoveKind, ReadMove, ReadOff, ReadProgram
@@ -331,9 +331,11 @@ class _Project:
         return code
 
     def statements(self, code: Element) -> list[tuple[int, str]]:
-        """Return the lines of a routine without remarks, with their numbers."""
+        """Return the lines of a routine that do something, with their numbers."""
         lines = program_lines(code.file, code.quoted[0], code.line)[1:-1]
-        return statements(lines, "//", code.line + 1)
+        harmless = harmless_lines("val3")
+        found = statements(lines, "//", code.line + 1)
+        return [(number, row) for number, row in found if not harmless.fullmatch(row)]
 
     def calls(self, start: Element) -> list[tuple[int, str, str]]:
         """Return what start() calls: line, alias of the library or nothing, routine."""
