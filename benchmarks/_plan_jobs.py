@@ -98,6 +98,47 @@ spacing_mm = 2.5
 gamma_step_deg = 8
 feed = "dip"
 """,
+    # A rail under the robot and a table under the part.
+    "external": _HEAD.replace(
+        "[tool]\n",
+        """\
+[[robot.external]]
+name = "rail"
+kind = "linear"
+carries = "robot"
+axis = [0, 1, 0]
+lower_mm = -400
+upper_mm = 400
+velocity_mm_s = 1000
+acceleration_mm_s2 = 2000
+[[robot.external]]
+name = "table"
+kind = "rotary"
+carries = "part"
+axis = [0, 0, 1]
+point_mm = [1200, -100, 450]
+lower_deg = -60
+upper_deg = 60
+velocity_deg_s = 60
+acceleration_deg_s2 = 120
+[tool]
+""",
+    )
+    + """\
+[[contour]]
+pick = "0/hole1"
+speed_m_min = 3
+spacing_mm = 4
+[[contour]]
+pick = "0/outer"
+name = "trim"
+speed_m_min = 6
+spacing_mm = 8
+[plan]
+gamma_step_deg = 10
+[program]
+language = "none"
+""",
     # Four pieces on nodes that divide the intervals.
     "pieces": _HEAD.replace("[4, 6]", "[]")
     + """\

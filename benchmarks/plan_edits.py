@@ -29,7 +29,7 @@ EDITS = 3000
 """Number of edits of each job."""
 SEED = 14
 HOW = (
-    "Every value of four small plan.json files, and values of their jobs, edited by a seeded "
+    "Every value of five small plan.json files, and values of their jobs, edited by a seeded "
     "grammar; an oracle that owes the audit nothing says which edits are harmless. Counted is what "
     "the audit with the job makes of them: a finding (caught), bad input (refused), or nothing."
 )
@@ -59,6 +59,12 @@ JOB_EDITS: tuple[tuple[str, str], ...] = (
     ("endless = [4, 6]", "endless = [6]"),
     ("endless = []", "endless = [6]"),
     ("gamma_step_deg = 6", "gamma_step_deg = 3"),
+    ("upper_mm = 400", "upper_mm = 1"),
+    ("velocity_mm_s = 1000", "velocity_mm_s = 1"),
+    ("acceleration_deg_s2 = 120", "acceleration_deg_s2 = 1"),
+    ("axis = [0, 1, 0]", "axis = [1, 0, 0]"),
+    ("point_mm = [1200, -100, 450]", "point_mm = [1200, -90, 450]"),
+    ('carries = "robot"', 'carries = "part"'),
     ("near_miss_mm = 5", "near_miss_mm = 6"),
     ("size_mm = [300, 300, 50]", "size_mm = [300, 300, 190]"),
     ("tilt_deg = 3", "tilt_deg = 0.1"),
@@ -168,7 +174,7 @@ def judged_all(made: Iterable[tuple[Path, Path]], count: int, seed: int) -> Tall
 
 
 def run(*, quick: bool) -> Report:
-    """Edit the plan.json files of four jobs, and the jobs."""
+    """Edit the plan.json files of the jobs, and the jobs."""
     count = 100 if quick else EDITS
     with tempfile.TemporaryDirectory() as folder:
         tally = campaign(Path(folder), JOBS, count, SEED)

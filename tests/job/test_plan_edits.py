@@ -7,14 +7,25 @@ from functools import lru_cache, partial
 import numpy as np
 import pytest
 from benchmarks import _plan_jobs, plan_edits
+from tests.arms import job_of_arm
 
 import kerfpath
 from commands import run
+from jobs import DEMO, SMALL
 from kerfpath.errors import InputError
-from kerfpath.job import Audit, audit_file, prepare, read_job, read_plan_file
+from kerfpath.job import (
+    Audit,
+    audit_file,
+    plan_file_text,
+    prepare,
+    read_job,
+    read_plan_file,
+    run_job,
+)
 
+DEFAULTS = ("metric", "retract_mm", "path_tolerance_mm")
 EDITS = 25
-"""Of each of four jobs: what a few seconds allow. `python -m benchmarks plan_edits` does 3000."""
+"""Of each of the jobs: what a few seconds allow. `python -m benchmarks plan_edits` does 3000."""
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +53,27 @@ def test_no_harmful_edit_of_a_plan_passes(made):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["part", "cell", "dip", "pieces"])
+def test_no_harmful_edit_of_a_plan_with_torques_passes(tmp_path):
+    shutil.copy(DEMO / "b_pillar.step", tmp_path)
+    hole, rest = SMALL.rsplit("[[contour]]", 1)
+    # Without the values that are the defaults, whose removal from the plan's copy does no harm.
+    text = hole + rest[rest.index("[plan]") :]
+    text = "".join(row for row in text.splitlines(True) if row.split(" = ")[0] not in DEFAULTS)
+    job, plan = tmp_path / "job.toml", tmp_path / "plan.json"
+    job.write_text(job_of_arm(tmp_path, text))
+    outcome = run_job(read_job(job))
+    assert outcome.passed
+    plan.write_text(plan_file_text(outcome))
+    tally = plan_edits.Tally()
+    audit = Audit.of(job)
+    plan_edits.edited_plans(tally, lambda p: audit.audited(p).passed, plan, 2 * EDITS, seed=5)
+    assert tally.passed == []
+    assert tally.broke == []
+    assert tally.total("caught") > EDITS / 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["part", "cell", "dip", "external", "pieces"])
 def test_no_job_edited_since_passes(made, name):
     job, plan = made(name)
     assert audit_file(plan, job).passed
