@@ -102,6 +102,7 @@ def test_a_contour_with_times_of_its_own_is_cut_in_them(cell):
     timed = contour.resample(dt=0.02, speed=0.12)
     made = hand_plan(timed, *cell, speed=0.12)
     made = replace(made, time=timed.time)
-    moves = moves_of(build_program([made]).sections[0], LinearMove)[1:-1]
+    whole = build_program([made], thin_tolerance=0)
+    moves = moves_of(whole.sections[0], LinearMove)[1:-1]
     np.testing.assert_allclose([m.speed for m in moves], np.diff(timed.s) / np.diff(timed.time))
     assert moves[-1].speed < 0.6 * moves[0].speed

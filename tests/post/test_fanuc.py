@@ -268,7 +268,7 @@ def test_arcs_are_one_line_in_two_rows(program):
 
 
 def test_a_contour_longer_than_a_program_is_refused_not_divided(cell):
-    program = build_program([hand_plan(arc(count=250), *cell)])
+    program = build_program([hand_plan(arc(count=250), *cell)], thin_tolerance=0)
     options = FanucSettings(laser_output=1, lines_per_file=100)
     assert codes(program, "error", "fanuc", options) == ["file-length"]
     with pytest.raises(InputError, match=r"256 lines.* not divided.* lines_per_file"):

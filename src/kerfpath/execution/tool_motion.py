@@ -44,6 +44,8 @@ class ToolMotion:
         Circle of each move, in the part; the normal is zero where the move is straight.
     orientation : {"slerp", "two-angle"}
         How the tool turns between two targets, see `Controller`.
+    stretch : (K-1,), optional
+        Share by which each move takes longer because of the controller's cycle, in `duration`.
 
     Attributes
     ----------
@@ -59,6 +61,7 @@ class ToolMotion:
     centre: Array
     normal: Array
     orientation: Orientation = "slerp"
+    stretch: Array | None = None
     time: Array = field(init=False)
     sweep: Array = field(init=False)
     _along: Array = field(init=False, repr=False)
@@ -105,12 +108,14 @@ class ToolMotion:
         angle = np.max([np.linalg.norm(part, axis=1) for part in parts], axis=0)
         duration = np.maximum(length / speed, angle / controller.turning_speed)
         duration = np.maximum(duration, SHORTEST)
+        stretch = controller.stretch(duration)
+        duration = duration * (1 + stretch)
         zone = np.array([controller.zone(move.zone, move.speed) for move in moves[:-1]])
         fastest = length / duration
         half = zone / np.maximum(np.maximum(fastest[:-1], fastest[1:]), 1e-12)
         room = np.minimum(duration[:-1], duration[1:]) / 2
         half = np.append(0.0, np.append(np.minimum(half, room), 0.0))
-        return replace(even, duration=duration, half=half)
+        return replace(even, duration=duration, half=half, stretch=stretch)
 
     @classmethod
     def through(

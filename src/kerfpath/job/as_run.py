@@ -24,7 +24,7 @@ from kerfpath.execution import (
 )
 from kerfpath.job.format import Job
 from kerfpath.plans import Plan
-from kerfpath.post import Controller, Program, build_program
+from kerfpath.post import STRETCHED, Controller, Program, build_program
 
 __all__ = [
     "AsRun",
@@ -111,7 +111,7 @@ def run_judged(job: Job, run: Executed, plan: Plan, path: Contour, why: str = ""
     advice = [f"{row.advice}; {why}".removesuffix("; ") for row in shares]
     kept = [replace(r, level=level, advice=a) for r, a in zip(shares, advice, strict=True)]
     torque = [replace(row, level=level) for row in _torque(run, plan)]
-    rows = (*kept, *unproved, *torque, *_deviations(job, run, plan, path))
+    rows = (*kept, *unproved, *torque, *_deviations(job, run, plan, path), *_cycle(run, plan))
     if np.isnan(run.acceleration_share).any():
         return AsRun(checks=rows)
     timing = timing_of(run, job.robot)
@@ -132,6 +132,29 @@ def _torque(run: Executed, plan: Plan) -> Iterator[Check]:
             node=_node(run, plan, peak.time),
             advice=f"joint {peak.joint + 1} exceeds its limit: go more slowly, or carry less",
         )
+
+
+def _cycle(run: Executed, plan: Plan) -> Iterator[Check]:
+    """Yield the check of the moves that the controller's cycle makes longer than planned."""
+    motion, controller = run.tool_motion, run.controller
+    stretch = motion.stretch
+    if stretch is None or max(controller.shortest, controller.cycle) <= 0:
+        return
+    k, many = int(np.argmax(stretch)), stretch > STRETCHED
+    extra = float((motion.duration * stretch / (1 + stretch)).sum())
+    assumed = "" if controller.shortest_given else ", which is assumed; set shortest_move_ms"
+    yield Check(
+        code="cycle-as-run",
+        title="time by which the controller's cycle stretches a move",
+        value=float(stretch[k]),
+        limit=STRETCHED,
+        unit="share",
+        node=_node(run, plan, float(motion.time[k + 1])),
+        level="error" if controller.shortest_given else "warning",
+        advice=f"{int(many.sum())} of {len(stretch)} moves are too short for it, and the cut takes "
+        f"{extra:.3g} s longer than planned (shortest move {controller.shortest * 1e3:g} ms"
+        f"{assumed}): raise spacing_mm or thin_mm, or lower the speed",
+    )
 
 
 def _speed(run: Executed, plan: Plan, timing: Timing) -> Check:

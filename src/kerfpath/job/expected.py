@@ -28,6 +28,7 @@ from kerfpath.post import (
     Rules,
     Step,
     build_program,
+    may_replace,
     read_as_written,
 )
 from kerfpath.retime import feed, retime
@@ -504,7 +505,7 @@ def nodes_at_targets(job: Job, candidate: Candidate, cut: ReadCut, s: Array) -> 
     """
     nodes, dt, parts = candidate.nodes, candidate.dt, job.options.refine_parts
     targets = cut.ends
-    if parts > 1 and len(targets) > len(nodes):
+    if parts > 1 and _on_parts(nodes.s, s[targets], parts):
         nodes, dt = divide_nodes(candidate.path, nodes, parts), dt / parts
     if len(targets) == len(nodes):
         at = np.arange(len(nodes))
@@ -512,13 +513,51 @@ def nodes_at_targets(job: Job, candidate: Candidate, cut: ReadCut, s: Array) -> 
         at = np.abs(nodes.s[None] - s[targets][:, None]).argmin(axis=1)
     arc = np.array([move.kind == "circular" for move in cut.targets])
     step = np.diff(at, prepend=-1)
+    left_out = _left_out(job, nodes, dt, at, ~arc)
+    kept = np.ones(len(nodes), dtype=bool)
+    for last in np.flatnonzero(left_out).tolist():
+        kept[at[last - 1] + 1 : at[last]] = False
     return TargetNodes(
-        nodes=nodes,
-        time=dt * np.arange(len(nodes), dtype=np.float64),
-        at=at,
+        nodes=nodes if kept.all() else _only(nodes, kept),
+        time=dt * np.flatnonzero(kept).astype(np.float64),
+        at=np.cumsum(kept)[at] - 1,
         off=np.linalg.norm(cut.T_part_tip[targets, :3, 3] - nodes.points[at], axis=1),
-        alone=np.where(arc, step < 1, step != 1),
+        alone=np.where(arc, step < 1, (step != 1) & ~left_out),
     )
+
+
+def _on_parts(s: Array, targets: Array, parts: int) -> bool:
+    """Return whether targets, at arc lengths (m,) m, are at parts of the intervals of nodes s."""
+    if len(targets) > len(s):
+        return True
+    at = np.interp(targets, s, np.arange(len(s)))
+    return bool(np.abs(at - np.round(at)).max() > 1 / (2 * parts))
+
+
+def _left_out(job: Job, nodes: Contour, dt: float, at: Ints, straight: Bools) -> Bools:
+    """Return which moves, each to the node `at` (m,), may leave out nodes, as they are too short.
+
+    The nodes are `dt` (s) apart, and the laser does not change there. How far they are from the
+    path with the targets alone is audited.
+    """
+    program = job.program
+    found = np.zeros(len(at), dtype=bool)
+    if program.thin_tolerance <= 0:
+        return found
+    controller = program.rules.controller
+    micro = [kind == "micro joint" for kind in nodes.kinds]
+    for j in (np.flatnonzero(straight[1:] & (np.diff(at) > 1)) + 1).tolist():
+        one = len(set(micro[at[j - 1] : at[j]])) == 1
+        found[j] = one and may_replace(controller, dt, int(at[j] - at[j - 1]))
+    return found
+
+
+def _only(nodes: Contour, kept: Bools) -> Contour:
+    """Return the contour through some of its nodes."""
+    return Contour(
+        nodes.points[kept], nodes.axes[kept], s=nodes.s[kept], kind=nodes.kind[kept],
+        name=nodes.name,
+    )  # fmt: skip
 
 
 def expect_program(
@@ -538,8 +577,8 @@ def expect_program(
     rules, options = job.program.rules, job.program
     plans = [whole_cut(job, cut, requested, plan) for cut, requested, plan in cuts]
     moves = _moves(job, [cut for cut, _, _ in cuts], plans, home)
-    # Arcs are added below, where they were read.
-    program = build_program(plans, options, moves=moves, arc_tolerance=None)
+    # Arcs are added below, where they were read; nodes left out are no nodes of the plans.
+    program = build_program(plans, options, moves=moves, arc_tolerance=None, thin_tolerance=0.0)
     sections = []
     for section, (cut, requested, _) in zip(program.sections, cuts, strict=True):
         steps = [

@@ -117,6 +117,13 @@ def touch_up(
     _require_kind(job, file)
     part = job.read_part()
     groups, notes = _read_edits(program, job, file)
+    for p, group in zip(file.plans, groups, strict=True):
+        if len(group.path) != len(p.contour) + 1:
+            raise InputError(
+                f"{program}: contour {p.name!r} has {len(group.path) - 1} targets for "
+                f"{len(p.contour)} nodes, so that it cannot be touched up; write thin_mm = 0 in "
+                "[program] and make the program again"
+            )
     targets = [
         _taught(p, group.path[: len(p.contour)])
         for p, group in zip(file.plans, groups, strict=True)

@@ -29,6 +29,7 @@ from kerfpath.post.folder import write_set as write_set
 from kerfpath.post.joint_trajectory import joint_trajectory as joint_trajectory
 from kerfpath.post.languages import ENTRY_POINTS as ENTRY_POINTS
 from kerfpath.post.languages import PLAIN as PLAIN
+from kerfpath.post.languages import STRETCHED as STRETCHED
 from kerfpath.post.languages import Controller as Controller
 from kerfpath.post.languages import Formatter as Formatter
 from kerfpath.post.languages import Language as Language
@@ -80,6 +81,7 @@ from kerfpath.post.read_program import ReadSection as ReadSection
 from kerfpath.post.read_program import ReadStep as ReadStep
 from kerfpath.post.read_program import ReadWait as ReadWait
 from kerfpath.post.read_program import with_tips as with_tips
+from kerfpath.post.thinning import may_replace as may_replace
 from kerfpath.post.writer import ProgramText as ProgramText
 from kerfpath.post.writer import post as post
 from kerfpath.post.writer import post_and_read as post_and_read

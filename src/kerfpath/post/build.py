@@ -30,6 +30,7 @@ from kerfpath.post.program import (
     Switch,
     Wait,
 )
+from kerfpath.post.thinning import Thinning
 from kerfpath.robots import ExternalAxis, Robot, carried, posture_name
 from kerfpath.transfer import End, TransferMove, back_off, least_time, speed_share
 
@@ -341,11 +342,19 @@ def build_program(
         air_checked=len(moves) > 0 and all(move.clear for move in moves),
         caveats=(CAPSULES,) if any(UNPROVED in plan.proof.statement for plan in plans) else (),
     )
-    if options.arc_tolerance is None:
+    if options.arc_tolerance is not None:
+        eta_v = min(plan.settings.eta_v for plan in plans)
+        eta_a = min(plan.settings.eta_a for plan in plans)
+        program = with_arcs(program, options.arc_tolerance, eta_v=eta_v, eta_a=eta_a)
+    if options.language == "none":
         return program
-    eta_v = min(plan.settings.eta_v for plan in plans)
-    eta_a = min(plan.settings.eta_a for plan in plans)
-    return with_arcs(program, options.arc_tolerance, eta_v=eta_v, eta_a=eta_a)
+    thinning = Thinning(
+        controller=options.rules.controller,
+        tolerance=options.thin_tolerance,
+        zone=options.zone,
+        zone_error=options.zone_error,
+    )
+    return thinning.of(program)
 
 
 def _steps(plan: Plan, way: Iterable[JointMove], options: ProgramOptions) -> Iterator[Step]:

@@ -7,10 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kerfpath.arrays import Array
 from kerfpath.errors import InputError
 from kerfpath.losses import Loss, Reason
 from kerfpath.post.arcs import distances
 from kerfpath.post.languages import (
+    STRETCHED,
     Language,
     LanguageSettings,
     Rules,
@@ -21,8 +23,10 @@ from kerfpath.post.languages import language as find_language
 from kerfpath.post.program import (
     SIGNALS,
     Await,
+    CircularMove,
     JointMove,
     LinearMove,
+    Move,
     Program,
     ProgramIssue,
     Request,
@@ -32,6 +36,8 @@ from kerfpath.post.program import (
     switches_of,
 )
 
+SHORTEST = 1e-9
+"""Shortest time (s) of a move whose stretch is computed."""
 LARGEST_JOINT_STEP = np.pi
 """Joint step (rad) from which the short way round is no longer unique."""
 LARGEST_ORIENTATION_STEP = np.pi / 2
@@ -308,6 +314,7 @@ def _check_motion(program: Program, section: Section, rules: Rules) -> Iterator[
             f"{np.degrees(most):g} deg/s; the controller will slow the tip down",
             section.name,
         )
+    yield from _check_shortest(section, lengths, rules)
     near = np.minimum(np.append(lengths, np.inf), np.append(np.inf, lengths))
     zone = np.array([move.zone for move in moves])
     if overlaps := int((zone > near / 2 * (1 + ROUNDING)).sum()):
@@ -319,6 +326,42 @@ def _check_motion(program: Program, section: Section, rules: Rules) -> Iterator[
             section.name,
         )
     yield from _check_lead_times(section, lengths.tolist())
+
+
+def _check_shortest(section: Section, lengths: Array, rules: Rules) -> Iterator[ProgramIssue]:
+    """Check that the controller's cycle does not stretch moves of the path."""
+    controller, moves = rules.controller, section.moves[1:]
+    took = np.array(
+        [
+            move.duration if isinstance(move, CircularMove) else length / max(move.speed, 1e-9)
+            for move, length in zip(moves, lengths.tolist(), strict=True)
+            if isinstance(move, LinearMove)
+        ]
+    )
+    number = [k for k, move in enumerate(moves, 1) if isinstance(move, LinearMove)]
+    stretch = controller.stretch(np.maximum(took, SHORTEST))
+    found = np.flatnonzero(stretch > STRETCHED)
+    if not found.size:
+        return
+    k = int(found[np.argmax(stretch[found])])
+    last = number[k]
+    extra = float((took * stretch)[found].sum())
+    at = f"x, y, z = {', '.join(f'{x * 1e3:.1f}' for x in _end(moves[last - 1]))} mm"
+    assumed = "" if controller.shortest_given else " (assumed; set shortest_move_ms)"
+    yield ProgramIssue(
+        "error" if controller.shortest_given else "warning",
+        "short-move",
+        f"{len(found)} of {len(took)} moves of the path are too short for the controller{assumed}: "
+        f"it takes {extra:.3g} s longer than planned, and may stop with the beam on. The worst, to "
+        f"{at}, lasts {took[k] * 1e3:.3g} ms and takes {took[k] * (1 + stretch[k]) * 1e3:.3g} ms; "
+        "raise spacing_mm or thin_mm, or lower the speed",
+        f"{section.name}, move {last}",
+    )
+
+
+def _end(move: Move) -> Array:
+    assert isinstance(move, LinearMove)
+    return move.T_part_tip[:3, 3]
 
 
 def _check_lead_times(section: Section, lengths: list[float]) -> Iterator[ProgramIssue]:

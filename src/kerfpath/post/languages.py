@@ -54,6 +54,12 @@ joints move evenly from one target to the other, and the first three keep the ti
 """
 
 
+STRETCHED = 0.1
+"""Share by which moves may take longer than planned before that is reported."""
+CYCLE_NOISE = 1e-6
+"""Share by which a time may exceed whole cycles because of rounding."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Controller:
     """Properties of a controller that decide how it runs the path of a program.
@@ -72,6 +78,12 @@ class Controller:
         The same as a time at the programmed speed.
     assumed : str
         What is assumed of its corners, because the settings do not give it; empty if nothing is.
+    shortest : float s
+        Shortest time of a move of the path: a shorter one takes as long.
+    cycle : float s
+        Moves of the path take whole multiples of it; 0: any time.
+    shortest_given : bool
+        Whether the settings give the shortest time, or it is assumed.
     """
 
     turning_speed: float = np.inf
@@ -79,8 +91,18 @@ class Controller:
     corner: float | None = None
     corner_time: float | None = None
     assumed: str = ""
+    shortest: float = 0.0
+    cycle: float = 0.0
+    shortest_given: bool = False
 
     __repr__ = short_repr
+
+    def stretch(self, time: Array) -> Array:
+        """Return the share by which moves take longer than the times (m,) s that are asked for."""
+        longer = np.maximum(time, self.shortest)
+        if self.cycle > 0:
+            longer = self.cycle * np.ceil(longer / self.cycle * (1 - CYCLE_NOISE))
+        return np.asarray(np.maximum(longer, time) / time - 1)
 
     @property
     def rounds_by_itself(self) -> bool:
@@ -123,6 +145,19 @@ def numbered(port: str, most: int, least: int = 1) -> Any:
 LinesPerFile = Annotated[
     int, setting("a whole number of lines from 100 to 1000000", "5000", ge=100, le=1_000_000)
 ]
+
+
+ShortestMove = Annotated[
+    float | None,
+    setting("the shortest time of a move of the path, 0 to 1000, in ms", "12.0", ge=0, le=1000),
+]
+"""The controller's own; without it a value is assumed, and moves below it are warned of."""
+
+
+def shortest_move(said_ms: float | None, assumed_ms: float) -> dict[str, Any]:
+    """Return the shortest move of a `Controller` from a setting, or what is assumed without it."""
+    shortest_ms = assumed_ms if said_ms is None else said_ms
+    return {"shortest": shortest_ms * 1e-3, "shortest_given": said_ms is not None}
 
 
 OrientationSetting = Annotated[

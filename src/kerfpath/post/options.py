@@ -26,6 +26,7 @@ class ProgramKeywords(TypedDict, total=False):
     approach_speed: float
     air_speed: float | None
     arc_tolerance: float | None
+    thin_tolerance: float
     handshakes: Sequence[Handshake]
 
 
@@ -131,6 +132,15 @@ class ProgramOptions:
         above=0,
         example="0.01",
         key="arcs_mm",
+    )
+    thin_tolerance: float = setting(
+        0.02,
+        "where moves are too short for the controller, targets are left out if the move in their "
+        "place stays this near; 0: none are left out",
+        unit="mm",
+        least=0,
+        example="0.02",
+        key="thin_mm",
     )
     handshakes: Sequence[Handshake] = setting(
         (),

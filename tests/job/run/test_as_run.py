@@ -8,7 +8,10 @@ import pytest
 from jobs import DEMO, SMALL
 from kerfpath.job import AsRun, audit_file, read_job, run_job, write_result
 
-QUICK = SMALL.replace("[plan]", "[plan]\ncertify = false")
+QUICK = (
+    SMALL.replace("[plan]", "[plan]\ncertify = false")
+    + "\n[program.rapid]\nshortest_move_ms = 12\n"
+)
 
 
 def cuts_of(folder, text):
@@ -25,15 +28,15 @@ def with_program(text):
 def test_the_corners_of_the_program_are_looked_at(tmp_path):
     result = cuts_of(tmp_path, QUICK)
     for cut in result.cuts:
-        velocity, acceleration, tip, axis, speed = cut.as_run.checks
+        velocity, acceleration, tip, axis, cycle, speed = cut.as_run.checks
         assert (velocity.code, acceleration.code) == ("velocity-as-run", "acceleration-as-run")
         criteria = cut.plan.criteria
         # Zones end at 0.49 of the way, and straight moves of the tool bend the joints' way.
         assert velocity.value == pytest.approx(criteria.peak_velocity.max(), rel=0.02)
         assert acceleration.value == pytest.approx(criteria.peak_acceleration.max(), rel=0.1)
         assert all(row.ok for row in cut.as_run.checks)
-        codes = ("tip-as-run", "axis-as-run", "speed-as-run")
-        assert (tip.code, axis.code, speed.code) == codes
+        codes = ("tip-as-run", "axis-as-run", "cycle-as-run", "speed-as-run")
+        assert (tip.code, axis.code, cycle.code, speed.code) == codes
         assert 0 < tip.value < 1e-4
         assert 0 < axis.value < 5e-3
         timing = cut.as_run.timing
@@ -140,10 +143,7 @@ def test_a_program_is_judged_by_the_zones_of_its_text(tmp_path):
     }
 
 
-WRIST = """
-[program.rapid]
-orientation = "wrist"
-"""
+WRIST = 'orientation = "wrist"\n'
 
 
 @pytest.mark.slow

@@ -85,8 +85,11 @@ def test_a_guarantee_asks_for_what_is_stated(tmp_path, language):
     assert rows["acceleration-as-run"].title.endswith("at every instant")
 
 
+NO_CYCLE = "shortest_move_ms = 0\ninterpolation_ms = 0"
+
+
 def test_a_controller_that_hardly_rounds_is_warned_of(tmp_path):
-    result = done(tmp_path, "fanuc", "corner_ms = 60.0\ncnt_percent = 1")
+    result = done(tmp_path, "fanuc", f"corner_ms = 60.0\ncnt_percent = 1\n{NO_CYCLE}")
     row = rows_of(result)["acceleration-as-run"]
     assert not row.ok
     assert row.level == "warning"

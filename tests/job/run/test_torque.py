@@ -45,7 +45,9 @@ def test_torques_of_the_motion_as_run_are_in_the_checks(planned, folder):
     assert row.ok
     assert "sampled, without friction and rotors" in row.title
     # By hand: central differences of the joints over the whole run, twenty times as dense.
-    course = longest_run(build_program([cut.plan], job.program)).tool_motion
+    course = longest_run(
+        build_program([cut.plan], job.program), job.program.rules.controller
+    ).tool_motion
     h, time = 1e-4, np.linspace(2e-4, course.time[-1] - 2e-4, 4000)
     nominal = np.stack([np.interp(time, course.time, q) for q in cut.plan.unwrapped.T], axis=1)
     q = [

@@ -28,9 +28,11 @@ from kerfpath.post.languages import (
     OverrideSetting,
     PortSettings,
     Rules,
+    ShortestMove,
     number,
     numbered,
     setting,
+    shortest_move,
 )
 from kerfpath.post.program import JointMove, LinearMove, Move, Program, Section, Step, Switch
 from kerfpath.robots import Robot
@@ -42,6 +44,8 @@ UNITS = {"cm/min": 0.01 / 60, "mm/sec": 1e-3}
 """Units of speeds in m/s; controllers count both in whole numbers."""
 CORNER_MS = 100.0
 """Time before and after a corner in which CNT100 is assumed to round it, if not given."""
+SHORTEST_MS = 16.0
+"""Shortest time (ms) of a move of the path, if the settings give none."""
 LONGEST_LEAD = 30.0
 """Longest time (s) of TB."""
 SPECIAL = re.compile(r"(RSR|PNS|STYLE)\d*|CON|PRN|AUX|NUL|(COM|LPT)\d", re.IGNORECASE)
@@ -98,6 +102,10 @@ class FanucSettings(PortSettings, output=Output, input=Input):
         int, setting("the decimals of mm and deg in positions, 3 to 6", "3", ge=3, le=6)
     ] = 4
     orientation: OrientationSetting = "two-angle"
+    shortest_move_ms: ShortestMove = None
+    interpolation_ms: Annotated[
+        float, setting("the controller's interpolation cycle, 0 to 100, in ms", "8.0", ge=0, le=100)
+    ] = 8.0
     override: OverrideSetting = "full"
 
 
@@ -143,8 +151,10 @@ def rules(settings: FanucSettings) -> Rules:
 
 def _controller(settings: FanucSettings) -> Controller:
     """Return the controller: CNT rounds within a time, whatever zone a program has."""
+    moves = shortest_move(settings.shortest_move_ms, SHORTEST_MS)
+    moves["cycle"] = settings.interpolation_ms * 1e-3
     if settings.corner == "CR":
-        return Controller(orientation=settings.orientation)
+        return Controller(orientation=settings.orientation, **moves)
     full = CORNER_MS if settings.corner_ms is None else settings.corner_ms
     assumed = (
         f"CNT100 is assumed to round from {CORNER_MS:g} ms before a corner to {CORNER_MS:g} ms "
@@ -154,6 +164,7 @@ def _controller(settings: FanucSettings) -> Controller:
         orientation=settings.orientation,
         corner_time=full * 1e-3 * max(settings.cnt_percent, 1) / 100,  # CNT0 rounds, but hardly
         assumed=assumed if settings.corner_ms is None else "",
+        **moves,
     )
 
 

@@ -29,8 +29,10 @@ from kerfpath.post.languages import (
     OrientationSetting,
     PortSettings,
     Rules,
+    ShortestMove,
     numbered,
     setting,
+    shortest_move,
 )
 from kerfpath.post.program import (
     Await,
@@ -50,6 +52,8 @@ from kerfpath.robots import MOST_EXTERNAL, Robot
 # -----------------------------------------------------------------------------
 # Settings of a Yaskawa controller, and rules of its jobs.
 
+SHORTEST_MS = 12.0
+"""Shortest time (ms) of a move of the path, if the settings give none."""
 LEVEL_MM = 12.5
 """Distance from a corner at which a position level is assumed to round it, if not given."""
 SPEED_STEP = 1e-4
@@ -117,6 +121,7 @@ class InformSettings(PortSettings, output=Output, input=Input):
         Literal["B", "R"], setting("the axis whose angle decides flip, B or R", '"R"')
     ] = "B"
     orientation: OrientationSetting = "slerp"
+    shortest_move_ms: ShortestMove = None
     date: Annotated[
         Annotated[str, StringConstraints(pattern=r"^\d{4}/\d\d/\d\d \d\d:\d\d$")],
         setting("a date as YYYY/MM/DD HH:MM", '"2026/11/21 10:00"'),
@@ -165,6 +170,7 @@ def _controller(settings: InformSettings) -> Controller:
         orientation=settings.orientation,
         corner=(LEVEL_MM if length is None else length) * 1e-3,
         assumed=assumed if length is None else "",
+        **shortest_move(settings.shortest_move_ms, SHORTEST_MS),
     )
 
 

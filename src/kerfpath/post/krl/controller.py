@@ -31,10 +31,12 @@ from kerfpath.post.languages import (
     PortSettings,
     PositionerFrame,
     Rules,
+    ShortestMove,
     number,
     numbered,
     plain,
     setting,
+    shortest_move,
 )
 from kerfpath.post.program import JointMove, Program, ProgramIssue
 from kerfpath.robots import MOST_EXTERNAL, Robot
@@ -90,6 +92,8 @@ def posture(robot: Robot, q: Array, settings: object) -> list[tuple[int | str, .
 # Settings of a KUKA controller, and rules of its programs.
 
 AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
+SHORTEST_MS = 12.0
+"""Shortest time (ms) of a move of the path, if the settings give none."""
 LONGEST_NAME = 24
 """Characters of a name."""
 SLOWEST = 1e-5
@@ -154,6 +158,7 @@ class KrlSettings(PortSettings, output=Output, input=Input):
         float, setting("a speed from 1 to 1000, in deg/s ($VEL.ORI1)", "200.0", ge=1, le=1000)
     ] = 200.0
     orientation: OrientationSetting = "two-angle"
+    shortest_move_ms: ShortestMove = None
     override: OverrideSetting = "full"
 
 
@@ -206,6 +211,7 @@ def rules(settings: KrlSettings) -> Rules:
         controller=Controller(
             turning_speed=float(np.radians(settings.turning_speed_deg_s)),
             orientation=settings.orientation,
+            **shortest_move(settings.shortest_move_ms, SHORTEST_MS),
         ),
         longest_lead=LONGEST_LEAD,
     )

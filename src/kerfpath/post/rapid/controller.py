@@ -28,9 +28,11 @@ from kerfpath.post.languages import (
     PortSettings,
     PositionerFrame,
     Rules,
+    ShortestMove,
     number,
     plain,
     setting,
+    shortest_move,
 )
 from kerfpath.robots import MOST_EXTERNAL, Robot
 
@@ -105,6 +107,8 @@ SPEED_STEP = 1e-5
 """Speeds (m/s) have two decimals of mm/s."""
 POINT_STEP, ANGLE_STEP = 0.5e-7, 1e-8
 """Rounding errors of four decimals of mm (m), and of eight decimals of a quaternion (rad)."""
+SHORTEST_MS = 24.0
+"""Shortest time (ms) of a move of the path, if the settings give none."""
 LONGEST_LEAD = 0.5
 r"""Longest lead (s) that ``TriggIO \Time`` takes."""
 
@@ -152,6 +156,7 @@ class RapidSettings(PortSettings, output=Request, input=Input):
     folder: Annotated[Folder, setting("a folder of the controller", '"HOME:"')] = "HOME:"
     work_object: Annotated[Name, setting("a name for the part's frame", '"wPart"')] = "wPart"
     orientation: OrientationSetting = "slerp"
+    shortest_move_ms: ShortestMove = None
     mechanical_units: Units = None
     external_letters: Letters = None
     positioner_frame: PositionerFrame = None
@@ -165,7 +170,11 @@ def rules(settings: RapidSettings) -> Rules:
         speed_step=SPEED_STEP,
         point_step=POINT_STEP,
         angle_step=ANGLE_STEP,
-        controller=Controller(turning_speed=float(TURNING_SPEED), orientation=settings.orientation),
+        controller=Controller(
+            turning_speed=float(TURNING_SPEED),
+            orientation=settings.orientation,
+            **shortest_move(settings.shortest_move_ms, SHORTEST_MS),
+        ),
         longest_lead=LONGEST_LEAD,
     )
 

@@ -28,11 +28,13 @@ from kerfpath.post.languages import (
     OrientationSetting,
     PortSettings,
     Rules,
+    ShortestMove,
     number,
     outputs,
     require_one_file,
     reset_lines,
     setting,
+    shortest_move,
 )
 from kerfpath.post.program import (
     Await,
@@ -156,6 +158,8 @@ def switch_lines(signal: Signal, output: int) -> list[str]:
 
 SPEED_STEP = 1e-6
 """Speeds (m/s) have six decimals."""
+SHORTEST_MS = 8.0
+"""Shortest time (ms) of a move of the path, if the settings give none."""
 FIRST = "first_contour"
 """Number of the contour at which the program begins, for a restart."""
 POINT_STEP, ANGLE_STEP = 0.5e-7, 0.5e-9
@@ -175,6 +179,7 @@ class URScriptSettings(PortSettings, output=Output, input=Input):
         float, setting("a number from 1 to 5000, in deg/s^2", "80", ge=1, le=5000)
     ] = 80.0
     orientation: OrientationSetting = "slerp"
+    shortest_move_ms: ShortestMove = None
 
     @property
     def acceleration(self) -> float:
@@ -207,7 +212,10 @@ def rules(settings: URScriptSettings) -> Rules:
         speed_step=SPEED_STEP,
         point_step=POINT_STEP,
         angle_step=ANGLE_STEP,
-        controller=Controller(orientation=settings.orientation),
+        controller=Controller(
+            orientation=settings.orientation,
+            **shortest_move(settings.shortest_move_ms, SHORTEST_MS),
+        ),
     )
 
 

@@ -18,7 +18,9 @@ from kerfpath.post.languages import (
     OverrideSetting,
     PortSettings,
     Rules,
+    ShortestMove,
     setting,
+    shortest_move,
 )
 from kerfpath.post.program import (
     Program,
@@ -31,6 +33,8 @@ from kerfpath.robots import Robot
 # -----------------------------------------------------------------------------
 # Settings of a Staubli controller, and rules of its programs.
 
+SHORTEST_MS = 12.0
+"""Shortest time (ms) of a move of the path, if the settings give none."""
 LONGEST_NAME = 15
 """Characters of a name."""
 POINT_STEP, ANGLE_STEP = 0.5e-7, float(np.radians(0.5e-6))
@@ -89,6 +93,7 @@ class Val3Settings(PortSettings, output=Output, input=Input):
         setting("the folder of projects, as the controller calls it", '"Disk://"'),
     ] = "Disk://"
     orientation: OrientationSetting = "slerp"
+    shortest_move_ms: ShortestMove = None
     override: OverrideSetting = "full"
     controller: Annotated[Literal["CS8", "CS9"], setting("CS8 or CS9", '"CS8"')] = "CS9"
     version: Annotated[
@@ -123,7 +128,10 @@ def rules(settings: Val3Settings) -> Rules:
         speed_step=SPEED_STEP,
         point_step=POINT_STEP,
         angle_step=ANGLE_STEP,
-        controller=Controller(orientation=settings.orientation),
+        controller=Controller(
+            orientation=settings.orientation,
+            **shortest_move(settings.shortest_move_ms, SHORTEST_MS),
+        ),
     )
 
 
