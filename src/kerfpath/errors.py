@@ -24,10 +24,16 @@ __all__ = [
     "OptionConflict",
     "Relaxation",
     "about",
+    "printable",
 ]
 
 LONGEST, BEGINNING = 600, 420
 """Most characters of a message about bad input; a longer one keeps its beginning and its end."""
+
+
+def printable(text: str) -> str:
+    """Return a text with escapes for the characters that do not print, as direction marks."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 class KerfpathError(Exception):
@@ -51,7 +57,7 @@ class InputError(KerfpathError, ValueError):
 
     def __init__(self, message: str, others: Sequence[str] = (), *, parameter: str = "") -> None:
         self.others, self.parameter = tuple(others), parameter
-        line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)
+        line = printable(message)
         if len(line) > LONGEST:
             line = f"{line[:BEGINNING]} ... {line[BEGINNING + 5 - LONGEST :]}"
         super().__init__(line)

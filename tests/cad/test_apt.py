@@ -230,7 +230,7 @@ REFUSED = {
     "five numbers": (GOOD + "GOTO/1,2,3,4,5\n", "line 6: GOTO: expected 3 or 6 numbers, got 5"),
     "a word for a number": (GOOD + "GOTO/P1,2,3\n", "line 6: GOTO: expected a number, got 'P1'"),
     "an underscore": (GOOD + "GOTO/1_0,2,3\n", "line 6: GOTO: expected a number, got '1_0'"),
-    "infinity": (GOOD + "GOTO/inf,2,3\n", "line 6: GOTO: expected a finite number"),
+    "infinity": (GOOD + "GOTO/inf,2,3\n", "line 6: GOTO: expected a number, got 'INF'"),
     "a circle": (GOOD + "CIRCLE/0,0,0,0,0,1,5,.01,.5,10,0\n", "line 6: 'CIRCLE/.*': a curve; have"),
     "an arc": (GOOD + "TLON,GOFWD/(CIRCLE/0,0,0,5),ON\n", "line 6: 'TLON,GOFWD/.*linear moves"),
     "another arc": (GOOD + "MOVARC/0,0,0,0,0,1,5,ANGLE,90\n", "line 6: 'MOVARC/.*linear moves"),

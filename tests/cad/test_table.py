@@ -135,7 +135,7 @@ BAD = {
     "not a number": (SQUARE.replace("10,20", "1o,20"), "line 4, column x: .*a number, got '1o'"),
     "two commas": (SQUARE.replace("10,20", "10,5,20"), "line 4: expected 6 columns"),
     "thousands": (SQUARE.replace(",", ";").replace("20;", "1.020,5;"), "got '1.020,5'"),
-    "NaN": (SQUARE.replace("10,20", "10,nan"), "line 4, column y: .*finite number, got 'nan'"),
+    "NaN": (SQUARE.replace("10,20", "10,nan"), "line 4, column y: expected a number, got 'nan'"),
     "infinity": (SQUARE.replace("10,20", "10,1e999"), "line 4, column y: .*finite"),
     "far away": (SQUARE.replace("10,20", "10,1e12"), "line 4: a point further than 10 km"),
     "no direction": (SQUARE.replace("20,0,0,0,1", "20,0,0,0,0", 1), "line 4: nx ny nz are all 0"),

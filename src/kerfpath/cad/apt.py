@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -18,7 +19,9 @@ from kerfpath.cad.toolpath import (
     unit_axis,
 )
 from kerfpath.errors import InputError
+from kerfpath.text import upper
 
+BLANK = " \t"
 UNITS = {"MM": "mm", "CM": "cm", "INCHES": "in", "INCH": "in", "IN": "in", "FEET": "ft", "M": "m"}
 TEXTS = ("PARTNO", "PPRINT", "REMARK", "TPRINT")
 """Words that any text may follow, with or without a slash."""
@@ -78,7 +81,7 @@ def _statements(lines: Sequence[str]) -> Iterator[tuple[int, str, str]]:
     """Yield line, major word and rest of each statement, with continued lines joined."""
     begun, whole = 0, ""
     for number, line in enumerate(lines, start=1):
-        bare = line.partition("$$")[0].strip()
+        bare = line.partition("$$")[0].strip(BLANK)
         begun = begun if whole else number
         whole += bare.removesuffix("$")
         if bare and not bare.endswith("$"):
@@ -89,12 +92,11 @@ def _statements(lines: Sequence[str]) -> Iterator[tuple[int, str, str]]:
 
 
 def _split(statement: str) -> tuple[str, str]:
-    upper = statement.upper()
     for word in TEXTS:
-        if upper.startswith(word):
+        if upper(statement).startswith(word):
             return word, statement[len(word) :].lstrip(" /")
     word, _, rest = statement.partition("/")
-    return " ".join(word.upper().split()), rest.strip()
+    return re.sub(f"[{BLANK}]+", " ", upper(word)).strip(BLANK), rest.strip(BLANK)
 
 
 class _Reader:
@@ -120,7 +122,7 @@ class _Reader:
         InputError
             A statement that is not known, or that changes the path.
         """
-        where, values = f"line {line}", [value.strip() for value in rest.upper().split(",")]
+        where, values = f"line {line}", [value.strip(BLANK) for value in upper(rest).split(",")]
         if word in ("GOTO", "FROM"):
             self._goto(where, line, word, values)
         elif word in TEXTS or (word in HARMLESS and "RAPID" not in values):
@@ -188,7 +190,7 @@ class _Reader:
 
     def _begins(self, line: int, word: str, rest: str) -> None:
         if word == "TOOL PATH":
-            self._operation = rest.partition(",")[0].strip()
+            self._operation = rest.partition(",")[0].strip(BLANK)
             self._axis = UPRIGHT if self._is_upright else None
         elif word == "END-OF-PATH":
             self._operation = ""

@@ -44,7 +44,7 @@ from kerfpath.cad.curves import Arc, Curve, Line, Spline
 from kerfpath.cad.left_out import LeftOut
 from kerfpath.cad.part import Part
 from kerfpath.cad.units import LARGEST, MM, UNITS_MM
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, printable
 
 # -----------------------------------------------------------------------------
 # Convert the entities of a DXF that are lines to cut to curves.
@@ -136,6 +136,14 @@ COMMON = frozenset(map(str, (
     430, 440,
 )))  # fmt: skip
 """Codes before the marker, the same for all kinds (DXF reference, common group codes)."""
+CONTROL = re.compile(rb"[\0-\x08\v\f\x0e-\x1f\x7f](?!\s*\Z)|\r(?!\n)")
+"""A control character in a text file, other than the end of file of DOS at its end."""
+UNDERSCORE = re.compile(
+    rb"^[ \t]*(?:[1-9][0-9]|1[1-7][0-9]|2[1-3789][0-9]|3[78][0-9]|4[0-69][0-9]|10[1-7][0-9])"
+    rb"[ \t]*\r?\n[ \t]*[-+]?[0-9.]+_[0-9_.]+(?:[eE][-+]?[0-9_]+)?[ \t]*\r?$",
+    re.MULTILINE,
+)
+"""A code of numbers, then a number with an underscore."""
 DROPPED = re.compile(
     r"(?:Removed|Deleted) (?:[a-zDXF]+ )*([A-Z][A-Z0-9_]+)(?:\(#\w+\))? (?:entity )?(.*)"
 )
@@ -155,6 +163,8 @@ def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, 
     is_binary = content.startswith(BINARY)
     if not (is_binary or b"SECTION" in content[:4096]):
         raise DXFError(f"expected SECTION at its start, got {content[:32]!r}")
+    if not is_binary:
+        _require_text(content)
     stand = Counter(kind.decode() for kind in STANDS.findall(content))
     if stand.total() > MOST:
         raise InputError(f"holds {stand.total()} lines, {TOO_MUCH}")
@@ -170,9 +180,24 @@ def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, 
             auditor: Auditor = document.audit()
         else:
             document, auditor = recover.read(BytesIO(MARKED.sub(_with_markers, content)))
+    if wrong := [message for message in logged if message.startswith("recovered invalid")]:
+        raise InputError(f"the file is damaged: {wrong[0]}; save the drawing as DXF again")
     faults = [*logged, *(fault.message for fault in (*auditor.fixes, *auditor.errors))]
     faults = [" ".join(fault.split())[:200] for fault in faults]
     return document, faults, _lost(document, stand, faults)
+
+
+def _require_text(content: bytes) -> None:
+    """Raise InputError with the line of a control character, or of what Python takes for a number.
+
+    For `float` and `int`, which ezdxf uses, 1_0 is ten.
+    """
+    for pattern, what in ((CONTROL, "a control character"), (UNDERSCORE, "a number with _")):
+        if (found := pattern.search(content)) is not None:
+            line = content.count(b"\n", 0, found.end()) + 1
+            raise InputError(
+                f"the file is damaged: line {line} has {what}; save the drawing as DXF again"
+            )
 
 
 def _with_markers(entity: re.Match[bytes]) -> bytes:
@@ -247,6 +272,13 @@ DEEPEST = 32
 """Deepest nesting of blocks; more means that a block contains itself."""
 FLAT = 1e-6
 """How far (mm) a curve may leave the drawing plane, as writers round numbers."""
+REQUIRED = {
+    "LINE": ("start", "end"),
+    "CIRCLE": ("center", "radius"),
+    "ARC": ("center", "radius", "start_angle", "end_angle"),
+    "ELLIPSE": ("center", "major_axis"),
+}
+"""Attributes without which an entity is damaged, by its kind."""
 NEVER_CUT = frozenset([
     "TEXT", "MTEXT", "ATTDEF", "ATTRIB", "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION",
     "LEADER", "MLEADER", "MULTILEADER", "TOLERANCE", "POINT", "VIEWPORT", "IMAGE", "WIPEOUT",
@@ -304,7 +336,8 @@ def read_dxf(
         path, unit or declared, sheet.strokes, gap=gap, notes=notes, left_out=sheet.summed(),
         axis=axis,
     )  # fmt: skip
-    return replace(part, frames={str(ucs.dxf.name): _frame(ucs, scale) for ucs in document.ucs})
+    frames = {printable(str(ucs.dxf.name)): _frame(ucs, scale) for ucs in document.ucs}
+    return replace(part, frames=frames)
 
 
 def _size(curve: Curve) -> int:
@@ -382,6 +415,9 @@ class _Sheet:
         if isinstance(entity, Insert):
             self._insert(entity, T, look, depth)
             return
+        if missing := [name for name in REQUIRED.get(kind, ()) if not entity.dxf.hasattr(name)]:
+            self.left_out[kind, f"its {missing[0]} is missing"] += 1  # ezdxf has a default for it
+            return
         curves = list(islice(curves_of(entity, T), MOST + 1))
         if not curves:
             self.left_out[kind, "not a line to cut"] += 1
@@ -423,7 +459,7 @@ class _Sheet:
             raise InputError(f"holds more than {MOST} curves and blocks, {TOO_MUCH}")
 
     def _look(self, entity: DXFGraphic, inside: Style) -> Style:
-        layer = inside[0] if entity.dxf.layer == "0" else str(entity.dxf.layer)
+        layer = inside[0] if entity.dxf.layer == "0" else printable(str(entity.dxf.layer))
         if entity.dxf.hasattr("true_color"):
             return layer, "#{:02x}{:02x}{:02x}".format(*int2rgb(entity.dxf.true_color))
         index = int(entity.dxf.color)

@@ -20,7 +20,7 @@ from kerfpath.cad.left_out import LOST, LeftOut, counted, kind_of
 from kerfpath.cad.sewing import sewn_shape
 from kerfpath.cad.shape import NamedFace, NamedShape, failures, list_shapes, occt, require_few_faces
 from kerfpath.cad.units import UNITS_MM
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, printable
 
 FLAGS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm"}
 """Units by the flag of the global section (IGES 5.3, table 2)."""
@@ -176,4 +176,4 @@ def _name(reader: IGESControl_Reader, face: TopoDS_Shape) -> str:
     if not isinstance(entity, IGESData_IGESEntity) or not entity.HasName():
         return ""
     name = entity.NameValue()
-    return "" if name is None else str(name.ToCString()).strip()
+    return "" if name is None else printable(str(name.ToCString()).strip())

@@ -7,13 +7,15 @@ from collections.abc import Sequence
 
 from kerfpath.cad.toolpath import Tip, ToolPath, Triple, finite, unit_axis
 from kerfpath.errors import InputError
+from kerfpath.text import upper
 
-BEGIN = re.compile(r"\s*\d*\s*BEGIN PGM\s+\S+(?:\s+(\S+))?")
+BEGIN = re.compile(r"\s*\d*\s*BEGIN PGM\s+\S+(?:\s+(\S+))?", re.ASCII)
 UNITS = {"MM": "mm", "INCH": "in"}
 AXIS = ("TX", "TY", "TZ")
 NORMAL = ("NX", "NY", "NZ")
 HARMLESS = re.compile(
-    r"BLK FORM\b|TOOL (?:CALL|DEF)\b|STOP\b|CYCL DEF 32(?:\.\d)?\b|M\d+$|FUNCTION TCPM\b|\*"
+    r"BLK FORM\b|TOOL (?:CALL|DEF)\b|STOP\b|CYCL DEF 32(?:\.\d)?\b|M\d+$|FUNCTION TCPM\b|\*",
+    re.ASCII,
 )
 TCPM = re.compile(r"FUNCTION TCPM\b|M128\b")
 ENDS = ("M2", "M02", "M30")
@@ -21,13 +23,13 @@ IN_MACHINE = ("M91", "M92")
 CHANGING = ("M89", "M99", "M114", "M118", "M130", "M140", "M144")
 """Called cycles, compensated tool axes, handwheel, other systems: moves that are not supported."""
 NO_TCPM = re.compile(r"FUNCTION RESET TCPM$|M129$")
-WORD = re.compile(r"([TN]?[XYZ]|[ABCFM])([-+]?[\d.,]+|MAX)|(R[0LR])$")
+WORD = re.compile(r"([TN]?[XYZ]|[ABCFM])([-+]?[0-9.,]+|MAX)|(R[0LR])$")
 
 
 def is_klartext(lines: Sequence[str]) -> bool:
     """Return whether a program begins as Heidenhain's do."""
     first = next((line for line in lines if line.strip() and not line.strip().startswith(";")), "")
-    return BEGIN.match(first.upper()) is not None
+    return BEGIN.match(upper(first)) is not None
 
 
 def klartext_path(lines: Sequence[str]) -> ToolPath:
@@ -41,7 +43,7 @@ def klartext_path(lines: Sequence[str]) -> ToolPath:
     """
     program = _Program()
     for number, line in enumerate(lines, start=1):
-        text = re.sub(r"^\s*\d+\b", "", line.upper().partition(";")[0]).strip()
+        text = re.sub(r"^[ \t]*[0-9]+\b", "", upper(line).partition(";")[0]).strip(" \t")
         if text:
             program.take(number, f"line {number}", text)
     return ToolPath(moves=program.tip.moves, unit=program.unit, unused=program.unused)
@@ -67,7 +69,7 @@ class _Program:
         """
         if self._end and not text.startswith("END PGM"):
             raise InputError(f"{where}: a block after the end of the program in line {self._end}")
-        kind, *words = text.split()
+        kind, *words = re.split("[ \t]+", text)
         if begin := BEGIN.match(text):
             unit = begin[1] or ""
             if unit not in UNITS or self.unit:

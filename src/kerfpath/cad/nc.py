@@ -14,22 +14,25 @@ from kerfpath.cad.toolpath import (
     Tip,
     ToolPath,
     Triple,
+    finite,
     lines_of,
     part_of_tool_path,
     unit_axis,
 )
 from kerfpath.errors import InputError
+from kerfpath.text import upper
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 WORD = re.compile(
     rf"\s*(?:(?P<named>[A-Z]\d*)\s*=\s*(?P<value>{NUMBER})?"
     rf"|(?P<keyword>[A-Z_][A-Z_][A-Z0-9_]*)\s*(?P<arguments>\([^)]*\))?"
     rf"|(?P<letter>[A-Z])\s*(?P<number>{NUMBER})"
-    rf"|(?P<comment>\([^)]*\)))"
+    rf"|(?P<comment>\([^)]*\)))",
+    re.ASCII,
 )
 TEXT = re.compile(r'MSG\s*\(.*\)|T\s*=\s*"[^"]*"')
 """Words with text: a message, the name of a tool."""
-HEADER = re.compile(r"%|[O:]\d+\s*$|\$PATH")
+HEADER = re.compile(r"%|[O:]\d+\s*$|\$PATH", re.ASCII)
 AXIS = ("A3", "B3", "C3")
 UNITS = {20: "in", 21: "mm", 70: "in", 71: "mm", 700: "in", 710: "mm"}
 OFFSETS = (54, 55, 56, 57, 58, 59, 500, *range(505, 600))
@@ -60,7 +63,7 @@ ENDS = (2, 17, 30)
 TOOL_CHANGE = 6
 CALLS = (98, 99)
 UNUSED = "DFHMST"
-ROTARY = re.compile(r"[ABC]\d*")
+ROTARY = re.compile("[ABC][0-9]*")
 
 
 def read_nc(
@@ -82,7 +85,7 @@ def read_nc(
 def _siemens_path(lines: Sequence[str]) -> ToolPath:
     program = _Program()
     for number, line in enumerate(lines, start=1):
-        text = TEXT.sub("", line.upper()).partition(";")[0].strip()
+        text = TEXT.sub("", upper(line)).partition(";")[0].strip(" \t")
         if not text or HEADER.match(text):
             continue
         if text.startswith("/"):
@@ -136,11 +139,11 @@ class _Block:
         if len(name) > 1 and not name[1:].isdigit():
             self.keywords[name] = value
         elif name in "GM":
-            (self.g if name == "G" else self.m).append(float(value))
+            (self.g if name == "G" else self.m).append(finite(value, f"{self.where}: {name}"))
         elif name in self.words:
             raise InputError(f"{self.where}: {name} twice in one block")
         else:
-            self.words[name] = float(value)
+            self.words[name] = finite(value, f"{self.where}: {name}")
 
 
 class _Program:

@@ -22,6 +22,7 @@ from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
 from kerfpath.isolated import call_apart, seconds_for, stand_by, too_slow
 from kerfpath.progress import Progress, no_progress
+from kerfpath.text import lower
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -326,8 +327,8 @@ def _header(table: TableCells) -> tuple[list[str], dict[str, float]]:
     """Return the names of the columns without units, and the unit of each in mm."""
     columns, mm = [], {}
     for cell in table.rows[0]:
-        name = cell.lower().strip("\"' ")
-        parts = re.fullmatch(r"(\w+_[xyz])\s*[_\[(]\s*([a-z]+)\s*[\])]?", name)
+        name = lower(cell).strip("\"' ")
+        parts = re.fullmatch(r"(\w+_[xyz])\s*[_\[(]\s*([a-z]+)\s*[\])]?", name, re.ASCII)
         if parts and parts[1] in COLUMNS and parts[2] in UNITS_MM:
             name, mm[parts[1]] = parts[1], UNITS_MM[parts[2]]
         elif name != "point":

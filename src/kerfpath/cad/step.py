@@ -45,7 +45,7 @@ from kerfpath.cad.step_model import (
     step_frames,
 )
 from kerfpath.cad.units import UNITS_MM
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, printable
 
 # -----------------------------------------------------------------------------
 # Colours and layers in STEP files, by entity.
@@ -73,7 +73,7 @@ def styles_in(entities: Entities) -> tuple[dict[object, str], dict[object, str]]
         name = layer.Name()
         for k in range(1, layer.NbAssignedItems() + 1):
             layers[layer.AssignedItemsValue(k).Value()] = (
-                "" if name is None else name.ToCString().strip()
+                "" if name is None else printable(name.ToCString().strip())
             )
     for styled in entities.of(StepVisual_StyledItem):
         for colour in _fills(styled):
@@ -294,7 +294,7 @@ def _product(definition: StepBasic_ProductDefinition) -> str:
     formation = definition.Formation()
     product = None if formation is None else formation.OfProduct()
     name = None if product is None else product.Name()
-    return (name.ToCString().strip() if name is not None else "") or "component"
+    return printable(name.ToCString().strip() if name is not None else "") or "component"
 
 
 def _header_unit(reader: STEPControl_Reader) -> str:

@@ -43,7 +43,7 @@ from kerfpath.arrays import Array, freeze
 from kerfpath.cad.left_out import LOST, LeftOut, counted, kind_of
 from kerfpath.cad.shape import failures, unique
 from kerfpath.cad.units import LARGEST, MM
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, printable
 
 ALONE = (TopAbs_ShapeEnum.TopAbs_FACE, TopAbs_ShapeEnum.TopAbs_SHELL)
 """Kinds of shapes that are never a component of an assembly."""
@@ -137,7 +137,7 @@ def name_of(entity: object) -> str:
     """Return the name of an item, "" if it has none."""
     if not isinstance(entity, StepRepr_RepresentationItem) or entity.Name() is None:
         return ""
-    name = entity.Name().ToCString().strip()
+    name = printable(entity.Name().ToCString().strip())
     return "" if name.lower() in UNNAMED else name
 
 

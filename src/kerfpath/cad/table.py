@@ -17,11 +17,13 @@ from kerfpath.cad.build import kind_of_points, loop_of, part_without_faces, trac
 from kerfpath.cad.part import Part
 from kerfpath.cad.units import LARGEST, MM, UNITS_MM
 from kerfpath.errors import InputError
+from kerfpath.text import lower, number, text_lines
 
 # -----------------------------------------------------------------------------
 # Read tables from text: delimiters, comments, decimal commas and numbers.
 
 COMMENTS = ("#", "%", "//")
+BLANK = " \t"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +79,7 @@ class TableCells:
         except ValueError:
             raise InputError(f"{where}: expected a number, got {cell[:40]!r}") from None
         if not np.isfinite(value):
-            raise InputError(f"{where}: expected a finite number, got {cell!r}")
+            raise InputError(f"{where}: expected a finite number, got {cell[:40]!r}")
         return value
 
 
@@ -91,19 +93,19 @@ def cells_of(content: bytes, expected: str) -> TableCells:
     """
     numbered = [
         (number, line)
-        for number, line in enumerate(re.split(r"\r\n|\r|\n", _text(content)), start=1)
-        if line.strip() and not line.lstrip().startswith(COMMENTS)
+        for number, line in enumerate(text_lines(_text(content)), start=1)
+        if line.strip(BLANK) and not line.lstrip(BLANK).startswith(COMMENTS)
     ]
     if not numbered:
         raise InputError(f"holds no rows; expected columns {expected}")
     delimiter = next((d for d in (";", "\t", "|", ",") if d in numbered[0][1]), None)
     lines = [number for number, _ in numbered]
     if delimiter is None:
-        rows = [line.split() for _, line in numbered]
+        rows = [re.split(f"[{BLANK}]+", line.strip(BLANK)) for _, line in numbered]
     else:
         try:
             rows = [
-                [cell.strip() for cell in row]
+                [cell.strip(BLANK) for cell in row]
                 for row in csv.reader((line for _, line in numbered), delimiter=delimiter)
             ]
         except csv.Error as error:
@@ -127,9 +129,7 @@ def _number(cell: str, has_decimal_comma: bool) -> float:
         if "." in cell:
             raise ValueError(cell)
         cell = cell.replace(",", ".")
-    if "_" in cell:  # Python accepts it between digits
-        raise ValueError(cell)
-    return float(cell)
+    return number(cell)
 
 
 # -----------------------------------------------------------------------------
@@ -228,7 +228,7 @@ def _renamed(table: TableCells, given: Mapping[str, str]) -> TableCells:
     for name, theirs in given.items():
         if name not in KNOWN:
             raise InputError(f"columns: expected names of {' '.join(KNOWN)}, got {name!r}")
-        places = [k for k, cell in enumerate(header) if cell.lower() == str(theirs).lower()]
+        places = [k for k, cell in enumerate(header) if lower(cell) == lower(str(theirs))]
         if len(places) != 1:
             raise InputError(
                 f"line {table.lines[0]}: expected one column {theirs!r} for {name}, "
@@ -237,9 +237,9 @@ def _renamed(table: TableCells, given: Mapping[str, str]) -> TableCells:
         chosen[places[0]] = name
     row = []
     for k, cell in enumerate(header):
-        unit = UNIT.search(cell.lower())
+        unit = UNIT.search(lower(cell))
         if k not in chosen:
-            row.append(f"{cell} ({UNUSED})" if cell.lower() in KNOWN else cell)
+            row.append(f"{cell} ({UNUSED})" if lower(cell) in KNOWN else cell)
         elif unit and unit[1] in UNITS_MM and chosen[k] in POSITION:
             row.append(f"{chosen[k]}_{unit[1]}")
         else:
@@ -282,7 +282,7 @@ def _header(table: TableCells, has_axis: bool) -> tuple[tuple[str, ...], str]:
         return (), ""
     columns, units = [], []
     for cell in table.rows[0]:
-        name = cell.lower().strip("\"' ")
+        name = lower(cell).strip("\"' ")
         parts = re.fullmatch(r"([xyz])\s*[_\[( ]\s*([a-z]+)\s*[\])]?", name)
         columns.append(parts[1] if parts else name)
         units += [parts[2]] if parts else []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import re
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from kerfpath.cad.part import Loop, Part
 from kerfpath.cad.units import LARGEST, MM, UNITS_MM
 from kerfpath.contour import angle_between
 from kerfpath.errors import InputError
+from kerfpath.text import number, text_lines, upper
 
 Triple = tuple[float, float, float]
 UNKNOWN = "the word is not known, and may change the path"
@@ -120,10 +120,16 @@ class Tip:
 
 
 def lines_of(content: bytes) -> list[str]:
-    """Return the lines of a file; characters that cannot be decoded are replaced."""
+    """Return the lines of a file; characters that cannot be decoded are replaced.
+
+    Raises
+    ------
+    InputError
+        A control character, or another that no text contains (the message has the line).
+    """
     wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     text = content.decode("utf-16" if wide else "utf-8-sig", errors="replace")
-    return re.split(r"\r\n|\r|\n", text)
+    return text_lines(text)
 
 
 def finite(text: str, where: str) -> float:
@@ -135,7 +141,7 @@ def finite(text: str, where: str) -> float:
         Something else; the message begins with `where`.
     """
     try:
-        value = float("_" if "_" in text else text.upper().replace("D", "E"))
+        value = number(upper(text).replace("D", "E"))
     except ValueError:
         raise InputError(f"{where}: expected a number, got {text[:40]!r}") from None
     if not np.isfinite(value):

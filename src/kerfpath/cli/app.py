@@ -6,6 +6,7 @@ Exit codes are 0 for done, 1 for no feasible plan or a failed audit, 2 for bad i
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +17,8 @@ from rich.markup import escape
 from kerfpath import __version__
 from kerfpath.cli.show import busy, compile_kernels, errors, out, progress_bars, quiet
 from kerfpath.cli.streams import flush
-from kerfpath.errors import AuditFailed, KerfpathError, NoFeasiblePath
+from kerfpath.errors import AuditFailed, InputError, KerfpathError, NoFeasiblePath
+from kerfpath.text import NOT_TEXT, named
 
 app = typer.Typer(
     add_completion=False,
@@ -53,6 +55,7 @@ Strict = Annotated[
 def run() -> None:
     """Run the command line and exit with its exit code."""
     try:
+        _require_text(*sys.argv[1:])
         try:
             app()
         finally:
@@ -64,6 +67,22 @@ def run() -> None:
         for line in (str(error), *getattr(error, "others", ())):
             errors.print(f"[bold red]kerfpath: error:[/] {escape(line)}")
         sys.exit(2)
+
+
+def _require_text(*arguments: str) -> None:
+    """Raise InputError for an argument, or a current folder, that is no text in UTF-8.
+
+    Jobs, reports and programs name files in Unicode, and every command shows its arguments.
+    """
+    with suppress(OSError):  # the folder is gone
+        arguments += (str(Path.cwd()),)
+    for argument in arguments:
+        if (found := NOT_TEXT.search(argument)) is not None:
+            is_byte = "\udc80" <= found[0] <= "\udcff"
+            got = "bytes that are not UTF-8" if is_byte else named(found[0])
+            raise InputError(
+                f"{argument}: expected text in UTF-8, got {got}; rename the file or folder"
+            )
 
 
 def _version(asked: bool) -> None:

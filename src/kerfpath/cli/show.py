@@ -15,15 +15,16 @@ from threading import Event, Thread
 from time import monotonic
 
 from rich.cells import cell_len
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.markup import escape
 from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
 from kerfpath.cli.stop import stop_in_order
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, printable
 from kerfpath.files import write_whole
 from kerfpath.progress import Progress, no_progress
 
@@ -44,8 +45,26 @@ DAY = 86400.0
 quiet = Event()
 """Set if no progress is to be shown."""
 
-out = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else _PIPED)
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
+
+class _Lines(Console):
+    """A console that prints escapes for characters in names that do not print.
+
+    Otherwise a name from a file, or of one, could change the terminal or the direction of writing.
+    """
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        for segment in super().render(renderable, options):
+            if segment.control or segment.text.isprintable():
+                yield segment
+            else:
+                text = "\n".join(map(printable, segment.text.split("\n")))
+                yield Segment(text, segment.style)
+
+
+out = _Lines(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else _PIPED)
+errors = _Lines(stderr=True, highlight=False, soft_wrap=True)
 
 
 def print_json(data: Mapping[str, object]) -> None:
@@ -69,6 +88,7 @@ def table(
     terminal headings longer than their column are folded first, then columns in `spare` are left
     out, in that order, until the others fit, and last of all words are folded.
     """
+    rows = [[printable(cell) for cell in row] for row in rows]  # as wide as they are printed
     fixed = {*numbers, *whole}
     cells = [
         max((cell_len(Text.from_markup(row[i]).plain) for row in rows), default=0)

@@ -427,6 +427,10 @@ def read_document(path: Path) -> PlanDocument:
         _Document.model_validate(data)
     except ValidationError as error:
         raise InputError(f"{path}: {_problem(error)}; plan the job again") from None
+    for name, table in data["job"].items():
+        if name != "contour" and not isinstance(table, dict):
+            said = f"job.{name}: expected a table, got {_shown(table)}"
+            raise InputError(f"{path}: {said}; plan the job again")
     twice = [name for name, n in Counter(e["name"] for e in data["contours"]).items() if n > 1]
     if twice:
         said = f"expected distinct names, got {_shown(twice[0])} twice"

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
 
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell
@@ -256,14 +257,19 @@ def program_language(source: Mapping[str, Any], path: Path) -> str:
     return name
 
 
+class _Externals(BaseModel):
+    """The external axes in the [robot] of a job."""
+
+    external: tuple[ExternalTable, ...] = ()
+
+
 def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
     """Return the job of a plan.json, without its drawing and its cell."""
     first = file.plans[0]
     sequence = None
     if file.job.get("sequence") is not None:
         sequence = file.table("sequence", SequenceTable)
-    axes = file.job["robot"].get("external", ())
-    external = [ExternalTable.model_validate(axis) for axis in axes]
+    external = file.table("robot", _Externals).external
     return Job(
         path=file.path,
         robot=first.robot,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
@@ -42,6 +41,7 @@ from kerfpath.post.read_program import (
     ReadWait,
 )
 from kerfpath.robots import Robot
+from kerfpath.text import NOT_TEXT, named
 
 # -----------------------------------------------------------------------------
 # The base of all readers, which read programs line by line.
@@ -50,12 +50,6 @@ SHOWN = 60
 """Characters of a line that a message shows."""
 END_OF_FILE = "the end of the file"
 """Text of the row after the last one."""
-NOT_TEXT = re.compile(
-    r"[\0-\x08\v\f\x0e-\x1f\x7f-\x9f\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
-    r"\ud800-\udfff\U000e0000-\U000e007f]|\r(?!\n)"
-)
-"""Control characters, separators of lines and characters without a glyph, as those that change the
-direction of writing; not the tab and the ends of lines."""
 BLANK = " \t"
 """Blanks of all languages; further ones, as U+00A0, are no blanks for a controller."""
 
@@ -89,10 +83,9 @@ def program_lines(file: str, text: str, first: int = 1) -> list[str]:
     """
     if found := NOT_TEXT.search(text):
         line = first + text.count("\n", 0, found.start())
-        what = f"U+{ord(found[0]):04X} {unicodedata.name(found[0], '')}".rstrip()
         raise InputError(
-            f"{file}, line {line}: a program must not contain the character {what}; its lines end "
-            "with LF or CR LF"
+            f"{file}, line {line}: a program must not contain the character {named(found[0])}; its "
+            "lines end with LF or CR LF"
         )
     return text.splitlines()
 

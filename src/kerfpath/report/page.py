@@ -22,6 +22,8 @@ from jinja2.ext import Extension
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
+from kerfpath.text import visible
+
 PASS, FAIL, WARN = "pass", "fail", "warn"
 """States of a verdict, which templates show by a sign and a colour."""
 LEAN = '<script src="plotly.js"></script>'
@@ -156,8 +158,8 @@ def _resource(name: str) -> Markup:
 
 
 def _escaped(value: object) -> object:
-    """Escape a value as `html` does; its quotes differ from those of Jinja."""
-    return value if hasattr(value, "__html__") else Markup(html.escape(str(value)))
+    """Escape a value as `html` does, whose quotes differ from Jinja's, and what is no text."""
+    return value if hasattr(value, "__html__") else Markup(html.escape(visible(str(value))))
 
 
 class _JoinLines(Extension):

@@ -38,9 +38,11 @@ from kerfpath.planner import coarse_places, external_course, layered_graph
 from kerfpath.post import ProgramOptions
 from kerfpath.robots import Robot
 from kerfpath.setup import Setup
+from kerfpath.text import NOT_TEXT, named
 
 MOST_TEXT = 10_000_000
 """Largest job file, in characters; enough for many thousand contours."""
+NOT_IN_STRINGS = re.compile(rf"{NOT_TEXT.pattern}|[\t\r\n]")
 _DOTTED = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){33}")
 
 
@@ -342,6 +344,31 @@ def _text(path: Path) -> str:
         ) from None
 
 
+def _require_text(path: Path, text: str, tables: Mapping[str, Any]) -> None:
+    """Raise InputError for a character without a glyph in the file, or in a string of it."""
+    if (found := NOT_TEXT.search(text)) is not None:
+        line = text.count("\n", 0, found.start()) + 1
+        raise error_at(path, line, f"expected text, got {named(found[0])}; remove it")
+
+    def look(value: Any, key: tuple[str | int, ...]) -> None:
+        if isinstance(value, dict | list):
+            inner = value.items() if isinstance(value, dict) else enumerate(value)
+            for each, its in inner:
+                look(its, (*key, each))
+                if isinstance(each, str):
+                    look_at(each, (*key, each))
+        elif isinstance(value, str):
+            look_at(value, key)
+
+    def look_at(value: str, key: tuple[str | int, ...]) -> None:
+        if (found := NOT_IN_STRINGS.search(value)) is not None:
+            raise refusal_at(
+                path, key, f"expected one line of text, got {named(found[0])}; remove it"
+            )
+
+    look(tables, ())
+
+
 def _tables(path: Path, text: str) -> dict[str, Any]:
     if len(text) > MOST_TEXT:
         raise error_at(
@@ -356,6 +383,7 @@ def _tables(path: Path, text: str) -> dict[str, Any]:
         raise error_at(path, line, "expected a key of a job, got one with too many dotted parts")
     try:
         tables = tomllib.loads(text)
+        _require_text(path, text, tables)
     except RecursionError:
         raise error_at(path, None, "arrays or tables are nested too deeply; flatten them") from None
     except tomllib.TOMLDecodeError as error:
@@ -363,6 +391,8 @@ def _tables(path: Path, text: str) -> dict[str, Any]:
         at = re.search(r" \(at line (\d+), column \d+\)$", said)
         line = int(at[1]) if at else text.rstrip("\n").count("\n") + 1
         raise error_at(path, line, f"not valid TOML: {said}; correct it there") from None
+    except InputError:
+        raise
     except ValueError:  # what Python's int() refuses
         raise error_at(path, None, "not valid TOML: an integer is too long; shorten it") from None
     if not tables:

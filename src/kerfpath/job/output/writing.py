@@ -484,7 +484,7 @@ def trajectory_text(plans: Sequence[Plan], moves: Sequence[TransferMove] = ()) -
     header += ["x_mm", "y_mm", "z_mm", "axis_x", "axis_y", "axis_z", "gamma_deg", "posture"]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(header)
+    writer.writerow(map(_no_formula, header))
     homeless = len(moves) < len(plans)
     for i, plan in enumerate(plans):
         if moves and not (homeless and i == 0):
@@ -500,10 +500,15 @@ def trajectory_text(plans: Sequence[Plan], moves: Sequence[TransferMove] = ()) -
         )
         rows = zip(numbers.tolist(), plan.contour.kinds, plan.posture, strict=True)
         for k, (row, kind, posture) in enumerate(rows):
-            writer.writerow([plan.name, k, kind, *row, int(posture)])
+            writer.writerow([_no_formula(plan.name), k, kind, *row, int(posture)])
     if len(moves) > len(plans):
         _write_air(writer, moves[-1], plans[-1])
     return out.getvalue()
+
+
+def _no_formula(name: str) -> str:
+    """Return a name with an apostrophe before what a spreadsheet would take for a formula."""
+    return f"'{name}" if name.startswith(("=", "+", "-", "@")) else name
 
 
 def _joint_header(plans: Sequence[Plan]) -> list[str]:
