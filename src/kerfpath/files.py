@@ -1,4 +1,7 @@
-"""Write files atomically: complete or not at all, even if the process is stopped."""
+"""Write files atomically: complete or not at all, even if the process is stopped.
+
+Also folders for temporary files, which do not stay either.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,14 @@ import errno
 import fcntl
 import os
 import secrets
+import shutil
 import stat
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import RLock
-from time import monotonic, sleep
+from time import monotonic, sleep, time
 
 _WRITING = RLock()
 _locked: set[Path] = set()
@@ -62,7 +67,7 @@ def write_whole(files: Mapping[Path, bytes | None]) -> None:
     with only_writer(folder):
         try:
             for path in files:
-                _require_replaceable(path)
+                require_replaceable(path)
             for path, temporary in beside.items():
                 with _about(path):
                     _write_new(temporary, files[path] or b"", like=path)
@@ -110,8 +115,14 @@ def only_writer(folder: Path) -> Iterator[None]:
             os.close(number)
 
 
-def _require_replaceable(path: Path) -> None:
-    """Raise OSError if something other than a writable regular file lies at the path."""
+def require_replaceable(path: Path) -> None:
+    """Require that nothing or a writable regular file, no link to one, lies at the path.
+
+    Raises
+    ------
+    OSError
+        With the reason.
+    """
     try:
         mode = path.lstat().st_mode
     except OSError:  # nothing is there, or writing will tell
@@ -171,3 +182,53 @@ def finish_writes(timeout: float) -> None:
     Call it just before the process ends: every later `write_whole` waits forever.
     """
     _WRITING.acquire(timeout=timeout)
+
+
+# -----------------------------------------------------------------------------
+# Folders for temporary files.
+
+SCRATCH = "kerfpath-scratch-"
+"""Beginning of the names of such folders."""
+YOUNG = 60.0
+"""Age up to which a folder may be one that its process has not locked yet, s."""
+
+_scratch: set[Path] = set()
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """Make a folder for temporary files, and remove it at the end.
+
+    Those that killed processes of this user have left are removed first.
+    """
+    for left in Path(tempfile.gettempdir()).glob(f"{SCRATCH}*"):
+        with suppress(OSError):
+            _remove_left(left)
+    folder = Path(tempfile.mkdtemp(prefix=SCRATCH))
+    number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    _lock(number, folder)
+    _scratch.add(folder)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        _scratch.discard(folder)
+        os.close(number)
+
+
+def _remove_left(folder: Path) -> None:
+    """Remove a folder of this user that no process has locked."""
+    number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        found = os.fstat(number)
+        if found.st_uid == os.getuid() and found.st_mtime < time() - YOUNG:
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            shutil.rmtree(folder, ignore_errors=True)
+    finally:
+        os.close(number)
+
+
+def remove_scratch() -> None:
+    """Remove all folders of `scratch_folder`; only the end of the process may follow."""
+    for folder in list(_scratch):
+        shutil.rmtree(folder, ignore_errors=True)

@@ -271,6 +271,19 @@ def test_a_store_of_another_kind_is_refused_and_left_alone(tmp_path, edit, said)
     assert (tmp_path / "s").read_bytes() == before
 
 
+@pytest.mark.parametrize("suffix", ["", "-wal", "-journal"])
+def test_a_store_is_a_regular_file_and_what_else_is_there_stays(tmp_path, suffix):
+    precious, path = tmp_path / "precious", tmp_path / f"store{suffix}"
+    precious.touch()
+    for put in (os.mkfifo, lambda path: path.symlink_to(precious), os.mkdir):
+        put(path)
+        with pytest.raises(InputError, match=f"store{suffix}: cannot be the store of a sweep"):
+            store_module.Store(tmp_path / "store")
+        assert {each.name for each in tmp_path.iterdir()} == {"precious", path.name}
+        path.rmdir() if path.is_dir() else path.unlink()
+    assert precious.stat().st_size == 0
+
+
 def test_a_file_that_is_no_store_is_refused(tmp_path):
     (tmp_path / "plan.json").write_text("{}" * 1000)
     with pytest.raises(InputError, match=r"plan\.json: this file is not the store of a sweep"):

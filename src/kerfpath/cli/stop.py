@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from threading import Thread, current_thread, main_thread
 from typing import Any
 
-from kerfpath.files import finish_writes
+from kerfpath.files import finish_writes, remove_scratch
 from kerfpath.isolated import end_processes
 
 STOPS: dict[int, Any] = {
@@ -109,6 +109,7 @@ def _watch(receiver: socket.socket, heard: Collection[int]) -> None:
         if count > (1 if _in_order else 0):
             finish_writes(FILE_SECONDS)
             end_processes()
+            remove_scratch()
             _print("kerfpath: stopped")
             os._exit(exit_code(stops[-1]))
 

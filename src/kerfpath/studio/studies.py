@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from os import cpu_count
-from pathlib import Path
 from time import perf_counter
 from typing import Literal, NamedTuple
 
@@ -17,6 +14,7 @@ import numpy as np
 
 from kerfpath.arrays import Array
 from kerfpath.errors import InputError
+from kerfpath.files import scratch_folder
 from kerfpath.front import AHEAD, Criterion, Evaluation, FrontSearch, Subproblem
 from kerfpath.job import CutResult, Job, PreparedJob
 from kerfpath.plans import Plan
@@ -338,38 +336,37 @@ class Layouts:
 
     def _look(self, prepared: PreparedJob, ask: LayoutRequest, revision: int, stop: Stop) -> None:
         """Search on a copy of the job, as the job itself may be saved meanwhile."""
-        folder = Path(tempfile.mkdtemp(prefix="kerfpath-layout-"))
         study: _LayoutStudy | None = None
         try:
-            job = folder / "job.toml"
-            text = placed_text(prepared.job, {}, folder, "a copy")
-            if ask.grid:
-                text = with_values(text, [(("plan", "method"), "exact")])
-            job.write_text(text, encoding="utf-8")
-            nodes = nodes_of(contours_of(**job_key(job), goal=ask.goal))
-            at = Placement(
-                job=prepared.job,
-                requests=tuple(prepared.contours),
-                middle=middle_of(prepared.job, nodes),
-            )
-            study = self._study = _LayoutStudy(at, ask, revision, self._say, stop)
-            table = prepared.job.layout.model_copy(
-                update={"goal": ask.goal, "evaluations": ask.evaluations, "map_points": 0}
-            )
-            found = layout_as(
-                job,
-                table,
-                store=folder / "store.sqlite",
-                ranges=ask.ranges,
-                processes=max(1, (cpu_count() or 1) - 1),
-                progress=study.progress,
-                found=study.found,
-            )
-            study.say("done", found)
+            with scratch_folder() as folder:
+                job = folder / "job.toml"
+                text = placed_text(prepared.job, {}, folder, "a copy")
+                if ask.grid:
+                    text = with_values(text, [(("plan", "method"), "exact")])
+                job.write_text(text, encoding="utf-8")
+                nodes = nodes_of(contours_of(**job_key(job), goal=ask.goal))
+                at = Placement(
+                    job=prepared.job,
+                    requests=tuple(prepared.contours),
+                    middle=middle_of(prepared.job, nodes),
+                )
+                study = self._study = _LayoutStudy(at, ask, revision, self._say, stop)
+                table = prepared.job.layout.model_copy(
+                    update={"goal": ask.goal, "evaluations": ask.evaluations, "map_points": 0}
+                )
+                found = layout_as(
+                    job,
+                    table,
+                    store=folder / "store.sqlite",
+                    ranges=ask.ranges,
+                    processes=max(1, (cpu_count() or 1) - 1),
+                    progress=study.progress,
+                    found=study.found,
+                )
+                study.say("done", found)
         finally:
             if study is not None and study.state == "running":
                 study.say("stopped")
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 class _LayoutStudy:

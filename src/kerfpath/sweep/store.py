@@ -15,6 +15,7 @@ from typing import Any
 from kerfpath import __version__
 from kerfpath.arrays import short_repr
 from kerfpath.errors import InputError
+from kerfpath.files import require_replaceable
 from kerfpath.progress import Progress, no_progress
 from kerfpath.sweep.task import SCHEMA, Failure, Task, TaskOutcome, name_of, task_of
 from kerfpath.sweep.workers import on_cluster, on_processes
@@ -24,6 +25,9 @@ from kerfpath.sweep.workers import on_cluster, on_processes
 
 APPLICATION = 0x6B657266
 """Application id of the SQLite file: "kerf"."""
+
+BESIDE = ("-wal", "-journal", "-shm")
+"""Ends of the names of files that SQLite writes beside the store."""
 
 TABLES = f"""
 BEGIN EXCLUSIVE;
@@ -60,12 +64,18 @@ class Store:
     Raises
     ------
     InputError
-        The file is used by another sweep, is from another version of kerfpath or of the store, or
-        cannot be read or written. Every method may raise it.
+        The file is used by another sweep, is from another version of kerfpath or of the store, is
+        not a regular file, or cannot be read or written. Every method may raise it.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        try:
+            for suffix in ("", *BESIDE):
+                require_replaceable(path.with_name(path.name + suffix))
+        except OSError as error:
+            said = f"{error.filename}: cannot be the store of a sweep"
+            raise InputError(f"{said} ({error.strerror}): name another file") from None
         with self._explain():
             self._base = sqlite3.connect(path, timeout=0)
             try:

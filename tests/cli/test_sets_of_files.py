@@ -1,0 +1,93 @@
+"""The files of a run belong together; commands say so in one line where they do not."""
+
+import os
+import shutil
+
+import pytest
+
+from commands import assert_refused, run
+from jobs import DEMO, SMALL
+
+
+@pytest.fixture(scope="module")
+def two_runs(tmp_path_factory):
+    """Files of a run, and those of the run of the same job at another speed that replaced them."""
+    folder = tmp_path_factory.mktemp("runs")
+    shutil.copy(DEMO / "b_pillar.step", folder)
+    kept = {}
+    for name, speed in (("before", "2"), ("after", "3")):
+        text = SMALL.replace("[plan]", "[plan]\ncertify = false")
+        (folder / "small.toml").write_text(
+            text.replace("speed_m_min = 3", f"speed_m_min = {speed}")
+        )
+        result = run("plan", "small.toml", "--out", "out", cwd=folder)
+        assert result.returncode == 0, result.stderr
+        kept[name] = {path.name: path.read_bytes() for path in (folder / "out").iterdir()}
+    return folder, kept
+
+
+@pytest.fixture
+def folder(two_runs):
+    """The folder of the job, with the files of its last run."""
+    folder, kept = two_runs
+    shutil.rmtree(folder / "out")
+    (folder / "out").mkdir()
+    for name, content in kept["after"].items():
+        (folder / "out" / name).write_bytes(content)
+    return folder
+
+
+READERS = {
+    "audit of the plan": "audit out/plan.json --job small.toml",
+    "audit of the plan alone": "audit out/plan.json",
+    "audit of the program": "audit out/small.mod --job small.toml",
+    "post": "post out/plan.json -o posted.mod",
+    "compare": "compare out/small.mod out/small.mod --job small.toml",
+    "touch-up": "touch-up out/small.mod --job small.toml --plan out/plan.json --out touched",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stale", ["small.mod", "plan.json", "report.html", "trajectory.csv"])
+def test_who_reads_a_folder_says_which_file_is_left_of_an_earlier_run(stale, folder, two_runs):
+    (folder / "out" / stale).write_bytes(two_runs[1]["before"][stale])
+    for words in READERS.values():
+        assert_refused(run(*words.split(), cwd=folder), f"out/{stale} is left of an earlier run")
+    assert run("plan", "small.toml", "--out", "out", cwd=folder).returncode == 0
+    assert run(*READERS["audit of the program"].split(), cwd=folder).returncode == 0
+
+
+@pytest.mark.slow
+def test_an_edited_program_is_audited_and_an_old_one_elsewhere_too(folder, two_runs):
+    program = folder / "out" / "small.mod"
+    text = program.read_text()
+    program.write_text(text.replace("ENDMODULE", "! checked by the night shift\nENDMODULE"))
+    assert run(*READERS["audit of the program"].split(), cwd=folder).returncode == 0
+    assert run(*READERS["audit of the plan"].split(), cwd=folder).returncode == 0
+    lines = text.splitlines(keepends=True)
+    half = [k for k, line in enumerate(lines) if "MoveL" in line][10]
+    program.write_text("".join(lines[:half] + lines[half + 1 :]))
+    assert run(*READERS["audit of the program"].split(), cwd=folder).returncode == 1
+    (folder / "elsewhere").mkdir(exist_ok=True)
+    old = folder / "elsewhere" / "small.mod"
+    old.write_bytes(two_runs[1]["before"]["small.mod"])
+    result = run("audit", old, "--job", "small.toml", cwd=folder)
+    assert result.returncode == 1, result.stderr  # of another speed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["plan.json", "report.html", "small.mod", ".kerfpath.json"])
+def test_what_is_no_file_is_not_replaced(name, folder):
+    path, precious = folder / "out" / name, folder / "precious"
+    precious.write_text("precious")
+    for put in (os.mkfifo, lambda path: path.symlink_to(precious), os.mkdir):
+        path.unlink()
+        put(path)
+        before = sorted(each.name for each in (folder / "out").iterdir())
+        result = run("plan", "small.toml", "--out", "out", cwd=folder)
+        assert_refused(result, f"out/{name}: it is a")
+        assert sorted(each.name for each in (folder / "out").iterdir()) == before
+        assert precious.read_text() == "precious"
+        if path.is_dir():
+            path.rmdir()
+            path.touch()
