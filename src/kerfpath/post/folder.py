@@ -156,8 +156,9 @@ def _replace(
     is_old: Callable[[_Entry], bool], *, keep: bool,
 ) -> FolderChanges:  # fmt: skip
     """Write a set in place of the old ones; `keep` their edited files, or else refuse them."""
-    _make_folders(folder, files)
+    _make_folder(folder)
     with _explained({}), only_writer(folder):
+        _make_folders(folder, files)
         listed = _read_list(folder)
         old = [n for n, e in listed.items() if n not in files and is_old(e)]
         there = {n: _hash_of(folder / n) for n in {*files, *old}}
@@ -189,9 +190,9 @@ def _replace(
         contents |= {folder / n: new[n] for n in reversed(list(files)) if there[n] != _hash(new[n])}
         contents |= removed
         _write(contents)
-    for parent in {path.parent for path in removed} - {folder}:
-        with suppress(OSError):
-            parent.rmdir()
+        for parent in {path.parent for path in removed} - {folder}:
+            with suppress(OSError):
+                parent.rmdir()
     return FolderChanges(
         written=tuple(folder / n for n in files),
         removed=tuple(removed),
@@ -241,12 +242,16 @@ def _make_folders(folder: Path, names: Iterable[str]) -> None:
         A folder cannot be made, or is a link that leads out of the folder.
     """
     for parent in dict.fromkeys((folder / name).parent for name in names):
-        try:
-            parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{parent}: cannot create the folder ({error})") from None
+        _make_folder(parent)
         if not parent.resolve().is_relative_to(folder.resolve()):
             raise InputError(f"{parent}: expected a folder in {folder}, got a link; remove it")
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot create the folder ({error})") from None
 
 
 def _write(contents: Mapping[Path, bytes | None]) -> None:
