@@ -23,6 +23,7 @@ NAMES = (
     "cad",
     "corpus",
     "large_drawings",
+    "mutants",
     "first_runs",
     "kerf",
     "part",
@@ -98,6 +99,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import large_drawings
 
         return [large_drawings.run(quick=quick)]
+    if name == "mutants":
+        from benchmarks import mutants
+
+        return [mutants.run(quick=quick)]
     if name == "external":
         from benchmarks import external
 

@@ -23,6 +23,7 @@ import tempfile
 import time
 from collections import Counter
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 
 from kerfpath.cli.show import out
 from readers import READERS
@@ -60,10 +61,16 @@ def child(name: str) -> None:
             took = time.process_time() - started
             if took > HANG / 2:
                 wrong += f"\ntook {took:.1f} s"
-            print(json.dumps([whole.spoilt.name, wrong, took]), file=answers, flush=True)
+            peak = max(map(_peak, (RUSAGE_SELF, RUSAGE_CHILDREN)))
+            print(json.dumps([whole.spoilt.name, wrong, took, peak]), file=answers, flush=True)
             whole.spoilt.write_bytes(sound[whole.spoilt])
     finally:
         shutil.rmtree(folder)
+
+
+def _peak(who: int) -> float:
+    """Return the most memory that a process, or one that it waited for, has had, MB."""
+    return getrusage(who).ru_maxrss / 1024
 
 
 def _limit() -> None:
@@ -82,7 +89,7 @@ class Campaign:
         self.name, self.out = name, out
         self.faults: Counter[str] = Counter()
         self.mutants = 0
-        self.slowest = 0.0
+        self.slowest = self.most = 0.0
         self.child: subprocess.Popen[str] | None = None
         out.mkdir(parents=True, exist_ok=True)
         self.said = (out / "stderr.txt").open("w+")
@@ -120,8 +127,8 @@ class Campaign:
         if select.select([self.child.stdout], [], [], 3 * HANG)[0]:
             answer = self.child.stdout.readline()
             if answer:
-                file, wrong, took = json.loads(answer)
-                self.slowest = max(self.slowest, took)
+                file, wrong, took, peak = json.loads(answer)
+                self.slowest, self.most = max(self.slowest, took), max(self.most, peak)
             else:
                 wrong = f"crashes: {self.child.wait()}"
         else:
@@ -175,7 +182,8 @@ def main() -> int:
         bad += faults
         print(
             f"{name}: {campaign.mutants} mutants, {faults} faults of {len(campaign.faults)} kinds, "
-            f"slowest {campaign.slowest:.1f} s, {time.monotonic() - started:.0f} s in all"
+            f"slowest {campaign.slowest:.1f} s, most {campaign.most:.0f} MB, "
+            f"{time.monotonic() - started:.0f} s in all"
         )
         for kind, count in campaign.faults.most_common():
             print(f"    {count:5} {kind}")

@@ -114,6 +114,8 @@ class Store:
     def _explain(self) -> Iterator[None]:
         try:
             yield
+        except UnicodeDecodeError as error:
+            raise InputError(f"{self._path}: {REASONS[sqlite3.SQLITE_NOTADB]}") from error
         except sqlite3.DatabaseError as error:
             reason = REASONS.get(getattr(error, "sqlite_errorcode", 0) & 0xFF, str(error))
             raise InputError(f"{self._path}: {reason}") from error
