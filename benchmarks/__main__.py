@@ -29,6 +29,7 @@ NAMES = (
     "part",
     "programs",
     "program_edits",
+    "program_characters",
     "handshakes",
     "plan_edits",
     "pareto",
@@ -127,6 +128,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import program_edits
 
         return [program_edits.run(quick=quick)]
+    if name == "program_characters":
+        from benchmarks import program_edits
+
+        return [program_edits.run_characters(quick=quick)]
     if name == "handshakes":
         from benchmarks import handshakes
 

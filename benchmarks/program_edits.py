@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -29,7 +29,7 @@ from kerfpath.post import (
     read_program,
 )
 
-__all__ = ["Outcome", "Subject", "Tally", "run", "subjects"]
+__all__ = ["Outcome", "Subject", "Tally", "run", "run_characters", "subjects"]
 
 COLUMNS = (
     "harm: caught", "refused", "passed", "harmless: passed", "not", "not of our making", "either",
@@ -125,14 +125,18 @@ in each language for {arm}, and for {others}. Its program is spoilt in two ways,
 audited by the job. Faults: every fault of `_program_faults` (the laser on with the retract, a wait
 in the cut, an approach from afar, ...) is put into the neutral program and written out, so that it
 is an edit in each language that can say it; each does harm. Edits: {edits} edits of the text by the
-grammar of `_program_edits`, whose oracle says which do harm. Characters: {characters} edits of
-how the text is spelled (`_character_edits`: control characters, foreign digits, letters and blanks,
-numbers of other languages, lines commented out, quoted, broken, joined or too long); each does harm
-by a model of where remarks begin and end. Harmless: {harmless} edits that people and pendants make
-all the time. Caught: the audit has a finding.
+grammar of `_program_edits`, whose oracle says which do harm. Caught: the audit has a finding.
 Refused: no program of the job's making, with file and line. Passed: neither. Not of our making: the
 reader does not take the text, so that the oracle has nothing to judge. Either: another text of the
 same motion, or a move within what the job allows; it may pass."""
+
+HOW_CHARACTERS = """\
+The programs of the section before. Characters: {characters} edits in each language of how the
+text is spelled (`_character_edits`: control characters, foreign digits, letters and blanks, numbers
+of other languages, lines commented out, quoted, broken, joined or too long); each does harm by a
+model of where remarks begin and end. Harmless: {harmless} edits that people and pendants make all
+the time: remarks, blanks, case, digits, ends of lines, texts for the operator, timers, loads, heads
+of files. The columns are those of the section before."""
 
 Outcome = Literal["caught", "refused", "passed"]
 
@@ -322,33 +326,53 @@ def _draw(path: Path) -> None:
 
 def run(*, quick: bool = False) -> Report:
     """Return the results of faults and edits, by language and by kind."""
-    share = 0.2 if quick else 1.0
-    edits_made, characters, harmless = (round(share * n) for n in (EDITS, CHARACTERS, HARMLESS))
+    count = 50 if quick else EDITS
     others = " and ".join(f"{arm} ({name})" for name, arm in ARMS.items())
+    tries: dict[str, Try] = {
+        "faults": Tally.try_faults,
+        "edits": lambda tally, subject, rng: tally.try_edits(subject, rng, count),
+    }
+    return _report("Edited programs", HOW.format(arm=ARM, others=others, edits=count), tries)
+
+
+def run_characters(*, quick: bool = False) -> Report:
+    """Return the results of edits of characters and of harmless edits, by language and by kind."""
+    share = 0.1 if quick else 1.0
+    count, harmless = round(share * CHARACTERS), round(share * HARMLESS)
+    tries: dict[str, Try] = {
+        "characters": lambda tally, subject, rng: tally.try_characters(subject, rng, count),
+        "harmless": lambda tally, subject, rng: tally.try_characters(
+            subject, rng, harmless, harmless=True
+        ),
+    }
+    how = HOW_CHARACTERS.format(characters=count, harmless=harmless)
+    return _report("Characters of programs", how, tries)
+
+
+Try = Callable[[Tally, Subject, np.random.Generator], None]
+"""Makes edits of a program and audits each."""
+
+
+def _report(title: str, how: str, tries: Mapping[str, Try]) -> Report:
     all_of_them, rows = Tally(), []
     with tempfile.TemporaryDirectory() as folder:
         for number, subject in enumerate(subjects(Path(folder))):
-            for what in ("faults", "edits", "characters", "harmless"):
+            for what, made in tries.items():
                 rng, tally = np.random.default_rng(number), Tally()
-                if what == "faults":
-                    tally.try_faults(subject, rng)
-                elif what == "edits":
-                    tally.try_edits(subject, rng, edits_made)
-                elif what == "characters":
-                    tally.try_characters(subject, rng, characters)
-                else:
-                    tally.try_characters(subject, rng, harmless, harmless=True)
+                made(tally, subject, rng)
                 rows.append([subject.language.name, what, *map(str, _row(tally))])
                 all_of_them.counts.update(tally.counts)
                 all_of_them.told.update(tally.told)
                 all_of_them.wrong.extend(tally.wrong)
     kinds = sorted({kind for _, kind, _, _ in all_of_them.counts})
     told = all_of_them.told
+    lines = (
+        f"of {told.total()} harmful edits of the text that were found, {told['told']} are told "
+        "with their own line or one beside it"
+    )
     return Report(
-        title="Edited programs",
-        how=HOW.format(
-            arm=ARM, others=others, edits=edits_made, characters=characters, harmless=harmless
-        ),
+        title=title,
+        how=how,
         sheets=[
             Sheet(columns=("language", "what", *COLUMNS), rows=rows, words=2),
             Sheet(
@@ -360,8 +384,7 @@ def run(*, quick: bool = False) -> Report:
             f"of {all_of_them.of('harmful')} that do harm {all_of_them.of('harmful', 'passed')} "
             f"passed; of {all_of_them.of('harmless')} that are harmless "
             f"{all_of_them.of('harmless') - all_of_them.of('harmless', 'passed')} did not",
-            f"of {told.total()} harmful edits of the text that were found, {told['told']} are told "
-            "with their own line or one beside it",
+            *([lines] if told else []),
             *all_of_them.wrong[:20],
         ],
     )

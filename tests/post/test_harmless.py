@@ -230,6 +230,7 @@ HARMFUL = {
         (".src", r"DEF one\(\)\r\n", "DEF one()\r\n$LOAD={M 17}\r\n"),
         (".src", r"DEF one\(\)\r\n", "DEF one()\r\n&REL 4\r\n"),
         (".src", r"DEF one\(\)\r\n", "DEF one()\r\nDECL FDAT FP1={TOOL_NO 2}\r\n"),
+        (".dat", r"ENDDAT", "DECL FDAT FP1={TOOL_NO 2} $OUT[1]=TRUE {}\r\nENDDAT"),
         (".src", r"(\$OUT\[1\]=FALSE)", " " * 250 + r"\1"),
     ],
     "rapid": [

@@ -59,7 +59,7 @@ HARMLESS: dict[str, tuple[Harmless, ...]] = {
             why=_LOAD,
         ),
         Harmless(
-            pattern=r"DECL (?:E6POS X|E6AXIS X|FDAT F|LDAT L|PDAT P)\w+ = \{.*\}",
+            pattern=r"DECL (?:E6POS X|E6AXIS X|FDAT F|LDAT L|PDAT P)\w+ = \{[^=$]*\}",
             example="DECL E6POS XP1={X 10.0,Y 0.0,Z 90.0,A 0.0,B 0.0,C 0.0}",
             why="data of the pendant's forms, which no line uses",
             where="data",

@@ -30,7 +30,7 @@ _NUMBER = rf"-?{_WHOLE}(?:\.\d+)?"
 _NUMBERS = rf"\[({_NUMBER}(?:, *{_NUMBER})*)\]"
 _POINT = re.compile(
     rf"- {{positions: {_NUMBERS}, velocities: {_NUMBERS}, accelerations: {_NUMBERS}, effort: \[\], "
-    rf"time_from_start: {{sec: ({_WHOLE}), nanosec: ({_WHOLE})}}}}",
+    rf"time_from_start: {{sec: ({_WHOLE}), nanosec: (0|[1-9]\d{{0,8}})}}}}",
     re.ASCII,
 )
 _TIME = rf"- {{time: (-?{_WHOLE}\.\d{{9}}), "
