@@ -234,7 +234,8 @@ def _second(lines: list[str], language: str, rng: np.random.Generator) -> Made:
     between = _random(
         (" ", "; ", ";", ": ", ":", ", ", "\\ ", " & ", " ! ;", "\t", "{ ", "} "), rng
     )
-    if not two.strip() or re.search(LEXES[language].mark, between):
+    behind_move = language == "inform" and two.startswith("//")  # begins a remark there
+    if not two.strip() or behind_move or re.search(LEXES[language].mark, between):
         return None
     changed = f"{before}{one}{between}{two}{end}"
     return "second statement", k, _with(lines, k, changed), f"{between}{two.strip()}"

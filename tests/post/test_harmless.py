@@ -109,6 +109,7 @@ HARMLESS = {
         ("ONE.ls", r"/MN\r\n", "/MN\r\n   1:   ;\r\n"),
         ("ONE.ls", r"/MN\r\n", "\r\n/MN\r\n"),
         ("ONE.ls", r"/PROG  ", "/PROG "),
+        ("_OFF.ls", r"/POS\r\n", "   9:  ! that is all ;\r\n/POS\r\n"),
         ("ONE.ls", r"STACK_SIZE\t= 0", "STACK_SIZE\t= 500"),
     ],
     "inform": [
@@ -128,6 +129,7 @@ HARMLESS = {
         ("ONE.JBI", r"END\r\n$", "END"),
         ("ONE.JBI", r"NOP\r\n", 'NOP\r\nMSG "contour one"\r\n'),
         ("ONE.JBI", r"MOVL C00001 V", "\t MOVL C00001 V"),
+        ("_OFF.JBI", r"END\r\n$", "'that is all\r\nEND\r\n"),
         ("ONE.JBI", r"(MOVL C00001.*PL=1)", r"\t \1 //the first corner"),
         ("ONE.JBI", r"(RCONF 1,0,0,0,0,0)(,0)*", r"\1"),
     ],

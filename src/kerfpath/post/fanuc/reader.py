@@ -35,7 +35,7 @@ from kerfpath.post.fanuc.writer import (
     watch_lines,
 )
 from kerfpath.post.flow import section_of
-from kerfpath.post.line_reader import numbers_in, patterns
+from kerfpath.post.line_reader import numbers_in, only, patterns
 from kerfpath.post.places import off_name
 from kerfpath.post.program import Await, Switch
 from kerfpath.post.read_program import (
@@ -188,7 +188,7 @@ class _Watching(Listing):
     def __init__(self, file: str, text: str, robot: Robot, settings: FanucSettings) -> None:
         super().__init__(file, text, robot, settings)
         self.require_next(watch_lines(settings))
-        self.body({}, NO_GROUP)
+        self.body(only(_MAIN, "remark"), NO_GROUP)
         self.end()
 
 

@@ -31,7 +31,7 @@ from kerfpath.post.inform.writer import (
     wait_lines,
 )
 from kerfpath.post.languages import reset_lines
-from kerfpath.post.line_reader import BLANK, LineReader, patterns, program_lines
+from kerfpath.post.line_reader import BLANK, LineReader, only, patterns, program_lines
 from kerfpath.post.places import off_name
 from kerfpath.post.program import Await, Handshake, Switch
 from kerfpath.post.read_program import MoveKind, ReadProgram
@@ -172,7 +172,7 @@ class _Off(_Text):
             raise self.fault("this job must have no positions")
         self.require_rows(middle("main", settings, self.external)[1])
         self.require_next(switch_off_lines(settings))
-        self.instructions({})
+        self.instructions(only(_MAIN, "remark"))
 
 
 class _Main(_Text):
