@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from kerfpath.planner.subsampled import subsampled
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
-from kerfpath.search import BeamWidth, ContinuousPath, find_shortest
+from kerfpath.search import BeamWidth, ContinuousPath, ContinuousSearch, find_shortest
 
 FIRST_STEP = 5e-3
 """rad: first change of gamma when a path between the samples is refined."""
@@ -35,6 +36,10 @@ COARSE_STEP = np.radians(1.5)
 """rad: step of gamma from which a search that finds nothing is repeated with half the step."""
 NEARLY = 0.95
 """Share of the speed at which a motion must have been found for that."""
+VALLEYS = 20
+"""Most valleys through which courses are looked for."""
+SAME_COST = 1e-6
+"""Relative difference of courses that count as equally costly."""
 GAIN = 5e-3
 """Relative gain that a refinement may reach beyond the promised cost of a path."""
 NARROWED = 6
@@ -187,22 +192,29 @@ def clear_motion(
         paths = [path for beam in QUICK for path in search.paths(beam)]
     begin("refinement")
     starts.refine(paths)
-    if not thorough:
-        return starts.best
+    if thorough:
+        _search_wider(task, starts, search, paths)
+        starts.refine_valleys(search)
+    return starts.best
+
+
+def _search_wider(
+    task: Task, starts: _Starts, search: ContinuousSearch, paths: list[ContinuousPath]
+) -> None:
+    """Refine more paths if the value function promises a better motion than the best one."""
     if starts.above(search.value, ENOUGH):
         paths += search.paths(wide(task))
         starts.refine(paths)
         starts.refine_from_grid(task)
     if starts.best is not None and starts.above(search.value, POOR):
-        fine = _finer(task) if finder.is_free else None
+        fine = _finer(task) if starts.finder.is_free else None
         if fine is not None:
             starts.refine_from_grid(fine)
         width, _, ways = wide(task)
         paths += search.paths(BeamWidth(width, OTHERWISE, ways))
         starts.refine(paths, unpromising=True)
-        made = refine_from_random_starts(starts.best.plan, finder)
-        return replace(starts.best, plan=made, cost_after=made.cost)
-    return starts.best
+        made = refine_from_random_starts(starts.best.plan, starts.finder)
+        starts.best = replace(starts.best, plan=made, cost_after=made.cost)
 
 
 def _from_fewer_nodes(task: Task, finder: CollisionFreeSearch) -> tuple[Plan | None, float]:
@@ -221,11 +233,14 @@ def _from_fewer_nodes(task: Task, finder: CollisionFreeSearch) -> tuple[Plan | N
     return thin.at_all_nodes(found.plan), found.cost_after if told else 0.0
 
 
+_CLAIM = Proof(optimal=False, statement="found over continuous rotation")
+
+
 class _Starts:
     """Starts of refinements, and the best motion that was reached from them."""
 
     def __init__(self, task: Task, finder: CollisionFreeSearch) -> None:
-        self._task, self._finder = task, finder
+        self._task, self.finder = task, finder
         self._tried: list[Plan] = []
         self.best: Refinement | None = None
 
@@ -238,7 +253,7 @@ class _Starts:
         if made is not None:
             self._tried.append(made)
             found = refiner.refine(made, first=FIRST_STEP, least=least)
-            self.best = found if found.done and self._finder.is_clear(found.plan) else None
+            self.best = found if found.done and self.finder.is_clear(found.plan) else None
 
     def refine(self, paths: list[ContinuousPath], *, unpromising: bool = False) -> None:
         """Refine paths, the most promising first, and of similar paths only one.
@@ -246,8 +261,7 @@ class _Starts:
         Paths that promise no better motion are refined only if `unpromising`: the cost of bringing
         a path inside the limits is a guess.
         """
-        claim = Proof(optimal=False, statement="found over continuous rotation")
-        plans = [self._task.plan_between(path, claim) for path in paths]
+        plans = [self._task.plan_between(path, _CLAIM) for path in paths]
         for promised, i in sorted((refiner.promise(plan), i) for i, plan in enumerate(plans)):
             best, made = self.best, plans[i]
             hopeless = best is not None and promised * (1 - GAIN) >= best.cost_after
@@ -256,8 +270,27 @@ class _Starts:
             known = self._tried if best is None else [*self._tried, best.plan]
             if not any(alike(made, other) for other in known):
                 self._tried.append(made)
-                found = _refine_path(self._task, self._finder, paths[i], made)
+                found = _refine_path(self._task, self.finder, paths[i], made)
                 self.best = _better(best, found)
+
+    def refine_valleys(self, search: ContinuousSearch) -> None:
+        """Refine courses through other valleys that may cost less than the best motion.
+
+        Under (6) the cheapest course by (5) alone need not lead to the best motion. Of courses that
+        cost the same, which differ in the posture of the wrist, one is enough. Where there is no
+        motion to improve on, the grid is a better start.
+        """
+        if self.best is None:
+            return
+        courses = list(islice(search.valleys(), VALLEYS))
+        self.finder.learn([ends for path in courses for ends in (path.one, path.other)])
+        refined = np.zeros(0)
+        for path in courses:
+            cost = self._task.plan_between(path, _CLAIM).cost
+            least = (1 + POOR) * self.best.cost_after
+            if cost < least and not np.isclose(cost, refined, rtol=SAME_COST).any():
+                self.refine([path], unpromising=True)
+                refined = np.append(refined, cost)
 
     def refine_from_grid(self, task: Task) -> None:
         """Refine the best path on the grid of a task, if there is already a motion to improve on.
@@ -268,13 +301,13 @@ class _Starts:
             return
         found: Refinement | None
         try:
-            path = self._finder.find(find_shortest, task.problem)
+            path = self.finder.find(find_shortest, task.problem)
         except NoFeasiblePath:
-            found = plan_off_grid(task, self._finder) if task.settings.closure == "free" else None
+            found = plan_off_grid(task, self.finder) if task.settings.closure == "free" else None
         else:
             claim = Proof(optimal=False, statement="begun from the grid")
             found = refiner.refine(task.plan(path.index, path.cost, claim))
-        if found is not None and found.done and self._finder.is_clear(found.plan):
+        if found is not None and found.done and self.finder.is_clear(found.plan):
             own = replace(found.plan, settings=self._task.settings)
             self.best = _better(self.best, replace(found, plan=own))
 

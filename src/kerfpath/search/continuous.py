@@ -14,7 +14,7 @@ from kerfpath.kernels import continuous as kernel
 from kerfpath.kernels.beam import Alike, Beam, advance
 from kerfpath.kernels.continuous import Steps, Targets
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.metric import increments_between
+from kerfpath.kernels.metric import increments_between, wrap
 from kerfpath.limits import Limits
 from kerfpath.search.problem import SearchProblem, unroll
 
@@ -28,6 +28,12 @@ SAME_COST, MOST_TURNS = 1e-9, 16
 APART = 0.15
 """rad: some joint of two first vertices that are both tried differs by more; the refinement can
 move a path by less."""
+VALLEY_LAYERS = 7
+"""Layers in which valleys are looked for."""
+SAME_COURSE = 0.06
+"""rad: courses in the same postures whose gamma differs by less everywhere are one."""
+ANY_CHANGE = 1e6
+"""rad: change of an increment that no joint ever has."""
 _LAYERS_SAMPLED, _VERTICES_SAMPLED = 12, 16
 """Layers, and vertices of each, that are sampled to choose the joint that sorts the targets."""
 
@@ -150,7 +156,8 @@ class ContinuousSearch:
             np.ascontiguousarray(layers.q), layers.start, layers.endless, samples, velocity
         )
         closed = problem.closure == "periodic"
-        self._ways = self._tied_ways(closed=closed) if closed or limited.any() else self._one_way()
+        self._samples, self._tied = samples, closed or bool(limited.any())
+        self._ways = self._tied_ways(closed=closed) if self._tied else self._one_way()
 
     @property
     def value(self) -> float:
@@ -167,12 +174,68 @@ class ContinuousSearch:
             if path is not None:
                 yield path
 
+    def valleys(self) -> Iterator[ContinuousPath]:
+        """Yield the best course under (5) alone through each valley, the cheapest first.
+
+        The best course through a vertex costs what leads there and what leads on. A valley is a
+        vertex of one of a few layers where this is less than at its neighbours in gamma. Courses
+        like one before are left out. There are none if the constraints depend on the first vertex.
+        """
+        if self._tied:
+            return
+        targets, back = self._targets, _reversed(self._targets)
+        steps, cost, N = self._steps, self._cost, len(self._cost)
+        to_go, from_start = self._values(steps, cost), _values_to(back, steps, cost[::-1])
+        there = from_start[::-1]
+        through = np.maximum(to_go, there) if steps.minimax else to_go + there - cost
+        bottom, (one, other) = through < np.inf, (targets.one, targets.other)
+        bottom[one[through[one] > through[other]]] = False
+        bottom[other[through[other] > through[one]]] = False
+        K = len(targets.start) - 1
+        layer = np.repeat(np.arange(K), np.diff(targets.start))
+        bottom &= np.isin(layer, np.linspace(0, K - 1, VALLEY_LAYERS).astype(int))
+        valleys = np.flatnonzero(bottom)
+        known: list[tuple[Array, Ints]] = []
+        for v in valleys[np.argsort(through[valleys], kind="stable")]:
+            k = int(layer[v])
+            here, posture = self._gamma(v, v, np.zeros(1)), self._samples.posture
+            if any(abs(wrap(gamma[k] - here)) < SAME_COURSE and on[k] == posture[v]
+                   for gamma, on in known):  # fmt: skip
+                continue
+            ahead = _course(targets, steps, cost, to_go, int(v))
+            behind = _course(back, steps, cost[::-1], from_start, N - 1 - int(v))
+            if ahead is None or behind is None:
+                continue
+            one, other = (
+                np.append(N - 1 - b[:0:-1], a) for a, b in zip(ahead[:2], behind[:2], strict=True)
+            )
+            share = np.append(behind[2][:0:-1], ahead[2])
+            gamma = self._gamma(one, other, share)
+            if any(np.array_equal(on, posture[one]) and np.abs(wrap(at - gamma)).max() < SAME_COURSE
+                   for at, on in known):  # fmt: skip
+                continue
+            known.append((gamma, posture[one]))
+            yield self._path(one, other, share)
+
+    def _gamma(self, one: Ints, other: Ints, share: Array) -> Array:
+        """Return about what gamma (rad) is at points between vertices, as if samples were even."""
+        turn = 2 * np.pi / self._samples.samples
+        at, to = (self._samples.sample[v] * turn for v in (one, other))
+        return np.asarray(at + share * wrap(to - at))
+
+    def _path(self, one: Ints, other: Ints, share: Array) -> ContinuousPath:
+        targets = self._targets
+        between = increments_between(targets.q[one], targets.q[other], targets.endless)
+        return ContinuousPath(
+            one=self._origin[one],
+            other=self._origin[other],
+            share=share,
+            q=targets.q[one] + share[:, None] * between,
+        )
+
     def _values(self, steps: Steps, cost: Array, last: Bools | None = None) -> Array:
         """Return the value function (N,) for vertex costs (N,) and allowed last vertices (m,)."""
-        a, V = self._targets.start[-2], np.full(len(cost), np.inf)
-        V[a:] = cost[a:] if last is None else np.where(last, cost[a:], np.inf)
-        kernel.values_to_go(self._targets, steps, cost, V)
-        return V
+        return _values_to(self._targets, steps, cost, last)
 
     def _one_way(self) -> list[_Way]:
         """Return the way from any first vertex to any last one, or an empty list."""
@@ -267,13 +330,61 @@ class ContinuousSearch:
             at[k], share[k], b = beam.at[k, b], beam.share[k, b], beam.parent[k, b]
         one = np.concatenate([at[:1], targets.one[at[1:]]])
         other = np.concatenate([at[:1], targets.other[at[1:]]])
-        between = increments_between(targets.q[one], targets.q[other], targets.endless)
-        return ContinuousPath(
-            one=self._origin[one],
-            other=self._origin[other],
-            share=share,
-            q=targets.q[one] + share[:, None] * between,
-        )
+        return self._path(one, other, share)
+
+
+def _values_to(targets: Targets, steps: Steps, cost: Array, last: Bools | None = None) -> Array:
+    """Return the value function (N,) for vertex costs (N,) and allowed last vertices (m,)."""
+    cost = np.ascontiguousarray(cost)
+    a, V = targets.start[-2], np.full(len(cost), np.inf)
+    V[a:] = cost[a:] if last is None else np.where(last, cost[a:], np.inf)
+    kernel.values_to_go(targets, steps, cost, V)
+    return V
+
+
+def _course(
+    targets: Targets, steps: Steps, cost: Array, values: Array, v: int
+) -> tuple[Ints, Ints, Array] | None:
+    """Return the best course from a vertex to the last layer: the ends of its targets, and shares.
+
+    None if no step leads on from a point between two vertices.
+    """
+    k = int(np.searchsorted(targets.start, v, side="right")) - 1
+    K = len(targets.start) - 1 - k
+    here = np.array([v])
+    if K == 1:
+        return here, here, np.zeros(1)
+    part = targets._replace(start=targets.start[k:], begin=targets.begin[k:], half=targets.half[k:])
+    beam = Beam(
+        np.empty((K, 1), np.int64), np.empty((K, 1)), np.empty((K, 1), np.int64), np.empty((K, 1)),
+        np.zeros(K, np.int64),
+    )  # fmt: skip
+    change = np.full(targets.q.shape[1], ANY_CHANGE)
+    cost = np.ascontiguousarray(cost)
+    if advance(part, steps, cost, values, change, here, Alike(1.0, 1.0), beam) < K:
+        return None
+    at = beam.at[1:, 0]
+    one, other = (np.append(here, ends[at]) for ends in (targets.one, targets.other))
+    return one, other, np.append(0.0, beam.share[1:, 0])
+
+
+def _reversed(targets: Targets) -> Targets:
+    """Return the targets of the same problem from its last layer to its first."""
+    N, layers = len(targets.q), np.diff(targets.begin)[::-1]
+    order = np.concatenate(
+        [np.arange(a, b) for a, b in zip(targets.begin[-2::-1], targets.begin[:0:-1], strict=True)]
+    )
+    return Targets(
+        np.ascontiguousarray(targets.q[::-1]),
+        np.ascontiguousarray(N - targets.start[::-1]),
+        N - 1 - targets.one[order],
+        N - 1 - targets.other[order],
+        np.append(0, np.cumsum(layers)),
+        targets.key[order],
+        np.ascontiguousarray(targets.half[::-1]),
+        targets.joint,
+        targets.endless,
+    )
 
 
 def _targets(
