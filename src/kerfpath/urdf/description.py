@@ -29,6 +29,8 @@ from kerfpath.urdf.tree import Joint, Tree, child, numbers, pose_of, read_root, 
 # -----------------------------------------------------------------------------
 # Collision bodies of a description, each in the frame of the joint that moves it.
 
+THINNEST = 1e-6
+"""Least size of a body, m; thinner ones have no hull in the digits of a computer."""
 SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
 
 
@@ -97,9 +99,10 @@ def _size(shape: ElementTree.Element, where: str) -> Array:
         return numbers(shape, "scale", where, (1.0, 1.0, 1.0))
     keys, count = SIZES[shape.tag]
     size = np.concatenate([numbers(shape, key, where, (0.0,) * count) for key in keys.split()])
-    if not (size > 0).all():
+    if not (size >= THINNEST).all():
         raise InputError(
-            f"{where}: expected a {shape.tag} with positive {keys}, got {size.tolist()}"
+            f"{where}: expected a {shape.tag} with positive {keys} of {THINNEST:g} m or more, got "
+            f"{size.tolist()}"
         )
     return size
 
