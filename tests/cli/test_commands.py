@@ -61,7 +61,8 @@ def test_a_plan_says_what_it_did(planned, folder):
     assert all((folder / f).exists() for f in planned["files"])
     for contour in planned["contours"]:
         assert 0 < contour["peak_velocity_share"] <= 0.95
-        assert contour["issues"] == []
+        # 1 mm at 3 m/min is 20 ms, of 24 ms that are assumed.
+        assert all("[cycle-as-run]" in issue for issue in contour["issues"])
         assert 0 < contour["bound"] <= contour["cost"]
         assert contour["gap"] <= 0.005  # what is asked for where the job says nothing
         assert "no motion within the limits costs less than" in contour["proof"]
