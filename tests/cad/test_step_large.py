@@ -73,3 +73,11 @@ def test_a_mesh_is_the_same_in_another_process(tmp_path: Path) -> None:
     expected, same = read(shape).mesh()
     np.testing.assert_allclose(vertices, expected, atol=1e-9)
     assert np.array_equal(triangles, same)
+
+
+def test_a_very_long_word_is_refused_at_once(tmp_path: Path) -> None:
+    """The time for it grew with the square of its length: minutes for a megabyte."""
+    path = write_step(tmp_path / "word.step", box(1, 1, 1))
+    path.write_text(path.read_text("ascii").replace("DIRECTION(", "x" * 1_000_000, 1), "ascii")
+    with pytest.raises(InputError, match=r"word\.step: .*Incorrect syntax"):
+        read(path)

@@ -118,7 +118,7 @@ BLANKS = re.compile(rb"'[^']*'|/\*.*?\*/|\s+", re.DOTALL)
 SECTION = re.compile(rb";DATA(?:\([^;]*\))?;(.*?)ENDSEC;", re.DOTALL | re.IGNORECASE)
 NUMBER = rb"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?"
 ITEM = rb"(?:\$++|\*|#\d++|%s|\.\w++\.|\"[0-9A-Fa-f]*+\")" % NUMBER
-LIST = re.compile(rb"!?(?:[A-Za-z_]\w*+)?\((?:%s(?:,%s)*+)?\)" % (ITEM, ITEM))
+LIST = re.compile(rb"!?(?:(?<!\w)[A-Za-z_]\w*+)?\((?:%s(?:,%s)*+)?\)" % (ITEM, ITEM))
 """A list without inner lists; with a type in front of it, an entity."""
 ENTITY = re.compile(rb"#\d+=\$+")
 DEEPEST = 32
