@@ -361,6 +361,7 @@ BAD = {
     ),
     "an odd shape": (put("<cone/>"), "expected one of mesh, box, cylinder, sphere, got <cone>"),
     "a flat box": (put('<box size="1 0 1"/>'), "a box with positive size"),
+    "a mesh of a long name": (put(f'<mesh filename="{"x" * 5000}"/>'), "was not found"),
     "a box of no thickness": (put('<box size="1 5e-324 1"/>'), "of 1e-06 m or more"),
     "a mesh elsewhere": (put('<mesh filename="http://a/b.stl"/>'), "is not a local file"),
     "a mesh without a name": (put("<mesh/>"), "the mesh '' was not found"),

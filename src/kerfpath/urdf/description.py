@@ -6,6 +6,7 @@ A description also gives the pairs of links that may touch, if its SRDF is there
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -107,6 +108,13 @@ def _size(shape: ElementTree.Element, where: str) -> Array:
     return size
 
 
+def _is_file(path: Path) -> bool:
+    """Return whether a path leads to a file; no name is too long or too odd to ask."""
+    with suppress(OSError, ValueError):
+        return path.is_file()
+    return False
+
+
 def _mesh_file(
     tree: Tree, mesh: ElementTree.Element, where: str, packages: Mapping[str, Path]
 ) -> Path:
@@ -120,10 +128,10 @@ def _mesh_file(
     elif scheme == "package":
         package, _, inside = rest.partition("/")
         places = [packages[package]] if package in packages else _places(here, package)
-        file = next((p / inside for p in places if (p / inside).is_file()), Path(inside))
+        file = next((p / inside for p in places if _is_file(p / inside)), Path(inside))
     else:
         raise InputError(f"{where}: the mesh {name!r} is not a local file")
-    if not name or not file.is_file():
+    if not name or not _is_file(file):
         raise InputError(
             f"{where}: the mesh {name!r} was not found; give the folder of its package in "
             "packages, or read only the kinematics, without meshes",
