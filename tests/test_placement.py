@@ -199,7 +199,7 @@ def test_a_table_of_measured_points_is_read(tmp_path):
         ),
         ("B;500;0", "B;500", "line 4: expected 7 columns, got 6"),
         ("B;500", "B;5oo", "line 4, column nominal_x: expected a number, got '5oo'"),
-        ("1500,5", "nan", "line 4, column measured_x: expected a finite number"),
+        ("1500,5", "nan", "line 4, column measured_x: expected a number, got 'nan'"),
     ],
 )
 def test_a_table_with_a_fault_is_refused_in_one_line(tmp_path, old, new, message):

@@ -18,6 +18,7 @@ from jobs import DEMO, SMALL
 from kerfpath import robot
 from kerfpath.job import read_plan_file
 from kerfpath.planner import at_least, at_most
+from kerfpath.post import MANIFEST
 from programs import read_text
 
 
@@ -177,7 +178,7 @@ def test_a_part_out_of_reach_is_reported_without_a_program(folder):
     assert "no admissible pose at node 0" in result.stdout
     assert "unreachable" in result.stdout
     names = {p.name for p in (folder / "far-plan").iterdir()}
-    assert names == {"plan.json", "trajectory.csv", "report.html"}
+    assert names == {MANIFEST, "plan.json", "trajectory.csv", "report.html"}
     data = json.loads((folder / "far-plan" / "plan.json").read_text())
     assert not data["contours"][0]["feasible"]
     assert data["contours"][0]["proved"]

@@ -212,7 +212,7 @@ def walled(part, arm, tool, placement):
     """The four holes with a wall between them, and the cell; planned from and to a home."""
     at = np.array([p.points.mean(axis=0) for p in part]) @ placement[:3, :3].T + placement[:3, 3]
     middle, top = at.mean(axis=0), at[:, 2].max()
-    wall = box_between(middle - [0.3, 0.005, 0.1], [middle[0] + 0.3, middle[1] + 0.005, top + 0.02])
+    wall = box_between(middle - [0.3, 0.005, 0.1], [middle[0] + 0.3, middle[1] + 0.005, top + 0.05])
     cell = cell_of(arm, tool=tool, placement=placement, fixtures={"wall": wall})
     asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
     home = np.radians([0, -20, 10, 0, 60, 0])

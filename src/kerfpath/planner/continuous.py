@@ -39,7 +39,7 @@ NEARLY = 0.95
 VALLEYS = 20
 """Most valleys through which courses are looked for."""
 SAME_COST = 1e-6
-"""Relative difference of courses that count as equally costly."""
+"""Relative difference of courses and motions that count as equally costly."""
 GAIN = 5e-3
 """Relative gain that a refinement may reach beyond the promised cost of a path."""
 NARROWED = 6
@@ -289,7 +289,10 @@ class _Starts:
             cost = self._task.plan_between(path, _CLAIM).cost
             least = (1 + POOR) * self.best.cost_after
             if cost < least and not np.isclose(cost, refined, rtol=SAME_COST).any():
+                before = self.best
                 self.refine([path], unpromising=True)
+                if self.best.cost_after > (1 - SAME_COST) * before.cost_after:
+                    self.best = before
                 refined = np.append(refined, cost)
 
     def refine_from_grid(self, task: Task) -> None:

@@ -76,6 +76,8 @@ class Switch:
     lead_time: float = 0.0
     needs: tuple[Signal | Partner, ...] = ()
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointMove:

@@ -187,7 +187,9 @@ class ContinuousSearch:
         steps, cost, N = self._steps, self._cost, len(self._cost)
         to_go, from_start = self._values(steps, cost), _values_to(back, steps, cost[::-1])
         there = from_start[::-1]
-        through = np.maximum(to_go, there) if steps.minimax else to_go + there - cost
+        passed = np.isfinite(to_go + there)
+        through = np.maximum(to_go, there) if steps.minimax else to_go + there
+        through[passed] -= 0.0 if steps.minimax else cost[passed]  # it is in both
         bottom, (one, other) = through < np.inf, (targets.one, targets.other)
         bottom[one[through[one] > through[other]]] = False
         bottom[other[through[other] > through[one]]] = False

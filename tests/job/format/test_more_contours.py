@@ -66,12 +66,10 @@ def test_a_contour_taken_out_leaves_all_other_lines(demo, index):
     assert [line for line in text.splitlines() if line.startswith("#")] == comments
 
 
-def test_a_separator_in_a_remark_is_no_end_of_a_line(demo, tmp_path):
-    _, part = demo
-    text = "# note\u2028[[contour]]\n" + WHOLE
-    added = with_loops(job_of(tmp_path, text), part, ["skin/hole2"])
-    assert tables(added)[:-1] == tables(text)
-    assert without_contour(job_of(tmp_path, added), len(tables(text))) == text
+def test_a_separator_in_a_remark_is_refused(tmp_path):
+    """An editor that takes it for the end of a line shows a table that is none."""
+    with pytest.raises(InputError, match=r"job.toml:1: expected text, got U\+2028 LINE SEPARATOR"):
+        job_of(tmp_path, "# note\u2028[[contour]]\n" + WHOLE)
 
 
 def test_leads_and_corners_of_the_model_come_along_and_its_name_does_not(tmp_path):
