@@ -111,6 +111,11 @@ def test_equal_notes_are_merged():
                     "more 1"]  # fmt: skip
 
 
+def test_notes_that_differ_in_signs_are_merged():
+    notes = [f"hole_{i}: at x = {(-1) ** i * i}.5 mm" for i in range(3)]
+    assert merge_notes(notes) == [notes[0] + " (and 2 more like it; the report has all)"]
+
+
 def test_without_a_terminal_lines_tell_what_is_being_done(monkeypatch):
     monkeypatch.setattr(show_module, "LINE_SECONDS", 0.02)
     said = io.StringIO()

@@ -38,6 +38,7 @@ from kerfpath.job import (
     with_map,
     write_result,
 )
+from kerfpath.names import identifiers
 from kerfpath.planner import FastestSpeed, at_least, at_most
 
 # -----------------------------------------------------------------------------
@@ -163,6 +164,9 @@ def finish_run(
         }
     )
     _show_cuts(outcome.cuts)
+    names = [cut.name for cut in outcome.cuts]
+    names += identifiers(names, ())  # as in programs
+    warnings: list[str] = []
     for cut in outcome.cuts:
         if cut.broken is not None:
             out.print(f"[bold]{escape(cut.name)}[/]: {escape(cut.failure)}")
@@ -171,9 +175,13 @@ def finish_run(
         if (tilt := _largest_tilt(cut)) is not None:
             out.print(f"[bold]{escape(cut.name)}[/]: tool axis tilted by up to {tilt:.2f} deg")
         for check in (*cut.checks, *cut.as_run.checks):
-            if not check.ok:
+            if not check.ok and check.level == "warning":
+                warnings.append(f"{cut.name}: {check.issue()}")
+            elif not check.ok:
                 out.print(f"[bold]{escape(cut.name)}[/]: {escape(str(check.issue()))}")
-    for note in merge_notes(written.notes, [cut.name for cut in outcome.cuts]):
+    for warning in merge_notes(warnings, names):
+        out.print(escape(warning))
+    for note in merge_notes(written.notes, names):
         out.print(f"note: {escape(note)}")
     for fault in written.faults:
         out.print(f"[bold red]do not cut:[/] {escape(fault)}")

@@ -134,7 +134,7 @@ def merge_notes(notes: Sequence[str], names: Collection[str] = ()) -> list[str]:
     """Return the notes; those that differ only in figures and `names` are one, with a count."""
     groups: dict[str, list[str]] = {}
     longest = sorted(names, key=len, reverse=True)
-    pattern = "|".join([*map(re.escape, longest), r"\d+(?:\.\d+)?"])
+    pattern = "|".join([*map(re.escape, longest), r"-?\d+(?:\.\d+)?"])
     for note in notes:
         groups.setdefault(re.sub(pattern, "#", note), []).append(note)
     return [
