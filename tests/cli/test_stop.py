@@ -25,10 +25,11 @@ STOPS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
 
 
 def started(*arguments, cwd):
-    """Start the command so that it hears Ctrl-C, whatever this process does with it."""
+    """Start the command so that it hears signals, whatever this process does with it."""
 
     def hears():
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it
 
     return subprocess.Popen(
         [KERFPATH, *map(str, arguments)], cwd=cwd, text=True, preexec_fn=hears,

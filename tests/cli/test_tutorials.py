@@ -28,10 +28,10 @@ def write_job(folder, text):
 
 
 def edit_program(folder):
-    """Lift the target of line 43 by 3 mm, as the last lesson says."""
+    """Lift the target of line 53 by 3 mm, as the last lesson says."""
     lines = (folder / "hole" / "hole.mod").read_text().splitlines(keepends=True)
-    assert lines[42].count(",0.0000],[") == 1
-    lines[42] = lines[42].replace(",0.0000],[", ",3.0000],[")
+    assert lines[52].count(",0.0000],[") == 1
+    lines[52] = lines[52].replace(",0.0000],[", ",3.0000],[")
     (folder / "edited.mod").write_text("".join(lines))
 
 
@@ -59,5 +59,5 @@ def test_the_lessons_run(tmp_path):
     assert "Cycle time" in said["$ kerfpath plan part.toml --out part"]
     assert "audit passed" in said["$ kerfpath audit hole/hole.mod --job hole.toml"]
     failed = said["$ kerfpath audit edited.mod --job hole.toml"]
-    assert "line 43" in failed
+    assert "line 53" in failed
     assert "3 mm" in failed

@@ -185,7 +185,8 @@ class ContinuousSearch:
             return
         targets, back = self._targets, _reversed(self._targets)
         steps, cost, N = self._steps, self._cost, len(self._cost)
-        to_go, from_start = self._values(steps, cost), _values_to(back, steps, cost[::-1])
+        back_cost = freeze(np.ascontiguousarray(cost[::-1]))
+        to_go, from_start = self._values(steps, cost), _values_to(back, steps, back_cost)
         there = from_start[::-1]
         passed = np.isfinite(to_go + there)
         through = np.maximum(to_go, there) if steps.minimax else to_go + there
@@ -205,7 +206,7 @@ class ContinuousSearch:
                    for gamma, on in known):  # fmt: skip
                 continue
             ahead = _course(targets, steps, cost, to_go, int(v))
-            behind = _course(back, steps, cost[::-1], from_start, N - 1 - int(v))
+            behind = _course(back, steps, back_cost, from_start, N - 1 - int(v))
             if ahead is None or behind is None:
                 continue
             one, other = (
@@ -337,7 +338,6 @@ class ContinuousSearch:
 
 def _values_to(targets: Targets, steps: Steps, cost: Array, last: Bools | None = None) -> Array:
     """Return the value function (N,) for vertex costs (N,) and allowed last vertices (m,)."""
-    cost = np.ascontiguousarray(cost)
     a, V = targets.start[-2], np.full(len(cost), np.inf)
     V[a:] = cost[a:] if last is None else np.where(last, cost[a:], np.inf)
     kernel.values_to_go(targets, steps, cost, V)
@@ -361,8 +361,7 @@ def _course(
         np.empty((K, 1), np.int64), np.empty((K, 1)), np.empty((K, 1), np.int64), np.empty((K, 1)),
         np.zeros(K, np.int64),
     )  # fmt: skip
-    change = np.full(targets.q.shape[1], ANY_CHANGE)
-    cost = np.ascontiguousarray(cost)
+    change = freeze(np.full(targets.q.shape[1], ANY_CHANGE))
     if advance(part, steps, cost, values, change, here, Alike(1.0, 1.0), beam) < K:
         return None
     at = beam.at[1:, 0]
@@ -377,8 +376,8 @@ def _reversed(targets: Targets) -> Targets:
         [np.arange(a, b) for a, b in zip(targets.begin[-2::-1], targets.begin[:0:-1], strict=True)]
     )
     return Targets(
-        np.ascontiguousarray(targets.q[::-1]),
-        np.ascontiguousarray(N - targets.start[::-1]),
+        freeze(np.ascontiguousarray(targets.q[::-1])),
+        freeze(np.ascontiguousarray(N - targets.start[::-1])),
         N - 1 - targets.one[order],
         N - 1 - targets.other[order],
         np.append(0, np.cumsum(layers)),

@@ -92,6 +92,7 @@ def test_where_nothing_is_proved_the_guarantee_fails(tmp_path, text, said, why):
 @pytest.mark.slow
 def test_the_speed_as_run_is_found_with_axes_too(tmp_path, text):
     slit = text[: text.index("[[contour]]")] + text[text.rindex("[[contour]]") :]
+    slit = slit.replace("[program.rapid]\n", "[program.rapid]\nshortest_move_ms = 0\n")
     (found,) = fastest_speeds(job_of(tmp_path, slit))
     assert 0.5 * found.at_nodes.speed < found.as_run <= found.at_nodes.speed
     kept = re.sub("speed_m_min = .*", f"speed_m_min = {found.as_run * 60!r}", slit)

@@ -12,7 +12,8 @@ GUARANTEED = re.sub(
     "eta_acceleration = 1",
     SMALL.replace("[plan]", '[plan]\ncertify = false\nbetween_nodes = "guaranteed"'),
 ).replace("spacing_mm = 1 ", "spacing_mm = 4 ")
-"""Every share of the limits is used at the nodes, which are far apart."""
+GUARANTEED += "\n[program.rapid]\nshortest_move_ms = 0\n"
+"""Every share of the limits is used at the nodes, which are far apart; any move is long enough."""
 
 
 def read(folder, text):
