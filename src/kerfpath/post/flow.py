@@ -136,48 +136,6 @@ def section_of(name: str, flow: Sequence[FlowStep]) -> ReadSection:
 # The program: every path is followed.
 
 
-def unsafe_restarts(program: ReadProgram) -> list[ProgramIssue]:
-    """Return where a program must not be begun or continued while everything is off.
-
-    From there, the laser would come on without an output or an answer that it has on the planned
-    path. Each issue has a stretch of lines, by the place of its first one.
-
-    Parameters
-    ----------
-    program : ReadProgram
-        As in `unsafe_paths`.
-
-    Raises
-    ------
-    InputError
-        A wait leads to a label that is missing.
-    """
-    return [
-        ProgramIssue("warning", "restart", stretch.message, stretch.first)
-        for stretch in _Machine(program).unsafe_stretches()
-    ]
-
-
-class _Stretch(NamedTuple):
-    """Steps of the planned path from which the laser comes on without what it needs."""
-
-    steps: tuple[tuple[int | str, int], ...]
-    """Routine and index of each; the last one switches the laser on."""
-    first: str
-    last: str
-    """File and line of both ends."""
-    missing: State
-
-    @property
-    def message(self) -> str:
-        """What happens if the program is begun there."""
-        until = f" or later, up to {self.last}," if self.last != self.first else ""
-        return (
-            f"begun here{until} with everything off, the laser comes on without "
-            f"{_listed(self.missing)}"
-        )
-
-
 @dataclass(frozen=True, slots=True)
 class _Visit:
     """A step on a path: the routine by its number or the error exit by its name, and the index."""
@@ -221,6 +179,48 @@ def unsafe_paths(program: ReadProgram) -> list[ProgramIssue]:
         elif machine.planned.get((visit.routine, visit.at)) != visit.state:
             queue.extend(machine.following(visit))
     return issues
+
+
+def unsafe_restarts(program: ReadProgram) -> list[ProgramIssue]:
+    """Return where a program must not be begun or continued while everything is off.
+
+    From there, the laser would come on without an output or an answer that it has on the planned
+    path. Each issue has a stretch of lines, by the place of its first one.
+
+    Parameters
+    ----------
+    program : ReadProgram
+        As in `unsafe_paths`.
+
+    Raises
+    ------
+    InputError
+        A wait leads to a label that is missing.
+    """
+    return [
+        ProgramIssue("warning", "restart", stretch.message, stretch.first)
+        for stretch in _Machine(program).unsafe_stretches()
+    ]
+
+
+class _Stretch(NamedTuple):
+    """Steps of the planned path from which the laser comes on without what it needs."""
+
+    steps: tuple[tuple[int | str, int], ...]
+    """Routine and index of each; the last one switches the laser on."""
+    first: str
+    last: str
+    """File and line of both ends."""
+    missing: State
+
+    @property
+    def message(self) -> str:
+        """What happens if the program is begun there."""
+        until = f" or later, up to {self.last}," if self.last != self.first else ""
+        return (
+            f"begun here{until} with everything off, the laser comes on without "
+            f"{_listed(self.missing)}"
+        )
 
 
 def _switched_at(move: ReadMove) -> str:
@@ -313,10 +313,10 @@ class _Machine:
     def unsafe_beginnings(self) -> Iterator[ProgramIssue]:
         """Yield an issue for each contour that must not even be begun at its first line."""
         for stretch in self.unsafe_stretches():
-            for routine, at in stretch.steps:
+            for routine in (routine for routine, at in stretch.steps if at == 0):
                 flow = self.routines[routine].flow
-                moves = [step for step in flow if isinstance(step, ReadMove)]
-                if at == 0 and moves and moves[0].kind == "joint":
+                move = next((step for step in flow if isinstance(step, ReadMove)), None)
+                if move is not None and move.kind == "joint":
                     yield ProgramIssue("error", "flow", stretch.message, flow[0].place)
 
     def check(self, visit: _Visit) -> Iterator[ProgramIssue]:

@@ -171,5 +171,7 @@ def without_remark(line: str, mark: str) -> str:
 
     Text whose quote is not closed goes to the end of the line.
     """
+    if mark not in line:
+        return line
     match = re.match(rf'(?:"[^"]*(?:"|$)|(?!{re.escape(mark)})[^"])*', line)
     return match[0] if match else line

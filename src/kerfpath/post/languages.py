@@ -104,6 +104,11 @@ class Controller:
             longer = self.cycle * np.ceil(longer / self.cycle * (1 - CYCLE_NOISE))
         return np.asarray(np.maximum(longer, time) / time - 1)
 
+    def with_shortest(self, said_ms: float | None, assumed_ms: float) -> Controller:
+        """Return the controller with the shortest move of a setting, or what is assumed without."""
+        shortest_ms = assumed_ms if said_ms is None else said_ms
+        return replace(self, shortest=shortest_ms * 1e-3, shortest_given=said_ms is not None)
+
     @property
     def rounds_by_itself(self) -> bool:
         """Whether it rounds corners by its own measure, not by that of the program."""
@@ -152,12 +157,6 @@ ShortestMove = Annotated[
     setting("the shortest time of a move of the path, 0 to 1000, in ms", "12.0", ge=0, le=1000),
 ]
 """The controller's own; without it a value is assumed, and moves below it are warned of."""
-
-
-def shortest_move(said_ms: float | None, assumed_ms: float) -> dict[str, Any]:
-    """Return the shortest move of a `Controller` from a setting, or what is assumed without it."""
-    shortest_ms = assumed_ms if said_ms is None else said_ms
-    return {"shortest": shortest_ms * 1e-3, "shortest_given": said_ms is not None}
 
 
 OrientationSetting = Annotated[
@@ -410,7 +409,8 @@ class Formatter(ABC):
         self.asked = list(self.asked_before(section))
         for step in section.steps:
             yield from self.step(step)
-            self.asked = still_asked([*self.asked, *asked_in([step])])
+            if changes := list(asked_in([step])):
+                self.asked = still_asked([*self.asked, *changes])
 
     def asked_before(self, section: Section) -> Sequence[Handshake]:
         """Return the handshakes that hold where a section begins."""

@@ -32,7 +32,6 @@ from kerfpath.post.languages import (
     number,
     numbered,
     setting,
-    shortest_move,
 )
 from kerfpath.post.program import JointMove, LinearMove, Move, Program, Section, Step, Switch
 from kerfpath.robots import Robot
@@ -151,20 +150,20 @@ def rules(settings: FanucSettings) -> Rules:
 
 def _controller(settings: FanucSettings) -> Controller:
     """Return the controller: CNT rounds within a time, whatever zone a program has."""
-    moves = shortest_move(settings.shortest_move_ms, SHORTEST_MS)
-    moves["cycle"] = settings.interpolation_ms * 1e-3
+    plain = Controller(
+        orientation=settings.orientation, cycle=settings.interpolation_ms * 1e-3
+    ).with_shortest(settings.shortest_move_ms, SHORTEST_MS)
     if settings.corner == "CR":
-        return Controller(orientation=settings.orientation, **moves)
+        return plain
     full = CORNER_MS if settings.corner_ms is None else settings.corner_ms
     assumed = (
         f"CNT100 is assumed to round from {CORNER_MS:g} ms before a corner to {CORNER_MS:g} ms "
         "after it; set corner_ms in [program.fanuc]"
     )
-    return Controller(
-        orientation=settings.orientation,
+    return replace(
+        plain,
         corner_time=full * 1e-3 * max(settings.cnt_percent, 1) / 100,  # CNT0 rounds, but hardly
         assumed=assumed if settings.corner_ms is None else "",
-        **moves,
     )
 
 

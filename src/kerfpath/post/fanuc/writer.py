@@ -322,13 +322,12 @@ class Fanuc(CalledFormatter):
         yield from (f"  {self._set(switch)} ;" for switch in split_switches(move).before)
 
     def _after(self, move: LinearMove) -> Iterator[str]:
-        for switch in split_switches(move).after:
-            needed = " AND ".join(f"DO[{port}]" for port in self.needed(switch))
-            output = self.output(switch.signal)
-            yield f"  IF ({needed}),DO[{output}]=(ON) ;" if needed else f"  {self._set(switch)} ;"
+        yield from (f"  {self._set(switch)} ;" for switch in split_switches(move).after)
 
     def _set(self, switch: Switch) -> str:
-        return f"DO[{self.output(switch.signal)}]={'ON' if switch.on else 'OFF'}"
+        output, state = self.output(switch.signal), "ON" if switch.on else "OFF"
+        needed = " AND ".join(f"DO[{port}]" for port in self.needed(switch))
+        return f"IF ({needed}),DO[{output}]=({state})" if needed else f"DO[{output}]={state}"
 
     def _positions(self, section: Section) -> list[str]:
         """Return the targets of a section in the order in which its lines number them."""

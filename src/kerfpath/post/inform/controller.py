@@ -32,7 +32,6 @@ from kerfpath.post.languages import (
     ShortestMove,
     numbered,
     setting,
-    shortest_move,
 )
 from kerfpath.post.program import (
     Await,
@@ -170,8 +169,7 @@ def _controller(settings: InformSettings) -> Controller:
         orientation=settings.orientation,
         corner=(LEVEL_MM if length is None else length) * 1e-3,
         assumed=assumed if length is None else "",
-        **shortest_move(settings.shortest_move_ms, SHORTEST_MS),
-    )
+    ).with_shortest(settings.shortest_move_ms, SHORTEST_MS)
 
 
 def is_reserved(name: str) -> bool:

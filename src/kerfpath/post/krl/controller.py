@@ -36,7 +36,6 @@ from kerfpath.post.languages import (
     numbered,
     plain,
     setting,
-    shortest_move,
 )
 from kerfpath.post.program import JointMove, Program, ProgramIssue
 from kerfpath.robots import MOST_EXTERNAL, Robot
@@ -211,8 +210,7 @@ def rules(settings: KrlSettings) -> Rules:
         controller=Controller(
             turning_speed=float(np.radians(settings.turning_speed_deg_s)),
             orientation=settings.orientation,
-            **shortest_move(settings.shortest_move_ms, SHORTEST_MS),
-        ),
+        ).with_shortest(settings.shortest_move_ms, SHORTEST_MS),
         longest_lead=LONGEST_LEAD,
     )
 

@@ -57,7 +57,7 @@ _LINES = patterns(
         "end_condition": "ENDIF",
         "again": rf"{FIRST}=1",
         "request": r"\$OUT\[(\d+)\]=(TRUE|FALSE)",
-        "switch": r"\$OUT\[(\d+)\]=(\$OUT\[\d+\](?: AND \$OUT\[\d+\])*)",
+        "guarded": r"\$OUT\[(\d+)\]=(\$OUT\[\d+\](?: AND \$OUT\[\d+\])*)",
         "wait_for": r"\$TIMER\[\d+\]=-(\d+)",
         "end": "END",
         "routine": rf"DEF {_NAME}\((|{PASSED} :IN)\)",
@@ -73,8 +73,8 @@ _IN_FIRST = only(_LINES, "condition", "call", "end_condition", "end")
 _IN_MAIN = only(_LINES, "tool", "base", "coupled_base", "again") | _IN_FIRST
 _IN_ROUTINE = only(
     _LINES,
-    "linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "request", "switch",
-    "wait_for", "end",
+    "linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "request",
+    "guarded", "wait_for", "end",
 )  # fmt: skip
 _WITHOUT_ANSWER = patterns(
     {
@@ -256,7 +256,7 @@ class _File(LineReader):
     def request(self, output: str, state: str) -> None:
         self.ask(int(output), on=state == "TRUE")
 
-    def switch(self, output: str, needed: str) -> None:
+    def guarded(self, output: str, needed: str) -> None:
         self.require_output(int(output), self.settings.laser_output)
         self.add_needing(numbers_in(needed))
 

@@ -32,7 +32,6 @@ from kerfpath.post.languages import (
     number,
     plain,
     setting,
-    shortest_move,
 )
 from kerfpath.robots import MOST_EXTERNAL, Robot
 
@@ -173,8 +172,7 @@ def rules(settings: RapidSettings) -> Rules:
         controller=Controller(
             turning_speed=float(TURNING_SPEED),
             orientation=settings.orientation,
-            **shortest_move(settings.shortest_move_ms, SHORTEST_MS),
-        ),
+        ).with_shortest(settings.shortest_move_ms, SHORTEST_MS),
         longest_lead=LONGEST_LEAD,
     )
 

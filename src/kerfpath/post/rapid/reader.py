@@ -103,7 +103,7 @@ _LINES = patterns(
         "end_routine": "ENDPROC",
         "first": rf"PERS num {FIRST}:=(\d+);",
         "request": rf"SetDO {_NAME},([01]);",
-        "switch": rf"IF (DOutput\(\w+\)=1(?: AND DOutput\(\w+\)=1)*) SetDO {_NAME},1;",
+        "guarded": rf"IF (DOutput\(\w+\)=1(?: AND DOutput\(\w+\)=1)*) SetDO {_NAME},1;",
         "wait_for": rf"WaitDI {_NAME},1\\MaxTime:=([\d.]+);",
         "set_trigger": rf"TriggIO {_NAME},([\d.]+)\\Time\\DOp:={_NAME},([01]);",
         "wait": r"WaitTime ([\d.]+);",
@@ -140,7 +140,7 @@ IN_MAIN = only(
 IN_ROUTINE = only(
     _LINES,
     "joint_move", "linear_move", "circular_move", "switching_move", "switching_arc", "wait",
-    "request", "switch", "wait_for", "end_routine",
+    "request", "guarded", "wait_for", "end_routine",
 )  # fmt: skip
 
 _ON_ERROR = patterns(
@@ -346,7 +346,7 @@ class _Reader(Aggregates):
     def request(self, output: str, value: str) -> None:
         self.ask(output, on=value == "1")
 
-    def switch(self, needed: str, output: str) -> None:
+    def guarded(self, needed: str, output: str) -> None:
         ports = re.findall(r"DOutput\((\w+)\)", needed, re.ASCII | re.IGNORECASE)
         self.require_output(output, self.settings.laser_output)
         self.add_needing(self.spelled(port) for port in ports)

@@ -34,7 +34,6 @@ from kerfpath.post.languages import (
     require_one_file,
     reset_lines,
     setting,
-    shortest_move,
 )
 from kerfpath.post.program import (
     Await,
@@ -212,9 +211,8 @@ def rules(settings: URScriptSettings) -> Rules:
         speed_step=SPEED_STEP,
         point_step=POINT_STEP,
         angle_step=ANGLE_STEP,
-        controller=Controller(
-            orientation=settings.orientation,
-            **shortest_move(settings.shortest_move_ms, SHORTEST_MS),
+        controller=Controller(orientation=settings.orientation).with_shortest(
+            settings.shortest_move_ms, SHORTEST_MS
         ),
     )
 

@@ -20,7 +20,6 @@ from kerfpath.post.languages import (
     Rules,
     ShortestMove,
     setting,
-    shortest_move,
 )
 from kerfpath.post.program import (
     Program,
@@ -128,9 +127,8 @@ def rules(settings: Val3Settings) -> Rules:
         speed_step=SPEED_STEP,
         point_step=POINT_STEP,
         angle_step=ANGLE_STEP,
-        controller=Controller(
-            orientation=settings.orientation,
-            **shortest_move(settings.shortest_move_ms, SHORTEST_MS),
+        controller=Controller(orientation=settings.orientation).with_shortest(
+            settings.shortest_move_ms, SHORTEST_MS
         ),
     )
 
