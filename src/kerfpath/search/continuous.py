@@ -181,46 +181,43 @@ class ContinuousSearch:
         vertex of one of a few layers where this is less than at its neighbours in gamma. Courses
         like one before are left out. There are none if the constraints depend on the first vertex.
         """
-        if self._tied:
+        if self._tied or not self._ways:
             return
-        targets, back = self._targets, _reversed(self._targets)
-        steps, cost, N = self._steps, self._cost, len(self._cost)
-        back_cost = freeze(np.ascontiguousarray(cost[::-1]))
-        to_go, from_start = self._values(steps, cost), _values_to(back, steps, back_cost)
-        there = from_start[::-1]
-        passed = np.isfinite(to_go + there)
-        through = np.maximum(to_go, there) if steps.minimax else to_go + there
-        through[passed] -= 0.0 if steps.minimax else cost[passed]  # it is in both
-        bottom, (one, other) = through < np.inf, (targets.one, targets.other)
-        bottom[one[through[one] > through[other]]] = False
-        bottom[other[through[other] > through[one]]] = False
-        K = len(targets.start) - 1
-        layer = np.repeat(np.arange(K), np.diff(targets.start))
-        bottom &= np.isin(layer, np.linspace(0, K - 1, VALLEY_LAYERS).astype(int))
-        valleys = np.flatnonzero(bottom)
+        steps, posture = self._steps, self._samples.posture
+        # With a maximum the values of the way are those under a cap.
+        to_go = self._values(steps, self._cost) if steps.minimax else self._ways[0].V
+        ahead = _Direction(self._targets, self._cost, to_go)
+        behind = _reversed(ahead, steps)
         known: list[tuple[Array, Ints]] = []
-        for v in valleys[np.argsort(through[valleys], kind="stable")]:
-            k = int(layer[v])
-            here, posture = self._gamma(v, v, np.zeros(1)), self._samples.posture
-            if any(abs(wrap(gamma[k] - here)) < SAME_COURSE and on[k] == posture[v]
-                   for gamma, on in known):  # fmt: skip
+        for layer, v in self._valleys(to_go, behind.values[::-1]):
+            here = self._gamma(v, v, np.zeros(1))
+            if any(_same(gamma[layer], here) and on[layer] == posture[v] for gamma, on in known):
                 continue
-            ahead = _course(targets, steps, cost, to_go, int(v))
-            behind = _course(back, steps, back_cost, from_start, N - 1 - int(v))
-            if ahead is None or behind is None:
+            points = _course_through(v, ahead, behind, steps)
+            if points is None:
                 continue
-            one, other = (
-                np.append(N - 1 - b[:0:-1], a) for a, b in zip(ahead[:2], behind[:2], strict=True)
-            )
-            share = np.append(behind[2][:0:-1], ahead[2])
-            gamma = self._gamma(one, other, share)
-            if any(np.array_equal(on, posture[one]) and np.abs(wrap(at - gamma)).max() < SAME_COURSE
-                   for at, on in known):  # fmt: skip
-                continue
-            known.append((gamma, posture[one]))
-            yield self._path(one, other, share)
+            gamma, on = self._gamma(*points), posture[points[0]]
+            if not any(_same(at, gamma) and np.array_equal(its, on) for at, its in known):
+                known.append((gamma, on))
+                yield self._path(*points)
 
-    def _gamma(self, one: Ints, other: Ints, share: Array) -> Array:
+    def _valleys(self, to_go: Array, from_start: Array) -> Iterator[tuple[int, int]]:
+        """Yield layer and vertex of each valley, by the cost of the best course through it."""
+        passed = np.isfinite(to_go + from_start)
+        if self._steps.minimax:
+            through = np.maximum(to_go, from_start)
+        else:
+            through = to_go + from_start
+            through[passed] -= self._cost[passed]  # it is in both
+        K = len(self._targets.start) - 1
+        layer = np.repeat(np.arange(K), np.diff(self._targets.start))
+        bottom = passed & _are_bottoms(self._targets, through)
+        bottom &= np.isin(layer, np.linspace(0, K - 1, VALLEY_LAYERS).astype(int))
+        found = np.flatnonzero(bottom)
+        for v in found[np.argsort(through[found], kind="stable")].tolist():
+            yield int(layer[v]), v
+
+    def _gamma(self, one: Ints | int, other: Ints | int, share: Array) -> Array:
         """Return about what gamma (rad) is at points between vertices, as if samples were even."""
         turn = 2 * np.pi / self._samples.samples
         at, to = (self._samples.sample[v] * turn for v in (one, other))
@@ -263,11 +260,8 @@ class ContinuousSearch:
 
     def _by_valleys(self, first: Ints, V: Array) -> Ints:
         """Return first vertices that have a path, those at local minima of the value first."""
-        targets, bottom = self._targets, np.ones(int(self._targets.start[1]), np.bool_)
-        joined = slice(0, int(targets.begin[1]))
-        one, other = targets.one[joined], targets.other[joined]
-        bottom[one[V[one] > V[other]]] = False
-        bottom[other[V[other] > V[one]]] = False
+        begin = self._targets.begin[:2]
+        bottom = _are_bottoms(self._targets._replace(begin=begin), V)
         first = first[V[first] < np.inf]
         return first[np.lexsort((V[first], ~bottom[first]))]
 
@@ -344,13 +338,47 @@ def _values_to(targets: Targets, steps: Steps, cost: Array, last: Bools | None =
     return V
 
 
-def _course(
-    targets: Targets, steps: Steps, cost: Array, values: Array, v: int
-) -> tuple[Ints, Ints, Array] | None:
-    """Return the best course from a vertex to the last layer: the ends of its targets, and shares.
+def _are_bottoms(targets: Targets, values: Array) -> Bools:
+    """Return which vertices (N,) have no neighbour in gamma with a lower value."""
+    joined = slice(int(targets.begin[0]), int(targets.begin[-1]))
+    one, other = targets.one[joined], targets.other[joined]
+    bottom = np.ones(len(values), np.bool_)
+    bottom[one[values[one] > values[other]]] = False
+    bottom[other[values[other] > values[one]]] = False
+    return bottom
 
-    None if no step leads on from a point between two vertices.
-    """
+
+class _Direction(NamedTuple):
+    """The problem from its first layer to its last, or back, and its value function."""
+
+    targets: Targets
+    cost: Array
+    values: Array
+
+
+_Points = tuple[Ints, Ints, Array]
+"""The vertices between which the points of a path lie, and the shares."""
+
+
+def _same(one: Array, other: Array) -> bool:
+    """Return whether gammas differ by too little to belong to two courses."""
+    return bool(np.abs(wrap(one - other)).max() < SAME_COURSE)
+
+
+def _course_through(v: int, ahead: _Direction, behind: _Direction, steps: Steps) -> _Points | None:
+    """Return the best course through a vertex; None if no step leads on from a point of it."""
+    on, back = _course(v, ahead, steps), _course(len(ahead.cost) - 1 - v, behind, steps)
+    if on is None or back is None:
+        return None
+    one, other = (
+        np.append(len(ahead.cost) - 1 - b[:0:-1], a) for a, b in zip(on[:2], back[:2], strict=True)
+    )
+    return one, other, np.append(back[2][:0:-1], on[2])
+
+
+def _course(v: int, direction: _Direction, steps: Steps) -> _Points | None:
+    """Return the best course from a vertex to the last layer of a direction."""
+    targets, cost, values = direction
     k = int(np.searchsorted(targets.start, v, side="right")) - 1
     K = len(targets.start) - 1 - k
     here = np.array([v])
@@ -369,13 +397,14 @@ def _course(
     return one, other, np.append(0.0, beam.share[1:, 0])
 
 
-def _reversed(targets: Targets) -> Targets:
-    """Return the targets of the same problem from its last layer to its first."""
+def _reversed(ahead: _Direction, steps: Steps) -> _Direction:
+    """Return the same problem from its last layer to its first."""
+    targets = ahead.targets
     N, layers = len(targets.q), np.diff(targets.begin)[::-1]
     order = np.concatenate(
         [np.arange(a, b) for a, b in zip(targets.begin[-2::-1], targets.begin[:0:-1], strict=True)]
     )
-    return Targets(
+    back = Targets(
         freeze(np.ascontiguousarray(targets.q[::-1])),
         freeze(np.ascontiguousarray(N - targets.start[::-1])),
         N - 1 - targets.one[order],
@@ -386,6 +415,8 @@ def _reversed(targets: Targets) -> Targets:
         targets.joint,
         targets.endless,
     )
+    cost = freeze(np.ascontiguousarray(ahead.cost[::-1]))
+    return _Direction(back, cost, _values_to(back, steps, cost))
 
 
 def _targets(
