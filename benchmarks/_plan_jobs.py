@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ezdxf.filemanagement import new
 
+from benchmarks.program_edits import EXTERNAL
 from kerfpath.job import plan_file_text, read_job, run_job
 
 __all__ = ["JOBS", "planned"]
@@ -101,28 +102,7 @@ feed = "dip"
     # A rail under the robot and a table under the part.
     "external": _HEAD.replace(
         "[tool]\n",
-        """\
-[[robot.external]]
-name = "rail"
-kind = "linear"
-carries = "robot"
-axis = [0, 1, 0]
-lower_mm = -400
-upper_mm = 400
-velocity_mm_s = 1000
-acceleration_mm_s2 = 2000
-[[robot.external]]
-name = "table"
-kind = "rotary"
-carries = "part"
-axis = [0, 0, 1]
-point_mm = [1200, -100, 450]
-lower_deg = -60
-upper_deg = 60
-velocity_deg_s = 60
-acceleration_deg_s2 = 120
-[tool]
-""",
+        EXTERNAL.format(reach=1200).removeprefix("floor = false\n") + "[tool]\n",
     )
     + """\
 [[contour]]

@@ -50,6 +50,8 @@ _LEAVES = "leaves"
 
 NOT_INHERITED = ("PYTHONPATH", "PYTHONSTARTUP", "PYTHONINSPECT")
 """Variables of the environment that could make a Python process run other code than ours."""
+OF_NUMBA = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")
+"""The variables of numba that do not change compiled code; those that commands heed."""
 
 
 def clean_environment() -> dict[str, str]:

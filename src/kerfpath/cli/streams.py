@@ -10,9 +10,7 @@ from contextlib import suppress
 from typing import Any
 
 from kerfpath.errors import InputError
-
-KEPT = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")
-"""The variables of numba that mean something to a command."""
+from kerfpath.isolated import OF_NUMBA
 
 
 class _Output(io.FileIO):
@@ -50,7 +48,7 @@ def settle() -> None:
     InputError
         Stdout is closed.
     """
-    for name in [n for n in os.environ if n.startswith("NUMBA_") and n not in KEPT]:
+    for name in [n for n in os.environ if n.startswith("NUMBA_") and n not in OF_NUMBA]:
         del os.environ[name]
     if sys.stdout is not sys.__stdout__ or sys.stderr is not sys.__stderr__:
         return

@@ -35,6 +35,7 @@ from numba.core.caching import FunctionCache, InTreeCacheLocator
 from numba.core.registry import cpu_target
 from numba.core.serialize import dumps
 
+from kerfpath.isolated import OF_NUMBA
 from kerfpath.kernels.alone import config
 
 FOLDERS_KEPT = 8
@@ -45,8 +46,6 @@ PROBE = bytes(1 << 20)
 """Written to see whether there is room: the largest file of the cache has a tenth of it."""
 HASH = hashlib.sha256().digest_size
 """Bytes with which each file begins: the hash of its name and of the rest."""
-HARMLESS = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")
-"""Variables of numba that do not change compiled code."""
 
 
 def _digest() -> str:
@@ -55,7 +54,7 @@ def _digest() -> str:
     versions = numba.__version__, np.__version__, llvmlite.__version__
     processor = cpu_target.target_context.codegen().magic_tuple()
     settings = sorted((n, v) for n, v in os.environ.items() if n.startswith("NUMBA_"))
-    settings = [(name, value) for name, value in settings if name not in HARMLESS]
+    settings = [(name, value) for name, value in settings if name not in OF_NUMBA]
     digest = hashlib.sha256(repr((versions, processor, settings)).encode())
     for source in (*sorted(here.glob("*.py")), here.parent / "losses.py"):
         digest.update(source.name.encode() + source.read_bytes())
@@ -187,7 +186,7 @@ def _read(name: str) -> Any:
 
 
 def _write(name: str, data: object) -> None:
-    content: bytes = dumps(data)  # type: ignore[no-untyped-call]
+    content: bytes = dumps(data)  # type: ignore[no-untyped-call]  # of numba
     half = CACHE / f"{name}.tmp.{token_hex(8)}"
     try:
         half.write_bytes(_hash(name, content) + content)
@@ -207,7 +206,7 @@ class KernelCache(FunctionCache):
         kept = config.CACHE_LOCATOR_CLASSES
         config.CACHE_LOCATOR_CLASSES = f"{__name__}.{Locator.__name__}"
         try:
-            super().__init__(function)  # type: ignore[no-untyped-call]
+            super().__init__(function)  # type: ignore[no-untyped-call]  # of numba
         finally:
             config.CACHE_LOCATOR_CLASSES = kept
         files: Any = _Files(self._impl.filename_base)
