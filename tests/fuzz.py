@@ -95,6 +95,7 @@ class Campaign:
         self.said = (out / "stderr.txt").open("w+")
 
     def run(self, first: int, mutants: int, seconds: float) -> None:
+        self.start()
         until = time.monotonic() + seconds
         for seed in range(first, first + mutants):
             if time.monotonic() > until:
@@ -164,7 +165,9 @@ def _kind(wrong: str) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("readers", nargs="*", choices=[*READERS, []], metavar="READER")
-    parser.add_argument("--seconds", type=float, default=1e9, help="per reader")
+    parser.add_argument(
+        "--seconds", type=float, default=1e9, help="per reader, once it has read sound files"
+    )
     parser.add_argument("--mutants", type=int, default=1000, help="per reader")
     parser.add_argument("--first", type=int, default=0, help="seed")
     parser.add_argument("--out", type=Path, default=Path("fuzzed"))

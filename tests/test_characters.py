@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+from OCP.gp import gp_Pln
 from tests.cad.test_apt import NX
 from tests.cad.test_nc import SIEMENS
 
@@ -24,7 +26,7 @@ from kerfpath.cli.show import out, table
 from kerfpath.errors import InputError
 from kerfpath.job import program_from_file, read_job, read_plan_file
 from kerfpath.job.output.writing import trajectory_text
-from readers import _job, _planned
+from readers import _job, _planned, examples
 
 HEAD = "0\nSECTION\n2\nENTITIES\n"
 LINE = "0\nLINE\n8\nCUT\n10\n3.25\n20\n33\n11\n43.5\n21\n33\n"
@@ -56,9 +58,40 @@ def drawing(path: Path) -> list[np.ndarray]:
     return geometry(read(path, "mm" if path.suffix in (".dxf", ".cls") else None))
 
 
+def solid(path: Path) -> list[np.ndarray]:
+    """What is drawn in a STEP or IGES file; what it says of entities left out is a refusal."""
+    part = read(path)
+    if part.left_out:
+        raise InputError(f"{path}: {'; '.join(part.notes)}")
+    return geometry(part)
+
+
+def rectangle(path: Path) -> str:
+    """The text of a STEP or IGES file of one face, after it has been written."""
+    write = examples().write_step if path.suffix == ".step" else examples().write_iges
+    write(path, BRepBuilderAPI_MakeFace(gp_Pln(), 3.25, 43.5, 0.0, 33.0).Face())
+    return path.read_text("ascii")
+
+
+def fitted(content: bytes) -> bytes:
+    """An IGES file whose lines lose or get blanks, so that each section stays in its columns."""
+    return b"\n".join(map(_fitted, content.split(b"\n")))
+
+
+def _fitted(line: bytes) -> bytes:
+    section, over = line[-8:-7], len(line) - 80
+    if section not in (b"S", b"G", b"D", b"P"):
+        return line
+    end = len(line) - (16 if section == b"P" else 8)
+    if over <= 0:
+        return line[:end] + b" " * -over + line[end:]
+    blanks = line.rfind(b" " * over, 0, end)
+    return line if blanks < 0 else line[:blanks] + line[blanks + over :]
+
+
 class Kind(NamedTuple):
     name: str
-    text: str
+    text: str | Callable[[Path], str]
     read: Callable[[Path], list[np.ndarray]]
 
 
@@ -71,9 +104,11 @@ KINDS = {
     "Siemens": Kind("a.mpf", SIEMENS, drawing),
     "Heidenhain": Kind("a.h", KLARTEXT, drawing),
     "measured": Kind("a.csv", MEASURED, lambda path: list(read_measured(path))),
+    "STEP": Kind("a.step", rectangle, solid),
+    "IGES": Kind("a.iges", rectangle, solid),
 }
 UNPRINTED = {*CONTROL, *DIRECTION}
-FEWER = {"APT": 11, "Siemens": 11, "Heidenhain": 5}
+FEWER = {"APT": 11, "Siemens": 11, "Heidenhain": 5, "STEP": 401, "IGES": 397}
 """Of longer files, one place in so many."""
 
 
@@ -97,14 +132,16 @@ def test_no_character_changes_a_path(tmp_path: Path, kind: str) -> None:
     Digits may be added to a number, and a part of a line taken out, by what is plain ASCII: of
     these files nothing is said but that they do not crash.
     """
-    name, text, reading = KINDS[kind]
+    name, made, reading = KINDS[kind]
     path = tmp_path / name
+    text = made if isinstance(made, str) else made(path)
     path.write_text(text)
     meant, refused, tried = reading(path), 0, 0
     contents = [
         odd.encode("utf-8", "surrogatepass") for odd in spoilt(text, every=FEWER.get(kind, 7))
     ]
-    for content in [*contents, *wholes(text)]:
+    for each in [*contents, *wholes(text)]:
+        content = fitted(each) if kind == "IGES" else each
         path.write_bytes(content)
         tried += 1
         found = answer(reading, path)
@@ -117,6 +154,33 @@ def test_no_character_changes_a_path(tmp_path: Path, kind: str) -> None:
         assert plain or same(found, meant), content[-300:]
     assert tried > 100
     assert refused > tried / 3
+
+
+@pytest.mark.parametrize(
+    ("number", "odd"),
+    [
+        ("43.5,33.,0.", "43.5,\u0663,0."),
+        ("43.5,33.,0.", "43.5,3_3.,0."),
+        ("110,43.5", "\uff1110,43.5"),
+        (",1.,2,2HMM", ",1\0,2,2HMM"),
+        ("     110       5", "     11\u0660       5"),
+    ],
+)
+def test_what_is_no_number_in_an_iges_file_is_not_0(tmp_path: Path, number: str, odd: str) -> None:
+    path = tmp_path / "a.iges"
+    text = rectangle(path)
+    assert number in text
+    path.write_bytes(fitted(text.replace(number, odd).encode()))
+    with pytest.raises(InputError, match=r"a\.iges: .*expected a number in line \d+, got"):
+        read(path)
+
+
+def test_a_number_of_many_digits_is_refused_in_a_step_file(tmp_path: Path) -> None:
+    """Python itself converts no more than 4300 digits."""
+    path = tmp_path / "a.step"
+    path.write_text(rectangle(path).replace("#18", f"#18{'9' * 5000}"))
+    with pytest.raises(InputError, match=r"a\.step: .*#18999.* is more than 2147483647"):
+        read(path)
 
 
 def test_names_of_drawings_are_shown_in_characters_that_print(tmp_path: Path) -> None:

@@ -31,9 +31,16 @@ LONGEST, BEGINNING = 600, 420
 """Most characters of a message about bad input; a longer one keeps its beginning and its end."""
 
 
-def printable(text: str) -> str:
-    """Return a text with escapes for the characters that do not print, as direction marks."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+def printable(text: str, *, keep: str = "") -> str:
+    """Return a text with escapes for the characters that do not print, as direction marks.
+
+    Parameters
+    ----------
+    text : str
+    keep : str
+        Characters that stay, as ends of lines do where several lines are shown.
+    """
+    return "".join(c if c.isprintable() or c in keep else repr(c)[1:-1] for c in text)
 
 
 class KerfpathError(Exception):

@@ -39,11 +39,6 @@ def text_lines(text: str) -> list[str]:
     return [line.removesuffix("\r") for line in text.split("\n")]
 
 
-def visible(text: str) -> str:
-    """Return a text, of any number of lines, with escapes for characters that no text contains."""
-    return NOT_TEXT.sub(lambda found: repr(found[0])[1:-1], text)
-
-
 def named(character: str) -> str:
     """Return the code and the name of a character."""
     return f"U+{ord(character):04X} {unicodedata.name(character, '')}".rstrip()

@@ -75,19 +75,35 @@ def test_an_edited_program_is_audited_and_an_old_one_elsewhere_too(folder, two_r
     assert result.returncode == 1, result.stderr  # of another speed
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["plan.json", "report.html", "small.mod", ".kerfpath.json"])
-def test_what_is_no_file_is_not_replaced(name, folder):
-    path, precious = folder / "out" / name, folder / "precious"
+WRITERS = {
+    "plan": ["plan.json", "trajectory.csv", "report.html", "small.mod", ".kerfpath.json"],
+    "pareto": ["pareto.json", "pareto.html"],
+    "layout": ["layout.json", "layout.html", "placed.toml"],
+    "layout --robots": ["robots.json", "robots.html"],
+}
+
+
+@pytest.mark.parametrize(
+    ("command", "name"), [(command, name) for command in WRITERS for name in WRITERS[command]]
+)
+def test_what_is_no_file_is_not_replaced(command, name, tmp_path, monkeypatch):
+    """It is refused before any work is done."""
+
+    def begun(*arguments, **options):
+        pytest.fail("the work has begun")
+
+    monkeypatch.setattr("kerfpath.cli.plan_output.prepare", begun)
+    monkeypatch.setattr("kerfpath.cli.study_output.compile_kernels", begun)
+    shutil.copy(DEMO / "b_pillar.step", tmp_path)
+    (tmp_path / "small.toml").write_text(SMALL)
+    (tmp_path / "out").mkdir()
+    path, precious = tmp_path / "out" / name, tmp_path / "precious"
     precious.write_text("precious")
     for put in (os.mkfifo, lambda path: path.symlink_to(precious), os.mkdir):
-        path.unlink()
+        path.unlink(missing_ok=True)
         put(path)
-        before = sorted(each.name for each in (folder / "out").iterdir())
-        result = run("plan", "small.toml", "--out", "out", cwd=folder)
+        words = command.split()
+        result = run(words[0], "small.toml", *words[1:], "--out", "out", cwd=tmp_path)
         assert_refused(result, f"out/{name}: it is a")
-        assert sorted(each.name for each in (folder / "out").iterdir()) == before
+        assert [each.name for each in (tmp_path / "out").iterdir()] == [name]
         assert precious.read_text() == "precious"
-        if path.is_dir():
-            path.rmdir()
-            path.touch()

@@ -154,7 +154,10 @@ def test_accelerations_of_every_joint_are_read_the_smaller_of_both_ways(tmp_path
     [
         ("", "joint 'j1' has no position limits; give lower and upper for all 6 joints"),
         ('<limit velocity="1"/>', "joint 'j1' has no position limits"),
-        ('<limit lower="0" upper="0" velocity="1"/>', "has the same lower and upper limit, 0 rad"),
+        (
+            '<limit lower="0" upper="0" velocity="1"/>',
+            "has the lower limit 0 rad and the upper limit 0 rad",
+        ),
         ('<limit lower="-3" upper="3"/>', "joint 'j1' has no velocity limit; give velocity"),
         ('<limit lower="-3" upper="3" velocity="0"/>', "the velocity limit 0 rad/s, so it"),
     ],
@@ -345,7 +348,7 @@ BAD = {
     "words": (swap('velocity="2"', 'velocity="fast"'), "velocity= as a finite number, got 'fast'"),
     "NaN": (swap('lower="-3"', 'lower="nan"'), "lower= as a finite number"),
     "two numbers": (swap('xyz="0.0 0.0 1.0"', 'xyz="0 1"'), "as 3 finite numbers"),
-    "reversed": (swap('lower="-3"', 'lower="4"'), "limits of joint 1 are reversed"),
+    "reversed": (swap('lower="-3"', 'lower="4"'), "joint 'j1' has the lower limit 4 rad"),
     "a loop": (add(joint("back", "link_6", "base", np.eye(4))), "form a closed loop"),
     "two parents": (
         add(joint("back", "base", "link_4", np.eye(4))),

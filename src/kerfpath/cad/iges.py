@@ -82,6 +82,85 @@ def _require_whole(content: bytes) -> None:
             "the file is damaged: parameters of section P belong to no entity, or are "
             "scattered; copy or export it again"
         )
+    _require_numbers(lines)
+
+
+# -----------------------------------------------------------------------------
+# Numbers: OCCT takes 0 for any that it does not understand.
+
+TYPES = re.compile(rb"[ 0+]*(?:[15]\d\d|[34]08|430)[ .]*")
+"""Types of entities that are a shape or place one."""
+USED = 14
+"""Parameters of the global section up to the flag of the unit, the last that is used."""
+NUMBER = rb" *+(?:[-+]?+(?:\d++\.?+\d*+|\.\d++)(?:[EeDd][-+]?+\d++)?+)?+ *+"
+"""A number, or blanks in place of one that has its default."""
+STRING = re.compile(rb" *(\d{1,5})H")
+"""How a text begins: its length in bytes."""
+
+
+def _require_numbers(lines: list[bytes]) -> None:
+    """Check the numbers of the directory, and those of entities that are a shape or place one.
+
+    Raises
+    ------
+    InputError
+        One is no number.
+    """
+    of = {s: [k for k, line in enumerate(lines) if line[72:73] == s] for s in (b"G", b"D", b"P")}
+    for row, k in enumerate(of[b"D"]):
+        fields = lines[k][:40] if row % 2 else lines[k][:72]  # then reserved ones, and a label
+        if (odd := re.search(rb"[^-+ \d]+", fields)) is not None:
+            raise _no_number(odd[0], k)
+    first = of[b"G"][0] if of[b"G"] else 0
+    header = b"".join(lines[k][:72] for k in of[b"G"])
+    comma, end = _delimiters(header)
+    for number, (at, word) in enumerate(_words(header, comma, end)):
+        if number < USED and not re.fullmatch(NUMBER, word):
+            raise _no_number(word, first + at // 72)
+    numbers = re.compile(rb"(?:%s%s)*+%s%s" % (NUMBER, comma, NUMBER, end))
+    for _, rows in groupby(of[b"P"], lambda k: lines[k][64:72].strip()):
+        first, *others = rows
+        text = b"".join(lines[k][:64].ljust(64) for k in (first, *others))
+        if numbers.match(text):
+            continue
+        for number, (at, word) in enumerate(_words(text, comma, end)):
+            if not re.fullmatch(NUMBER, word):
+                raise _no_number(word, first + at // 64)
+            if number == 0 and not TYPES.fullmatch(word):
+                break
+
+
+def _words(text: bytes, comma: bytes, end: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield where each parameter is, and what it is; nothing for a text of the length it says."""
+    stop, at = re.compile(rb"%s|%s" % (comma, end)), 0
+    while at < len(text):
+        string = STRING.match(text, at)
+        first = at if string is None else string.end() + int(string[1])
+        found = stop.search(text, first)
+        last = len(text) if found is None else found.start()
+        is_text = string is not None and not text[first:last].strip()
+        yield at, b"" if is_text else text[at:last]
+        if re.match(end, text[last : last + 1]):
+            return
+        at = last + 1
+
+
+def _delimiters(content: bytes) -> tuple[bytes, bytes]:
+    """Return what section G says is between parameters and after the last, as patterns."""
+    said = re.match(rb" *(?:1H(.))?. *(?:1H(.))?", content, re.DOTALL)
+    comma, end = (b"", b"") if said is None else said.groups(b"")
+    return re.escape(comma or b","), re.escape(end or b";")
+
+
+def _no_number(found: bytes, line: int) -> InputError:
+    return InputError(
+        f"the file is damaged: expected a number in line {line + 1}, got "
+        f"{found.strip().decode('utf-8', 'replace')!r}; copy or export it again"
+    )
+
+
+# -----------------------------------------------------------------------------
+# Read the file.
 
 
 def _read(path: Path, unit: str | None, gap: float) -> NamedShape:

@@ -347,7 +347,8 @@ def _beside(low: Array, high: Array, areas: Array) -> list[Ints]:
     middle = np.where(has_loops[:, None], (low + high) / 2, NOWHERE)
     half = np.where(has_loops, np.linalg.norm(high - low, axis=1) / 2, 0.0)
     reach = half + THIN * np.sqrt(areas)
-    found: list[list[Ints]] = [[] for _ in range(len(areas))]
+    none = np.empty(0, dtype=np.int64)  # all that a skin without area has
+    found = [[none] for _ in range(len(areas))]
     size = np.floor(np.log2(np.maximum(areas, np.finfo(float).tiny)))
     for one in np.unique(size):
         those = np.flatnonzero(size == one)

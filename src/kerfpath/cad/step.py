@@ -148,14 +148,20 @@ def require_grammar(content: bytes) -> None:
     for statement in reduced.split(b";")[:-1]:
         if not ENTITY.fullmatch(statement):
             raise _damaged(f"{_line(content, statement)}: Incorrect syntax")
-    made = Counter(map(int, re.findall(rb"#(\d+)=", data)))
+    made = Counter(re.findall(rb"#0*(\d+)=", data))
     number, times = made.most_common(1)[0]
     if times > 1:
-        raise _damaged(f"#{number} is defined {times} times")
-    if (largest := max(made)) > LARGEST_NUMBER:
-        raise _damaged(f"#{largest} is more than {LARGEST_NUMBER}")
-    if missing := set(map(int, re.findall(rb"#(\d+)(?![\d=])", data))) - made.keys():
-        raise _damaged(f"Unresolved Reference to #{min(missing)}")
+        raise _damaged(f"#{number.decode()} is defined {times} times")
+    largest = max(made, key=_size)
+    if _size(largest) > _size(b"%d" % LARGEST_NUMBER):
+        raise _damaged(f"#{largest.decode()} is more than {LARGEST_NUMBER}")
+    if missing := set(re.findall(rb"#0*(\d+)(?![\d=])", data)) - made.keys():
+        raise _damaged(f"Unresolved Reference to #{min(missing, key=_size).decode()}")
+
+
+def _size(digits: bytes) -> tuple[int, bytes]:
+    """Return what orders numbers, of more digits even than Python converts."""
+    return len(digits), digits
 
 
 def _line(content: bytes, statement: bytes) -> str:

@@ -30,9 +30,9 @@ from kerfpath.job import (
     JobResult,
     prepare,
     read_job,
-    require_folder,
     require_foreseen,
     require_language,
+    require_place,
     run_prepared,
     sequence_entry,
     with_map,
@@ -118,9 +118,9 @@ def plan_job(
     typer.Exit
         Code 1: some contour has no plan that passes its audit.
     """
-    require_folder(folder)
     job = read_job(job_file)
     require_language(job)
+    require_place(job, folder)
     if draw_map:
         job = with_map(job)
     part = drawing_of(job)

@@ -59,8 +59,7 @@ class _Lines(Console):
             if segment.control or segment.text.isprintable():
                 yield segment
             else:
-                text = "\n".join(map(printable, segment.text.split("\n")))
-                yield Segment(text, segment.style)
+                yield Segment(printable(segment.text, keep="\n"), segment.style)
 
 
 out = _Lines(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else _PIPED)

@@ -22,7 +22,7 @@ from kerfpath.cli.show import (
     table,
 )
 from kerfpath.front import Front, SearchKind
-from kerfpath.job import Goal, make_folder, read_job, require_folder, require_language
+from kerfpath.job import Goal, make_folder, read_job, require_language, require_place
 from kerfpath.planner import FINER, ON_THIS_GRID
 from kerfpath.report import LayoutEntry
 from kerfpath.study import (
@@ -119,7 +119,7 @@ def show_front(
     processes: int | None,
 ) -> None:
     """Find the front of a contour, write pareto.json and pareto.html, and print its plans."""
-    make_folder(folder)
+    make_folder(folder, ("pareto.json", "pareto.html"))
     compile_kernels()
     with sweep_bar("runs") as progress:
         found = pareto_of_job(
@@ -203,9 +203,9 @@ def pick_plan(job_file: Path, folder: Path, which: str, *, refine: bool, strict:
     """
     pick = read_pick(folder, job_file, which)
     to = folder / f"plan-{pick.number}"
-    require_folder(to)
     job = read_job(job_file)
     require_language(job)
+    require_place(job, to)
     compile_kernels(job.robot.kinematics)
     with progress_bars() as progress:
         part, outcome = plan_picked(job_file, pick, refine=refine, progress=progress)
@@ -234,7 +234,7 @@ def show_robots_for(
     InputError
         As `which_robots`; or the folder cannot be made.
     """
-    make_folder(folder)
+    make_folder(folder, ("robots.json", "robots.html"))
     if scheduler is None:
         compile_kernels()
     with sweep_bar("robots") as progress:
@@ -299,7 +299,7 @@ def show_layout(
 ) -> bool:
     """Find the best placement, write its files, print it; return whether any is feasible."""
     ranges = ranges_of(vary)
-    make_folder(folder)
+    make_folder(folder, ("layout.json", "layout.html", "placed.toml"))
     compile_kernels()
     with progress_bars("") as progress, resumable():
         found = layout(

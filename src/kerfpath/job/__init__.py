@@ -42,6 +42,7 @@ from kerfpath.job.output import program_texts as program_texts
 from kerfpath.job.output import python_script as python_script
 from kerfpath.job.output import require_folder as require_folder
 from kerfpath.job.output import require_language as require_language
+from kerfpath.job.output import require_place as require_place
 from kerfpath.job.output import result_texts as result_texts
 from kerfpath.job.output import script_refusal as script_refusal
 from kerfpath.job.output import stale_program as stale_program

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from kerfpath.auditor import Check
+from kerfpath.errors import printable
 from kerfpath.job.audit_report import count
 from kerfpath.job.expected import SAME_VALUE
 from kerfpath.job.format import Job, JobFile
@@ -238,6 +239,5 @@ class _Absent:
 
 
 def _shown(value: Any) -> str:
-    text = "nothing" if value is _Absent else str(value)
-    text = "".join(c if c.isprintable() else "?" for c in text)
+    text = "nothing" if value is _Absent else printable(str(value))
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."

@@ -411,8 +411,7 @@ def read_document(path: Path) -> PlanDocument:
         data = json.loads(text, object_pairs_hook=_once, parse_constant=_no_number)
         json.dumps(data, ensure_ascii=False).encode()  # half a surrogate pair is no text
     except (ValueError, RecursionError) as error:
-        said = "".join(c for c in " ".join(str(error).split()) if c.isprintable())
-        raise InputError(f"{path}: not a plan.json: {said}") from None
+        raise InputError(f"{path}: not a plan.json: {' '.join(str(error).split())}") from None
     if (
         not isinstance(data, dict)
         or type(data.get("schema")) is not int
@@ -454,7 +453,6 @@ def _problem(error: ValidationError) -> str:
     """Return the first problem: where, what was expected, what came."""
     first = error.errors(include_url=False)[0]
     where = ".".join(str(step) for step in first["loc"] if step not in ("planned", "broken"))
-    where = "".join(c if c.isprintable() else "?" for c in where)
     if first["type"] == "missing":
         return f"the key {where} is missing"
     if first["type"] == "extra_forbidden":

@@ -22,7 +22,7 @@ from jinja2.ext import Extension
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from kerfpath.text import visible
+from kerfpath.errors import printable
 
 PASS, FAIL, WARN = "pass", "fail", "warn"
 """States of a verdict, which templates show by a sign and a colour."""
@@ -159,7 +159,9 @@ def _resource(name: str) -> Markup:
 
 def _escaped(value: object) -> object:
     """Escape a value as `html` does, whose quotes differ from Jinja's, and what is no text."""
-    return value if hasattr(value, "__html__") else Markup(html.escape(visible(str(value))))
+    if hasattr(value, "__html__"):
+        return value
+    return Markup(html.escape(printable(str(value), keep="\n\t")))
 
 
 class _JoinLines(Extension):

@@ -121,15 +121,16 @@ def _ranges(description: Description, given: LimitKeywords) -> tuple[Array, Arra
             continue
         if (joint.lower is None and lower is None) or (joint.upper is None and upper is None):
             raise _lacks(description, joint.name, "has no position limits", "lower", "upper")
-        if joint.lower == joint.upper and (lower is None or upper is None):
+        low[i], high[i] = joint.lower or 0.0, joint.upper or 0.0
+        if not low[i] < high[i] and (lower is None or upper is None):
             raise _lacks(
                 description,
                 joint.name,
-                f"has the same lower and upper limit, {joint.lower:g} rad, so it cannot move",
+                f"has the lower limit {low[i]:g} rad and the upper limit {high[i]:g} rad, so it "
+                "cannot move",
                 "lower",
                 "upper",
             )
-        low[i], high[i] = joint.lower or 0.0, joint.upper or 0.0
     return (
         low if lower is None else np.asarray(lower),
         high if upper is None else np.asarray(upper),

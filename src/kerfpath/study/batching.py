@@ -20,6 +20,7 @@ from kerfpath.job import (
     read_job,
     require_folder,
     require_language,
+    require_place,
     result_texts,
     run_job,
     stale_program,
@@ -118,7 +119,7 @@ def batch(
     with Sweep(
         plan_job, store=out / STORE, scheduler=scheduler, processes=processes, progress=progress
     ) as tasks:
-        asked = [_submit(tasks, path) for path in paths]
+        asked = [_submit(tasks, *each) for each in zip(paths, folders, strict=True)]
         for path, folder, given in zip(paths, folders, asked, strict=True):
             if isinstance(given, InputError):
                 found.append(BatchResult(job=path, folder=folder, passed=False, reason=str(given)))
@@ -152,11 +153,13 @@ def _folders(paths: Sequence[Path], out: Path) -> list[Path]:
     return folders
 
 
-def _submit(tasks: Sweep, path: Path) -> tuple[ProgramOptions, str] | InputError:
+def _submit(tasks: Sweep, path: Path, folder: Path) -> tuple[ProgramOptions, str] | InputError:
     """Submit a job; return its program options and the key of its task, or the error in it."""
     try:
-        key = tasks.submit(**job_key(path))
-        return read_job(path).program, key
+        key = job_key(path)  # before it is read: a task whose file has changed since is refused
+        job = read_job(path)
+        require_place(job, folder)
+        return job.program, tasks.submit(**key)
     except InputError as error:
         return error
 

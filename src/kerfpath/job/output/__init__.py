@@ -11,6 +11,7 @@ from kerfpath.job.output.writing import program_places as program_places
 from kerfpath.job.output.writing import program_texts as program_texts
 from kerfpath.job.output.writing import require_folder as require_folder
 from kerfpath.job.output.writing import require_language as require_language
+from kerfpath.job.output.writing import require_place as require_place
 from kerfpath.job.output.writing import result_texts as result_texts
 from kerfpath.job.output.writing import stale_program as stale_program
 from kerfpath.job.output.writing import write_result as write_result

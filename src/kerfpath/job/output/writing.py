@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 from kerfpath.arrays import Array, short_repr
 from kerfpath.cad import Departure
 from kerfpath.errors import AuditFailed, InputError
+from kerfpath.files import require_replaceable
 from kerfpath.job.audit_report import collision_note
 from kerfpath.job.format import Job, refusal_at
 from kerfpath.job.plan_file import (
@@ -27,6 +28,7 @@ from kerfpath.job.programs import expected_of_cuts, program_of
 from kerfpath.job.run import JobResult
 from kerfpath.plans import Plan, joint_columns
 from kerfpath.post import (
+    MANIFEST,
     Line,
     ProgramIssue,
     ProgramOptions,
@@ -424,22 +426,50 @@ def short_pieces(outcome: JobResult) -> list[str]:
     ]
 
 
-def require_folder(folder: Path) -> None:
+def require_folder(folder: Path, files: Iterable[str] = ()) -> None:
     """Require that a path is a folder or can become one, before any work is done.
+
+    Parameters
+    ----------
+    folder : Path
+    files : iterable of str
+        Names of files that the work will write into it, as far as they are known before.
 
     Raises
     ------
     InputError
-        The path or one of its parents is a file.
+        The path or one of its parents is a file; what lies in the place of a file cannot be
+        replaced, as a folder, a FIFO or a read-only file.
     """
     for place in (folder, *folder.parents):
         if place.is_dir():
-            return
+            break
         if place.exists():
             raise InputError(f"{folder}: expected a folder, but {place} is a file; name another")
+    for name in files:
+        try:
+            require_replaceable(folder / name)
+        except OSError as error:
+            raise InputError(
+                f"{error.filename}: {error.strerror}; remove it, or name another folder"
+            ) from None
 
 
-def make_folder(folder: Path) -> None:
+def require_place(job: Job, folder: Path) -> None:
+    """Require that the files of a run can be written into a folder, before any work is done.
+
+    Raises
+    ------
+    InputError
+        As `require_folder`.
+    """
+    files = ["plan.json", "trajectory.csv", "report.html", MANIFEST]
+    if job.program.language != "none":
+        files.append(f"{job.program.name}{job.program.robot_language.suffix}")
+    require_folder(folder, files)
+
+
+def make_folder(folder: Path, files: Iterable[str] = ()) -> None:
     """Make a folder for the files, unless it is there.
 
     Raises
@@ -447,7 +477,7 @@ def make_folder(folder: Path) -> None:
     InputError
         As `require_folder`; it cannot be made.
     """
-    require_folder(folder)
+    require_folder(folder, files)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
