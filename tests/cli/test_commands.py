@@ -47,6 +47,7 @@ def test_the_demo_leaves_all_four_files(tmp_path):
     result = run("demo", "--out", tmp_path / "deep" / "demo")
     assert result.returncode == 0, result.stderr
     assert result.stdout.count("passed") == 7
+    assert "too short" not in result.stdout + result.stderr
     assert "Collisions are not checked" in result.stdout
     names = {p.name for p in (tmp_path / "deep" / "demo").iterdir()}
     ours = {"plan.json", "trajectory.csv", "report.html", "b_pillar.mod"}

@@ -78,7 +78,7 @@ def test_straight_cuts_keep_the_shortest_move_and_their_time(name):
     assert len(took) > 0.5 * 0.9 / max(controller.shortest, controller.cycle)
     assert took.sum() == pytest.approx(plan.time[-1])
     assert sum(m.duration * m.speed for m in inner(program)) == pytest.approx(0.03)
-    assert "short-move" not in [issue.code for issue in preflight(program, name)]
+    assert "cycle-as-run" not in [issue.code for issue in preflight(program, name)]
     options = settings_of(name)
     read = read_program(post(program, name, options), name, program.robot, options)
     assert deviations(program, read, language(name), options) == []
@@ -158,18 +158,18 @@ def test_nothing_is_left_out_without_need():
 @pytest.mark.parametrize("name", ARMS)
 def test_what_is_still_too_short_is_a_warning_or_by_the_setting_an_error(name):
     program = build_program([planned(name, straight(301))], language=name, thin_tolerance=0)
-    (issue,) = [i for i in preflight(program, name, settings_of(name)) if i.code == "short-move"]
+    (issue,) = [i for i in preflight(program, name, settings_of(name)) if i.code == "cycle-as-run"]
     assert issue.level == "warning"
     assert issue.place.startswith("straight, move ")
     for words in ("300 of 302 moves", "x, y, z = ", "lasts 3 ms", "spacing_mm or thin_mm"):
         assert words in issue.message
     given = settings_of(name, shortest_move_ms=10.0)
-    (issue,) = [i for i in preflight(program, name, given) if i.code == "short-move"]
+    (issue,) = [i for i in preflight(program, name, given) if i.code == "cycle-as-run"]
     assert issue.level == "error"
     free = settings_of(name, shortest_move_ms=0.0)
     if name == "fanuc":
         free = free.model_copy(update={"interpolation_ms": 0.0})
-    assert "short-move" not in [i.code for i in preflight(program, name, free)]
+    assert "cycle-as-run" not in [i.code for i in preflight(program, name, free)]
 
 
 def test_the_model_takes_the_cycle_into_account():

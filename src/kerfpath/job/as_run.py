@@ -24,7 +24,7 @@ from kerfpath.execution import (
 )
 from kerfpath.job.format import Job
 from kerfpath.plans import Plan
-from kerfpath.post import STRETCHED, Controller, Program, build_program
+from kerfpath.post import REMEDY_SHORT, STRETCHED, Controller, Program, build_program
 
 __all__ = [
     "AsRun",
@@ -140,20 +140,16 @@ def _cycle(run: Executed, plan: Plan) -> Iterator[Check]:
     stretch = motion.stretch
     if stretch is None or max(controller.shortest, controller.cycle) <= 0:
         return
-    k, many = int(np.argmax(stretch)), stretch > STRETCHED
-    extra = float((motion.duration * stretch / (1 + stretch)).sum())
-    assumed = "" if controller.shortest_given else ", which is assumed; set shortest_move_ms"
+    found = controller.short_moves(motion.duration / (1 + stretch))
     yield Check(
         code="cycle-as-run",
         title="time by which the controller's cycle stretches a move",
-        value=float(stretch[k]),
+        value=found.share,
         limit=STRETCHED,
         unit="share",
-        node=_node(run, plan, float(motion.time[k + 1])),
-        level="error" if controller.shortest_given else "warning",
-        advice=f"{int(many.sum())} of {len(stretch)} moves are too short for it, and the cut takes "
-        f"{extra:.3g} s longer than planned (shortest move {controller.shortest * 1e3:g} ms"
-        f"{assumed}): raise spacing_mm or thin_mm, or lower the speed",
+        node=_node(run, plan, float(motion.time[found.worst + 1])),
+        level=found.level,
+        advice=f"{found.words}; {REMEDY_SHORT}",
     )
 
 

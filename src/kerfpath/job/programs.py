@@ -34,7 +34,7 @@ from kerfpath.job.plan_file import PlanFile, read_plan_file
 from kerfpath.job.run import CutResult
 from kerfpath.placement import MeasuredFrame, place_moves, placed, planned_again
 from kerfpath.plans import Plan
-from kerfpath.post import ProgramOptions, build_program, dry_run, post_and_read
+from kerfpath.post import ProgramIssue, ProgramOptions, build_program, dry_run, post_and_read
 from kerfpath.post import language as find_language
 from kerfpath.transfer import TransferMove
 
@@ -88,7 +88,7 @@ def program_of(
     expected: Expected,
     strict: bool = False,
     dry_share: float | None = None,
-) -> tuple[dict[str, str], list[str]]:
+) -> tuple[dict[str, str], tuple[ProgramIssue, ...]]:
     """Return the files of the program that cuts `plans`, and the warnings of its preflight.
 
     Between the cuts the robot makes `moves`; without any, it moves straight to each cut. With
@@ -119,7 +119,7 @@ def program_of(
     if dry_share is not None:
         dry = dry_run(program, dry_share)
         written = post_and_read(dry, options.language, options.settings, strict=strict)
-    return written.files, [str(issue) for issue in written.warnings]
+    return written.files, written.warnings
 
 
 def _require_passed(found: AuditReport, title: str) -> None:
@@ -240,7 +240,7 @@ def program_from_file(
         strict=strict,
         dry_share=dry_share,
     )
-    return files, notes + warnings
+    return files, [*notes, *map(str, warnings)]
 
 
 def program_language(source: Mapping[str, Any], path: Path) -> str:

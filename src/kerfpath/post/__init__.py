@@ -29,6 +29,7 @@ from kerfpath.post.folder import write_set as write_set
 from kerfpath.post.joint_trajectory import joint_trajectory as joint_trajectory
 from kerfpath.post.languages import ENTRY_POINTS as ENTRY_POINTS
 from kerfpath.post.languages import PLAIN as PLAIN
+from kerfpath.post.languages import REMEDY_SHORT as REMEDY_SHORT
 from kerfpath.post.languages import STRETCHED as STRETCHED
 from kerfpath.post.languages import Controller as Controller
 from kerfpath.post.languages import Formatter as Formatter

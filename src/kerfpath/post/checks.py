@@ -12,6 +12,7 @@ from kerfpath.errors import InputError
 from kerfpath.losses import Loss, Reason
 from kerfpath.post.arcs import distances
 from kerfpath.post.languages import (
+    REMEDY_SHORT,
     STRETCHED,
     Language,
     LanguageSettings,
@@ -339,22 +340,18 @@ def _check_shortest(section: Section, lengths: Array, rules: Rules) -> Iterator[
         ]
     )
     number = [k for k, move in enumerate(moves, 1) if isinstance(move, LinearMove)]
-    stretch = controller.stretch(np.maximum(took, SHORTEST))
-    found = np.flatnonzero(stretch > STRETCHED)
-    if not found.size:
+    if not took.size:
         return
-    k = int(found[np.argmax(stretch[found])])
-    last = number[k]
-    extra = float((took * stretch)[found].sum())
+    found = controller.short_moves(np.maximum(took, SHORTEST))
+    if found.share <= STRETCHED:
+        return
+    planned, last = took[found.worst] * 1e3, number[found.worst]
     at = f"x, y, z = {', '.join(f'{x * 1e3:.1f}' for x in _end(moves[last - 1]))} mm"
-    assumed = "" if controller.shortest_given else " (assumed; set shortest_move_ms)"
     yield ProgramIssue(
-        "error" if controller.shortest_given else "warning",
-        "short-move",
-        f"{len(found)} of {len(took)} moves of the path are too short for the controller{assumed}: "
-        f"it takes {extra:.3g} s longer than planned, and may stop with the beam on. The worst, to "
-        f"{at}, lasts {took[k] * 1e3:.3g} ms and takes {took[k] * (1 + stretch[k]) * 1e3:.3g} ms; "
-        "raise spacing_mm or thin_mm, or lower the speed",
+        found.level,
+        "cycle-as-run",
+        f"{found.words}. The worst, to {at}, lasts {planned:.3g} ms and takes "
+        f"{planned * (1 + found.share):.3g} ms; {REMEDY_SHORT}",
         f"{section.name}, move {last}",
     )
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -60,6 +60,31 @@ CYCLE_NOISE = 1e-6
 """Share by which a time may exceed whole cycles because of rounding."""
 
 
+class ShortMoves(NamedTuple):
+    """What a controller's cycle does to the moves of a path.
+
+    Parameters
+    ----------
+    worst : int
+        Number, from 0, of the move that it stretches most.
+    share : float
+        Share by which that move takes longer than planned.
+    words : str
+        How many moves are too short, and what follows.
+    level : {"error", "warning"}
+        An error if the shortest time is given, not assumed.
+    """
+
+    worst: int
+    share: float
+    words: str
+    level: Level
+
+
+REMEDY_SHORT = "raise spacing_mm or thin_mm, or lower the speed"
+"""What helps against moves that are too short."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Controller:
     """Properties of a controller that decide how it runs the path of a program.
@@ -103,6 +128,21 @@ class Controller:
         if self.cycle > 0:
             longer = self.cycle * np.ceil(longer / self.cycle * (1 - CYCLE_NOISE))
         return np.asarray(np.maximum(longer, time) / time - 1)
+
+    def short_moves(self, time: Array) -> ShortMoves:
+        """Return what the cycle does to moves of a path of planned times (m,) s, m > 0."""
+        stretch = self.stretch(time)
+        many = stretch > STRETCHED
+        extra = float((time * stretch)[many].sum())
+        assumed = "" if self.shortest_given else ", assumed; set shortest_move_ms"
+        return ShortMoves(
+            worst=int(np.argmax(stretch)),
+            share=float(stretch.max()),
+            words=f"{int(many.sum())} of {len(time)} moves of the path are too short for the "
+            f"controller (shortest move {self.shortest * 1e3:g} ms{assumed}): it takes {extra:.3g} "
+            "s longer than planned, and may stop with the beam on",
+            level="error" if self.shortest_given else "warning",
+        )
 
     def with_shortest(self, said_ms: float | None, assumed_ms: float) -> Controller:
         """Return the controller with the shortest move of a setting, or what is assumed without."""
@@ -651,6 +691,8 @@ class Language:
         and coordinated motion, as sentences. None: the language has no external axes.
     encodings : tuple of str
         Encodings of its texts, in the order in which they are tried. Only remarks differ.
+    byte_order_mark : bool
+        Whether its files begin with one, in UTF-8.
     longest_line : int
         Characters of the longest line that is read.
     inherited : callable, optional
@@ -676,6 +718,7 @@ class Language:
     assumed: Mapping[str, Any] = field(default_factory=dict)
     externals: Callable[[Robot, Any], Iterator[str]] | None = None
     encodings: tuple[str, ...] = ("utf-8-sig",)
+    byte_order_mark: bool = False
     longest_line: int = 2000
     inherited: Callable[[Any], tuple[Inherited, ...]] = _nothing_inherited
     read: Reader | None = None

@@ -340,7 +340,9 @@ def program_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
             program, warnings = program_of(
                 outcome.plans, job.program, moves, expected=expected, strict=strict
             )
-            notes += warnings
+            # What the tables of the cuts say already is not said again.
+            failed = {row.code for cut in outcome.cuts for row in cut.as_run.checks if not row.ok}
+            notes += [str(warning) for warning in warnings if warning.code not in failed]
         except (InputError, AuditFailed) as error:
             refused, unsafe = str(error), isinstance(error, AuditFailed)
             faults.append(refused if unsafe else f"no program was written: {error}")
