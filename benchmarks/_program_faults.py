@@ -151,6 +151,12 @@ def _section_faults(steps: Sequence[Step], rng: np.random.Generator) -> Iterator
     yield "no retract", without(back)
     yield "no approach", without(start)
     yield "no joint move", without(joint[-1])
+    if len(joint) > 1:
+        yield "contour begun fast", changed(joint[0], speed=0.5)
+        yield "contour begun without its slow move", without(joint[0])
+        here = steps[joint[0]]
+        assert isinstance(here, JointMove)
+        yield "contour begun elsewhere", changed(joint[0], q=_nudged(here.q, rng, 5.0))
     yield "node left out", without(middle)
     yield "node twice", inserted(middle, steps[middle])
     yield "nodes swapped", (*steps[:middle], steps[middle + 1], steps[middle], *steps[middle + 2 :])

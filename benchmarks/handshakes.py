@@ -43,8 +43,9 @@ ARMS = {
 ACCELERATION = [300, 300, 400, 1000, 1000, 1500]
 HOW = """\
 Programs of one and two holes in each language that has outputs, with 0 to 3 requests to partners, 0
-to 4 waits for them, and the gas with and without. Paths: every wait ends without an answer, and
-after a pause the operator continues, as often as he likes, until the program ends; unsafe is a path
+to 4 waits for them, the gas with and without, and a lead time of 20 ms. Paths: every wait ends
+without an answer, and after a pause the operator continues, as often as he likes, until the program
+ends; unsafe is a path
 with the laser on where it must not be, something left on, or a cut that goes on without what it
 had. Lines: the program is begun at every step while everything is off, as after a loss of power, or
 where the operator moves the cursor; unsafe is a line from which the laser comes on without an
@@ -69,7 +70,7 @@ def run(*, quick: bool = False) -> Report:
                 handshakes=(*shakes, *waits),
                 gas_lead=gas,
                 pierce_time=0.1,
-                lead_time=0.0,
+                lead_time=0.02,
             )
             read = read_program(post(program, name, settings), name, program.robot, settings)
             flow = [step for section in read.sections for step in section.flow]

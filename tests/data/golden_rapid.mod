@@ -8,7 +8,7 @@ MODULE cut_skin_outer
   ! To begin at a contour, set nFirst to its number and move PP to Main.
   PERS tooldata tLaser:=[TRUE,[[51.3000,0.0000,248.7000],[0.95371695,0.00000000,0.30070580,0.00000000]],[-1,[0,0,0],[1,0,0,0],0,0,0]];
   PERS wobjdata wPart:=[FALSE,TRUE,"",[[1053.7000,-151.1000,612.3000],[0.96327561,-0.00981749,0.02988342,0.26666588]],[[0,0,0],[1,0,0,0]]];
-  CONST speeddata vAir:=[250.00,125,5000,1000];
+  CONST speeddata vAir:=[100.00,50,5000,1000];
   CONST speeddata vApproach:=[100.00,500,5000,1000];
   CONST speeddata vCut:=[120.00,500,5000,1000];
   CONST zonedata zCorner:=[FALSE,0.300,0.300,0.300,0.030,0.300,0.030];

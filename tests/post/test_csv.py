@@ -68,7 +68,7 @@ def test_times_are_those_planned(program):
     again = len(program.moves) + 1
     dq = twice.moves[len(program.moves)].q - twice.moves[len(program.moves) - 1].q
     least = least_time(dq[None], *program.robot.speed_limits())[0]
-    assert took.pop(again) == pytest.approx(least / 0.25, abs=2e-9)
+    assert took.pop(again) == pytest.approx(least / 0.1, abs=2e-9)
     planned = [getattr(step, "duration", getattr(step, "time", None)) for step in steps]
     for k, time in took.items():
         assert time == pytest.approx(planned[k], abs=2e-9)

@@ -128,7 +128,7 @@ def test_a_target_that_is_added_or_left_out_moves_no_other(read, number):
     ("number", "changes", "code", "words"),
     [
         (5, {"speed": 0.2}, "speeds", "1 move, 100 mm/s in A and 200 mm/s in B"),
-        (0, {"speed": 0.5}, "speeds", "1 move, 25.0% in A and 50.0% in B"),
+        (0, {"speed": 0.5}, "speeds", "1 move, 10.0% in A and 50.0% in B"),
         (5, {"zone": 0.0}, "zones", "1 move, 0.3 mm in A and a stop in B"),
         (1, {"switches": ()}, "switches", "laser on 0.02 s ahead in A and nothing in B"),
         (5, {"posture": (0, 0, 0, 9)}, "postures", "and 0 0 0 9 in B"),

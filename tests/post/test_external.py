@@ -164,7 +164,7 @@ def test_speed_data_have_the_speeds_of_the_axes():
     turning = f"{np.degrees(2.5):.0f}"
     assert f"vCut:=[50.00,500,2000,{turning}];" in text
     # The first joint move has a quarter of every speed, that of the axes too.
-    assert f"vAir:=[250.00,125,500,{np.degrees(2.5) / 4:.0f}];" in text
+    assert f"vAir:=[100.00,50,200,{np.degrees(2.5) / 10:.0f}];" in text
     lines = text.splitlines()
     active = [line.strip() for line in lines if "Unit " in line and "!" not in line]
     assert active == ["ActUnit TRACK_1;", "ActUnit STN_1;", "DeactUnit STN_1;"]
@@ -195,7 +195,7 @@ EDITS = {
     ),
     "inform": (
         (" BC00000", "", "expected 'MOVJ C00000 BC00000"),
-        (" +MOVJ EC00000 VJ=25.00", "", "expected 'MOVJ C00000 BC00000"),
+        (" +MOVJ EC00000 VJ=10.00", "", "expected 'MOVJ C00000 BC00000"),
         ("EC00000=0", "EC00000=0,0", "expected pulses of turn"),
         ("///GROUP2 ST1\r\n", "", "expected '///GROUP2 ST1'"),
         ("RB1,BS1", "RB1", "expected '///GROUP1 RB1,BS1'"),

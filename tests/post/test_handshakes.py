@@ -11,6 +11,7 @@ from kerfpath.post import (
     Comment,
     ReadHandshake,
     Request,
+    Wait,
     build_program,
     deviations,
     differences,
@@ -105,13 +106,18 @@ def test_the_laser_goes_on_only_with_gas_and_requests(name):
             assert refusal(files | {file: files[file].replace(line, edited)}, name, made, options)
 
 
-def test_a_laser_with_a_lead_time_is_switched_by_the_motion_alone():
+def test_a_laser_with_a_lead_time_needs_them_too_and_the_robot_waits_for_it():
     made = program("krl", handshakes=ASKED)
-    late = build_program(
-        [hand_plan(arc("one"), made.robot, *frames())], lead_time=0.05, handshakes=ASKED
-    )
-    on = [s for move in late.moves for s in getattr(move, "switches", ()) if s.on]
-    assert [s.needs for s in on] == [()]
+    plans = [hand_plan(arc("one"), made.robot, *frames())]
+    led = build_program(plans, lead_time=0.05, gas_lead=0.2, pierce_time=0.1, handshakes=ASKED)
+    switches = [s for move in led.moves for s in getattr(move, "switches", ())]
+    assert [(s.signal, s.on, s.lead_time, s.needs) for s in switches] == [
+        ("gas", True, 0.2, ()),
+        ("laser", True, 0.0, ("gas", "shutter", "height")),
+        ("laser", False, 0.05, ()),
+        ("gas", False, 0.0, ()),
+    ]
+    assert [step.time for step in led.steps if isinstance(step, Wait)] == [pytest.approx(0.15)]
 
 
 EDITS = {
@@ -275,3 +281,46 @@ def test_each_contour_is_a_program_that_can_be_started_alone(name):
             text = files[f"{contour}_AIR.JBI"]
             assert "///USER 1" in text
             assert "///RCONF" in text
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_the_move_at_which_a_contour_may_be_begun_is_slow(name):
+    """It goes nowhere if the robot comes from the contour before."""
+    made = program(name, ("one", "two", "three"))
+    here = None
+    for section in made.sections:
+        first, *_, last = section.moves
+        assert (first.speed, first.duration) == (0.1, None)
+        assert here is None or (first.q == here).all()
+        here = last.q
+    assert {section.moves[1].speed == 0.1 for section in made.sections[1:]} == {False}
+    read = read_program(post(made, name, settings(name)), name, made.robot, settings(name))
+    assert [s.moves[0].speed for s in read.sections if s.moves[0].kind == "joint"] == (
+        pytest.approx([0.1] * 3, abs=1e-4)
+    )
+    slower = program(name, ("one", "two"), start_speed=0.02, air_speed=0.5)
+    assert [s.moves[0].speed for s in slower.sections] == [0.02] * 2
+    assert slower.sections[1].moves[1].duration is None or slower.sections[1].moves[1].speed > 0.02
+    slow = program(name, ("one", "two"), air_speed=0.05)
+    assert [s.moves[0].speed for s in slow.sections] == [0.05] * 2
+
+
+FASTER = {
+    "rapid": (".mod", "vAir1,", "vAir2,"),
+    "krl": (".src", "BAS(#VEL_PTP,10)", "BAS(#VEL_PTP,100)"),
+    "fanuc": ("TWO.ls", "J P[1] 10%", "J P[1] 100%"),
+    "val3": ("two.pgx", "mAir[0]", "mAir[1]"),
+    "inform": ("TWO_AIR.JBI", "C00000 VJ=10.00", "C00000 VJ=100.00"),
+    "urscript": (".script", "v=0.209440", "v=2.094395"),
+}
+
+
+@pytest.mark.parametrize("name", FASTER)
+def test_a_contour_that_would_be_begun_fast_is_found(name):
+    made, (end, old, new) = program(name, ("one", "two")), FASTER[name]
+    files = post(made, name, settings(name))
+    (file,) = [file for file in files if file.endswith(end)]
+    text, _, after = files[file].rpartition(old)
+    found = refusal(files | {file: f"{text}{new}{after}"}, name, made, settings(name))
+    assert "the speed is" in found
+    assert "expected 10.0%" in found

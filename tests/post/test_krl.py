@@ -283,7 +283,7 @@ def test_preflight_refuses_a_joint_move_that_rounds_its_corner(program):
         ),
         ("$VEL.CP=0.100000\r\n", "", "$VEL.CP has not been set in this routine"),
         ("$APO.CDIS=0.300\r\n", "", "$APO.CDIS has not been set"),
-        ("BAS(#VEL_PTP,25)\r\n", "", "BAS(#VEL_PTP,...) has not been set"),
+        ("BAS(#VEL_PTP,10)\r\n", "", "BAS(#VEL_PTP,...) has not been set"),
         ("DO $OUT[5]=TRUE", "DO $OUT[7]=TRUE", "expected the output 5 to be switched, got 7"),
         ("DELAY=-20", "DELAY=20", "must not have a positive DELAY"),
         ("=TRUE\r\nLIN", "=TRUE\r\nWAIT SEC 1.0\r\nLIN", "must come right before its motion"),

@@ -125,7 +125,7 @@ def test_motions_that_are_alike_share_a_descriptor(cell):
     data = post(build_program(plans, zone=3e-4), "val3", OUTPUTS)["cut_one/cut_one.dtx"]
     assert data.count('blend="Cartesian"') == 1
     assert 'name="mPath" access="private" xsi:type="array" type="mdesc" size="2"' in data
-    assert 'name="mAir" access="private" xsi:type="array" type="mdesc" size="1"' in data
+    assert 'name="mAir" access="private" xsi:type="array" type="mdesc" size="2"' in data
 
 
 def test_arcs_are_written_as_movec(program):
@@ -398,7 +398,7 @@ def test_the_reader_refuses_what_it_does_not_know(file, old, new, message):
     [
         (DTX, "wpositive", "wnegative"),
         (DTX, 'tmax="120.000"', 'tmax="121.000"'),
-        (DTX, 'vel="25.00"', 'vel="35.00"'),
+        (DTX, 'vel="10.00"', 'vel="35.00"'),
         (DTX, 'j6="73.', 'j6="74.'),
         (DTX, 'y="17.3041"', 'y="17.4041"'),
         (DTX, 'leave="0.3000" reach="0.3000"', 'leave="0.4000" reach="0.4000"'),

@@ -416,8 +416,10 @@ def _process_checks(
     most = SAME_SPEED + digits[fast]
     node = int(np.argmax(wrong)) if wrong.any() else 0
     process = BeamProcess.of(job.program)
-    lead = np.abs(cut.lead_times - process.lead_time)
-    wait = abs(float(cut.waits.sum()) - process.pierce_time)
+    expected = np.full(len(cut.lead_times), process.lead_time)
+    expected[:1] = process.start_lead
+    lead = np.abs(cut.lead_times - expected)
+    wait = abs(float(cut.waits.sum()) - process.start_wait)
     lengths = np.diff(s)[wrong].sum()
     return [
         check("speed", "difference of the speed from the job's", excess[fast], most, "share", fast),

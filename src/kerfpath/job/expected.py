@@ -582,7 +582,7 @@ def expect_program(
     sections = []
     for section, (cut, requested, _) in zip(program.sections, cuts, strict=True):
         steps = [
-            replace(step, q=_same_pose(program, step.q, cut.approach[-1], rules))
+            replace(step, q=_same_pose(program, step.q, cut.approach, rules))
             if isinstance(step, JointMove)
             else step
             for step in section.steps
@@ -642,9 +642,10 @@ def _moves(
     """Return the moves between cuts with the corners that were read, and the job's home."""
     if job.sequence is None:
         return []
+    # Each approach but the first begins where the cut before it ends.
     corners = [
-        [*cut.approach[:-1], back_off(plan, "start", job.program.retract)]
-        for cut, plan in zip(cuts, plans, strict=True)
+        [*cut.approach[number > 0 : -1], back_off(plan, "start", job.program.retract)]
+        for number, (cut, plan) in enumerate(zip(cuts, plans, strict=True))
     ]
     backs = [back_off(plan, "end", job.program.retract) for plan in plans]
     ways = [[back, *way] for back, way in zip(backs, corners[1:], strict=False)]
@@ -660,11 +661,12 @@ def _moves(
     ]
 
 
-def _same_pose(program: Program, requested: Array, read: Array, rules: Rules) -> Array:
-    """Return the joints that were read if they bring the tool to the requested pose.
+def _same_pose(program: Program, requested: Array, approach: Array, rules: Rules) -> Array:
+    """Return the nearest joints that were read (m, n) if they bring the tool to the requested pose.
 
     Near a singularity, the digits of a pose leave a larger error in the joints than in the pose.
     """
+    read = min(approach, key=lambda q: float(np.abs(requested - q).max()))
     T = program.robot.forward(np.array([requested, read])) @ program.T_flange_tip
     left = len(requested) * rules.angle_step
     off = np.linalg.norm(T[0, :3, 3] - T[1, :3, 3])

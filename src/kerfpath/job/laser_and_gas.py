@@ -17,7 +17,15 @@ import numpy as np
 
 from kerfpath.auditor import Check, Unit
 from kerfpath.job.audit_report import check
-from kerfpath.post import ProgramOptions, ReadMove, ReadProgram, ReadWait, Signal, groups_of
+from kerfpath.post import (
+    ProgramOptions,
+    ReadMove,
+    ReadProgram,
+    ReadWait,
+    Signal,
+    groups_of,
+    laser_start,
+)
 from kerfpath.robots import Robot
 from kerfpath.transfer import least_time
 
@@ -46,7 +54,12 @@ class BeamProcess:
     ----------
     lead_time : float s
         Lead time of the laser.
+    start_lead : float s
+        That at a start: 0 where partners were asked, because the robot stands.
+    start_wait : float s
+        How long the robot waits at a start.
     pierce_time : float s
+        How long the beam may be on there.
     gas_lead : float s or None
         How long before the start the gas is to flow; None: the program does not switch it.
     stops : bool
@@ -54,6 +67,8 @@ class BeamProcess:
     """
 
     lead_time: float
+    start_lead: float
+    start_wait: float
     pierce_time: float
     gas_lead: float | None
     stops: bool
@@ -62,9 +77,14 @@ class BeamProcess:
     def of(cls, options: ProgramOptions) -> BeamProcess:
         """Return the requirements of [program], as far as its language can express them."""
         gas, ahead = options.gas_lead, options.robot_language.ahead
+        lead_time = options.lead_time if ahead else 0.0
+        laser, wait = laser_start(options)
+        start_lead = min(laser.lead_time, lead_time)
         return cls(
-            lead_time=options.lead_time if ahead else 0.0,
-            pierce_time=options.pierce_time,
+            lead_time=lead_time,
+            start_lead=start_lead,
+            start_wait=wait,
+            pierce_time=wait + start_lead - lead_time,
             gas_lead=gas if gas is None or ahead else 0.0,
             stops=options.zone == 0,
         )

@@ -12,6 +12,7 @@ from kerfpath.post.arcs import timetable as timetable
 from kerfpath.post.arcs import with_arcs as with_arcs
 from kerfpath.post.build import build_program as build_program
 from kerfpath.post.build import dry_run as dry_run
+from kerfpath.post.build import laser_start as laser_start
 from kerfpath.post.checks import preflight as preflight
 from kerfpath.post.comparison import Difference as Difference
 from kerfpath.post.comparison import deviations as deviations

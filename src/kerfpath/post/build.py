@@ -288,10 +288,12 @@ def build_program(
 ) -> Program:
     """Return the program that cuts the planned contours one after the other.
 
-    The steps of each contour are: a joint move to a pose backed off from the start along the tool
-    axis, a straight move to the start with a stop, laser on, straight moves through all nodes with
-    a stop at the last, laser off, and a straight move back along the tool axis. The laser is off
-    along micro joints. The gas, if it is switched, flows from before the start to the end.
+    The steps of each contour are: a slow joint move to where the contour before it ended, joint
+    moves to a pose backed off from the start along the tool axis, a straight move to the start with
+    a stop, laser on, straight moves through all nodes with a stop at the last, laser off, and a
+    straight move back along the tool axis. The slow move goes nowhere unless the program is begun
+    at this contour, with the robot elsewhere. The laser is off along micro joints. The gas, if it
+    is switched, flows from before the start to the end.
 
     Parameters
     ----------
@@ -324,10 +326,11 @@ def build_program(
     title = identifier(options.name or f"cut {first.name}")
     names = identifiers((plan.name for plan in plans), taken=(title,))
     *ways, home = _corners(plans, moves, options.retract)
-    air = _Air(first, options.air_speed or (PLANNED if moves else UNPLANNED))
+    share = options.air_speed or (PLANNED if moves else UNPLANNED)
+    air = _Air(first, share, min(share, options.start_speed))
     sections = []
     for plan, section_name, way in zip(plans, names, ways, strict=True):
-        steps = tuple(_steps(plan, air.moves(way), options))
+        steps = tuple(_steps(plan, air.start(way), options))
         sections.append(Section(name=section_name, steps=steps))
         air.here = back_off(plan, "end", options.retract)
     if home:
@@ -362,7 +365,8 @@ def _steps(plan: Plan, way: Iterable[JointMove], options: ProgramOptions) -> Ite
     _require_on_contour(plan)
     T = plan.T_part_tip
     q = plan.unwrapped
-    starts: tuple[Switch, ...] = (_start(options),)
+    laser, wait = laser_start(options)
+    starts: tuple[Switch, ...] = (laser,)
     if options.gas_lead is not None:
         starts = (Switch(signal="gas", on=True, lead_time=options.gas_lead), *starts)
     yield Comment(
@@ -372,8 +376,8 @@ def _steps(plan: Plan, way: Iterable[JointMove], options: ProgramOptions) -> Ite
     yield from way
     yield from options.handshakes
     yield _straight(options, T[0], q[0], starts)
-    if options.pierce_time > 0:
-        yield Wait(time=options.pierce_time)
+    if wait > 0:
+        yield Wait(time=wait)
     yield from _cut(plan, T, q, options)
     T_out = T[-1].copy()
     T_out[:3, 3] -= options.retract * T_out[:3, 2]
@@ -383,16 +387,18 @@ def _steps(plan: Plan, way: Iterable[JointMove], options: ProgramOptions) -> Ite
             yield replace(step, on=False)
 
 
-def _start(options: ProgramOptions) -> Switch:
-    """Return the switch at the start; where partners were asked, the laser needs all that is on.
+def laser_start(options: ProgramOptions) -> tuple[Switch, float]:
+    """Return the switch of the laser at a start, and how long the robot waits there, s.
 
-    With a lead time the controller switches while the robot moves, and cannot look at outputs.
+    Where partners were asked, the laser needs all that is on. Controllers look at outputs only
+    where the robot stands: it is switched there, and the robot waits for the lead time, too.
     """
     on = [step.partner for step in options.handshakes if isinstance(step, Request) and step.on]
-    if not on or options.lead_time > 0:
-        return _laser(options, on=True)
+    if not on:
+        return _laser(options, on=True), options.pierce_time
     gas: tuple[Signal, ...] = () if options.gas_lead is None else ("gas",)
-    return replace(_laser(options, on=True), needs=(*gas, *on))
+    laser = Switch(signal="laser", on=True, needs=(*gas, *on))
+    return laser, options.pierce_time + options.lead_time
 
 
 def _laser(options: ProgramOptions, *, on: bool) -> Switch:
@@ -440,20 +446,24 @@ class _Air:
     takes the planned time.
     """
 
-    def __init__(self, plan: Plan, share: float) -> None:
-        self._plan, self._share = plan, share
+    def __init__(self, plan: Plan, share: float, start_share: float) -> None:
+        self._plan, self._share, self._start_share = plan, share, start_share
         self.here: Array | None = None
-        """Joints from which the next move starts."""
+        """Joints from which the next move starts; None before the first."""
+
+    def start(self, corners: Sequence[Array]) -> Iterator[JointMove]:
+        """Yield the moves to a contour. The first is slow: a program may be begun there."""
+        first, *others = corners if self.here is None else [self.here, *corners]
+        self.here = first
+        yield JointMove(q=first, speed=self._start_share)
+        yield from self.moves(others)
 
     def moves(self, corners: Sequence[Array]) -> Iterator[JointMove]:
         """Yield a joint move to each corner."""
         robot, eta_v, eta_a = self._plan.robot, self._plan.settings.eta_v, self._plan.settings.eta_a
         for q in corners:
-            here, self.here = self.here, q
-            way = None if here is None else (q - here)[None]
-            if way is None:
-                yield JointMove(q=q, speed=min(self._share, UNPLANNED))
-                continue
+            assert self.here is not None
+            way, self.here = (q - self.here)[None], q
             if not way.any() or robot.velocity is None or robot.acceleration is None:
                 yield JointMove(q=q, speed=self._share)
                 continue

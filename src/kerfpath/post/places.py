@@ -13,6 +13,7 @@ import numpy as np
 from kerfpath.arrays import Array, short_repr
 from kerfpath.names import identifier, identifiers
 from kerfpath.post.arcs import Order, controller_frames, euler, timetable
+from kerfpath.post.build import laser_start
 from kerfpath.post.checks import foresee
 from kerfpath.post.languages import Formatter, number, plain
 from kerfpath.post.languages import language as find_language
@@ -286,7 +287,8 @@ def issues_before_planning(
     radius = SOME_ZONE if options.zone == "auto" else options.zone
     sections = []
     for section, (_, speed) in zip(names, cuts, strict=True):
-        on = [Switch(signal="laser", on=True, lead_time=options.lead_time)]
+        laser, wait = laser_start(options)
+        on = [laser]
         off = [Switch(signal="laser", on=False, lead_time=options.lead_time)]
         if options.gas_lead is not None:
             on.insert(0, Switch(signal="gas", on=True, lead_time=options.gas_lead))
@@ -301,7 +303,7 @@ def issues_before_planning(
                 duration=1.0,
                 switches=tuple(on),
             ),
-            *([Wait(time=options.pierce_time)] if options.pierce_time else []),
+            *([Wait(time=wait)] if wait else []),
             LinearMove(T_part_tip=here, q=q, speed=speed, duration=1.0, zone=radius),
             LinearMove(T_part_tip=here, q=q, speed=speed, duration=1.0, switches=tuple(off)),
         )

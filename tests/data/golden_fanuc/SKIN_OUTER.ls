@@ -23,7 +23,7 @@ CONTROL_CODE	= 00000000 00000000;
    2:  UTOOL_NUM=1 ;
    3:  ! skin/outer: 8 nodes, 155.7 mm, ;
    4:  ! posture front/up/plus ;
-   5:J P[1] 25% FINE    ;
+   5:J P[1] 10% FINE    ;
    6:L P[2] 600cm/min FINE TB    .02sec,DO[1]=ON    ;
    7:L P[3] 720cm/min CNT100    ;
    8:L P[4] 720cm/min CNT100    ;
