@@ -157,6 +157,23 @@ def without(text, call):
     return re.sub(r"(?<=IF nFirst<=)\d+", lambda _: str(next(numbers)), kept)
 
 
+def test_a_contour_that_would_be_begun_fast_is_found(folder, written):
+    (slow,) = re.findall(r"speeddata (vAir\d+):=\[100\.00,", written)
+    fast = next(name for name in re.findall(r"speeddata (vAir\d+)", written) if name != slow)
+    assert written.count(f"],{slow},fine") == 3, "one for each contour"
+    before, _, after = written.rpartition(f"],{slow},fine")
+    code, found = audited(folder, f"{before}],{fast},fine{after}")
+    assert code == 1
+    assert {which for _, which in failures(found)} == {"asked-speeds"}
+
+
+def test_a_byte_order_mark_is_noted(folder, written):
+    code, found = audited(folder, f"\ufeff{written}")
+    assert code == 0
+    assert "edited.mod: a byte order mark is at the beginning" in found["notes"][0]
+    assert "byte order mark" not in audited(folder, written)[1]["notes"][0]
+
+
 def test_a_cut_that_is_left_out_or_made_twice_is_found(folder, written):
     name = re.search(r"    IF nFirst<=\d joined;\n", written)[0]
     body = re.search(r"\n  PROC joined\(\)\n.*?ENDPROC\n", written, re.DOTALL)[0]

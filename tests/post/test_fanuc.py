@@ -343,7 +343,10 @@ def test_preflight_finds_what_only_this_language_cannot_say(program, cell):
     [
         (MAIN, "/PROG  CUT", "/PROG  PUT", "line 1: expected /PROG and the name of the file"),
         (MAIN, "/ATTR", "/APPL", "line 2: expected /ATTR"),
-        (MAIN, "VERSION", "VISION", "line 9: not an attribute: 'VISION"),
+        (MAIN, "VERSION", "VISION", "line 9: not an attribute of a listing in English: 'VIS"),
+        (MAIN, "PROG_SIZE", "PROG_GR\u00d6\u00dfE", "'PROG_GR\u00d6\u00dfE"),
+        (MAIN, "PROG_SIZE", "PROG_GR\u00d6\u00dfE", "set the controller to English and list"),
+        (MAIN, "CALL SKIN_OUTER    ;", "CALL\r\n    :  SKIN_OUTER    ;", "in the next line in one"),
         (MAIN, "1,*,*,*,*", "1,1,*,*,*", "expected DEFAULT_GROUP"),
         (MAIN, "LINE_COUNT\t= 28", "LINE_COUNT\t= 27", "LINE_COUNT is 27, but there are 28"),
         (MAIN, "  11:", "  12:", "expected line number 11"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -623,8 +623,9 @@ class Audit:
             job, cuts, home, cell if job.sequence is not None else None
         )
         missing = tuple(name for i, name in enumerate(names) if i not in done)
-        note = f"{collision_note(cell, moves_too=job.sequence is not None)} {_restart_note(read)}"
-        return AuditReport(tables=tables, missing=missing, note=note.strip(), places=places)
+        notes = collision_note(cell, moves_too=job.sequence is not None), *_notes(read)
+        note = " ".join(filter(None, notes))
+        return AuditReport(tables=tables, missing=missing, note=note, places=places)
 
     def _whole(
         self, file: PlanFile, judged: Sequence[PlanData], planned: Sequence[ExpectedPlan]
@@ -745,13 +746,16 @@ def _check_paths(read: ReadProgram) -> Check:
     return replace(row, advice=str(found[0])) if found else row
 
 
-def _restart_note(read: ReadProgram) -> str:
-    """Return where the program must not be begun or continued after everything went off."""
-    found = unsafe_restarts(read)
-    if not found:
-        return ""
-    more = f" (and {len(found) - 1} more such stretches)" if len(found) > 1 else ""
-    return f"After a stop begin a contour at its first line: {found[0]}{more}."
+def _notes(read: ReadProgram) -> Iterator[str]:
+    """Yield where a program must not be begun or continued after everything went off, and marks."""
+    if found := unsafe_restarts(read):
+        more = f" (and {len(found) - 1} more such stretches)" if len(found) > 1 else ""
+        yield f"After a stop begin a contour at its first line: {found[0]}{more}."
+    if read.marked:
+        yield (
+            f"{', '.join(read.marked)}: a byte order mark is at the beginning, which the "
+            "controller may not read; save as UTF-8 without it."
+        )
 
 
 def _new_title(title: str, tables: Mapping[str, object]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from codecs import BOM_UTF16_BE, BOM_UTF16_LE
+from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +21,6 @@ from kerfpath.post import (
     Rules,
     differences,
     groups_of,
-    language,
     languages,
     not_compared,
     read_program,
@@ -48,6 +47,8 @@ class TextFolder(Mapping[str, str]):
 
     def __init__(self, folder: Path, encodings: Sequence[str]) -> None:
         self.folder, self.encodings = folder, encodings
+        self.marked: list[str] = []
+        """Names of the files that were read and begin with a byte order mark."""
 
     def __getitem__(self, name: str) -> str:
         path = self.folder / name
@@ -60,6 +61,8 @@ class TextFolder(Mapping[str, str]):
             raise InputError(f"{path}: cannot be read ({why})") from None
         if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) or 0 in data[:2]:
             raise InputError(f"{path}: expected {self._names}, got UTF-16; save it as UTF-8")
+        if data.startswith(BOM_UTF8):
+            self.marked.append(path.name)
         for encoding in self.encodings:
             try:
                 return data.decode(encoding)
@@ -118,8 +121,10 @@ def program_on_disk(path: Path, job: Job) -> ReadProgram:
         raise InputError(f"{path}: no such file; give the path of a program or a plan.json")
     require_one_set(path)
     options = job.program
-    files = TextFolder(path.parent, language(options.language).encodings)
-    return read_program(files, options.language, job.robot, options.settings, main=path.name)
+    chosen = options.robot_language
+    files = TextFolder(path.parent, chosen.encodings)
+    read = read_program(files, options.language, job.robot, options.settings, main=path.name)
+    return read if chosen.byte_order_mark else replace(read, marked=tuple(files.marked))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -210,6 +210,8 @@ class ReadProgram:
         External axes of the robot that it was read for.
     exits : mapping of str to tuple of FlowStep
         What is done at each error exit, to which a wait without an answer leads from any routine.
+    marked : tuple of str
+        Files with a byte order mark, which files of the language do not have.
     """
 
     name: str
@@ -218,6 +220,7 @@ class ReadProgram:
     T_base_part: Array | None = None
     externals: tuple[ExternalAxis, ...] = ()
     exits: Mapping[str, tuple[FlowStep, ...]] = field(default_factory=dict)
+    marked: tuple[str, ...] = ()
 
     __repr__ = short_repr
 

@@ -108,7 +108,10 @@ class Listing(LineReader):
                     raise self.fault(f"expected DEFAULT_GROUP = {group}, got {match[1]}")
                 grouped = True
             elif not _ATTRIBUTE.fullmatch(row) and row != "/APPL":
-                raise self.fault(f"not an attribute: {row[:60]!r}")
+                raise self.fault(
+                    f"not an attribute of a listing in English: {row[:60]!r}; set the controller "
+                    "to English and list the program again"
+                )
         if not grouped:
             raise self.fault(f"expected DEFAULT_GROUP = {group} before this line")
         number, numbers = 0, set[bool]()
@@ -116,6 +119,11 @@ class Listing(LineReader):
             number += 1
             if _VIA.fullmatch(row):
                 row += self.next_row()
+            if not row.endswith(";"):
+                raise self.fault(
+                    f"expected ; at the end of the line, got {row[-60:]!r}; write a statement that "
+                    "goes on in the next line in one"
+                )
             match = _NUMBERED.fullmatch(row)
             if not match or match[1] not in ("", str(number)):
                 raise self.fault(f"expected line number {number}, got {self.text[:60]!r}")

@@ -26,6 +26,7 @@ VAL3 = Language(
     check=check,
     sayable=stop_to_switch,
     ahead=False,
+    byte_order_mark=True,
     assumed={"laser_output": r"BasicIO-1\%Q0"},
     inherited=inherited,
     read=read,
