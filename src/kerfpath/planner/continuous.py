@@ -220,12 +220,15 @@ def _search_wider(
 def _from_fewer_nodes(task: Task, finder: CollisionFreeSearch) -> tuple[Plan | None, float]:
     """Return the motion along some of very many nodes, extended to all, and a cost to compare with.
 
-    None if there is none. No motion along all nodes costs less than the best one along some: its
-    steps together are no shorter, and the subsample imposes no more (5), (6). The cost is 0 if this
-    does not apply.
+    None if there is none, or a node has no pose. No motion along all nodes costs less than the best
+    one along some: its steps together are no shorter, and the subsample imposes no more (5), (6).
+    The cost is 0 if this does not apply.
     """
     thin = subsampled(task)
-    found = None if thin is None else clear_motion(thin.task, finder.of(thin.task))
+    try:
+        found = None if thin is None else clear_motion(thin.task, finder.of(thin.task))
+    except NoFeasiblePath:
+        found = None
     if thin is None or found is None:
         return None, 0.0
     comfort = task.settings.comfort

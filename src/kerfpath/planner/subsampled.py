@@ -10,7 +10,8 @@ from scipy.interpolate import CubicSpline
 from kerfpath.arrays import Ints, short_repr
 from kerfpath.contour import Contour
 from kerfpath.effort import current_effort
-from kerfpath.planner.task import Task
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.planner.task import Layered, Task
 from kerfpath.plans import Plan, Proof, on_turns
 
 EVERY = 5, 4, 6, 3, 7
@@ -72,9 +73,9 @@ class SubsampledTask:
 def subsampled(task: Task) -> SubsampledTask | None:
     """Return a task with every few of very many nodes; None if it has fewer.
 
-    It is also None with a tilt or a grid of external axes, with a periodic closure whose intervals
-    do not divide evenly, and if one of the kept nodes has no pose. The graph of all nodes is not
-    built for it.
+    It is also None with a tilt or a grid of external axes, and with a periodic closure whose
+    intervals do not divide evenly. No graph is built for it: that of the kept nodes is built when
+    it is needed, which raises NoFeasiblePath if one of them has no pose.
     """
     last, axes = len(task.contour) - 1, len(task.robot.free)
     if last < current_effort().subsampled_from / (1 + axes) or task.settings.tilt is not None:
@@ -86,9 +87,7 @@ def subsampled(task: Task) -> SubsampledTask | None:
         return None
     every = (even or EVERY)[0]
     nodes = np.arange(0, last + 1, every)
-    whole, few = task.contour, task.at_nodes(nodes)
-    if (np.diff(few.graph.start) == 0).any():
-        return None
+    whole = task.contour
     contour = Contour(
         whole.points[nodes],
         whole.axes[nodes],
@@ -97,7 +96,23 @@ def subsampled(task: Task) -> SubsampledTask | None:
         x=whole.frames(task.settings.frames)[nodes, :3, 0],
         name=whole.name,
     )
-    few = replace(few, problem=replace(few.problem, dt=every * task.dt))
-    x = None if task.external is None else task.external[nodes]
-    thin = replace(task.on(few), contour=contour, external=x)
+
+    def layers(thin: Task, some: Ints | None) -> Layered:
+        built = task.at_nodes(nodes if some is None else nodes[some])
+        empty = np.flatnonzero(np.diff(built.graph.start) == 0)
+        if some is None and empty.size:
+            raise NoFeasiblePath(
+                f"contour {whole.name!r}: node {nodes[empty[0]]} has no pose",
+                proved=False,
+                node=int(empty[0]),
+            )
+        return replace(built, problem=replace(built.problem, dt=thin.dt))
+
+    thin = replace(
+        task,
+        contour=contour,
+        dt=every * task.dt,
+        layers=layers,
+        external=None if task.external is None else task.external[nodes],
+    )
     return SubsampledTask(task=thin, whole=task, nodes=nodes)

@@ -23,10 +23,14 @@ CORRECTIONS = 3
 """Most corrections of a step, through the joints it reached, before it is shortened."""
 CONVERGED = 1e-4
 """Relative gain promised by the model below which a descent has converged."""
+INSIDE, SURE = 0.9, 1e-6
+"""Share of the radius, and error of the model relative to the value: a step that stays below both
+ends the descent, as the model is convex and a larger radius would lead to the same place."""
 SMALLEST_RADIUS = 1e-7
 """rad: no controller resolves a smaller change."""
-NEARBY = (5e-3, 5e-4)
-"""rad: largest changes of gamma tried to bring a nearly admissible motion within the limits."""
+NEARBY = 5e-3
+"""rad: largest change of gamma tried to bring a nearly admissible motion within the limits; a tenth
+of it is tried next."""
 WIDER = 4.0
 """Factor by which a radius grows if it promises little because it is small."""
 AWAY = 1e3
@@ -167,7 +171,8 @@ class Descent:
         if at.admitted:
             return at, 0
         for near in self._nearer(at):
-            for radius in NEARBY:
+            largest = min(NEARBY, self.radius)
+            for radius in (largest, largest / 10):
                 step = self._step(near, radius, self.objective)
                 programs += step.programs
                 if step.to is not None:
@@ -212,13 +217,16 @@ class Descent:
             programs += step.programs
             gained = 0.0 if step.to is None else at.value(target) - step.to.value(target)
             if step.to is not None and step.promised <= CONVERGED * abs(at.value(target)):
+                at = step.to if gained > 0 else at
                 if WIDER * radius > min(self.radius, failed):
                     break
-                at, radius = step.to if gained > 0 else at, WIDER * radius
+                radius *= WIDER
                 continue
             if step.to is not None and gained > ENOUGH * step.promised:
+                off = abs(gained - step.promised)
+                certain = step.longest < INSIDE * radius and off <= SURE * abs(at.value(target))
                 at = step.to
-                if at.value(target) <= enough:
+                if certain or at.value(target) <= enough:
                     break
                 radius *= 2 if step.programs == 1 else 1
             else:
@@ -259,18 +267,19 @@ class Descent:
 
     def _model(self, at: MotionState, radius: float) -> LinearModel:
         slope = self.curves.slope(at.free, at.q)
-        # A node at the edge of reach does not move.
-        movable = np.asarray(np.isfinite(slope).all(axis=(1, 2)))
-        slope = np.where(movable[:, None, None], slope, 0.0)
+        # A node at the edge of reach does not move, nor does a variable without room.
+        reached = np.asarray(np.isfinite(slope).all(axis=(1, 2)))
+        slope = np.where(reached[:, None, None], slope, 0.0)
+        movable = reached[:, None] & (self.low < self.high)
         endless = self.limits.endless
         # A range may be a single point.
         room = np.minimum(MARGIN, (self.limits.upper - self.limits.lower) / 2)
         return LinearModel(
             q=at.q,
             slope=slope,
-            radius=np.repeat(np.where(movable, radius, 0.0)[:, None], at.free.shape[1], axis=1),
-            least=np.clip((self.low - at.free) / radius, -1.0, 0.0),
-            most=np.clip((self.high - at.free) / radius, 0.0, 1.0),
+            radius=np.where(movable, radius, 0.0),
+            least=np.where(movable, np.clip((self.low - at.free) / radius, -1.0, 0.0), -1.0),
+            most=np.where(movable, np.clip((self.high - at.free) / radius, 0.0, 1.0), 1.0),
             lower=np.where(endless, -np.inf, self.limits.lower + room),
             upper=np.where(endless, np.inf, self.limits.upper - room),
             rotation=self.rotation - MARGIN,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from kerfpath.arrays import Array, Ints
@@ -36,6 +38,12 @@ class JointCurves:
         self._H = H
         self._T_tip_flange = np.linalg.inv(T_flange_tip)
         self._posture = posture
+
+    def part(self, nodes: slice) -> JointCurves:
+        """Return the joints of some successive nodes."""
+        part = copy(self)
+        part._H, part._posture = self._H[nodes], self._posture[nodes]
+        return part
 
     def at(self, free: Array, near: Array) -> Array:
         """Return the joints (K, n) rad at `free` (K, F), each on the turn nearest to `near` (K, n).

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -62,6 +62,13 @@ class RateLimits:
     kept: KeptShares | None = None
 
     __repr__ = short_repr
+
+    def part(self, first: int, last: int) -> RateLimits:
+        """Return the limits of nodes `first` to `last`, both included, as an open motion."""
+        kept = self.kept
+        if kept is not None:
+            kept = KeptShares(kept.velocity[first:last], kept.acceleration[first : last - 1])
+        return replace(self, tau=self.tau[first:last], periodic=False, kept=kept)
 
     @property
     def meetings(self) -> tuple[Ints, Ints]:

@@ -17,6 +17,7 @@ from kerfpath.plans import Plan, Proof, has_room, on_turns, path_cost
 from kerfpath.refiner.descent import Descent, MotionState
 from kerfpath.refiner.joint_curves import JointCurves, room_at_ends
 from kerfpath.refiner.rates import KeptShares, RateLimits
+from kerfpath.refiner.sections import has_sections, lowest_in_sections
 from kerfpath.robots import lowest_joint
 from kerfpath.search import rotation_limits
 from kerfpath.windows import nearest_inside, room_beside
@@ -180,8 +181,14 @@ def refine(
 
 def _lowest(descent: Descent, start: MotionState, least: float) -> tuple[MotionState, int]:
     """Return the best motion found, or the one that breaks the limits least; number of programs."""
-    begun, programs = descent.admitted(start)
-    if not begun.admitted or begun.cost <= (1 + CLOSE) * least:
+    enough, programs = (1 + CLOSE) * least, 0
+    if has_sections(descent, least):
+        start, programs = lowest_in_sections(descent, start, enough)
+        if start.admitted:
+            return start, programs
+    begun, more = descent.admitted(start)
+    programs += more
+    if not begun.admitted or begun.cost <= enough:
         return begun, programs
     found, more = descent.best(begun)
     return found, programs + more

@@ -33,8 +33,12 @@ class ConstraintRows:
         self._flat.append((slope, bound))
 
     def at_most(self, value: Array, slope: Sparse, bound: Array | float) -> None:
-        """Add value + slope x <= bound over boxed unknowns, without the rows that always hold."""
-        kept = np.flatnonzero(value + span_of(slope) > bound)
+        """Add value + slope x <= bound over boxed unknowns.
+
+        Rows that always hold are left out, and so are those that no unknown changes.
+        """
+        span = span_of(slope)
+        kept = np.flatnonzero((value + span > bound) & (span > 0))
         if len(kept):
             self.hold(slope[kept], (bound - value)[kept])
 
