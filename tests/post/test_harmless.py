@@ -68,6 +68,9 @@ HARMLESS = {
             "DECL LDAT LCPDAT1={VEL 2.0,ACC 100.0}\r\nENDDAT",
         ),
         (".src", r"END\r\n$", "END"),
+        (".src", r"DEF one\(\)\r\n", "DEF one()\r\n$TIMER[1]=0\r\n$timer_stop[ 1 ] = false\r\n"),
+        (".src", r"(WAIT SEC 0\.100\r\n)", r"\1$TIMER_STOP[2]=TRUE\r\n"),
+        (".src", r"(\$BASE=.*\r\n)", r"\1$TIMER[1]=0\r\n"),
     ],
     "rapid": [
         (".mod", "MODULE cut_one", "%%%\n  VERSION:1\n  LANGUAGE:ENGLISH\n%%%\nMODULE cut_one"),
@@ -234,6 +237,11 @@ HARMFUL = {
         (".src", r"DEF one\(\)\r\n", "DEF one()\r\nDECL FDAT FP1={TOOL_NO 2}\r\n"),
         (".dat", r"ENDDAT", "DECL FDAT FP1={TOOL_NO 2} $OUT[1]=TRUE {}\r\nENDDAT"),
         (".src", r"(\$OUT\[1\]=FALSE)", " " * 250 + r"\1"),
+        (".src", r"(LIN .* C_DIS\r\n)", r"\1$TIMER_STOP[1]=FALSE\r\n"),
+        (".src", r"(TRIGGER .*\r\n)", r"\1$TIMER[1]=0\r\n"),
+        (".src", r"DEF one\(\)\r\n", "DEF one()\r\n$TIMER_STOP[20]=FALSE\r\n"),
+        (".src", r"DEF one\(\)\r\n", "DEF one()\r\n$TIMER[1]=-5\r\n"),
+        (".src", r"DEF one\(\)\r\n", "DEF one()\r\nWAIT FOR $TIMER_FLAG[1]\r\n"),
     ],
     "rapid": [
         (".mod", r"    SetDO x4,0;\n", "!   SetDO x4,0;\n"),

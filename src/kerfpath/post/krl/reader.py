@@ -20,6 +20,7 @@ from kerfpath.post.krl.writer import (
     HEAD,
     PASSED,
     SWITCH_OFF,
+    TIMER,
     data_list,
     opening_lines,
     switch_off_lines,
@@ -34,7 +35,7 @@ from kerfpath.post.line_reader import (
     statements,
 )
 from kerfpath.post.program import Await, Switch
-from kerfpath.post.read_program import FlowStep, MoveKind, ReadProgram, ReadSection
+from kerfpath.post.read_program import FlowStep, MoveKind, ReadMove, ReadProgram, ReadSection
 from kerfpath.robots import Robot
 
 _NAME = r"([A-Za-z]\w*)"
@@ -59,6 +60,7 @@ _LINES = patterns(
         "request": r"\$OUT\[(\d+)\]=(TRUE|FALSE)",
         "guarded": r"\$OUT\[(\d+)\]=(\$OUT\[\d+\](?: AND \$OUT\[\d+\])*)",
         "wait_for": r"\$TIMER\[\d+\]=-(\d+)",
+        "timer": r"\$TIMER(?:\[(\d+)\]=0|_STOP\[(\d+)\]=(?:TRUE|FALSE))",
         "end": "END",
         "routine": rf"DEF {_NAME}\((|{PASSED} :IN)\)",
         "tool": rf"\$TOOL={{{_POINT}}}",
@@ -69,12 +71,12 @@ _LINES = patterns(
 )
 
 _OUTSIDE = only(_LINES, "routine")
-_IN_FIRST = only(_LINES, "condition", "call", "end_condition", "end")
+_IN_FIRST = only(_LINES, "condition", "call", "end_condition", "timer", "end")
 _IN_MAIN = only(_LINES, "tool", "base", "coupled_base", "again") | _IN_FIRST
 _IN_ROUTINE = only(
     _LINES,
     "linear", "speed", "zone", "trigger", "circular", "joint", "share", "wait", "request",
-    "guarded", "wait_for", "end",
+    "guarded", "wait_for", "timer", "end",
 )  # fmt: skip
 _WITHOUT_ANSWER = patterns(
     {
@@ -271,6 +273,14 @@ class _File(LineReader):
         self.require_line(here, first)
         self.add_handshake(awaited)
         self.require_next(others, _WITHOUT_ANSWER)
+
+    def timer(self, reset: str | None, stopped: str | None) -> None:
+        """Pass over a timer that nothing waits for; its use stops the advance run."""
+        if int(reset or stopped or 0) == TIMER:
+            raise self.fault(f"timer {TIMER} is that of the waits for inputs; use another")
+        moves = [step for step in self.steps if isinstance(step, ReadMove)]
+        if self.switches or (moves and moves[-1].zone):
+            raise self.fault("a timer stops the robot in the cut; use it where the robot stands")
 
     def while_off(self, port: int) -> None:
         self.begin_loop()
