@@ -14,6 +14,7 @@ import contextlib
 import faulthandler
 import io
 import json
+import os
 import re
 import select
 import shutil
@@ -30,7 +31,7 @@ from readers import READERS
 from spoilt import complaint, spoilt
 
 HANG = 20.0
-"""s that no small file needs."""
+"""Time of the processor that no small file needs, s; a process is killed after three times that."""
 MEMORY = 2 * 1024**3
 """Bytes of address space that a process may take beside what it has before it reads."""
 
@@ -125,7 +126,11 @@ class Campaign:
         self.child.stdin.flush()
         started = time.monotonic()
         file, wrong = "", "hangs"
-        if select.select([self.child.stdout], [], [], 3 * HANG)[0]:
+        until = _used(self.child.pid) + 3 * HANG
+        while not (answered := select.select([self.child.stdout], [], [], HANG)[0]):
+            if _used(self.child.pid) > until or time.monotonic() - started > 60 * HANG:
+                break
+        if answered:
             answer = self.child.stdout.readline()
             if answer:
                 file, wrong, took, peak = json.loads(answer)
@@ -151,6 +156,16 @@ class Campaign:
             return
         took = time.monotonic() - started
         print(f"--- {self.name} seed {seed} {file} ({took:.1f} s)\n{wrong.strip()}", flush=True)
+
+
+def _used(pid: int) -> float:
+    """Return the time of the processor that a process and those it has started have used, s."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    used = sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+    for started in Path(f"/proc/{pid}/task").glob("*/children"):
+        with contextlib.suppress(FileNotFoundError):  # it has just ended
+            used += sum(map(_used, map(int, started.read_text().split())))
+    return used
 
 
 def _kind(wrong: str) -> str:

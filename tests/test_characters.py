@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from benchmarks._document import leaves, put
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 from OCP.gp import gp_Pln
 from tests.cad.test_apt import NX
@@ -301,7 +302,51 @@ def test_what_is_no_table_in_the_job_of_a_plan_is_refused(planned, tmp_path, key
     data["job"][key] = odd
     path = tmp_path / "plan.json"
     path.write_text(json.dumps(data))
-    with pytest.raises(InputError, match=r"plan\.json: job\..*: expected a table, got") as error:
+    said = r"plan\.json: (job\..*: expected a table|not a plan\.json: expected texts of .*), got"
+    with pytest.raises(InputError, match=said) as error:
         program_from_file(path, "csv")
     assert str(error.value).isprintable()
     assert run("audit", path).returncode == 2
+
+
+def test_every_text_of_a_plan_is_one_line(planned: Path, tmp_path: Path) -> None:
+    """Names of a plan go into the program that is written from it, as remarks for example."""
+    data = json.loads(planned.read_text())
+    texts = [place for place, value in leaves(data) if isinstance(value, str)]
+    odds = [*UNPRINTED, "\ud800", "\n", "\r", "\t"]
+    path = tmp_path / "plan.json"
+    for k in range(max(len(texts), len(odds))):
+        place, odd = texts[k % len(texts)], odds[k % len(odds)]
+        path.write_text(json.dumps(put(data, place, f"a{odd}")))
+        found = answer(read_plan_file, path)
+        assert (
+            f"plan.json: not a plan.json: expected texts of one line, got U+{ord(odd):04X}" in found
+        )
+    path.write_text(json.dumps(put(data, ("contours", 0, "name"), 'a\\n "b" \\u202e \xa0')))
+    assert read_plan_file(path).plans[0].contour.name == 'a\\n "b" \\u202e \xa0'
+
+
+@pytest.mark.slow
+def test_a_plan_with_odd_characters_means_the_same_or_is_refused(planned, tmp_path) -> None:
+    path = tmp_path / "plan.json"
+    text = planned.read_text("utf-8")
+
+    def values(path: Path) -> list[np.ndarray]:
+        plans = read_plan_file(path).plans
+        return [array for plan in plans for array in (plan.q, plan.gamma, plan.contour.points)]
+
+    path.write_text(text)
+    meant, refused, tried = values(path), 0, 0
+    contents = [odd.encode("utf-8", "surrogatepass") for odd in spoilt(text, every=1999)]
+    for content in [*contents, *wholes(text)]:
+        path.write_bytes(content)
+        tried += 1
+        found = answer(values, path)
+        if isinstance(found, str):
+            assert found.isprintable()
+            assert "plan.json" in found
+            refused += 1
+        else:
+            assert content.isascii() or same(found, meant), content[:300]
+    assert tried > 500
+    assert refused > tried / 2

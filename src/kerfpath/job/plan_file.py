@@ -49,6 +49,7 @@ from kerfpath.post import ProgramOptions, require_one_set
 from kerfpath.robots import Arm, Coupling, ExternalAxis, Robot, RobotLimits
 from kerfpath.sequence import PartPlan
 from kerfpath.setting import settings
+from kerfpath.text import NOT_TEXT, named
 from kerfpath.transfer import TransferMove
 from kerfpath.urdf import ChainInertia, KinematicChain
 
@@ -398,8 +399,8 @@ def read_document(path: Path) -> PlanDocument:
     ------
     InputError
         The file does not exist, is not JSON or has another schema; a key is unknown, missing or
-        twice in an object; a value has another type (true or "1.0" for a number); or a number is
-        not finite or too large.
+        twice in an object; a value has another type (true or "1.0" for a number); a number is not
+        finite or too large; or a text has a control character or one without a glyph.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -409,7 +410,7 @@ def read_document(path: Path) -> PlanDocument:
         raise InputError(f"{path}: not a plan.json: {' '.join(str(error).split())}") from None
     try:
         data = json.loads(text, object_pairs_hook=_once, parse_constant=_no_number)
-        json.dumps(data, ensure_ascii=False).encode()  # half a surrogate pair is no text
+        _require_text(json.dumps(data, ensure_ascii=False))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not a plan.json: {' '.join(str(error).split())}") from None
     if (
@@ -443,6 +444,18 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
         raise ValueError(f"the key {_shown(twice)} is twice in one object")
     return table
+
+
+CONTROL = re.compile(r"\\(?:[bfnrt]|u....)")
+"""A control character in JSON, which escapes it."""
+
+
+def _require_text(said: str) -> None:
+    """Require that every text of a document, written as JSON, is one line of text."""
+    odd = NOT_TEXT.search(said) or CONTROL.search(said.replace(r"\\", ""))
+    if odd is not None:
+        character = json.loads(f'"{odd[0]}"')
+        raise ValueError(f"expected texts of one line, got {named(character)}")
 
 
 def _no_number(word: str) -> Any:

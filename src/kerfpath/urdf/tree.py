@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, freeze, short_repr
 from kerfpath.errors import InputError
+from kerfpath.text import NOT_TEXT, named
 
 XACRO = ("{http://www.ros.org/wiki/xacro}", "{http://wiki.ros.org/xacro}")
 FINE = np.pi / 12
@@ -118,9 +120,9 @@ def read_tree(path: Path, snap: float) -> Tree:
             )
         parent[joint.child] = joint
     _require_no_loop(path, parent)
-    return Tree(
-        path=path, name=root.get("name", path.stem), links=links, joints=joints, parent=parent
-    )
+    name = root.get("name", path.stem)
+    _require_text(name, "the name of the robot", path)
+    return Tree(path=path, name=name, links=links, joints=joints, parent=parent)
 
 
 def read_root(path: Path, what: str) -> ElementTree.Element:
@@ -266,7 +268,13 @@ def _attribute(element: ElementTree.Element, key: str, what: str, path: Path) ->
     value = element.get(key)
     if not value:
         raise InputError(f"{path}: {what} has no {key}")
+    _require_text(value, f"the {key} of {what}", path)
     return value
+
+
+def _require_text(value: str, what: str, path: Path) -> None:
+    if (odd := re.search(rf"{NOT_TEXT.pattern}|[\t\n]", value)) is not None:
+        raise InputError(f"{path}: {what}: expected one line of text, got {named(odd[0])}")
 
 
 # -----------------------------------------------------------------------------
