@@ -5,8 +5,11 @@ A character that changes nothing may be read; whatever changes a number, a word 
 
 from __future__ import annotations
 
+import base64
 import json
 import os
+import re
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +20,7 @@ import pytest
 from benchmarks._document import leaves, put
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 from OCP.gp import gp_Pln
+from plotly.offline import get_plotlyjs
 from tests.cad.test_apt import NX
 from tests.cad.test_nc import SIEMENS
 
@@ -286,6 +290,34 @@ def test_no_name_in_a_table_is_a_formula(planned: Path) -> None:
     assert [row.partition(",")[0] for row in trajectory_text(file.plans).splitlines()[:2]] == [
         "contour", "ring",
     ]  # fmt: skip
+
+
+CODE = """=<img src=x onerror=alert(1)>"'&amp;</script><script>alert(2)</script>{{7*7}}"""
+
+
+@pytest.mark.slow
+def test_no_name_is_code_in_any_page(tmp_path: Path) -> None:
+    """Of contours, drawing and job, in the pages, and in the figures that they hold."""
+    job = _job(tmp_path, "csv")
+    (tmp_path / "ring.csv").rename(tmp_path / "a<b>'&.csv")
+    drawn, quoted = tmp_path / "a<b>'&.csv", CODE.replace('"', '""')
+    drawn.write_text(drawn.read_text().replace("ring,", f'"{quoted}",'))
+    text = job.read_text().replace('"ring.csv"', json.dumps(drawn.name))
+    job = job.rename(tmp_path / "job<i>'&.toml")
+    job.write_text(text.replace('"ring"', json.dumps(CODE)))
+    assert run("contours", drawn, "--html", tmp_path / "drawing.html").returncode == 0
+    assert run("plan", job, "--out", tmp_path / "out").returncode == 0
+    for page in (tmp_path / "drawing.html", tmp_path / "out" / "report.html"):
+        html = page.read_text("utf-8").replace(get_plotlyjs(), "")
+        packed = re.findall(r'<script type="application/octet-stream" id="[^"]+">([^<]+)<', html)
+        figures = [
+            json.dumps(json.loads(zlib.decompress(base64.b64decode(text)))) for text in packed
+        ]
+        assert any("&lt;img src=x onerror" in each for each in (html, *figures))
+        for each in (html, *figures):
+            assert not any(code in each for code in ("<img", "<script>alert", "<b>'", "<i>'"))
+    rows = (tmp_path / "out" / "trajectory.csv").read_text().splitlines()[1:]
+    assert all(row.startswith("\"'=<img") for row in rows)
 
 
 @pytest.fixture(scope="module")

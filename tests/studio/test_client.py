@@ -20,6 +20,13 @@ OWN = sorted(
 )
 
 
+@pytest.mark.parametrize("file", OWN, ids=lambda f: str(f.relative_to(CLIENT)))
+def test_the_page_makes_no_elements_from_text(file):
+    """Names of contours, drawings and jobs are set as text, which is no code."""
+    maker = r"(inner|outer)HTML|AdjacentHTML|dangerously|document\.write|srcdoc|\beval\(|Function\("
+    assert re.findall(maker, file.read_text("utf-8")) == []
+
+
 @pytest.mark.parametrize("folder", VENDORED, ids=lambda f: str(f.relative_to(ROOT)))
 def test_vendored_files_are_those_that_were_published(folder):
     lines = (folder / "SHA256SUMS").read_text().splitlines()
