@@ -35,8 +35,8 @@ def test_a_hole_is_cut_as_the_hole_most_like_it_before_the_trim_line(demo):
     job, part = demo
     text = with_loops(job, part, ["skin/hole2"])
     added = tables(text)[6]
-    # It has the diameter of hole1, which is cut at 3 m/min with nodes 1 mm apart.
-    assert added == {"pick": "skin/hole2", "speed_m_min": 3, "spacing_mm": 1}
+    # It has the diameter of hole1, which is cut at 3 m/min with nodes 1.25 mm apart.
+    assert added == {"pick": "skin/hole2", "speed_m_min": 3, "spacing_mm": 1.25}
     assert tables(text)[:6] + tables(text)[7:] == job.source["contour"]
     assert tables(text)[-1]["name"] == "trim"
 
