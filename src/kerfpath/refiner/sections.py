@@ -18,11 +18,13 @@ from kerfpath.refiner.descent import Descent, MotionState
 MANY = 800
 """Nodes from which a motion is moved in sections, if it may be: below, one program is as fast."""
 NODES = 400
-"""Nodes of a section: enough that a program costs more than its preparation."""
+"""Nodes of a section in the first sweep: enough that a program costs more than its preparation. In
+each further sweep sections have twice as many, as those that the first leaves outside the limits
+accelerate as much as they may over hundreds of nodes."""
 OVERLAP = 80
 """Nodes that successive sections share, so that no end stays where it was."""
 MOST_SWEEPS = 6
-"""Most times that all sections are moved; most of them move in the first two alone."""
+"""Most times that sections are moved; most of them move in the first two alone."""
 SAME = 1e-5
 """Relative gain of a section below which it counts as unmoved."""
 PROGRAMS = 8
@@ -65,7 +67,7 @@ def lowest_in_sections(
             break
         free, q = at.free.copy(), at.q.copy()
         before, moved = moved, np.zeros_like(moved)
-        for first, last in _sections(len(free), sweep % 2 * NODES // 2):
+        for first, last in _sections(len(free), NODES << sweep):
             nodes = slice(first, last + 1)
             if not before[nodes].any():
                 continue
@@ -80,16 +82,13 @@ def lowest_in_sections(
     return at, programs
 
 
-def _sections(nodes: int, shift: int) -> Iterator[tuple[int, int]]:
-    """Yield the first and the last node of each section; the first section is shorter by a shift.
-
-    The last section has up to half as many nodes more than the others.
-    """
-    first, last = 0, NODES - shift
-    while last + NODES // 2 < nodes:
+def _sections(nodes: int, size: int) -> Iterator[tuple[int, int]]:
+    """Yield the first and the last node of each section; the last has up to half as many more."""
+    first, last = 0, size
+    while last + size // 2 < nodes:
         yield first, last
         first = last - OVERLAP
-        last = first + NODES
+        last = first + size
     yield first, nodes - 1
 
 
