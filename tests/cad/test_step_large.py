@@ -6,13 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_MakeEdge,
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakeWire,
+)
 from OCP.collections import Array1_double, Array1_int, Array2_gp_Pnt
 from OCP.Geom import Geom_BSplineSurface
-from OCP.gp import gp_Pnt, gp_Trsf, gp_Vec
+from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pln, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.Interface import Interface_Static
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Shape
+from OCP.TopoDS import TopoDS, TopoDS_Shape
 from tests.cad.test_part import box, compound, write_step
 
 from kerfpath.cad import read
@@ -54,6 +58,23 @@ def test_an_assembly_of_too_many_faces_is_refused(tmp_path: Path) -> None:
         Interface_Static.SetIVal_s("write.step.assembly", 0)
     assert path.stat().st_size < 100_000
     said = f"many.step: contains {6 * 8**5} faces and loose curves, at most 30000 are read; export"
+    with pytest.raises(InputError, match=said):
+        read(path)
+
+
+def test_an_assembly_of_too_many_edges_is_refused(tmp_path: Path) -> None:
+    """A face with many holes, 1600 times: each edge would take memory in loops."""
+    sheet = BRepBuilderAPI_MakeFace(gp_Pln(), 0, 50, 0, 50)
+    for k in range(200):
+        circle = gp_Circ(gp_Ax2(gp_Pnt(2 + k % 20 * 2, 2 + k // 20 * 2, 0), gp_Dir(0, 0, 1)), 0.5)
+        wire = BRepBuilderAPI_MakeWire(BRepBuilderAPI_MakeEdge(circle).Edge()).Wire()
+        sheet.Add(TopoDS.Wire(wire.Reversed()))
+    Interface_Static.SetIVal_s("write.step.assembly", 1)
+    try:
+        path = write_step(tmp_path / "holes.step", repeated(sheet.Face(), 40, 2))
+    finally:
+        Interface_Static.SetIVal_s("write.step.assembly", 0)
+    said = f"holes.step: contains {204 * 1600} edges, at most 300000 are read; export"
     with pytest.raises(InputError, match=said):
         read(path)
 

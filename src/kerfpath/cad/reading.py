@@ -237,7 +237,7 @@ def _patient(progress: Progress, size: int) -> Progress:
 
     def show(what: str, done: int, total: int) -> None:
         progress(what, done, total)
-        if done % 64 == 0 and thread_time() > until:
+        if thread_time() > until:
             raise too_slow(seconds)
 
     return show

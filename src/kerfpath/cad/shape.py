@@ -165,15 +165,30 @@ def list_shapes(
 
 MOST_FACES = 30_000
 """Most faces and loose curves of a part; what an assembly repeats counts each time."""
+MOST_EDGES = 300_000
+"""Most edges of a part, counted for each of its faces: one takes some kilobytes in loops."""
 
 
 def require_few_faces(shape: TopoDS_Shape) -> None:
-    """Raise InputError if there are too many faces; repeated components take no longer."""
+    """Raise InputError if there are too many faces or edges; repeated components take no longer."""
+    edge = TopAbs_ShapeEnum.TopAbs_EDGE
+    for what, kinds, most in (
+        ("faces and loose curves", (TopAbs_ShapeEnum.TopAbs_FACE, edge), MOST_FACES),
+        ("edges", (edge,), MOST_EDGES),
+    ):
+        if (found := _count(shape, kinds)) > most:
+            raise InputError(
+                f"contains {found} {what}, at most {most} are read; export the part to cut alone"
+            )
+
+
+def _count(shape: TopoDS_Shape, kinds: tuple[TopAbs_ShapeEnum, ...]) -> int:
+    """Return the number of shapes of some kinds, without those that are inside others of them."""
     known = ShapeMap()
     counts: list[int] = []
 
     def count(shape: TopoDS_Shape) -> int:
-        if shape.ShapeType() in (TopAbs_ShapeEnum.TopAbs_FACE, TopAbs_ShapeEnum.TopAbs_EDGE):
+        if shape.ShapeType() in kinds:
             return 1
         alone = shape.Located(TopLoc_Location())
         if not known.Contains(alone):
@@ -182,11 +197,7 @@ def require_few_faces(shape: TopoDS_Shape) -> None:
             counts.append(found)
         return counts[known.FindIndex(alone) - 1]
 
-    if (found := count(shape)) > MOST_FACES:
-        raise InputError(
-            f"contains {found} faces and loose curves, at most {MOST_FACES} are read; export the "
-            "part to cut alone"
-        )
+    return count(shape)
 
 
 def failures(checks: Interface_CheckIterator) -> Iterator[tuple[int, str]]:
