@@ -56,6 +56,7 @@ WORDS = {
     ),
     "krl": Words(
         remark=r"\s*(;.*)?",
+        idle=(r"(&(?:ACCESS|REL) .*)",),  # the controller's own
         families=(*STATES, r"\$OUT\[\d\]", r"\$VEL\.ORI\d", r"\b(?:LIN|PTP)\b"),
         orderless=(r"\$OUT\[\d\]=FALSE", r"\$(?:TOOL|BASE)=.*",
                    r"\$(?:ADV|IPO|ORI|CIRC|VEL\.ORI).*"),
