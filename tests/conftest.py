@@ -44,7 +44,7 @@ set_effort(
         certified=False,
         certificate_pairs=1_500_000,
         certificate_pairs_per_node=0,
-        minimax_undecided=2,
+        minimax_pairs=300_000,
         infeasibility_steps=200_000,
         binding_nodes=2,
         speed_factors=(),

@@ -29,9 +29,8 @@ class Effort:
         Most steps from cell to cell in a certificate, in all and in addition for each node, unless
         a time is given.
     minimax_pairs : int
-        Pairs of steps after which a bound on the costliest step counts as undecided.
-    minimax_undecided : int
-        Bounds on the costliest step that may stay undecided before the search for one stops.
+        Most steps from cell to cell that a bound on the costliest step takes, unless a time is
+        given.
     infeasibility_steps, infeasibility_pairs : int
         Most steps between cells in one round, and most pairs of steps in all, before a proof that
         no motion exists ends undecided.
@@ -56,7 +55,6 @@ class Effort:
     certificate_pairs: int = 10_000_000
     certificate_pairs_per_node: int = 60_000
     minimax_pairs: int = 3_000_000
-    minimax_undecided: int = 3
     infeasibility_steps: int = 2_000_000
     infeasibility_pairs: int = 30_000_000
     binding_nodes: int = 12

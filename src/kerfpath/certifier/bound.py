@@ -63,8 +63,7 @@ class Certified:
     statement : str
         The proved bound, or the reason why there is none.
     stages, pairs : int
-        Number of stages, and of steps from cell to cell bounded in all of them. With the objective
-        "max", `stages` is the number of costs that were tried.
+        Number of stages, and of steps from cell to cell bounded in all of them.
     """
 
     plan: Plan
@@ -120,8 +119,10 @@ def certify(
         return Certified(plan=plan, done=False, statement=f"no bound is proved: {why}")
     steps = _steps_of(plan)
     if plan.settings.objective == "max":
-        best, tests = largest_step_bound(plan, steps, gap, lambda: monotonic() > until, progress)
-        found = _certified(plan, best, gap, None, tests, 0)
+        best, rounds, pairs = largest_step_bound(
+            plan, steps, gap, lambda: monotonic() > until, progress
+        )
+        found = _certified(plan, best, gap, None, rounds, pairs)
         return replace(found, statement=f"{found.statement}; {NOT_KEPT}") if checkable else found
     certification = _Certification(plan, steps, gap, until, checkable, progress)
     certification.run()

@@ -22,6 +22,11 @@ ROUNDED = 1e-14
 """Rounding error of a joint, in rad per rad and in rad."""
 SLIGHT = 1e-9
 """rad: half the width of a cell that represents a single gamma."""
+MORE_CELLS = 4
+"""Factor on the number of cells within which those with uncertain joints are halved: the work of a
+bound grows with its square."""
+CERTAIN_LEVEL = 11
+"""Largest level of cells that are halved because the joints on them are uncertain: 0.0024 deg."""
 EDGE = 1e-8
 """rad: joints this far out of their range still count as inside, as in the graph and the audit."""
 
@@ -68,6 +73,13 @@ class CellSet:
         """Largest distance of a joint from a straight line over the cell, (C, n) rad."""
         return np.asarray(np.abs(self.bend) * self.half[:, None] ** 2 / 2 + self.spread)
 
+    def uncertain(self, weight: Array, worth: float) -> Bools:
+        """Return on which cells (C,) the uncertainty of the joints is worth more than this cost.
+
+        ``weight`` is (n,) 1/rad; cells of `CERTAIN_LEVEL` count as certain.
+        """
+        return np.asarray((self.unsure @ weight > worth) & (self.level < CERTAIN_LEVEL))
+
     @property
     def lift(self) -> NDArray[np.int8]:
         """Approximate joints, (C, n), in units of pi / `LIFTS`."""
@@ -93,6 +105,17 @@ class CellSet:
         return CellSet(**{name: np.concatenate([getattr(s, name) for s in sets]) for name in names})
 
 
+def foldable(robot: Robot, farthest: Array) -> Bools:
+    """Return which joints (n,) may count as endless though they have a range.
+
+    The range is at least a turn. Each step moves a joint by at most the ``farthest`` (n,) rad, less
+    than half a turn, so that the increments of a motion are the same modulo turns.
+    """
+    limits = robot.joint_limits()
+    wide = limits.upper - limits.lower >= TURN
+    return np.asarray(wide & (farthest < np.pi) & ~limits.endless)
+
+
 class CellMaker:
     """Makes the cells of a contour.
 
@@ -107,10 +130,14 @@ class CellMaker:
         The postures that may be used; default all.
     width : float
         Factor on the uncertainty of the curvature, 1 as proved.
+    folded : (n,) bool, optional
+        Joints with a range of at least a turn that count as endless; default none. Their couplings
+        are left out.
 
     Attributes
     ----------
     endless : (n,) bool
+        With the folded ones.
     flip : tuple, optional
         As `Arm.flip`.
     """
@@ -122,9 +149,12 @@ class CellMaker:
         T_flange_tip: Array,
         postures: Iterable[int] | None = None,
         width: float = 1.0,
+        folded: Bools | None = None,
     ) -> None:
         self._robot, self._frames, self._tool = robot, frames, T_flange_tip
         limits = robot.joint_limits()
+        if folded is not None:
+            limits = limits._replace(endless=limits.endless | folded)
         # A coupling of an endless joint holds on one of its turns, which cells do not distinguish.
         plain = ~(limits.rows[:, limits.endless] != 0).any(axis=1)
         self._limits = limits._replace(
@@ -134,7 +164,7 @@ class CellMaker:
         )
         used = range(robot.postures) if postures is None else sorted(postures)
         self._postures, self._width = np.array(used, np.int8), width
-        self.endless, self.flip = robot.endless, robot.arm.flip
+        self.endless, self.flip = limits.endless, robot.arm.flip
 
     def coarsest(self, nodes: Ints) -> CellSet:
         """Return the cells of level 0 at some nodes, in postures and turns within the ranges."""
@@ -144,7 +174,7 @@ class CellMaker:
         sets = []
         for first in range(0, len(node), AT_ONCE):
             part = slice(first, first + AT_ONCE)
-            sets.append(self._lifted(self._enclosed(node[part], level[part], index[part])))
+            sets.append(self.lifted(self._enclosed(node[part], level[part], index[part])))
         return CellSet.join(sets)
 
     def motion(self, gamma: Array, posture: int) -> tuple[Array, Array] | None:
@@ -161,6 +191,26 @@ class CellMaker:
     def divided(self, cells: CellSet, which: Bools) -> CellSet:
         """Return the cells with some of them (C,) halved."""
         return CellSet.join([cells.take(~which), self.halves(cells.take(which))])
+
+    def certain(self, cells: CellSet, weight: Array, worth: float) -> CellSet:
+        """Return the cells, with those halved on which the joints are too uncertain.
+
+        Near a singularity bounds would find such cells one halving after the other.
+
+        Parameters
+        ----------
+        cells : CellSet
+        weight : (n,) 1/rad
+        worth : float
+            The largest cost of the uncertainty of the joints on a cell that may remain, unless
+            there are more than `MORE_CELLS` times as many cells then.
+        """
+        most = MORE_CELLS * len(cells)
+        while True:
+            which = cells.uncertain(weight, worth)
+            if not which.any() or len(cells) + which.sum() > most:
+                return cells
+            cells = self.divided(cells, which)
 
     def halves(self, cells: CellSet) -> CellSet:
         """Return both halves of the cells, on the same turns."""
@@ -192,7 +242,7 @@ class CellMaker:
         free = (cells.spread[parent] > FREE).any(axis=1)
         kept = [moved.take(self._inside(moved) & ~free)]
         if free.any():
-            lifted = self._lifted(made.take(np.unique(row[free])))
+            lifted = self.lifted(made.take(np.unique(row[free])))
             least = cells.floor[parent[free]].min()
             kept.append(replace(lifted, floor=np.full(len(lifted), least)))
         return CellSet.join(kept)
@@ -239,7 +289,7 @@ class CellMaker:
         )
         return made, place
 
-    def _lifted(self, cells: CellSet) -> CellSet:
+    def lifted(self, cells: CellSet) -> CellSet:
         """Return the cells on all turns within the ranges."""
         limits, box = self._limits, cells.box
         shifts = []

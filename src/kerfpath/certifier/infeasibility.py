@@ -112,13 +112,7 @@ class MotionTest:
             metric=MANHATTAN,
             endless=self._endless,
         )
-        return self.closed_to(steps, current_effort().infeasibility_pairs, around)
-
-    def closed_to(self, steps: Steps, most_pairs: int, around: int | None = None) -> Closed | None:
-        """Return the same for motions with given bounds (5) and (6) and largest cost of steps.
-
-        It ends undecided after `most_pairs` pairs of steps.
-        """
+        most_pairs = current_effort().infeasibility_pairs
         first, last = 0, self._count - 1
         if around is not None:
             first, last = max(first, around - NODES_AROUND), min(last, around + NODES_AROUND)

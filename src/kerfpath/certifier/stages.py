@@ -8,11 +8,12 @@ steps that break (6) are excluded where that is asked for.
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
@@ -187,8 +188,13 @@ class StageResult:
 
     @property
     def bound(self) -> float:
-        """Lower bound on the cost of any motion."""
-        return float(self.through.min(initial=np.inf))
+        """Lower bound on the cost of any motion: it passes a cell of each layer."""
+        return least_over_layers(self.cells.node, self.through)
+
+    def floored(self) -> StageResult:
+        """Return the result with what is known of the cells already, which becomes their floor."""
+        through = np.maximum(self.through, self.cells.floor)
+        return replace(self, cells=replace(self.cells, floor=through), through=through)
 
     def cheapest(self) -> Ints:
         """Return the cells of a motion that may be the cheapest, one per layer."""
@@ -278,6 +284,14 @@ def solve_stage(
         to=to,
         tests=tests,
     )
+
+
+def least_over_layers(node: NDArray[np.int32], through: Array) -> float:
+    """Return the bound that those of cells (C,) give, as a motion passes a cell at each node."""
+    _, layer = np.unique(node, return_inverse=True)
+    least = np.full(layer.max(initial=-1) + 1, np.inf)
+    np.minimum.at(least, layer, through)
+    return float(least.max(initial=-np.inf)) if len(least) else np.inf
 
 
 class Arranged(NamedTuple):

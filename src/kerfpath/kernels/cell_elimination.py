@@ -34,6 +34,7 @@ __all__ = [
     "keep_back",
     "keep_on",
     "list_steps",
+    "may_step",
 ]
 
 
@@ -67,7 +68,7 @@ def _exceeds_bound(cells: Cells, step: Step, a: int, b: int, D: Array) -> bool:
 
 
 @jit_inline
-def _steps(cells: Cells, step: Step, lead: Ints, a: int, b: int, out_D: Array) -> bool:
+def may_step(cells: Cells, step: Step, lead: Ints, a: int, b: int, out_D: Array) -> bool:
     """Fill D; return whether a step from cell a to b may keep (5) and cost at most `step.most`."""
     status = near(cells, step, a, b, out_D)
     if status != 1:
@@ -132,7 +133,7 @@ def count_steps(cells: Cells, step: Step, lead: Ints, k: int, live: Bools, out_c
         if live[a]:
             window(cells, step, a, k, run)
             for b in range(run[0], run[1]):
-                if live[b] and _steps(cells, step, lead, a, b, D):
+                if live[b] and may_step(cells, step, lead, a, b, D):
                     count += 1
         out_count[a - cells.start[k]] = count
 
@@ -150,7 +151,7 @@ def list_steps(
             continue
         window(cells, step, a, k, run)
         for b in range(run[0], run[1]):
-            if p < last and live[b] and _steps(cells, step, lead, a, b, D):
+            if p < last and live[b] and may_step(cells, step, lead, a, b, D):
                 out_to[p] = b
                 p += 1
 
