@@ -1,6 +1,7 @@
 """The certifier: bounds that no motion beats, on cells that say nothing untrue."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from kerfpath import InputError, plan
 from kerfpath.auditor import certified_bound
 from kerfpath.certificate import BASE
 from kerfpath.certifier import bound, certify, stages
-from kerfpath.certifier.cells import CellMaker
+from kerfpath.certifier.cells import CERTAIN_LEVEL, MORE_CELLS, CellMaker, foldable
 from kerfpath.certifier.division import between, turning_nodes
 from kerfpath.certifier.stages import Steps
 from kerfpath.job import read_job
@@ -48,8 +49,8 @@ def steps_of(one):
     )
 
 
-def maker_of(one, postures=(0, 1)):
-    return CellMaker(one.robot, one.frames, one.T_flange_tip, postures)
+def maker_of(one, postures=(0, 1), folded=None):
+    return CellMaker(one.robot, one.frames, one.T_flange_tip, postures, folded=folded)
 
 
 @pytest.mark.slow
@@ -99,12 +100,17 @@ def test_the_audit_proves_the_bound_again(name):
     assert found.plan.proof.bound <= again <= found.plan.cost
 
 
-@pytest.mark.parametrize("metric", METRICS)
-@pytest.mark.parametrize("tilted", [False, True])
-def test_no_step_costs_less_than_its_cells_say(made, metric, tilted):
+@pytest.mark.parametrize(
+    ("metric", "tilted", "folds"),
+    [*product(METRICS, [False, True], [False]), ("manhattan", True, True)],
+)
+def test_no_step_costs_less_than_its_cells_say(made, metric, tilted, folds):
     """Of steps drawn at random, with the true joints: rho + mu u + V' - V is no less."""
     one, rng = made(metric), np.random.default_rng(3)
-    steps, maker = steps_of(one), maker_of(one)
+    steps = steps_of(one)
+    maker = maker_of(one, folded=foldable(one.robot, steps.velocity) if folds else None)
+    assert folds == (maker.endless != one.robot.endless).any()
+    steps = replace(steps, endless=maker.endless)
     nodes = np.arange(len(one.q)) if tilted else np.arange(0, len(one.q), 3)
     cells = maker.halves(maker.coarsest(nodes))
     nu = np.zeros_like(one.q)
@@ -220,6 +226,46 @@ def test_the_same_plan_has_the_same_certificate(made):
     for a, b in zip(one.stages, two.stages, strict=True):
         np.testing.assert_array_equal(a.value, b.value)
         np.testing.assert_array_equal(a.dual, b.dual)
+
+
+def test_a_motion_passes_a_cell_at_each_node():
+    """The node whose cheapest cell costs most: node 0 has 1, node 1 has 2, node 2 has 4."""
+    node = np.array([0, 1, 0, 2, 1], np.int32)
+    through = np.array([3.0, 5.0, 1.0, 4.0, 2.0])
+    assert stages.least_over_layers(node, through) == 4.0
+    assert stages.least_over_layers(node[:0], through[:0]) == np.inf
+
+
+def test_cells_with_uncertain_joints_are_halved_first(made):
+    """No more of them than stated; and no cell is lost that the plan passes."""
+    one = made("manhattan")
+    maker, weight = maker_of(one), one.settings.weights
+    before = maker.coarsest(np.arange(len(one.q)))
+    worth = float(np.quantile(before.unsure @ weight, 0.9))
+    cells = maker.certain(before, weight, worth)
+    assert len(cells) <= MORE_CELLS * len(before)
+    left = cells.unsure @ weight > worth
+    assert not left.any() or (cells.level[left] == CERTAIN_LEVEL).all()
+    assert cells.level[cells.posture == one.posture[0]].min() == 0
+    middle = -np.pi + 2 * np.pi / (BASE * 2.0**cells.level) * (cells.index + 0.5)
+    for k, (gamma, posture) in enumerate(zip(one.gamma, one.posture, strict=True)):
+        away = np.abs((gamma - middle + np.pi) % (2 * np.pi) - np.pi)
+        assert ((cells.node == k) & (cells.posture == posture) & (away <= cells.half)).any()
+    few = maker.certain(before, weight, 0.0)
+    assert len(few) <= MORE_CELLS * len(before)
+
+
+def test_a_cell_keeps_what_an_earlier_stage_has_proved(made):
+    one = made("manhattan")
+    cells = maker_of(one).coarsest(np.arange(len(one.q)))
+    result = stages.solve_stage(cells, steps_of(one), care=one.cost)
+    known = np.where(result.cells.index % 2 == 0, 0.9 * one.cost, -np.inf)
+    floored = replace(result, cells=replace(result.cells, floor=known)).floored()
+    assert (floored.through == np.maximum(result.through, known)).all()
+    assert (floored.cells.floor == floored.through).all()
+    assert result.bound <= floored.bound <= one.cost
+    half = maker_of(one).halves(floored.cells)
+    assert set(half.floor) <= set(floored.through)
 
 
 def test_nodes_where_a_plan_turns(made):

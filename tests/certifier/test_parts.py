@@ -15,7 +15,7 @@ from kerfpath.certifier.multipliers import limit_prices
 from kerfpath.certifier.stages import Steps, cross_bends, solve_stage
 from kerfpath.kernels import cell_elimination
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.metric import MANHATTAN
+from kerfpath.kernels.metric import CHEBYCHEV, EUCLID, MANHATTAN
 
 METRICS = ("manhattan", "euclid", "chebychev")
 SPEED = 0.96
@@ -121,8 +121,9 @@ def steps(metric=MANHATTAN, acceleration=1.0):
     )
 
 
+@pytest.mark.parametrize("metric", [MANHATTAN, EUCLID, CHEBYCHEV])
 @pytest.mark.parametrize(("most", "price"), [(5.0, 1.0), (0.5, 0.5)])
-def test_the_price_of_a_limit_that_binds(most, price):
+def test_the_price_of_a_limit_that_binds(most, price, metric):
     """Worked by hand: the second increment d of joint 2 costs d, and (6) asks for |d - 1| <= 0.8.
 
     A limit wider by e saves e: the price is the weight 1 of the joint, or the most that is allowed,
@@ -130,10 +131,25 @@ def test_the_price_of_a_limit_that_binds(most, price):
     """
     u = np.array([[0.0, 1.0], [0.0, 0.0]])
     slope = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
-    prices = limit_prices(u, slope, steps(acceleration=0.8), reach=0.5, most=most)
+    prices = limit_prices(u, slope, steps(metric, 0.8), reach=0.5, most=most)
     assert not prices[[0, -1]].any()
     # The solver's own tolerance.
     np.testing.assert_allclose(prices[1], [0.0, -price], atol=1e-5)
+
+
+def test_prices_of_the_metrics_differ_where_joints_share_a_step():
+    """Worked by hand: (6) asks for a second increment d >= 0.2 of joint 2, beside one of joint 1.
+
+    Joint 1 (of weight 2) moves by 0.3: d costs 1 with "manhattan", d / sqrt(0.36 + d^2) with
+    "euclid", and nothing with "chebychev", as long as it is below 0.6.
+    """
+    u = np.array([[0.3, 1.0], [0.3, 0.0]])
+    slope = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+    found = [
+        -limit_prices(u, slope, steps(metric, 0.8), reach=0.5, most=5.0)[1, 1]
+        for metric in (MANHATTAN, EUCLID, CHEBYCHEV)
+    ]
+    assert found == pytest.approx([1.0, 0.2 / np.hypot(0.6, 0.2), 0.0], abs=1e-4)
 
 
 def test_no_prices_where_nothing_near_breaks_the_limit():
@@ -143,7 +159,7 @@ def test_no_prices_where_nothing_near_breaks_the_limit():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("metric", ["manhattan", "euclid"])
+@pytest.mark.parametrize("metric", METRICS)
 def test_a_plan_at_the_limit_has_prices(metric, planned):
     one = course_of(planned(metric=metric), 0.005)
     posture = int(one.plan.posture[0])

@@ -10,7 +10,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, scalar, short_repr
 from kerfpath.certificate import ALLOWANCE, Certificate, Stage
-from kerfpath.certifier.cells import CellMaker, CellSet
+from kerfpath.certifier.cells import CellMaker, CellSet, foldable
 from kerfpath.certifier.division import between, cells_to_divide, turning_nodes
 from kerfpath.certifier.minimax import largest_step_bound
 from kerfpath.certifier.multipliers import limit_prices
@@ -18,7 +18,6 @@ from kerfpath.certifier.parts import CARE, DEAREST, NARROW, SAME_COST, Parts
 from kerfpath.certifier.stages import StageResult, Steps, distinct_groups, linked, solve_stage
 from kerfpath.effort import current_effort
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.metric import CHEBYCHEV
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
 from kerfpath.search import METRIC_CODES
@@ -36,6 +35,8 @@ NEAR = 0.9
 """Share of the target from which (6) may be what is missing."""
 DEEPEST = 12
 """Largest level: cells of 0.001 deg."""
+UNCERTAIN = 0.01
+"""Share of the cost that the uncertainty of the joints on a new cell may be worth."""
 MOST_CELLS = 2_000_000
 """Most cells of a stage, some 2 GB; the certifier stops before it exceeds them."""
 CLEARLY, USUAL_LEVEL, WIDER = 0.02, 3, 2.0
@@ -43,6 +44,9 @@ CLEARLY, USUAL_LEVEL, WIDER = 0.02, 3, 2.0
 the plan by this share, four times the share per coarser level, because a checker's own enclosures
 may give less; and the factor on the curvature. Otherwise only `SAME_COST`, for rounding."""
 NOT_KEPT = 'a bound of the objective "max" has no certificate to keep'
+UNFOLDED = 0.2
+"""Share of the work within which cells must have been bounded on every turn of their joints, so
+that turns are distinguished: joints with a range of a turn or more count as endless before."""
 AT_LIMIT = 0.98
 """Share of the acceleration limit from which (6) may keep the plan from costing less."""
 EARLY, COARSE = 0.3, 1
@@ -191,9 +195,14 @@ class _Certification:
         progress: Progress,
     ) -> None:
         robot, asked = plan.robot, plan.settings
-        self.steps = steps
         self.margin, width = (CLEARLY, WIDER) if checkable else (SAME_COST, 1.0)
-        self.maker = CellMaker(robot, plan.frames, plan.T_flange_tip, asked.postures, width)
+        task = robot, plan.frames, plan.T_flange_tip, asked.postures, width
+        folded = foldable(robot, steps.velocity)
+        self.maker = CellMaker(*task)
+        self.unfolded: CellMaker | None = None
+        if folded.any() and not checkable:
+            self.maker, self.unfolded = CellMaker(*task, folded), self.maker
+        self.steps = replace(steps, endless=self.maker.endless)
         self.cost, self.until, self.progress = plan.cost, until, progress
         self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
         self.last = len(plan.q) - 1
@@ -212,26 +221,32 @@ class _Certification:
         """Run stages until the gap is reached or the work is spent."""
         cells = self.maker.coarsest(self.nodes)
         self.at_node = len(cells) / len(self.nodes)
+        cells = self.maker.certain(cells, self.steps.weight, UNCERTAIN * self.cost)
         fresh = True  # new cells, which the certificate must contain
         while True:
             result = solve_stage(cells, self.steps, care=CARE * self.cost)
+            if not self.checkable:
+                result = result.floored()
             gained, cells = self._take(result), result.cells
             clearly = self.margin * np.exp2(2.0 * (USUAL_LEVEL - cells.level))
             live = result.through <= self.cost * (1 + clearly)
             if not self.checkable:
                 live = np.logical_or.reduce(distinct_groups(result, live, self.maker))
             low = result.through < self.target
-            which, singular = cells_to_divide(cells, result.through, self.target, self.steps.weight)
-            which &= cells.level < DEEPEST
+            which, singular = cells_to_divide(
+                cells, result.through, self.target, self.steps.weight, DEEPEST
+            )
             fine = not singular and low.any() and np.median(cells.level[low]) >= FINE
             slow = bool(fine) and gained < STALLED
-            if fine and self._late(slow) and self._fits(self.last + 1) and self._priced:
+            left = float(live.mean() + which.mean())
+            ahead = self.pairs + result.pairs * left**2
+            if fine and self._late(slow, ahead) and self._fits(self.last + 1) and self._priced:
                 self._divide(cells.take(live))
                 return
-            if not low.any() or self._enough(result, float(live.mean() + which.mean())):
+            if not low.any() or len(cells) * left > MOST_CELLS or self._spent(ahead):
                 self._finish(result)
                 return
-            if fresh or 1 - live.mean() > DROPPED:
+            if fresh or not self.checkable or 1 - live.mean() > DROPPED:
                 self._keep(result)
                 fresh, kept = False, live
             else:
@@ -246,8 +261,22 @@ class _Certification:
             elif not which.any():
                 self._finish(result)
                 return
+            elif fine and (lifted := self._unfold(cells.take(live), result.pairs)) is not None:
+                which = (lifted.floor < self.target) & (lifted.level < DEEPEST)
+                cells = self.maker.divided(lifted, which)
             else:
                 cells = self.maker.divided(cells.take(kept), which[kept])
+
+    def _unfold(self, cells: CellSet, pairs: int) -> CellSet | None:
+        """Return the cells on all turns, to be distinguished from here on; None if too many."""
+        if self.unfolded is None or not len(cells):
+            return None
+        lifted = self.unfolded.lifted(cells)
+        if self.pairs + pairs * len(lifted) / len(cells) > UNFOLDED * self.most_pairs:
+            return None
+        self.maker, self.unfolded = self.unfolded, None
+        self.steps = replace(self.steps, endless=self.maker.endless)
+        return lifted
 
     @cached_property
     def _priced(self) -> bool:
@@ -255,8 +284,6 @@ class _Certification:
         if self.checkable:
             return False
         share = np.abs(self.plan.acceleration_share)
-        if self.steps.metric == CHEBYCHEV:  # its potentials are too loose for prices to help
-            return False
         if not (share > AT_LIMIT * self.plan.settings.eta_a).any():
             return False
         posture = int(np.bincount(self.plan.posture).argmax())
@@ -322,16 +349,10 @@ class _Certification:
         self.progress("certificate", int(1000 * (1 - short / self.target)), 1000)
         return (self.best - before) / max(self.target - before, 1e-300)
 
-    def _late(self, slow: bool) -> bool:
-        """Return whether to use multipliers of (6) from here on."""
+    def _late(self, slow: bool, ahead: float) -> bool:
+        """Return whether to use multipliers of (6) now; a stage more makes it `ahead` steps."""
         close = slow and self.best > NEAR * self.target
-        return close or self.pairs > EARLY * self.most_pairs
-
-    def _enough(self, result: StageResult, left: float) -> bool:
-        """Return whether the next stage, with a share `left` of the cells, is too much work."""
-        if len(result.cells) * left > MOST_CELLS:
-            return True
-        return self._spent(self.pairs + result.pairs * left**2)
+        return close or ahead > EARLY * self.most_pairs
 
     def _fits(self, nodes: int) -> bool:
         """Return whether coarse cells at this number of nodes are few enough."""
@@ -352,7 +373,8 @@ class _Certification:
         new = self.maker.coarsest(missing)
         while True:
             passed = linked(CellSet.join([cells, new]), self.steps)[len(cells) :]
-            coarse = passed & (new.level < level)
+            unsure = new.uncertain(self.steps.weight, UNCERTAIN * self.cost)
+            coarse = passed & ((new.level < level) | unsure)
             if not coarse.any() or len(new) > MOST_CELLS or self._spent(self.pairs):
                 return CellSet.join([cells, new])
             new = self.maker.divided(new, coarse)

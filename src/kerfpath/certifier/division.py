@@ -67,7 +67,7 @@ def between(nodes: Ints) -> Ints:
 
 
 def cells_to_divide(
-    cells: CellSet, through: Array, target: float, weight: Array
+    cells: CellSet, through: Array, target: float, weight: Array, deepest: int
 ) -> tuple[Bools, bool]:
     """Return which cells (C,) to divide, and whether only uncertain ones are divided.
 
@@ -84,20 +84,24 @@ def cells_to_divide(
     target : float
         Lower bound to reach.
     weight : (n,) 1/rad
+    deepest : int
+        Level of the cells that are not divided any more; what is uncertain on them stays so.
     """
-    low = through < target
+    divisible = cells.level < deepest
+    low = (through < target) & divisible
     if not low.any():
         return low, False
-    unsure = cells.unsure @ weight
+    unsure = np.where(divisible, cells.unsure @ weight, 0.0)
     order = np.lexsort((through, cells.node))
     cheapest = order[np.append(True, np.diff(cells.node[order]) > 0)]
     least = float(through[cheapest].min())
     if unsure[cheapest].sum() <= DECIDES * (target - least):
         return low, False
     lack = np.maximum(least + AIM * (target - least) - through, 0.0)
-    worth = np.minimum(unsure + BOX_WEIGHT * (cells.box @ weight), MOST * lack)
+    size = np.where(divisible, cells.box @ weight, 0.0)
+    worth = np.minimum(unsure + BOX_WEIGHT * size, MOST * lack)
     order = np.argsort(-worth, kind="stable")
     total = np.cumsum(worth[order])
     which = np.zeros(len(worth), np.bool_)
     which[order[: np.searchsorted(total, HALF * total[-1]) + 1]] = True
-    return which, True
+    return which & divisible, True

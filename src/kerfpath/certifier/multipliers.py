@@ -6,7 +6,7 @@ bound is valid with any multipliers; they only decide how close it is.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import clarabel
 import numpy as np
@@ -14,8 +14,7 @@ from scipy import sparse
 
 from kerfpath.arrays import Array
 from kerfpath.certifier.stages import Steps
-from kerfpath.kernels.metric import MANHATTAN, rho
-from kerfpath.kernels.reduced import tangents
+from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
 
 FAST = 10.0
 """Price of an increment beyond (5), in largest prices of (6)."""
@@ -57,14 +56,19 @@ def limit_prices(u: Array, slope: Array, steps: Steps, reach: float, most: float
     acts = np.flatnonzero(np.abs(bend) + abs(bent).sum(axis=1) > bound)
     if not len(acts):
         return None
-    cost, curved = _metric(u, moved, steps)
+    cost = np.sign(own) * weight
     cost[turns] = 0.0
+    lengths = None
+    if steps.metric != MANHATTAN:
+        cost[:] = 0.0
+        lengths = _Lengths(sparse.diags_array(weight) @ moved, weight * own, n, steps.metric)
     linear = np.concatenate(
         [
             cost @ moved,
             np.ones(len(turns)),
             FAST * most * weight[fast],
             most * weight[: len(bend)][acts],
+            np.ones(edges if lengths else 0),
         ]
     )
     groups: list[tuple[_Rows, Array, Array | float]] = [
@@ -72,7 +76,7 @@ def limit_prices(u: Array, slope: Array, steps: Steps, reach: float, most: float
         (moved[fast], own[fast], velocity[fast]),
         (bent[acts], bend[acts], bound[acts]),
     ]
-    dual = _dual(groups, linear, curved)
+    dual = _dual(groups, linear, lengths)
     if dual is None:
         return None
     prices = np.zeros(len(bend))
@@ -90,51 +94,73 @@ def _moved(slope: Array, n: int) -> _Rows:
     return sparse.csr_array((values, place), shape=(len(row), nodes))
 
 
-def _metric(u: Array, moved: _Rows, steps: Steps) -> tuple[Array, _Rows]:
-    """Return the slope of rho at increments u (K-1, n), ((K-1) n,), and its curvature (K, K).
+class _Lengths(NamedTuple):
+    """Weighted increments slope x + value, ((K-1) n,), and the metric that makes lengths of n."""
 
-    The Manhattan metric has no curvature between its kinks; for the others it is estimated.
-    """
-    step, slope = steps.over(1), np.empty_like(u)
-    tangents(u, step, slope)
-    if steps.metric == MANHATTAN:
-        return slope.ravel(), sparse.csr_array((moved.shape[1],) * 2)
-    length = np.array([rho(row, steps.weight, steps.metric) for row in u])
-    share = np.repeat(1 / np.maximum(length, NOTHING), u.shape[1])
-    weight = sparse.diags_array(np.tile(steps.weight**2, len(u)) * share)
-    return slope.ravel(), moved.T @ weight @ moved
+    slope: _Rows
+    value: Array
+    n: int
+    metric: int
+
+    def cones(self, first: int, unknowns: int) -> tuple[_Rows, Array, list[Any]]:
+        """Return rows, right sides and cones by which unknowns from `first` on are no shorter."""
+        edges = len(self.value) // self.n
+        each = np.arange(len(self.value)) // self.n
+        zeros = sparse.csr_array((len(self.value), unknowns - self.slope.shape[1]))
+        slope = sparse.hstack([self.slope, zeros])
+        if self.metric == CHEBYCHEV:
+            ones = np.ones(len(each))
+            own = sparse.csr_array(
+                (ones, (np.arange(len(each)), first + each)), shape=(len(each), unknowns)
+            )
+            right = np.concatenate([-self.value, self.value])
+            cones = [clarabel.NonnegativeConeT(len(right))]
+            return sparse.vstack([slope - own, -slope - own]), right, cones
+        edge = np.arange(edges)
+        size = (edges, unknowns)
+        own = sparse.csr_array((np.ones(edges), (edge, first + edge)), shape=size)
+        order = np.argsort(np.append(edge, each), kind="stable")  # the length, then its joints
+        rows = sparse.csr_array(sparse.vstack([-own, -slope]))[order]
+        right = np.append(np.zeros(edges), self.value)[order]
+        return rows, right, [clarabel.SecondOrderConeT(self.n + 1)] * edges
 
 
-def _dual(groups: list[tuple[_Rows, Array, Array | float]], cost: Array, curved: _Rows) -> Any:
+def _dual(
+    groups: list[tuple[_Rows, Array, Array | float]], cost: Array, lengths: _Lengths | None
+) -> Any:
     """Return the dual of |value + slope x| <= bound + s, s >= 0, of the last group, or None.
 
-    The program minimises cost (x, s) + x curved x / 2 over x from -1 to 1; every row of each group
-    (slope, value, bound) has its own s.
+    The program minimises cost (x, s, r) over x from -1 to 1; every row of each group (slope, value,
+    bound) has its own s, and r are no shorter than the lengths.
     """
-    boxed = curved.shape[0]
+    boxed = groups[0][0].shape[1]
     sizes = [len(value) for _, value, _ in groups]
     first = boxed + np.cumsum([0, *sizes])
-    unknowns = int(first[-1])
+    unknowns = len(cost)
 
     def own(begin: int, size: int) -> _Rows:
         place = np.arange(size), np.arange(begin, begin + size)
         return sparse.csr_array((np.ones(size), place), shape=(size, unknowns))
 
     rows, bounds = [own(0, boxed), -own(0, boxed)], [np.ones(2 * boxed)]
+    cones = [clarabel.NonnegativeConeT(2 * boxed)]
+    if lengths is not None:
+        longer, right, kinds = lengths.cones(int(first[-1]), unknowns)
+        rows, bounds, cones = [*rows, longer], [*bounds, right], cones + kinds
     for (slope, value, bound), begin, size in zip(groups, first, sizes, strict=False):
         slack = own(int(begin), size)
         wide = sparse.hstack([slope, sparse.csr_array((size, unknowns - boxed))])
         rows += [-slack, wide - slack, -wide - slack]
         bounds += [np.zeros(size), bound - value, bound + value]
-    right = np.concatenate(bounds)
+    cones.append(clarabel.NonnegativeConeT(3 * sum(sizes)))
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     solver = clarabel.DefaultSolver(
-        sparse.csc_matrix(sparse.block_diag([curved, sparse.csr_array((unknowns - boxed,) * 2)])),
+        sparse.csc_matrix((unknowns, unknowns)),
         cost,
         sparse.csc_matrix(sparse.vstack(rows)),
-        right,
-        [clarabel.NonnegativeConeT(len(right))],
+        np.concatenate(bounds),
+        cones,
         settings,
     )
     found = solver.solve()

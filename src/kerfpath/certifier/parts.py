@@ -184,8 +184,9 @@ class Parts:
         """
         cells = part.cells
         low = cells.floor < self._target
-        which, singular = cells_to_divide(cells, cells.floor, self._target, self._steps.weight)
-        which &= cells.level < DEEPEST
+        which, singular = cells_to_divide(
+            cells, cells.floor, self._target, self._steps.weight, DEEPEST
+        )
         if which.any() and (singular or part.stalled <= AGAIN):
             finer = self._maker.divided(cells, which)
             return [replace(part, cells=finer, stalled=0 if singular else part.stalled)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, Ints
 from kerfpath.kernels.jit import jit_inline
-from kerfpath.kernels.metric import MANHATTAN, extend, finish
+from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, extend, finish
 from kerfpath.kernels.reduced import Cells, Potential, Step, tangent
 
 __all__ = ["flatten", "guess_slopes"]
@@ -18,6 +18,9 @@ PENALTY = 10.0
 """Price of an increment beyond (5), in weights: it leads a guess back within (5)."""
 STILL = 1e-10
 """rad: a joint that moves less counts as still."""
+TIED = 2e-5
+"""Share of its largest change along a cell by which the weighted increment of a joint may be below
+the largest of all and still count as tied with it: what the search along the cell leaves."""
 HALVINGS = 30
 """Steps of the search along a cell for metrics that are not Manhattan."""
 UNSURE = 0.03
@@ -83,6 +86,32 @@ def _best_along(
 
 
 @jit_inline
+def _mix(D: Array, cells: Cells, step: Step, b: int, missing: float, out_y: Array) -> None:
+    """Move weight from the joint that decides the maximum metric to one that is tied with it.
+
+    The slopes (n,) along the curve of cell b then change by what is missing. Of several joints, or
+    directions of a joint that is still, the one that takes least of the weight is chosen.
+    """
+    n, first, size = len(D), 0, 0.0
+    for i in range(n):
+        size = max(size, step.weight[i] * abs(cells.slope[b, i]))
+        if step.weight[i] * abs(D[i]) > step.weight[first] * abs(D[first]):
+            first = i
+    top = step.weight[first] if D[first] > 0 else -step.weight[first]
+    most = step.weight[first] * abs(D[first]) - TIED * size * cells.half[b]
+    share, other, turned = 2.0, first, 0.0
+    for kind in range(2 * n):
+        i = kind // 2
+        w = step.weight[i] if kind % 2 == 0 else -step.weight[i]
+        change = w * cells.slope[b, i] - top * cells.slope[b, first]
+        if w * D[i] >= most and change * missing > 0.0 and missing / change < share:
+            share, other, turned = missing / change, i, w
+    if share <= 1.0:
+        out_y[first] -= share * top
+        out_y[other] += share * turned
+
+
+@jit_inline
 def _balance(
     D: Array, cells: Cells, potential: Potential, step: Step, b: int, t: float, out_y: Array
 ) -> None:
@@ -105,9 +134,13 @@ def _balance(
         if abs(D[i]) > step.velocity[i] + STILL:
             out_y[i] += PENALTY * step.weight[i] * (1.0 if D[i] > 0 else -1.0)
         slope += out_y[i] * cells.slope[b, i]
-    if step.metric != MANHATTAN or least <= slope <= most:
+    if least <= slope <= most:
         return
     wanted = least if slope < least else most
+    if step.metric == CHEBYCHEV:
+        _mix(D, cells, step, b, wanted - slope, out_y)
+    if step.metric != MANHATTAN:
+        return
     for i in range(len(D)):
         s, w, x = cells.slope[b, i], step.weight[i], abs(D[i])
         if s == 0.0:
