@@ -16,7 +16,7 @@ from kerfpath.isolated import start_python
 from kerfpath.kernels import CACHE, is_kept
 from kerfpath.kernels.metric import MANHATTAN, maximum_distance, total_distance
 from kerfpath.robots import Robot, robot
-from kerfpath.search import compile_search
+from kerfpath.search import compile_screening, compile_search
 
 __all__ = ["FOR_BOUNDS", "compile_stage", "finish_compiling", "is_compiled", "warm_up"]
 
@@ -44,6 +44,12 @@ def _compile_poses(kinematics: str) -> None:
         distance(freeze(increments.copy()), graph.q[0], MANHATTAN)
 
 
+def _compile_searches(_: str) -> None:
+    """Compile the kernels of the searches over continuous gamma."""
+    compile_search()
+    compile_screening()
+
+
 def _compile_cells(kinematics: str) -> None:
     """Compile the kernels that enclose the joints on cells of gamma."""
     robot, contour = _example(kinematics)
@@ -52,7 +58,7 @@ def _compile_cells(kinematics: str) -> None:
 
 
 STAGES: dict[str, Callable[[str], None]] = {
-    "search": lambda _: compile_search(),
+    "search": _compile_searches,
     "poses": _compile_poses,
     "bound": lambda _: compile_bound(),
     "cells": _compile_cells,

@@ -219,13 +219,14 @@ class PlanOptions(Settings):
     )
     restarts: int = setting(
         4,
-        "random starts from which a motion over continuous gamma is refined again where few starts "
-        "lead to it; more take longer and may find a better one",
+        "random changes of each kind and size from which the best motions over continuous gamma "
+        "are refined again, unless they cost hardly more than the least under the velocities; more "
+        "take longer and may find a better one",
         least=0,
         most=1000,
         example="40",
         group="Search",
-        label="Random starts",
+        label="Random changes",
         concerns="search",
     )
     refine_parts: int = setting(

@@ -14,6 +14,7 @@ from kerfpath.errors import InputError
 __all__ = [
     "GammaWindow",
     "WindowData",
+    "inside",
     "nearest_inside",
     "nodes_of",
     "room_beside",
@@ -140,6 +141,14 @@ def samples_inside(windows: Sequence[GammaWindow], s: Array, gamma: Array) -> Bo
     for window, here in zip(windows, nodes_of(windows, s), strict=True):
         inside[here] &= _inside(window, gamma)
     return inside
+
+
+def inside(windows: Sequence[GammaWindow], s: Array, gamma: Array) -> Bools:
+    """Return which gamma (B,) rad every window admits, each at its arc length s (B,) m."""
+    kept = np.ones(len(gamma), np.bool_)
+    for window, here in zip(windows, nodes_of(windows, s), strict=True):
+        kept &= ~here | _inside(window, gamma)
+    return kept
 
 
 def nearest_inside(windows: Sequence[GammaWindow], s: Array, gamma: Array) -> Array | None:

@@ -226,44 +226,6 @@ def test_where_nothing_leads_on_there_is_no_path():
     )
 
 
-@pytest.mark.parametrize("objective", ["sum", "max"])
-@pytest.mark.parametrize("metric", METRICS)
-def test_the_best_course_of_every_posture_goes_through_a_valley(metric, objective):
-    q, start, samples = circles(np.random.default_rng(3), K=10, posts=3, gone=0.0)
-    q[:, 1] += 5.0 * samples.posture  # no step leads from one to another
-    task = problem(q, start, metric=metric, objective=objective)
-    courses = list(ContinuousSearch(task, samples).valleys())
-    assert {int(samples.posture[path.one[0]]) for path in courses} == {0, 1, 2}
-    costs = []
-    for path in courses:
-        dq = naive.difference(path.q[:-1], path.q[1:], ENDLESS)
-        assert (np.abs(dq) <= task.aim.velocity + 2e-9).all()
-        layer = np.searchsorted(start, np.stack([path.one, path.other]), side="right") - 1
-        np.testing.assert_array_equal(layer, np.tile(np.arange(len(start) - 1), (2, 1)))
-        steps = np.array([naive.distance(d, task.weights, metric) for d in dq])
-        costs.append(steps.sum() if objective == "sum" else steps.max())
-    for posture in range(3):
-        own = [c for c, path in zip(costs, courses, strict=True)
-               if samples.posture[path.one[0]] == posture]  # fmt: skip
-        closed = np.where(samples.posture == posture, 0.0, np.inf)
-        alone = ContinuousSearch(replace(task, vertex_cost=closed), samples)
-        # Nine samples smear the values; a course is priced by its own steps.
-        assert min(own) < 1.1 * alone.value
-    apart = [(samples.sample[path.one] + path.share, samples.posture[path.one]) for path in courses]
-    for k, (at, posture) in enumerate(apart):
-        for other, its in apart[:k]:
-            off = np.abs((at - other + M / 2) % M - M / 2) * 2 * np.pi / M
-            assert off.max() >= 0.06 or not np.array_equal(posture, its)
-
-
-def test_courses_that_depend_on_the_first_vertex_are_not_looked_for():
-    q, start, samples = smooth()
-    q[start[-2] :] = q[start[0] : start[1]]
-    assert not list(ContinuousSearch(problem(q, start, closure="periodic"), samples).valleys())
-    q[start[5] : start[6], 1] += 10.0
-    assert not list(ContinuousSearch(problem(q, start), samples).valleys())  # nothing leads on
-
-
 def test_shut_edges_are_refused():
     q, start, samples = smooth()
     with pytest.raises(InputError, match="closed vertices only"):

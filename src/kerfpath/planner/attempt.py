@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from kerfpath.arrays import short_repr
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan
 
@@ -25,6 +26,8 @@ class Attempt:
         Called with the name of each phase that begins.
     refine : bool
         Whether a plan may leave the grid of gamma.
+    starts : Starts, optional
+        The motions found over continuous gamma.
     failure : NoFeasiblePath, optional
         Why the strategies that were tried have no plan.
     """
@@ -33,6 +36,7 @@ class Attempt:
     finder: CollisionFreeSearch
     begin: Callable[[str], None]
     refine: bool = False
+    starts: Starts | None = None
     failure: NoFeasiblePath | None = None
 
     __repr__ = short_repr

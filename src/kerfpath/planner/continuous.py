@@ -4,25 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import islice
 
 import numpy as np
 
-from kerfpath import refiner
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner.attempt import Attempt, Strategy, first_plan
 from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.exploration import Exploration, can_explore
 from kerfpath.planner.on_grid import plan_on_grid
-from kerfpath.planner.quickest import alike, clear_paths, wide
-from kerfpath.planner.refinements import plan_off_grid, refine_from_random_starts
+from kerfpath.planner.quickest import clear_paths, wide
+from kerfpath.planner.refinements import refine_from_random_starts
+from kerfpath.planner.starts import Starts
 from kerfpath.planner.subsampled import subsampled
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Refinement
-from kerfpath.search import BeamWidth, ContinuousPath, ContinuousSearch, find_shortest
+from kerfpath.search import BeamWidth, ContinuousPath, ContinuousSearch
 
-FIRST_STEP = 5e-3
-"""rad: first change of gamma when a path between the samples is refined."""
 FINE, COARSE = (0.1, 0.25), (1.1, 1.0)
 """`BeamWidth.alike` for paths that hardly accelerate, and for paths that must."""
 QUICK = (BeamWidth(60, FINE, 2), BeamWidth(200, COARSE, 2))
@@ -32,20 +30,14 @@ OTHERWISE = (0.5, 0.5)
 ENOUGH, POOR = 5e-3, 1e-2
 """Relative gap to the value function: below the first a motion is good; beyond the second (6) binds
 so much that the promised costs say little, and all paths are refined."""
+BY_FEW = 0.05
+"""The same along every few nodes, whose steps pass over what a course turns back between them."""
+SAME_COST = 1e-6
+"""Relative difference of motions that count as equally costly."""
 COARSE_STEP = np.radians(1.5)
 """rad: step of gamma from which a search that finds nothing is repeated with half the step."""
 NEARLY = 0.95
 """Share of the speed at which a motion must have been found for that."""
-VALLEYS = 20
-"""Most valleys through which courses are looked for."""
-SAME_COST = 1e-6
-"""Relative difference of courses and motions that count as equally costly."""
-GAIN = 5e-3
-"""Relative gain that a refinement may reach beyond the promised cost of a path."""
-NARROWED = 6
-"""Most repetitions of a refinement closer to its path while the result is not clear."""
-FREE = 1.0
-"""rad or m: how far external axes may at first leave their course in a cell."""
 
 
 def plan_continuous(task: Task, finder: CollisionFreeSearch, begin: Callable[[str], None]) -> Plan:
@@ -64,8 +56,25 @@ def best_motion_found(attempt: Attempt) -> Plan | None:
     if grid_reason(attempt.task):
         return None
     attempt.begin("search")
-    found = clear_motion(attempt.task, attempt.finder, attempt.begin)
+    attempt.starts = Starts(attempt.task, attempt.finder)
+    found = _clear_motion(attempt.task, attempt.starts, attempt.begin)
     return None if found is None else claimed(found, attempt.finder)
+
+
+def better_motion(attempt: Attempt) -> Plan | None:
+    """Explore all valleys, if this has not been done; return the plan if it is better.
+
+    It is for plans with a bound that lies far below their cost.
+    """
+    starts, before = attempt.starts, None if attempt.starts is None else attempt.starts.best
+    if starts is None or before is None or starts.explored or not can_explore(attempt.task):
+        return None
+    attempt.begin("search")
+    Exploration(attempt.task.whole(), starts).run()
+    assert starts.best is not None, "there was a motion before"
+    if starts.best.cost_after > (1 - SAME_COST) * before.cost_after:
+        return None
+    return claimed(starts.best, attempt.finder)
 
 
 def motion_from_grid(attempt: Attempt) -> Plan | None:
@@ -178,7 +187,15 @@ def clear_motion(
     NoFeasiblePath
         A node has no pose.
     """
-    starts = _Starts(task, finder)
+    starts = Starts(task, finder)
+    return _clear_motion(task, starts, begin, thorough=thorough)
+
+
+def _clear_motion(
+    task: Task, starts: Starts, begin: Callable[[str], None], *, thorough: bool = True
+) -> Refinement | None:
+    """Return the best clear motion found, which `starts` keep; None if there is none."""
+    finder = starts.finder
     made, least = _from_fewer_nodes(task, finder)
     starts.start_from(made, least)
     if starts.best is not None and not starts.above(least, ENOUGH):
@@ -192,14 +209,26 @@ def clear_motion(
         paths = [path for beam in QUICK for path in search.paths(beam)]
     begin("refinement")
     starts.refine(paths)
-    if thorough:
+    if thorough and can_explore(task):
+        _explore(task, starts, search)
+    elif thorough:
         _search_wider(task, starts, search, paths)
-        starts.refine_valleys(search)
     return starts.best
 
 
+def _explore(task: Task, starts: Starts, search: ContinuousSearch) -> None:
+    """Explore all valleys if there may be a better motion than the best one.
+
+    Along every few nodes the value function sees courses that it misses along all of them.
+    """
+    exploration = Exploration(task, starts)
+    if starts.above(search.value, ENOUGH) or starts.above(exploration.value, BY_FEW):
+        starts.refine([*search.paths(wide(task))])
+        exploration.run()
+
+
 def _search_wider(
-    task: Task, starts: _Starts, search: ContinuousSearch, paths: list[ContinuousPath]
+    task: Task, starts: Starts, search: ContinuousSearch, paths: list[ContinuousPath]
 ) -> None:
     """Refine more paths if the value function promises a better motion than the best one."""
     if starts.above(search.value, ENOUGH):
@@ -234,129 +263,6 @@ def _from_fewer_nodes(task: Task, finder: CollisionFreeSearch) -> tuple[Plan | N
     comfort = task.settings.comfort
     told = task.settings.objective == "sum" and (comfort is None or not comfort.costs)
     return thin.at_all_nodes(found.plan), found.cost_after if told else 0.0
-
-
-_CLAIM = Proof(optimal=False, statement="found over continuous rotation")
-
-
-class _Starts:
-    """Starts of refinements, and the best motion that was reached from them."""
-
-    def __init__(self, task: Task, finder: CollisionFreeSearch) -> None:
-        self._task, self.finder = task, finder
-        self._tried: list[Plan] = []
-        self.best: Refinement | None = None
-
-    def above(self, value: float, share: float) -> bool:
-        """Return whether the best motion costs more than (1 + share) times a value."""
-        return self.best is None or self.best.cost_after > (1 + share) * value
-
-    def start_from(self, made: Plan | None, least: float) -> None:
-        """Refine a motion that is close to the best one, whose cost is at least `least`."""
-        if made is not None:
-            self._tried.append(made)
-            found = refiner.refine(made, first=FIRST_STEP, least=least)
-            self.best = found if found.done and self.finder.is_clear(found.plan) else None
-
-    def refine(self, paths: list[ContinuousPath], *, unpromising: bool = False) -> None:
-        """Refine paths, the most promising first, and of similar paths only one.
-
-        Paths that promise no better motion are refined only if `unpromising`: the cost of bringing
-        a path inside the limits is a guess.
-        """
-        plans = [self._task.plan_between(path, _CLAIM) for path in paths]
-        for promised, i in sorted((refiner.promise(plan), i) for i, plan in enumerate(plans)):
-            best, made = self.best, plans[i]
-            hopeless = best is not None and promised * (1 - GAIN) >= best.cost_after
-            if hopeless and not unpromising:
-                break
-            known = self._tried if best is None else [*self._tried, best.plan]
-            if not any(alike(made, other) for other in known):
-                self._tried.append(made)
-                found = _refine_path(self._task, self.finder, paths[i], made)
-                self.best = _better(best, found)
-
-    def refine_valleys(self, search: ContinuousSearch) -> None:
-        """Refine courses through other valleys that may cost less than the best motion.
-
-        Under (6) the cheapest course by (5) alone need not lead to the best motion. Of courses that
-        cost the same, which differ in the posture of the wrist, one is enough. Where there is no
-        motion to improve on, the grid is a better start.
-        """
-        if self.best is None:
-            return
-        courses = list(islice(search.valleys(), VALLEYS))
-        self.finder.learn([ends for path in courses for ends in (path.one, path.other)])
-        refined = np.zeros(0)
-        for path in courses:
-            cost = self._task.plan_between(path, _CLAIM).cost
-            least = (1 + POOR) * self.best.cost_after
-            if cost < least and not np.isclose(cost, refined, rtol=SAME_COST).any():
-                before = self.best
-                self.refine([path], unpromising=True)
-                if self.best.cost_after > (1 - SAME_COST) * before.cost_after:
-                    self.best = before
-                refined = np.append(refined, cost)
-
-    def refine_from_grid(self, task: Task) -> None:
-        """Refine the best path on the grid of a task, if there is already a motion to improve on.
-
-        It leads to other local optima than paths between the samples do.
-        """
-        if self.best is None:
-            return
-        found: Refinement | None
-        try:
-            path = self.finder.find(find_shortest, task.problem)
-        except NoFeasiblePath:
-            found = plan_off_grid(task, self.finder) if task.settings.closure == "free" else None
-        else:
-            claim = Proof(optimal=False, statement="begun from the grid")
-            found = refiner.refine(task.plan(path.index, path.cost, claim))
-        if found is not None and found.done and self.finder.is_clear(found.plan):
-            own = replace(found.plan, settings=self._task.settings)
-            self.best = _better(self.best, replace(found, plan=own))
-
-
-def _refine_path(
-    task: Task, finder: CollisionFreeSearch, path: ContinuousPath, made: Plan
-) -> Refinement | None:
-    """Return the refinement of a path; None if it does not keep the limits or is not clear.
-
-    In a cell, gamma stays between clear samples. Where the refined motion is not clear, gamma and
-    external axes are kept closer to the path, and the refinement is repeated.
-    """
-    clear = finder.corridor(path.one, path.other)
-    if clear is None:
-        found = refiner.refine(made, first=FIRST_STEP)
-        return found if found.done else None
-    graph = task.graph
-    sample = graph.sample[path.one].astype(np.int64)
-    below, above = graph.gamma_at(sample), graph.gamma_at(sample + (path.one != path.other))
-    at = below + path.share * (above - below)
-    low = made.gamma - (at - graph.gamma_at(sample - clear[0]))
-    high = made.gamma + graph.gamma_at(sample + (path.one != path.other) + clear[1]) - at
-    begun = np.column_stack([made.gamma, made.unwrapped[:, made.robot.free]])
-    low, high = (
-        np.column_stack([gamma, begun[:, 1:] + side * FREE])
-        for gamma, side in ((low, -1.0), (high, 1.0))
-    )
-    for _ in range(NARROWED):
-        found = refiner.refine(made, first=FIRST_STEP, within=(low, high))
-        unclear = finder.unclear(found.plan)
-        if not (found.done and unclear.any()):
-            break
-        moved = unclear[:, None]
-        low = np.where(moved, (low + begun) / 2, low)
-        high = np.where(moved, (high + begun) / 2, high)
-    return found if found.done and not unclear.any() else None
-
-
-def _better(one: Refinement | None, other: Refinement | None) -> Refinement | None:
-    """Return the better of two motions, or the one that there is."""
-    if one is None or other is None:
-        return one or other
-    return min(one, other, key=lambda found: found.cost_after)
 
 
 def grid_reason(task: Task) -> str:

@@ -19,7 +19,12 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.options import KEEPS, PlanKeywords, PlanOptions, with_keywords
 from kerfpath.planner.attempt import Attempt, Strategy, first_plan
 from kerfpath.planner.collision_free import CollisionFreeSearch
-from kerfpath.planner.continuous import OVER_CONTINUOUS_GAMMA, clear_motion, grid_reason
+from kerfpath.planner.continuous import (
+    OVER_CONTINUOUS_GAMMA,
+    better_motion,
+    clear_motion,
+    grid_reason,
+)
 from kerfpath.planner.external_motion import along_a_course, best_external_motion
 from kerfpath.planner.on_grid import ON_GRID
 from kerfpath.planner.refinements import refine_plan
@@ -241,7 +246,11 @@ def plan(
         made = first_plan(attempt, strategies(task))
     except NoFeasiblePath as broken:
         raise add_window_note(broken, asked) from None
-    return with_bound(made, asked.certify, phase=phase)
+    made = with_bound(made, asked.certify, phase=phase)
+    if asked.certify is None or made.proof.gap is None or made.proof.gap <= asked.certify.gap:
+        return made
+    better = better_motion(attempt)
+    return made if better is None else with_bound(better, asked.certify, phase=phase)
 
 
 def strategies(task: Task) -> tuple[Strategy, ...]:

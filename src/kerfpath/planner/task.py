@@ -27,7 +27,7 @@ from kerfpath.planner.layers import (
     samples_of,
     within_margins,
 )
-from kerfpath.plans import Plan, Proof, path_cost
+from kerfpath.plans import Plan, Proof, on_turns, path_cost
 from kerfpath.robots import Robot
 from kerfpath.search import ContinuousPath, GammaSamples, SearchProblem
 from kerfpath.setup import Setup
@@ -205,27 +205,35 @@ class Task:
 
         With a periodic closure gamma is shifted along the path so that it ends where it begins.
         """
-        graph, s, near = self.graph, self.settings, path.one
+        graph, near = self.graph, path.one
         sample = graph.sample[near].astype(np.int64)
         below, above = graph.gamma_at(sample), graph.gamma_at(sample + 1)
         gamma = below + path.share * (above - below)
-        if s.closure == "periodic":
+        if self.settings.closure == "periodic":
             gamma = gamma - np.linspace(0.0, wrap(gamma[-1] - gamma[0]), len(gamma))
+        posture, tilt = graph.posture[near].astype(np.int64), graph.tilt[graph.variant[near]]
+        return self.plan_at(gamma, path.q, posture, proof, tilt)
+
+    def plan_at(
+        self, gamma: Array, q: Array, posture: Ints, proof: Proof, tilt: Array | None = None
+    ) -> Plan:
+        """Return the plan of a motion with joints near q (K, n) rad, which need not be in reach."""
+        s, (wrapped, turn) = self.settings, on_turns(self.robot, q)
         made = Plan(
             contour=self.contour,
             robot=self.robot,
             T_flange_tip=self.setup.tool,
             T_base_part=self.setup.placement,
-            q=path.q,
+            q=wrapped,
             gamma=gamma,
-            tilt=graph.tilt[graph.variant[near]],
-            posture=graph.posture[near].astype(np.int64),
-            turn=graph.turn[near].astype(np.int64),
+            tilt=np.zeros((len(gamma), 2)) if tilt is None else tilt,
+            posture=posture,
+            turn=turn,
             time=self.times,
             settings=s,
             cost=0.0,
             proof=proof,
-            counts=graph.counts(),
+            counts=self.graph.counts(),
         )
         dq = made.increments
         return replace(made, cost=path_cost(dq, s.weights, s.metric, s.objective, made.node_cost))

@@ -14,7 +14,7 @@ from kerfpath.kernels import continuous as kernel
 from kerfpath.kernels.beam import Alike, Beam, advance
 from kerfpath.kernels.continuous import Steps, Targets
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.metric import increments_between, wrap
+from kerfpath.kernels.metric import increments_between
 from kerfpath.limits import Limits
 from kerfpath.search.problem import SearchProblem, unroll
 
@@ -28,12 +28,6 @@ SAME_COST, MOST_TURNS = 1e-9, 16
 APART = 0.15
 """rad: some joint of two first vertices that are both tried differs by more; the refinement can
 move a path by less."""
-VALLEY_LAYERS = 7
-"""Layers in which valleys are looked for."""
-SAME_COURSE = 0.06
-"""rad: courses in the same postures whose gamma differs by less everywhere are one."""
-ANY_CHANGE = 1e6
-"""rad: change of an increment that no joint ever has."""
 _LAYERS_SAMPLED, _VERTICES_SAMPLED = 12, 16
 """Layers, and vertices of each, that are sampled to choose the joint that sorts the targets."""
 
@@ -156,8 +150,8 @@ class ContinuousSearch:
             np.ascontiguousarray(layers.q), layers.start, layers.endless, samples, velocity
         )
         closed = problem.closure == "periodic"
-        self._samples, self._tied = samples, closed or bool(limited.any())
-        self._ways = self._tied_ways(closed=closed) if self._tied else self._one_way()
+        tied = closed or limited.any()
+        self._ways = self._tied_ways(closed=closed) if tied else self._one_way()
 
     @property
     def value(self) -> float:
@@ -174,55 +168,6 @@ class ContinuousSearch:
             if path is not None:
                 yield path
 
-    def valleys(self) -> Iterator[ContinuousPath]:
-        """Yield the best course under (5) alone through each valley, the cheapest first.
-
-        The best course through a vertex costs what leads there and what leads on. A valley is a
-        vertex of one of a few layers where this is less than at its neighbours in gamma. Courses
-        like one before are left out. There are none if the constraints depend on the first vertex.
-        """
-        if self._tied or not self._ways:
-            return
-        steps, posture = self._steps, self._samples.posture
-        # With a maximum the values of the way are those under a cap.
-        to_go = self._values(steps, self._cost) if steps.minimax else self._ways[0].V
-        ahead = _Direction(self._targets, self._cost, to_go)
-        behind = _reversed(ahead, steps)
-        known: list[tuple[Array, Ints]] = []
-        for layer, v in self._valleys(to_go, behind.values[::-1]):
-            here = self._gamma(v, v, np.zeros(1))
-            if any(_same(gamma[layer], here) and on[layer] == posture[v] for gamma, on in known):
-                continue
-            points = _course_through(v, ahead, behind, steps)
-            if points is None:
-                continue
-            gamma, on = self._gamma(*points), posture[points[0]]
-            if not any(_same(at, gamma) and np.array_equal(its, on) for at, its in known):
-                known.append((gamma, on))
-                yield self._path(*points)
-
-    def _valleys(self, to_go: Array, from_start: Array) -> Iterator[tuple[int, int]]:
-        """Yield layer and vertex of each valley, by the cost of the best course through it."""
-        passed = np.isfinite(to_go + from_start)
-        if self._steps.minimax:
-            through = np.maximum(to_go, from_start)
-        else:
-            through = to_go + from_start
-            through[passed] -= self._cost[passed]  # it is in both
-        K = len(self._targets.start) - 1
-        layer = np.repeat(np.arange(K), np.diff(self._targets.start))
-        bottom = passed & _are_bottoms(self._targets, through)
-        bottom &= np.isin(layer, np.linspace(0, K - 1, VALLEY_LAYERS).astype(int))
-        found = np.flatnonzero(bottom)
-        for v in found[np.argsort(through[found], kind="stable")].tolist():
-            yield int(layer[v]), v
-
-    def _gamma(self, one: Ints | int, other: Ints | int, share: Array) -> Array:
-        """Return about what gamma (rad) is at points between vertices, as if samples were even."""
-        turn = 2 * np.pi / self._samples.samples
-        at, to = (self._samples.sample[v] * turn for v in (one, other))
-        return np.asarray(at + share * wrap(to - at))
-
     def _path(self, one: Ints, other: Ints, share: Array) -> ContinuousPath:
         targets = self._targets
         between = increments_between(targets.q[one], targets.q[other], targets.endless)
@@ -235,7 +180,7 @@ class ContinuousSearch:
 
     def _values(self, steps: Steps, cost: Array, last: Bools | None = None) -> Array:
         """Return the value function (N,) for vertex costs (N,) and allowed last vertices (m,)."""
-        return _values_to(self._targets, steps, cost, last)
+        return values_to(self._targets, steps, cost, last)
 
     def _one_way(self) -> list[_Way]:
         """Return the way from any first vertex to any last one, or an empty list."""
@@ -261,7 +206,7 @@ class ContinuousSearch:
     def _by_valleys(self, first: Ints, V: Array) -> Ints:
         """Return first vertices that have a path, those at local minima of the value first."""
         begin = self._targets.begin[:2]
-        bottom = _are_bottoms(self._targets._replace(begin=begin), V)
+        bottom = are_bottoms(self._targets._replace(begin=begin), V)
         first = first[V[first] < np.inf]
         return first[np.lexsort((V[first], ~bottom[first]))]
 
@@ -330,7 +275,7 @@ class ContinuousSearch:
         return self._path(one, other, share)
 
 
-def _values_to(targets: Targets, steps: Steps, cost: Array, last: Bools | None = None) -> Array:
+def values_to(targets: Targets, steps: Steps, cost: Array, last: Bools | None = None) -> Array:
     """Return the value function (N,) for vertex costs (N,) and allowed last vertices (m,)."""
     a, V = targets.start[-2], np.full(len(cost), np.inf)
     V[a:] = cost[a:] if last is None else np.where(last, cost[a:], np.inf)
@@ -338,7 +283,7 @@ def _values_to(targets: Targets, steps: Steps, cost: Array, last: Bools | None =
     return V
 
 
-def _are_bottoms(targets: Targets, values: Array) -> Bools:
+def are_bottoms(targets: Targets, values: Array) -> Bools:
     """Return which vertices (N,) have no neighbour in gamma with a lower value."""
     joined = slice(int(targets.begin[0]), int(targets.begin[-1]))
     one, other = targets.one[joined], targets.other[joined]
@@ -348,82 +293,11 @@ def _are_bottoms(targets: Targets, values: Array) -> Bools:
     return bottom
 
 
-class _Direction(NamedTuple):
-    """The problem from its first layer to its last, or back, and its value function."""
-
-    targets: Targets
-    cost: Array
-    values: Array
-
-
-_Points = tuple[Ints, Ints, Array]
-"""The vertices between which the points of a path lie, and the shares."""
-
-
-def _same(one: Array, other: Array) -> bool:
-    """Return whether gammas differ by too little to belong to two courses."""
-    return bool(np.abs(wrap(one - other)).max() < SAME_COURSE)
-
-
-def _course_through(v: int, ahead: _Direction, behind: _Direction, steps: Steps) -> _Points | None:
-    """Return the best course through a vertex; None if no step leads on from a point of it."""
-    on, back = _course(v, ahead, steps), _course(len(ahead.cost) - 1 - v, behind, steps)
-    if on is None or back is None:
-        return None
-    one, other = (
-        np.append(len(ahead.cost) - 1 - b[:0:-1], a) for a, b in zip(on[:2], back[:2], strict=True)
-    )
-    return one, other, np.append(back[2][:0:-1], on[2])
-
-
-def _course(v: int, direction: _Direction, steps: Steps) -> _Points | None:
-    """Return the best course from a vertex to the last layer of a direction."""
-    targets, cost, values = direction
-    k = int(np.searchsorted(targets.start, v, side="right")) - 1
-    K = len(targets.start) - 1 - k
-    here = np.array([v])
-    if K == 1:
-        return here, here, np.zeros(1)
-    part = targets._replace(start=targets.start[k:], begin=targets.begin[k:], half=targets.half[k:])
-    beam = Beam(
-        np.empty((K, 1), np.int64), np.empty((K, 1)), np.empty((K, 1), np.int64), np.empty((K, 1)),
-        np.zeros(K, np.int64),
-    )  # fmt: skip
-    change = freeze(np.full(targets.q.shape[1], ANY_CHANGE))
-    if advance(part, steps, cost, values, change, here, Alike(1.0, 1.0), beam) < K:
-        return None
-    at = beam.at[1:, 0]
-    one, other = (np.append(here, ends[at]) for ends in (targets.one, targets.other))
-    return one, other, np.append(0.0, beam.share[1:, 0])
-
-
-def _reversed(ahead: _Direction, steps: Steps) -> _Direction:
-    """Return the same problem from its last layer to its first."""
-    targets = ahead.targets
-    N, layers = len(targets.q), np.diff(targets.begin)[::-1]
-    order = np.concatenate(
-        [np.arange(a, b) for a, b in zip(targets.begin[-2::-1], targets.begin[:0:-1], strict=True)]
-    )
-    back = Targets(
-        freeze(np.ascontiguousarray(targets.q[::-1])),
-        freeze(np.ascontiguousarray(N - targets.start[::-1])),
-        N - 1 - targets.one[order],
-        N - 1 - targets.other[order],
-        np.append(0, np.cumsum(layers)),
-        targets.key[order],
-        np.ascontiguousarray(targets.half[::-1]),
-        targets.joint,
-        targets.endless,
-    )
-    cost = freeze(np.ascontiguousarray(ahead.cost[::-1]))
-    return _Direction(back, cost, _values_to(back, steps, cost))
-
-
 def _targets(
     q: Array, start: Ints, endless: Bools, samples: GammaSamples, velocity: Array
 ) -> Targets:
-    """Return the targets of steps, sorted by the joint that leaves the fewest within (5)."""
-    (N, n), K = q.shape, len(start) - 1
+    """Return the targets of steps between neighbouring samples of gamma."""
+    N, K = len(q), len(start) - 1
     one, other, begin = np.empty(N, np.int64), np.empty(N, np.int64), np.empty(K + 1, np.int64)
     widest = max(WIDEST, WIDEST_STEPS * 2 * np.pi / samples.samples)
     widest = min(widest, WIDEST_OF_ALL)
@@ -432,7 +306,23 @@ def _targets(
         widest, one, other, begin,
     )  # fmt: skip
     T = int(begin[-1])
-    targets = Targets(q, start, one[:T], other[:T], begin, np.empty(T), np.empty(K), 0, endless)
+    return targets_of(q, start, one[:T], other[:T], begin, endless, velocity)
+
+
+def targets_of(
+    q: Array, start: Ints, one: Ints, other: Ints, begin: Ints, endless: Bools, velocity: Array
+) -> Targets:
+    """Return targets, given by their ends, sorted by the joint that leaves the fewest within (5).
+
+    Parameters
+    ----------
+    q, start, one, other, begin, endless
+        As in `Targets`.
+    velocity : (n,) rad
+        Largest increment by (5).
+    """
+    K, n, T = len(start) - 1, q.shape[1], len(one)
+    targets = Targets(q, start, one, other, begin, np.empty(T), np.empty(K), 0, endless)
     pairs = np.zeros(n, np.int64)
     for k in np.unique(np.linspace(1, K - 1, _LAYERS_SAMPLED).astype(int)):
         here = q[start[k - 1] : start[k]]

@@ -1,0 +1,300 @@
+"""Exploration of all valleys: courses through them, screened together, refined, and shaken.
+
+Under (6) the cheapest course by (5) alone need not lead to the best motion, which may lie in any
+valley, in any posture, or pass a singularity from one posture to another. Courses are sought over
+samples of gamma that follow the joints, along all nodes and along every few: the fewer nodes, the
+larger the steps between them, beside which samples and kinks are fine. All are screened together;
+the best are refined, then changed by waves and smooth steps of gamma, and screened again.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import islice
+
+import numpy as np
+
+from kerfpath.arrays import Array, Ints, freeze
+from kerfpath.kernels.continuous import Steps
+from kerfpath.kernels.metric import wrap
+from kerfpath.kernels.screening import Energy
+from kerfpath.planner.starts import Starts
+from kerfpath.planner.task import Task
+from kerfpath.refiner import Refinement
+from kerfpath.robots import lowest_joint
+from kerfpath.search import (
+    METRIC_CODES,
+    SHARP,
+    SMOOTH,
+    Branches,
+    Course,
+    Screening,
+    Stage,
+    Valleys,
+    sample_branches,
+)
+from kerfpath.windows import inside
+
+STEP, LEAST_STEPS = np.radians(10.0), 8
+"""rad: typical largest increment along every few nodes, and fewest intervals between them."""
+SLACK = 1.02
+"""Factor of (5) along every few nodes, for contours whose intervals do not divide evenly."""
+COURSES = 40
+"""Most courses along the same nodes."""
+ANGLES = 36
+"""Angles at which gamma is constant along further courses, in every posture: where (6) binds, the
+best motion may hardly turn."""
+REFINED, REFINED_AGAIN = 5, 3
+"""Motions that are refined after the first screening, and after each later one."""
+HOPELESS = 1.25
+"""Scores from this many times the best cost on are not refined: a refinement gains less."""
+ROUNDS = 2
+"""Times that the best motions are shaken."""
+SHAKEN = 2
+"""Best motions that are shaken."""
+SIZES, SMALL = (0.15, 0.4, 0.8, 1.3), (0.05, 0.15, 0.4, 0.8)
+"""rad: largest changes of gamma of a motion, and of one that does not yet keep the limits."""
+WAVES = 5
+"""Cosines in a change; the slower ones are larger."""
+SAME_COST = 1e-3
+"""Relative difference of cost up to which two motions count as one when they are shaken."""
+SAME_MOTION = 0.02
+"""rad: a screened motion whose gamma is nearer to that of a known one is not refined."""
+SEED = 5
+"""Fixed, so that the same task always gets the same changes."""
+
+
+def can_explore(task: Task) -> bool:
+    """Return whether the joints of a pose follow from gamma alone: no tilt, no free joints."""
+    return task.settings.tilt is None and not task.robot.free.size
+
+
+class Exploration:
+    """Exploration of the valleys of a task.
+
+    Parameters
+    ----------
+    task : Task
+        A task that `can_explore`.
+    starts : Starts
+        Refines the motions and keeps the best.
+    """
+
+    def __init__(self, task: Task, starts: Starts) -> None:
+        self._task, self._starts = task, starts
+        s, robot, tool = task.settings, task.robot, task.setup.tool
+        self._frames = task.setup.placement @ task.contour.frames(s.frames)
+        limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
+        self._step = freeze(s.eta_v * velocity * task.dt)
+        self._screening = Screening(
+            arm=robot.arm,
+            frames=self._frames,
+            tool=tool,
+            limits=limits,
+            energy=Energy(
+                weight=freeze(np.array(s.weights, dtype=float)),
+                metric=METRIC_CODES[s.metric],
+                minimax=s.objective == "max",
+                smooth=0.0,
+                power=0.0,
+                velocity=self._step,
+                acceleration=freeze(s.eta_a * acceleration * task.dt**2),
+                lower=freeze(np.where(limits.endless, -np.inf, limits.lower)),
+                upper=freeze(np.where(limits.endless, np.inf, limits.upper)),
+                price=0.0,
+            ),
+        )
+        self._rng = np.random.default_rng(SEED)
+        self._known: list[Course] = []
+
+    @property
+    def value(self) -> float:
+        """Cost of the best course under (5) alone along every few nodes; infinite if none."""
+        return min(valleys.value for valleys, _ in self._along_few)
+
+    @cached_property
+    def _along_few(self) -> list[tuple[Valleys, Ints]]:
+        return [self._valleys(every) for every in sorted({self._few, max(1, self._few // 2)})]
+
+    def _valleys(self, every: int) -> tuple[Valleys, Ints]:
+        """Return the valleys along one of so many nodes, and these nodes (M,), evenly spread."""
+        last = len(self._frames) - 1
+        nodes = np.linspace(0, last, -(-last // every) + 1).round().astype(np.int64)
+        gap = int(np.diff(nodes).max())
+        step = self._step * gap * (SLACK if gap > 1 else 1.0)
+        s, robot, tool = self._task.settings, self._task.robot, self._task.setup.tool
+        branches = sample_branches(robot, self._frames[nodes], tool, step, s.postures)
+        energy = self._screening.energy
+        steps = Steps(energy.weight, energy.metric, energy.minimax, np.inf, -step, step)
+        return Valleys(branches, steps, self._cost(branches, self._task.contour.s[nodes])), nodes
+
+    def _cost(self, branches: Branches, s: Array) -> Array:
+        """Return the cost (N,) of samples at arc lengths s (K,); infinite if not admitted."""
+        asked, robot, tool = self._task.settings, self._task.robot, self._task.setup.tool
+        q, cost = branches.q, np.zeros(len(branches.q))
+        if asked.comfort is not None:
+            cost += asked.comfort.price(robot, q, tool)
+            for near in asked.comfort.too_near(robot, q, tool).values():
+                cost[near] = np.inf
+        if asked.floor is not None:
+            cost[lowest_joint(robot, q) < asked.floor] = np.inf
+        if asked.gamma_windows:
+            cost[~inside(asked.gamma_windows, s[branches.node], branches.gamma)] = np.inf
+        return cost
+
+    @property
+    def _few(self) -> int:
+        """One of this many nodes is kept so that a typical step is about `STEP`."""
+        every = int(np.ceil(STEP / np.median(self._step)))
+        return max(1, min(every, (len(self._frames) - 1) // LEAST_STEPS))
+
+    def run(self) -> None:
+        """Screen and refine courses through all valleys; shake the best motions."""
+        self._starts.explored = True
+        valleys = self._along_few
+        if self._few // 2 > 1:
+            valleys = [*valleys, self._valleys(1)]
+        courses = [
+            self._closed(each)
+            for through, nodes in valleys
+            for course in islice(through.courses(), COURSES)
+            for each in varied(_spread(course, nodes, len(self._frames)))
+        ]
+        courses += self._constant()
+        near = self._refine(self._screened(courses, SMOOTH, SHARP), REFINED)
+        for _ in range(ROUNDS):
+            shaken = self._shaken(near)
+            if not shaken:
+                break
+            near = self._refine(self._screened(shaken, SHARP), REFINED_AGAIN) or near
+
+    def _constant(self) -> list[Course]:
+        """Return courses with a constant gamma; they need not be in reach."""
+        robot, asked, K = self._task.robot, self._task.settings.postures, len(self._frames)
+        return [
+            Course(np.full(K, gamma), np.zeros((K, robot.joints)), np.full(K, posture))
+            for posture in (range(robot.postures) if asked is None else asked)
+            for gamma in 2 * np.pi * np.arange(ANGLES) / ANGLES
+        ]
+
+    def _closed(self, course: Course) -> Course:
+        """Return a course that ends with the gamma that it begins with, if it must."""
+        if self._task.settings.closure != "periodic":
+            return course
+        gamma = course.gamma
+        off = wrap(gamma[-1] - gamma[0])
+        return course._replace(gamma=gamma - np.linspace(0.0, off, len(gamma)))
+
+    def _screened(
+        self, courses: list[Course], *ways: tuple[Stage, ...]
+    ) -> list[tuple[float, Course]]:
+        """Return the motions that courses are screened to, each way, with scores, best first."""
+        found = [c for stages in ways for c in self._screening.screened(courses, stages)]
+        if not found:
+            return []
+        scores = self._screening.scores(np.array([course.q for course in found]))
+        return [(float(scores[i]), found[i]) for i in np.argsort(scores, kind="stable")]
+
+    def _refine(self, screened: list[tuple[float, Course]], most: int) -> list[Course]:
+        """Refine the best motions; return the ones tried if none of all keeps the limits."""
+        tried: list[Course] = []
+        for score, course in screened:
+            best = self._starts.best
+            if len(tried) == most or (best is not None and score > HOPELESS * best.cost_after):
+                break
+            if not self._is_known(course):
+                tried.append(course)
+                self._known.append(course)
+                self._starts.refine_course(self._closed(course), score)
+        return [] if self._starts.best is not None else tried
+
+    def _is_known(self, course: Course) -> bool:
+        """Return whether a motion is nearly one that has been refined, or one found so."""
+        found = (
+            Course(each.plan.gamma, each.plan.q, each.plan.posture)
+            for each in self._starts.all_found
+        )
+        return any(
+            np.array_equal(course.posture, other.posture)
+            and np.abs(wrap(course.gamma - other.gamma)).max() < SAME_MOTION
+            for other in (*self._known, *found)
+        )
+
+    def _shaken(self, near: list[Course]) -> list[Course]:
+        """Return the best motions, or else courses near the limits, changed at random."""
+        best: list[Refinement] = []
+        for found in sorted(self._starts.all_found, key=lambda each: each.cost_after):
+            if all(abs(found.cost_after / o.cost_after - 1) > SAME_COST for o in best):
+                best.append(found)
+        at = [
+            Course(np.unwrap(f.plan.gamma), f.plan.unwrapped, f.plan.posture) for f in best[:SHAKEN]
+        ]
+        count = self._task.settings.restarts
+        return [
+            self._closed(course._replace(gamma=course.gamma + change))
+            for course in at or near
+            for size in (SIZES if at else SMALL)
+            for change in (
+                *waves(self._rng, len(course.gamma), count, size),
+                *ramps(self._rng, len(course.gamma), count, size),
+            )
+        ]
+
+
+def _spread(course: Course, nodes: Ints, count: int) -> Course:
+    """Return a course along some nodes as one along all nodes, with gamma linear between them."""
+    if len(nodes) == count:
+        return course
+    at = np.arange(count)
+    nearest = np.searchsorted((nodes[1:] + nodes[:-1]) / 2, at)
+    return Course(
+        gamma=np.interp(at, nodes, course.gamma),
+        q=np.stack([np.interp(at, nodes, joint) for joint in course.q.T], axis=1),
+        posture=course.posture[nearest],
+    )
+
+
+def varied(course: Course) -> list[Course]:
+    """Return a course, and smoothed ones; one that changes posture also does so sooner and later.
+
+    A course with more than two changes of posture is returned alone.
+    """
+    changes, K = np.flatnonzero(np.diff(course.posture)), len(course.gamma)
+    if not len(changes):
+        return [course, course._replace(gamma=smoothed(course.gamma, max(2, K // 12)))]
+    courses = [course]
+    for shift in range(-2, 3) if len(changes) <= 2 else ():
+        posture = course.posture.copy()
+        if not (changes + shift >= 0).all() or not (changes + shift < K - 1).all():
+            continue
+        for x in changes.tolist():
+            first, last = sorted((x, x + shift))
+            posture[first + 1 : last + 1] = course.posture[x if shift > 0 else x + 1]
+        courses += [Course(smoothed(course.gamma, width), course.q, posture) for width in (2, 5)]
+    return courses
+
+
+def smoothed(gamma: Array, width: int) -> Array:
+    """Return gamma (K,) averaged over `width` nodes on either side, the near ones more."""
+    kernel = np.hanning(2 * width + 3)[1:-1]
+    padded = np.pad(gamma, width, mode="reflect", reflect_type="odd")
+    return np.asarray(np.convolve(padded, kernel / kernel.sum(), "valid"))
+
+
+def waves(rng: np.random.Generator, nodes: int, count: int, size: float) -> Array:
+    """Return random sums of slow cosines (count, K) whose largest absolute value is `size`."""
+    t, change = np.linspace(0, np.pi, nodes), np.zeros((count, nodes))
+    for m in range(WAVES):
+        phase = rng.uniform(0, 2 * np.pi, (count, 1))
+        change += rng.normal(size=(count, 1)) / (1 + m) * np.cos(m * t + phase)
+    return np.asarray(size * change / np.abs(change).max(axis=1, keepdims=True))
+
+
+def ramps(rng: np.random.Generator, nodes: int, count: int, size: float) -> Array:
+    """Return random smooth steps (count, K), from 0 to at most `size` or back, either way."""
+    centre = rng.uniform(0, nodes, (count, 1))
+    width = rng.uniform(0.03, 0.15, (count, 1)) * nodes
+    step = 1 / (1 + np.exp((centre - np.arange(nodes)) / width))
+    step = np.where(rng.random((count, 1)) < 0.5, step, 1 - step)
+    share = rng.choice([-1.0, 1.0], (count, 1)) * rng.uniform(0.5, 1, (count, 1))
+    return np.asarray(size * share * step)

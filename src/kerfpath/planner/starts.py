@@ -1,0 +1,151 @@
+"""Starts of refinements over continuous gamma, and the best motion reached from them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kerfpath import refiner
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.quickest import alike
+from kerfpath.planner.refinements import plan_off_grid
+from kerfpath.planner.task import Task
+from kerfpath.plans import Plan, Proof
+from kerfpath.refiner import Refinement
+from kerfpath.search import ContinuousPath, Course, find_shortest
+
+FIRST_STEP = 5e-3
+"""rad: first change of gamma when a path between the samples is refined."""
+GAIN = 5e-3
+"""Relative gain that a refinement may reach beyond the promised cost of a path."""
+FAR = 0.05
+"""Relative cost above its score from which the refinement of a course is repeated from nearer the
+limits."""
+NARROWED = 6
+"""Most repetitions of a refinement closer to its path while the result is not clear."""
+FREE = 1.0
+"""rad or m: how far external axes may at first leave their course in a cell."""
+
+
+_CLAIM = Proof(optimal=False, statement="found over continuous rotation")
+
+
+class Starts:
+    """Starts of refinements, and the best motion that was reached from them."""
+
+    def __init__(self, task: Task, finder: CollisionFreeSearch) -> None:
+        self._task, self.finder = task, finder
+        self._tried: list[Plan] = []
+        self.found: list[Refinement] = []
+        self.best: Refinement | None = None
+        self.explored = False
+
+    @property
+    def all_found(self) -> list[Refinement]:
+        """Motions found that keep the limits, the best one among them."""
+        return self.found if self.best is None else [*self.found, self.best]
+
+    def above(self, value: float, share: float) -> bool:
+        """Return whether the best motion costs more than (1 + share) times a value."""
+        return self.best is None or self.best.cost_after > (1 + share) * value
+
+    def start_from(self, made: Plan | None, least: float) -> None:
+        """Refine a motion that is close to the best one, whose cost is at least `least`."""
+        if made is not None:
+            self._tried.append(made)
+            found = refiner.refine(made, first=FIRST_STEP, least=least)
+            self.best = found if found.done and self.finder.is_clear(found.plan) else None
+
+    def refine(self, paths: list[ContinuousPath], *, unpromising: bool = False) -> None:
+        """Refine paths, the most promising first, and of similar paths only one.
+
+        Paths that promise no better motion are refined only if `unpromising`: the cost of bringing
+        a path inside the limits is a guess.
+        """
+        plans = [self._task.plan_between(path, _CLAIM) for path in paths]
+        for promised, i in sorted((refiner.promise(plan), i) for i, plan in enumerate(plans)):
+            best, made = self.best, plans[i]
+            hopeless = best is not None and promised * (1 - GAIN) >= best.cost_after
+            if hopeless and not unpromising:
+                break
+            known = self._tried if best is None else [*self._tried, best.plan]
+            if not any(alike(made, other) for other in known):
+                self._tried.append(made)
+                found = _refine_path(self._task, self.finder, paths[i], made)
+                self.best = _better(best, found)
+
+    def refine_course(self, course: Course, score: float) -> None:
+        """Refine a course whose cost is about `score`; if need be, first bring it near the limits.
+
+        A refinement that begins far outside the limits may end at a cost far above the score.
+        """
+        made = self._task.plan_at(*course, _CLAIM)
+        found = refiner.refine(made, first=FIRST_STEP)
+        if not (found.done and found.cost_after <= (1 + FAR) * score):
+            eased = refiner.refine(refiner.reduce_excess(made), first=FIRST_STEP)
+            found = min((found, eased), key=lambda each: (not each.done, each.cost_after))
+        if found.done and self.finder.is_clear(found.plan):
+            self.found.append(found)
+            self.best = _better(self.best, found)
+
+    def refine_from_grid(self, task: Task) -> None:
+        """Refine the best path on the grid of a task, if there is already a motion to improve on.
+
+        It leads to other local optima than paths between the samples do.
+        """
+        if self.best is None:
+            return
+        found: Refinement | None
+        try:
+            path = self.finder.find(find_shortest, task.problem)
+        except NoFeasiblePath:
+            found = plan_off_grid(task, self.finder) if task.settings.closure == "free" else None
+        else:
+            claim = Proof(optimal=False, statement="begun from the grid")
+            found = refiner.refine(task.plan(path.index, path.cost, claim))
+        if found is not None and found.done and self.finder.is_clear(found.plan):
+            own = replace(found.plan, settings=self._task.settings)
+            self.best = _better(self.best, replace(found, plan=own))
+
+
+def _refine_path(
+    task: Task, finder: CollisionFreeSearch, path: ContinuousPath, made: Plan
+) -> Refinement | None:
+    """Return the refinement of a path; None if it does not keep the limits or is not clear.
+
+    In a cell, gamma stays between clear samples. Where the refined motion is not clear, gamma and
+    external axes are kept closer to the path, and the refinement is repeated.
+    """
+    clear = finder.corridor(path.one, path.other)
+    if clear is None:
+        found = refiner.refine(made, first=FIRST_STEP)
+        return found if found.done else None
+    graph = task.graph
+    sample = graph.sample[path.one].astype(np.int64)
+    below, above = graph.gamma_at(sample), graph.gamma_at(sample + (path.one != path.other))
+    at = below + path.share * (above - below)
+    low = made.gamma - (at - graph.gamma_at(sample - clear[0]))
+    high = made.gamma + graph.gamma_at(sample + (path.one != path.other) + clear[1]) - at
+    begun = np.column_stack([made.gamma, made.unwrapped[:, made.robot.free]])
+    low, high = (
+        np.column_stack([gamma, begun[:, 1:] + side * FREE])
+        for gamma, side in ((low, -1.0), (high, 1.0))
+    )
+    for _ in range(NARROWED):
+        found = refiner.refine(made, first=FIRST_STEP, within=(low, high))
+        unclear = finder.unclear(found.plan)
+        if not (found.done and unclear.any()):
+            break
+        moved = unclear[:, None]
+        low = np.where(moved, (low + begun) / 2, low)
+        high = np.where(moved, (high + begun) / 2, high)
+    return found if found.done and not unclear.any() else None
+
+
+def _better(one: Refinement | None, other: Refinement | None) -> Refinement | None:
+    """Return the better of two motions, or the one that there is."""
+    if one is None or other is None:
+        return one or other
+    return min(one, other, key=lambda found: found.cost_after)

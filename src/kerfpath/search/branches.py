@@ -1,0 +1,231 @@
+"""Samples of gamma that follow the joints of every posture: close together where these swing.
+
+Near a singularity a joint may turn half a circle within a hundredth of a degree of gamma, and a
+grid of gamma misses it. Here an interval of gamma is halved while the joints of a posture leave the
+straight line between its ends by much of the step that (5) allows, or turn far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
+from kerfpath.kernels.metric import increments_between, wrap
+from kerfpath.robots import Robot
+
+INTERVALS = 90
+"""Intervals of gamma before any is halved: 4 degrees."""
+SAG, TURN = 0.1, 0.15
+"""An interval is halved if a joint leaves the straight line by more than this share of the step
+that (5) allows, or turns by more, rad."""
+HALVINGS, TO_EDGES = 12, 7
+"""Most halvings of an interval, to 0.001 degrees, and of one in which a branch ends, to 0.03."""
+WIDEST = 0.6
+"""rad: neighbouring samples are joined if no joint moves further between them."""
+EDGE = 1e-9
+"""rad: slack of the ranges of joints, for rounding."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Branches:
+    """Samples of the joints of every node over gamma, and which of them are neighbours.
+
+    Joints whose range is more than a turn count as endless: each is within half a turn of 0 or, if
+    that is outside its range, the next turn inside.
+
+    Parameters
+    ----------
+    start : (K+1,) int
+        Node k has the samples ``start[k]:start[k+1]``, by posture and gamma.
+    gamma : (N,) rad
+    posture : (N,) int
+    q : (N, n) rad
+    endless : (n,) bool
+        Joints that are compared modulo a turn.
+    one, other : (T,) int
+        Samples between which joints may be interpolated, node after node; a sample without a
+        neighbour is both.
+    begin : (K+1,) int
+        Node k has the pairs ``begin[k]:begin[k+1]``.
+    """
+
+    start: Ints
+    gamma: Array
+    posture: Ints
+    q: Array
+    endless: Bools
+    one: Ints
+    other: Ints
+    begin: Ints
+
+    __repr__ = short_repr
+
+    @property
+    def node(self) -> Ints:
+        """Node of each sample, (N,)."""
+        return np.repeat(np.arange(len(self.start) - 1), np.diff(self.start))
+
+
+class _Intervals(NamedTuple):
+    """Intervals of gamma of one node and posture, with the joints at their ends where admitted."""
+
+    node: Ints
+    posture: Ints
+    low: Array
+    high: Array
+    at_low: Bools
+    at_high: Bools
+    q_low: Array
+    q_high: Array
+
+    def of(self, which: Bools) -> _Intervals:
+        return _Intervals._make(part[which] for part in self)
+
+
+def sample_branches(
+    robot: Robot, frames: Array, tool: Array, step: Array, postures: Sequence[int] | None = None
+) -> Branches:
+    """Return samples of the branches of all nodes.
+
+    Parameters
+    ----------
+    robot : Robot
+        An arm with a free rotation and without free joints.
+    frames : (K, 4, 4) m
+        Task frames in the robot base.
+    tool : (4, 4) m
+        Tip frame in the flange.
+    step : (n,) rad
+        Largest increment of each joint from node to node.
+    postures : sequence of int, optional
+        Postures that may be used; default: all.
+    """
+    arm = _Arm(robot, frames, tool, postures)
+    gamma = 2 * np.pi * np.arange(INTERVALS) / INTERVALS - np.pi
+    q, admitted = arm.on_grid(gamma)
+    node, number, posture = (part.ravel() for part in np.indices(admitted.shape))
+    after = (number + 1) % INTERVALS
+    low = gamma[number]
+    intervals = _Intervals(
+        node, posture, low, low + 2 * np.pi / INTERVALS,
+        admitted[node, number, posture], admitted[node, after, posture],
+        q[node, number, posture], q[node, after, posture],
+    )  # fmt: skip
+    here = intervals.at_low
+    parts = [(node[here], posture[here], low[here], intervals.q_low[here])]
+    for halved in range(HALVINGS):
+        intervals = intervals.of(intervals.at_low | intervals.at_high)
+        middle = (intervals.low + intervals.high) / 2
+        at, admitted = arm.solve(intervals.node, middle, intervals.posture)
+        split = arm.coarse(intervals, at, admitted, step)
+        if halved >= TO_EDGES:
+            split &= intervals.at_low & intervals.at_high
+        if not split.any():
+            break
+        intervals, middle, at, admitted = (
+            intervals.of(split), middle[split], at[split], admitted[split],
+        )  # fmt: skip
+        parts.append(
+            (intervals.node[admitted], intervals.posture[admitted], middle[admitted], at[admitted])
+        )
+        below = intervals._replace(high=middle, at_high=admitted, q_high=at)
+        above = intervals._replace(low=middle, at_low=admitted, q_low=at)
+        intervals = _Intervals._make(
+            np.concatenate(ends) for ends in zip(below, above, strict=True)
+        )
+    node, posture, angle, q = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return _joined(node, posture, wrap(angle), q, arm.endless, len(frames))
+
+
+class _Arm:
+    """The joints of an arm at the nodes, within their ranges."""
+
+    def __init__(
+        self, robot: Robot, frames: Array, tool: Array, postures: Sequence[int] | None
+    ) -> None:
+        self._arm, self._frames, self._tool = robot.arm, np.ascontiguousarray(frames), tool
+        self._to_flange = np.linalg.inv(tool)
+        self._limits = robot.joint_limits()
+        wide = self._limits.upper - self._limits.lower > 2 * np.pi + EDGE
+        self.endless = np.asarray(robot.endless | wide)
+        self._wanted = np.isin(
+            np.arange(robot.postures), range(robot.postures) if postures is None else postures
+        )
+
+    def on_grid(self, gamma: Array) -> tuple[Array, Bools]:
+        """Return joints (K, m, P, n) at every gamma (m,), and which are admitted, (K, m, P)."""
+        q, reach = self._arm.inverse_nodes(self._frames, gamma, self._tool)
+        return self._within(q, reach & self._wanted)
+
+    def solve(self, node: Ints, gamma: Array, posture: Ints) -> tuple[Array, Bools]:
+        """Return joints (B, n) of nodes at gamma in postures (B,), and which are admitted, (B,)."""
+        spin = np.tile(np.eye(4), (len(gamma), 1, 1))
+        spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
+        spin[:, 1, 0] = np.sin(gamma)
+        spin[:, 0, 1] = -spin[:, 1, 0]
+        q, reach = self._arm.inverse_all(self._frames[node] @ spin @ self._to_flange)
+        each = np.arange(len(gamma))
+        return self._within(q[each, posture], reach[each, posture])
+
+    def _within(self, q: Array, reach: Bools) -> tuple[Array, Bools]:
+        """Bring joints in (-pi, pi] onto a turn inside their range; return where there is one."""
+        limits, bounded = self._limits, ~self._limits.endless
+        low, high = limits.lower - EDGE, limits.upper + EDGE
+        inside = (q >= low) & (q <= high)
+        up = q + 2 * np.pi * np.ceil((low - q) / (2 * np.pi))
+        q = np.where(bounded & ~inside, up, q)
+        admitted = reach & ((q <= high) | ~bounded).all(axis=-1)
+        for row, least, most in zip(limits.rows, limits.row_lower, limits.row_upper, strict=True):
+            if not (self.endless & (row != 0)).any():
+                value = q @ row
+                admitted &= (value >= least - EDGE) & (value <= most + EDGE)
+        return q, np.asarray(admitted)
+
+    def coarse(self, intervals: _Intervals, at: Array, admitted: Bools, step: Array) -> Bools:
+        """Return which intervals (B,) are to be halved, from the joints in their middle (B, n)."""
+        across = increments_between(intervals.q_low, intervals.q_high, self.endless)
+        sag = increments_between(intervals.q_low, at, self.endless) - across / 2
+        both = intervals.at_low & intervals.at_high
+        with np.errstate(invalid="ignore"):  # joints out of reach
+            far = (np.abs(across) > TURN).any(axis=1) | (np.abs(sag) > SAG * step).any(axis=1)
+        return np.asarray(np.where(both, far | ~admitted, True))
+
+
+def _joined(
+    node: Ints, posture: Ints, gamma: Array, q: Array, endless: Bools, nodes: int
+) -> Branches:
+    """Return samples in order, each joined with the next one in gamma on its branch."""
+    order = np.lexsort((gamma, posture, node))
+    node, posture, gamma = node[order], posture[order], gamma[order]
+    q = np.ascontiguousarray(q[order])
+    each = np.arange(len(node))
+    new = np.ones(len(node), np.bool_)
+    new[1:] = (node[1:] != node[:-1]) | (posture[1:] != posture[:-1])
+    first = np.flatnonzero(new)
+    last = np.append(first[1:], len(node)) - 1
+    after = each + 1
+    after[last] = first
+    near = np.mod(gamma[after] - gamma, 2 * np.pi) < (2 * np.pi + EDGE) / INTERVALS + EDGE
+    near &= np.abs(increments_between(q, q[after], endless)).max(axis=1, initial=0.0) <= WIDEST
+    near &= after != each
+    joined = near.copy()
+    joined[after[near]] = True
+    one = np.concatenate([each[near], each[~joined]])
+    other = np.concatenate([after[near], each[~joined]])
+    by_node = np.argsort(node[one], kind="stable")
+    one, other = one[by_node], other[by_node]
+    ends = np.arange(nodes + 1)
+    return Branches(
+        start=freeze(np.searchsorted(node, ends)),
+        gamma=gamma,
+        posture=posture,
+        q=freeze(q),
+        endless=freeze(endless),
+        one=one,
+        other=other,
+        begin=np.searchsorted(node[one], ends),
+    )

@@ -1,0 +1,258 @@
+"""Screening: many motions are brought near the limits and to low cost at once, and the best kept.
+
+Newton's method minimises an energy, the cost with penalties in place of the limits, over gamma of
+every node. It begins with a smoothed cost and weak penalties, which merge neighbouring optima, and
+ends close to the problem itself. After each stage alike and poor motions are dropped. What is left
+is for the refinement, which alone decides whether a motion keeps the limits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
+from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, wrap
+from kerfpath.kernels.screening import Energy, energies, newton_steps
+from kerfpath.kernels.turns import JointLimits
+from kerfpath.robots import Arm
+from kerfpath.search.valleys import Course
+
+
+class Stage(NamedTuple):
+    """One stage of a screening."""
+
+    smooth: float
+    """Rounding of the distances, in thirds of the typical one of a step."""
+    price: float
+    """Price of exceeding a limit by once the limit, in typical distances of a step."""
+    iterations: int
+    kept: int | None
+    """Most motions that are kept after it; None: all."""
+
+
+SMOOTH = (
+    Stage(1.0, 0.3, 10, None), Stage(1.0, 1.0, 10, 150), Stage(1.0, 3.0, 10, 100),
+    Stage(0.7, 10.0, 10, 70), Stage(0.5, 30.0, 10, 50), Stage(0.3, 100.0, 10, 40),
+    Stage(0.2, 300.0, 10, 30), Stage(0.1, 1e3, 12, 20), Stage(0.03, 3e3, 15, 14),
+    Stage(0.03, 3e4, 15, 12), Stage(0.03, 3e5, 15, 12),
+)  # fmt: skip
+"""Stages that merge basins, for courses that hardly keep (6)."""
+SHARP = (
+    Stage(0.3, 1.0, 10, 150), Stage(0.3, 10.0, 12, 80), Stage(0.2, 100.0, 12, 50),
+    Stage(0.1, 1e3, 12, 25), Stage(0.03, 3e3, 15, 12), Stage(0.03, 3e4, 15, 12),
+    Stage(0.03, 3e5, 15, 12),
+)  # fmt: skip
+"""Stages that stay closer to the courses that they begin with."""
+POWERS = ((0.4, 4.0), (0.15, 8.0), (0.0, 14.0))
+"""Norms in place of the Chebychev one, each from a rounding on."""
+DERIVATIVE_STEP = 1e-4
+"""rad: second differences are exact to 1e-8 of the fourth derivative, rounding to 1e-7."""
+LONGEST = 0.2
+"""rad: most by which gamma of a node changes in a step of Newton's method."""
+LENGTHS = (1.0, 0.35, 0.1, 0.02)
+"""Shares of a step that are tried, in this order."""
+CONVERGED = 1e-5
+"""Relative gain below which a motion is left as it is."""
+ALIKE, SAME_SCORE = 0.03, 0.02
+"""rad, and relative difference of scores: motions that differ by less are one."""
+OVER, OUTSIDE, NEGLIGIBLE = 0.2, 10.0, 0.01
+"""Scores are costs times 1 + OVER per limit exceeded by once the limit, and OUTSIDE per rad out of
+a range, if it is more than NEGLIGIBLE rad."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motions:
+    """Motions side by side, with joints by the kinematics, not wrapped.
+
+    Parameters
+    ----------
+    gamma : (S, K) rad
+    q : (S, K, n) rad
+    posture : (S, K) int
+    """
+
+    gamma: Array
+    q: Array
+    posture: Ints
+
+    __repr__ = short_repr
+
+    def of(self, which: Ints | Bools) -> Motions:
+        """Return some of the motions."""
+        return Motions(gamma=self.gamma[which], q=self.q[which], posture=self.posture[which])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Screening:
+    """The problem of the motions that are screened.
+
+    Parameters
+    ----------
+    arm : Arm
+    frames : (K, 4, 4) m
+        Task frames in the robot base.
+    tool : (4, 4) m
+        Tip frame in the flange.
+    limits : JointLimits
+    energy : Energy
+        Weights, metric, objective and limits; the rest is set by the stages.
+    """
+
+    arm: Arm
+    frames: Array
+    tool: Array
+    limits: JointLimits
+    energy: Energy
+
+    __repr__ = short_repr
+
+    def screened(self, courses: list[Course], stages: tuple[Stage, ...]) -> list[Course]:
+        """Return the best motions that courses lead to, by their score; there may be none."""
+        motions = self._motions(courses)
+        for stage in stages:
+            if not len(motions.gamma):
+                break
+            motions = self._descended(motions, stage)
+            motions = motions.of(self._best(motions, stage.kept))
+        motions = motions.of(np.argsort(self.scores(motions.q), kind="stable"))
+        return [
+            Course(*each) for each in zip(motions.gamma, motions.q, motions.posture, strict=True)
+        ]
+
+    def _motions(self, courses: list[Course]) -> Motions:
+        """Return the motions of courses that are in reach, on turns inside the ranges."""
+        gamma, near, posture = (np.array([c[part] for c in courses]) for part in range(3))
+        near = near.reshape(*gamma.shape, -1)
+        motions = Motions(gamma=gamma, q=self._joints(gamma, near, posture), posture=posture)
+        reached = np.asarray(np.isfinite(motions.q).all(axis=(1, 2)))
+        motions = motions.of(reached)
+        q = motions.q
+        step = wrap(np.diff(q, axis=1))
+        q[:, 1:] = q[:, :1] + np.cumsum(step, axis=1)
+        return replace(
+            motions, q=np.stack([within(self.limits, each) for each in q]) if len(q) else q
+        )
+
+    def _joints(self, gamma: Array, near: Array, posture: Ints) -> Array:
+        """Return the joints (S, K, n) at gamma (S, K) on the turns near `near`, or NaN."""
+        spin = np.zeros((*gamma.shape, 4, 4))
+        spin[..., 0, 0] = spin[..., 1, 1] = np.cos(gamma)
+        spin[..., 1, 0] = np.sin(gamma)
+        spin[..., 0, 1] = -spin[..., 1, 0]
+        spin[..., 2, 2] = spin[..., 3, 3] = 1.0
+        T = (self.frames @ spin @ np.linalg.inv(self.tool)).reshape(-1, 4, 4)
+        n = near.shape[2]
+        q = self.arm.follow(T, np.ascontiguousarray(near.reshape(-1, n)), posture.ravel())
+        return q.reshape(near.shape)
+
+    def _descended(self, motions: Motions, stage: Stage) -> Motions:
+        """Return motions after the iterations of a stage."""
+        gamma, q, posture = motions.gamma.copy(), motions.q.copy(), motions.posture
+        lengths = self._distances(q)
+        typical = float(np.median(lengths))
+        energy = self.energy._replace(
+            smooth=max(stage.smooth * typical / 3, 1e-12),
+            power=next(power for least, power in POWERS if stage.smooth >= least),
+            price=stage.price * typical,
+        )
+        scale = np.maximum(lengths.max(axis=1), 1e-9)
+        damping, live = np.full(len(q), CONVERGED), np.ones(len(q), np.bool_)
+        value = np.empty(len(q))
+        energies(q, energy, scale, value)
+        step = np.empty(gamma.shape)
+        h = DERIVATIVE_STEP
+        for _ in range(stage.iterations):
+            at = np.flatnonzero(live)
+            ahead = self._joints(gamma[at] + h, q[at], posture[at])
+            behind = self._joints(gamma[at] - h, q[at], posture[at])
+            first, second = (ahead - behind) / (2 * h), (ahead - 2 * q[at] + behind) / h**2
+            edge = ~np.isfinite(first + second)
+            first[edge] = second[edge] = 0.0
+            damp, change = damping[at], np.empty((len(at), gamma.shape[1]))
+            newton_steps(
+                q[at], first, second, energy, scale[at], LONGEST, damp, change,
+            )  # fmt: skip
+            step[at], damping[at] = change, damp
+            left, gain = live.copy(), np.zeros(len(q))
+            for share in LENGTHS:
+                m = np.flatnonzero(left)
+                there = gamma[m] + share * step[m]
+                joints = self._joints(there, q[m], posture[m])
+                new = np.empty(len(m))
+                energies(joints, energy, scale[m], new)
+                better = new < value[m]
+                taken = m[better]
+                gamma[taken], q[taken] = there[better], joints[better]
+                gain[taken] = value[taken] - new[better]
+                value[taken] = new[better]
+                damping[taken] *= 4.0 if share < 0.5 else 0.25
+                left[taken] = False
+                if not left.any():
+                    break
+            damping[left] *= 10.0
+            damping = np.clip(damping, 1e-8, 1e4)
+            live &= (gain > CONVERGED * np.abs(value)) | (left & (damping < 1e3))
+            if not live.any():
+                break
+        return Motions(gamma=gamma, q=q, posture=posture)
+
+    def _best(self, motions: Motions, most: int | None) -> Ints:
+        """Return at most so many motions of the best scores that differ."""
+        score = self.scores(motions.q)
+        order = np.argsort(score, kind="stable")
+        if most is None:
+            return order
+        kept: list[int] = []
+        for j in order.tolist():
+            apart = np.abs(wrap(motions.gamma[kept] - motions.gamma[j])).max(axis=1, initial=0.0)
+            same = (apart < ALIKE) & (score[kept] > (1 - SAME_SCORE) * score[j])
+            if not same.any():
+                kept.append(j)
+            if len(kept) == most:
+                break
+        return np.array(kept, dtype=np.int64)
+
+    def _distances(self, q: Array) -> Array:
+        """Return the distances (S, K-1) of the steps of motions."""
+        d = np.abs(np.diff(q, axis=1)) * self.energy.weight
+        if self.energy.metric == MANHATTAN:
+            return np.asarray(d.sum(axis=2))
+        if self.energy.metric == CHEBYCHEV:
+            return np.asarray(d.max(axis=2))
+        return np.asarray(np.sqrt((d * d).sum(axis=2)))
+
+    def scores(self, q: Array) -> Array:
+        """Return the cost (S,) of motions, more for those that break limits."""
+        lengths = self._distances(q)
+        cost = lengths.max(axis=1) if self.energy.minimax else lengths.sum(axis=1)
+        dq = np.diff(q, axis=1)
+        fast = np.abs(dq / self.energy.velocity).max(axis=2) - 1
+        sharp = np.abs(np.diff(dq, axis=1) / self.energy.acceleration).max(axis=2) - 1
+        over = np.maximum(fast, 0).sum(axis=1) + np.maximum(sharp, 0).sum(axis=1)
+        out = np.maximum(self.energy.lower - q, q - self.energy.upper).max(axis=(1, 2))
+        out = np.where(out > NEGLIGIBLE, out, 0.0)
+        return np.asarray(cost * (1 + OVER * over + OUTSIDE * out))
+
+
+def within(limits: JointLimits, q: Array) -> Array:
+    """Return joints (K, n) rad, not wrapped, each shifted by whole turns to fit its range best."""
+    turns = 2 * np.pi * np.arange(-3, 4)[:, None]
+    least, most = q.min(axis=0) + turns, q.max(axis=0) + turns
+    beyond = np.maximum(limits.lower - least, 0.0) + np.maximum(most - limits.upper, 0.0)
+    beyond = np.where(limits.endless, 0.0, beyond) + 1e-9 * np.abs(least + most)
+    return np.asarray(q + turns[np.argmin(beyond, axis=0), 0])
+
+
+# -----------------------------------------------------------------------------
+# Compile the kernels of a screening.
+
+
+def compile_screening() -> None:
+    """Compile the kernels of `Screening` by a step of one motion of three nodes."""
+    q, ones, one = np.zeros((1, 3, 6)), freeze(np.ones(6)), np.ones(1)
+    energy = Energy(ones, MANHATTAN, False, 1.0, 1.0, ones, ones, freeze(-ones), ones, 1.0)
+    energies(q, energy, one, np.empty(1))
+    newton_steps(q, q, q, energy, one, LONGEST, np.ones(1), np.empty((1, 3)))
