@@ -15,8 +15,9 @@ from kerfpath.graph import build, gamma_grid
 from kerfpath.isolated import start_python
 from kerfpath.kernels import CACHE, is_kept
 from kerfpath.kernels.metric import MANHATTAN, maximum_distance, total_distance
+from kerfpath.kernels.screening import Energy, energies, newton_steps
 from kerfpath.robots import Robot, robot
-from kerfpath.search import compile_screening, compile_search
+from kerfpath.search import compile_search
 
 __all__ = ["FOR_BOUNDS", "compile_stage", "finish_compiling", "is_compiled", "warm_up"]
 
@@ -47,7 +48,10 @@ def _compile_poses(kinematics: str) -> None:
 def _compile_searches(_: str) -> None:
     """Compile the kernels of the searches over continuous gamma."""
     compile_search()
-    compile_screening()
+    q, ones, one = np.zeros((1, 3, 6)), freeze(np.ones(6)), np.ones(1)
+    energy = Energy(ones, MANHATTAN, False, 1.0, 1.0, ones, ones, freeze(-ones), ones, 1.0)
+    energies(q, energy, one, np.empty(1))
+    newton_steps(q, q, q, energy, one, 1.0, np.ones(1), np.empty((1, 3)))
 
 
 def _compile_cells(kinematics: str) -> None:

@@ -18,21 +18,13 @@ from kerfpath.arrays import Array, Ints, freeze
 from kerfpath.kernels.continuous import Steps
 from kerfpath.kernels.metric import wrap
 from kerfpath.kernels.screening import Energy
+from kerfpath.planner.branches import sample_branches
+from kerfpath.planner.screening import SHARP, SMOOTH, Screening, Stage
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import Task
 from kerfpath.refiner import Refinement
 from kerfpath.robots import lowest_joint
-from kerfpath.search import (
-    METRIC_CODES,
-    SHARP,
-    SMOOTH,
-    Branches,
-    Course,
-    Screening,
-    Stage,
-    Valleys,
-    sample_branches,
-)
+from kerfpath.search import METRIC_CODES, Branches, Course, Valleys
 from kerfpath.windows import inside
 
 STEP, LEAST_STEPS = np.radians(10.0), 8

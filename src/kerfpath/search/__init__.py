@@ -1,7 +1,5 @@
 """Searches for the best path through a layered graph; each takes a `SearchProblem`."""
 
-from kerfpath.search.branches import Branches as Branches
-from kerfpath.search.branches import sample_branches as sample_branches
 from kerfpath.search.clear import CheckedEdges as CheckedEdges
 from kerfpath.search.clear import FoundPath as FoundPath
 from kerfpath.search.clear import find_clear as find_clear
@@ -24,11 +22,6 @@ from kerfpath.search.problem import SearchProblem as SearchProblem
 from kerfpath.search.problem import rotation_limits as rotation_limits
 from kerfpath.search.relaxations import Relaxations as Relaxations
 from kerfpath.search.relaxations import find_relaxations as find_relaxations
-from kerfpath.search.screening import SHARP as SHARP
-from kerfpath.search.screening import SMOOTH as SMOOTH
-from kerfpath.search.screening import Screening as Screening
-from kerfpath.search.screening import Stage as Stage
-from kerfpath.search.screening import compile_screening as compile_screening
 from kerfpath.search.shortest import LayeredPath as LayeredPath
 from kerfpath.search.shortest import find_shortest as find_shortest
 from kerfpath.search.shortest import shortest_path as shortest_path
@@ -37,5 +30,6 @@ from kerfpath.search.slow_path import find_slow_path as find_slow_path
 from kerfpath.search.slow_path import velocity_allows as velocity_allows
 from kerfpath.search.slowed import SlowedPath as SlowedPath
 from kerfpath.search.slowed import find_slowed as find_slowed
+from kerfpath.search.valleys import Branches as Branches
 from kerfpath.search.valleys import Course as Course
 from kerfpath.search.valleys import Valleys as Valleys

@@ -8,15 +8,15 @@ Where (6) binds, the best motion may lie in any of them.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath.arrays import Array, Ints, freeze
+from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
 from kerfpath.kernels.beam import Alike, Beam, advance
 from kerfpath.kernels.continuous import Steps, Targets
 from kerfpath.kernels.metric import increments, increments_between, wrap
-from kerfpath.search.branches import Branches
 from kerfpath.search.continuous import are_bottoms, targets_of, values_to
 
 LAYERS = 7
@@ -25,6 +25,46 @@ SAME_COURSE = 0.06
 """rad: courses in the same postures whose gamma differs by less everywhere are one."""
 ANY_CHANGE = 1e6
 """rad: change of an increment that no joint ever has."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Branches:
+    """Samples of the joints of every node over gamma, and which of them are neighbours.
+
+    Joints whose range is more than a turn count as endless: each is within half a turn of 0 or, if
+    that is outside its range, the next turn inside.
+
+    Parameters
+    ----------
+    start : (K+1,) int
+        Node k has the samples ``start[k]:start[k+1]``, by posture and gamma.
+    gamma : (N,) rad
+    posture : (N,) int
+    q : (N, n) rad
+    endless : (n,) bool
+        Joints that are compared modulo a turn.
+    one, other : (T,) int
+        Samples between which joints may be interpolated, node after node; a sample without a
+        neighbour is both.
+    begin : (K+1,) int
+        Node k has the pairs ``begin[k]:begin[k+1]``.
+    """
+
+    start: Ints
+    gamma: Array
+    posture: Ints
+    q: Array
+    endless: Bools
+    one: Ints
+    other: Ints
+    begin: Ints
+
+    __repr__ = short_repr
+
+    @property
+    def node(self) -> Ints:
+        """Node of each sample, (N,)."""
+        return np.repeat(np.arange(len(self.start) - 1), np.diff(self.start))
 
 
 class Course(NamedTuple):

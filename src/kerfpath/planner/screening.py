@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
+from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, wrap
 from kerfpath.kernels.screening import Energy, energies, newton_steps
 from kerfpath.kernels.turns import JointLimits
 from kerfpath.robots import Arm
-from kerfpath.search.valleys import Course
+from kerfpath.search import Course
 
 
 class Stage(NamedTuple):
@@ -244,15 +244,3 @@ def within(limits: JointLimits, q: Array) -> Array:
     beyond = np.maximum(limits.lower - least, 0.0) + np.maximum(most - limits.upper, 0.0)
     beyond = np.where(limits.endless, 0.0, beyond) + 1e-9 * np.abs(least + most)
     return np.asarray(q + turns[np.argmin(beyond, axis=0), 0])
-
-
-# -----------------------------------------------------------------------------
-# Compile the kernels of a screening.
-
-
-def compile_screening() -> None:
-    """Compile the kernels of `Screening` by a step of one motion of three nodes."""
-    q, ones, one = np.zeros((1, 3, 6)), freeze(np.ones(6)), np.ones(1)
-    energy = Energy(ones, MANHATTAN, False, 1.0, 1.0, ones, ones, freeze(-ones), ones, 1.0)
-    energies(q, energy, one, np.empty(1))
-    newton_steps(q, q, q, energy, one, LONGEST, np.ones(1), np.empty((1, 3)))

@@ -8,14 +8,14 @@ straight line between its ends by much of the step that (5) allows, or turn far.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
+from kerfpath.arrays import Array, Bools, Ints, freeze
 from kerfpath.kernels.metric import increments_between, wrap
 from kerfpath.robots import Robot
+from kerfpath.search import Branches
 
 INTERVALS = 90
 """Intervals of gamma before any is halved: 4 degrees."""
@@ -28,46 +28,6 @@ WIDEST = 0.6
 """rad: neighbouring samples are joined if no joint moves further between them."""
 EDGE = 1e-9
 """rad: slack of the ranges of joints, for rounding."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Branches:
-    """Samples of the joints of every node over gamma, and which of them are neighbours.
-
-    Joints whose range is more than a turn count as endless: each is within half a turn of 0 or, if
-    that is outside its range, the next turn inside.
-
-    Parameters
-    ----------
-    start : (K+1,) int
-        Node k has the samples ``start[k]:start[k+1]``, by posture and gamma.
-    gamma : (N,) rad
-    posture : (N,) int
-    q : (N, n) rad
-    endless : (n,) bool
-        Joints that are compared modulo a turn.
-    one, other : (T,) int
-        Samples between which joints may be interpolated, node after node; a sample without a
-        neighbour is both.
-    begin : (K+1,) int
-        Node k has the pairs ``begin[k]:begin[k+1]``.
-    """
-
-    start: Ints
-    gamma: Array
-    posture: Ints
-    q: Array
-    endless: Bools
-    one: Ints
-    other: Ints
-    begin: Ints
-
-    __repr__ = short_repr
-
-    @property
-    def node(self) -> Ints:
-        """Node of each sample, (N,)."""
-        return np.repeat(np.arange(len(self.start) - 1), np.diff(self.start))
 
 
 class _Intervals(NamedTuple):

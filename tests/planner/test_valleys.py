@@ -12,17 +12,9 @@ from kerfpath.kernels import screening as kernel
 from kerfpath.kernels.continuous import Steps
 from kerfpath.kernels.metric import increments_between, wrap
 from kerfpath.kernels.screening import Energy
-from kerfpath.search import (
-    METRIC_CODES,
-    SHARP,
-    SMOOTH,
-    Course,
-    Screening,
-    Valleys,
-    sample_branches,
-)
-from kerfpath.search.branches import HALVINGS, INTERVALS, SAG, TO_EDGES, TURN
-from kerfpath.search.screening import within
+from kerfpath.planner.branches import HALVINGS, INTERVALS, SAG, TO_EDGES, TURN, sample_branches
+from kerfpath.planner.screening import SHARP, SMOOTH, Screening, within
+from kerfpath.search import METRIC_CODES, Course, Valleys
 
 DT = 0.04
 """s"""
