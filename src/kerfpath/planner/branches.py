@@ -65,7 +65,7 @@ def sample_branches(
         Postures that may be used; default: all.
     """
     arm = _Arm(robot, frames, tool, postures)
-    gamma = 2 * np.pi * np.arange(INTERVALS) / INTERVALS - np.pi
+    gamma = freeze(2 * np.pi * np.arange(INTERVALS) / INTERVALS - np.pi)
     q, admitted = arm.on_grid(gamma)
     node, number, posture = (part.ravel() for part in np.indices(admitted.shape))
     after = (number + 1) % INTERVALS
@@ -107,7 +107,8 @@ class _Arm:
     def __init__(
         self, robot: Robot, frames: Array, tool: Array, postures: Sequence[int] | None
     ) -> None:
-        self._arm, self._frames, self._tool = robot.arm, np.ascontiguousarray(frames), tool
+        self._arm, self._tool = robot.arm, tool
+        self._frames = freeze(np.array(frames, order="C"))
         self._to_flange = np.linalg.inv(tool)
         self._limits = robot.joint_limits()
         wide = self._limits.upper - self._limits.lower > 2 * np.pi + EDGE
