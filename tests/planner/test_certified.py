@@ -43,7 +43,7 @@ def test_every_plan_is_certified_as_it_is_asked_for(asked, task, circle, arm, ke
     made = plan(circle, arm, phase=phases.append, **task, **keywords)
     ((given, gap, seconds),) = asked
     assert (gap, seconds) == (0.005, None)
-    assert phases[-1] == "certificate"
+    assert "certificate" in phases
     assert phases.count("certificate") == 1
     np.testing.assert_array_equal(given.q, made.q)
     assert (made.proof.bound, made.proof.gap) == (0.9 * made.cost, 0.1)

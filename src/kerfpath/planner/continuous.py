@@ -32,8 +32,8 @@ ENOUGH, POOR = 5e-3, 1e-2
 so much that the promised costs say little, and all paths are refined."""
 BY_FEW = 0.05
 """The same along every few nodes, whose steps pass over what a course turns back between them."""
-SAME_COST = 1e-6
-"""Relative difference of motions that count as equally costly."""
+BETTER = 1e-4
+"""Relative gain from which a motion replaces one that has a bound: that of a converged descent."""
 COARSE_STEP = np.radians(1.5)
 """rad: step of gamma from which a search that finds nothing is repeated with half the step."""
 NEARLY = 0.95
@@ -72,7 +72,7 @@ def better_motion(attempt: Attempt) -> Plan | None:
     attempt.begin("search")
     Exploration(attempt.task.whole(), starts).run()
     assert starts.best is not None, "there was a motion before"
-    if starts.best.cost_after > (1 - SAME_COST) * before.cost_after:
+    if starts.best.cost_after > (1 - BETTER) * before.cost_after:
         return None
     return claimed(starts.best, attempt.finder)
 
@@ -219,12 +219,14 @@ def _clear_motion(
 def _explore(task: Task, starts: Starts, search: ContinuousSearch) -> None:
     """Explore all valleys if there may be a better motion than the best one.
 
-    Along every few nodes the value function sees courses that it misses along all of them.
+    Along every few nodes the value function sees courses that it misses along all of them. Where
+    there is no motion to improve on, the grid is a better start, or the speed is too high.
     """
     exploration = Exploration(task, starts)
     if starts.above(search.value, ENOUGH) or starts.above(exploration.value, BY_FEW):
         starts.refine([*search.paths(wide(task))])
-        exploration.run()
+        if starts.best is not None:
+            exploration.run()
 
 
 def _search_wider(

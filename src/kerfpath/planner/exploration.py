@@ -14,7 +14,7 @@ from itertools import islice
 
 import numpy as np
 
-from kerfpath.arrays import Array, Ints, freeze
+from kerfpath.arrays import Array, Bools, Ints, freeze
 from kerfpath.kernels.continuous import Steps
 from kerfpath.kernels.metric import wrap
 from kerfpath.kernels.screening import Energy
@@ -44,8 +44,8 @@ ROUNDS = 2
 """Times that the best motions are shaken."""
 SHAKEN = 2
 """Best motions that are shaken."""
-SIZES, SMALL = (0.15, 0.4, 0.8, 1.3), (0.05, 0.15, 0.4, 0.8)
-"""rad: largest changes of gamma of a motion, and of one that does not yet keep the limits."""
+SIZES = (0.15, 0.4, 0.8, 1.3)
+"""rad: largest changes of gamma of a motion."""
 WAVES = 5
 """Cosines in a change; the slower ones are larger."""
 SAME_COST = 1e-3
@@ -69,7 +69,7 @@ class Exploration:
     task : Task
         A task that `can_explore`.
     starts : Starts
-        Refines the motions and keeps the best.
+        Refines the motions and keeps the best; it has one already.
     """
 
     def __init__(self, task: Task, starts: Starts) -> None:
@@ -96,6 +96,7 @@ class Exploration:
                 price=0.0,
             ),
         )
+        self._allowed = _postures_of(task)
         self._rng = np.random.default_rng(SEED)
         self._known: list[Course] = []
 
@@ -118,12 +119,13 @@ class Exploration:
         branches = sample_branches(robot, self._frames[nodes], tool, step, s.postures)
         energy = self._screening.energy
         steps = Steps(energy.weight, energy.metric, energy.minimax, np.inf, -step, step)
-        return Valleys(branches, steps, self._cost(branches, self._task.contour.s[nodes])), nodes
+        return Valleys(branches, steps, self._cost(branches, nodes)), nodes
 
-    def _cost(self, branches: Branches, s: Array) -> Array:
-        """Return the cost (N,) of samples at arc lengths s (K,); infinite if not admitted."""
+    def _cost(self, branches: Branches, nodes: Ints) -> Array:
+        """Return the cost (N,) of samples of some nodes (M,); infinite if not admitted."""
         asked, robot, tool = self._task.settings, self._task.robot, self._task.setup.tool
-        q, cost = branches.q, np.zeros(len(branches.q))
+        q, node = branches.q, nodes[branches.node]
+        cost = np.where(self._allowed[node, branches.posture], 0.0, np.inf)
         if asked.comfort is not None:
             cost += asked.comfort.price(robot, q, tool)
             for near in asked.comfort.too_near(robot, q, tool).values():
@@ -131,7 +133,8 @@ class Exploration:
         if asked.floor is not None:
             cost[lowest_joint(robot, q) < asked.floor] = np.inf
         if asked.gamma_windows:
-            cost[~inside(asked.gamma_windows, s[branches.node], branches.gamma)] = np.inf
+            s = self._task.contour.s[node]
+            cost[~inside(asked.gamma_windows, s, branches.gamma)] = np.inf
         return cost
 
     @property
@@ -153,12 +156,9 @@ class Exploration:
             for each in varied(_spread(course, nodes, len(self._frames)))
         ]
         courses += self._constant()
-        near = self._refine(self._screened(courses, SMOOTH, SHARP), REFINED)
+        self._refine(self._screened(courses, SMOOTH, SHARP), REFINED)
         for _ in range(ROUNDS):
-            shaken = self._shaken(near)
-            if not shaken:
-                break
-            near = self._refine(self._screened(shaken, SHARP), REFINED_AGAIN) or near
+            self._refine(self._screened(self._shaken(), SHARP), REFINED_AGAIN)
 
     def _constant(self) -> list[Course]:
         """Return courses with a constant gamma; they need not be in reach."""
@@ -181,24 +181,25 @@ class Exploration:
         self, courses: list[Course], *ways: tuple[Stage, ...]
     ) -> list[tuple[float, Course]]:
         """Return the motions that courses are screened to, each way, with scores, best first."""
+        every = np.arange(len(self._frames))
+        courses = [c for c in courses if self._allowed[every, c.posture].all()]
         found = [c for stages in ways for c in self._screening.screened(courses, stages)]
         if not found:
             return []
         scores = self._screening.scores(np.array([course.q for course in found]))
         return [(float(scores[i]), found[i]) for i in np.argsort(scores, kind="stable")]
 
-    def _refine(self, screened: list[tuple[float, Course]], most: int) -> list[Course]:
-        """Refine the best motions; return the ones tried if none of all keeps the limits."""
-        tried: list[Course] = []
+    def _refine(self, screened: list[tuple[float, Course]], most: int) -> None:
+        """Refine the best motions, at most so many, that are not known."""
+        tried = 0
         for score, course in screened:
             best = self._starts.best
-            if len(tried) == most or (best is not None and score > HOPELESS * best.cost_after):
+            if tried == most or (best is not None and score > HOPELESS * best.cost_after):
                 break
             if not self._is_known(course):
-                tried.append(course)
+                tried += 1
                 self._known.append(course)
                 self._starts.refine_course(self._closed(course), score)
-        return [] if self._starts.best is not None else tried
 
     def _is_known(self, course: Course) -> bool:
         """Return whether a motion is nearly one that has been refined, or one found so."""
@@ -212,25 +213,30 @@ class Exploration:
             for other in (*self._known, *found)
         )
 
-    def _shaken(self, near: list[Course]) -> list[Course]:
-        """Return the best motions, or else courses near the limits, changed at random."""
+    def _shaken(self) -> list[Course]:
+        """Return the best motions that differ in cost, changed at random."""
         best: list[Refinement] = []
         for found in sorted(self._starts.all_found, key=lambda each: each.cost_after):
             if all(abs(found.cost_after / o.cost_after - 1) > SAME_COST for o in best):
                 best.append(found)
-        at = [
-            Course(np.unwrap(f.plan.gamma), f.plan.unwrapped, f.plan.posture) for f in best[:SHAKEN]
-        ]
-        count = self._task.settings.restarts
+        count, K = self._task.settings.restarts, len(self._frames)
         return [
-            self._closed(course._replace(gamma=course.gamma + change))
-            for course in at or near
-            for size in (SIZES if at else SMALL)
-            for change in (
-                *waves(self._rng, len(course.gamma), count, size),
-                *ramps(self._rng, len(course.gamma), count, size),
-            )
+            self._closed(Course(np.unwrap(plan.gamma) + change, plan.unwrapped, plan.posture))
+            for plan in (found.plan for found in best[:SHAKEN])
+            for size in SIZES
+            for made in (waves, ramps)
+            for change in made(self._rng, K, count, size)
         ]
+
+
+def _postures_of(task: Task) -> Bools:
+    """Return which postures each node may have, (K, P): those in a graph that was given, or all."""
+    allowed = np.ones((len(task.contour), task.robot.postures), np.bool_)
+    if task.placed:
+        graph = task.graph
+        allowed[:] = False
+        allowed[np.repeat(np.arange(len(allowed)), np.diff(graph.start)), graph.posture] = True
+    return allowed
 
 
 def _spread(course: Course, nodes: Ints, count: int) -> Course:

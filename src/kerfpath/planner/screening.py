@@ -111,6 +111,8 @@ class Screening:
 
     def screened(self, courses: list[Course], stages: tuple[Stage, ...]) -> list[Course]:
         """Return the best motions that courses lead to, by their score; there may be none."""
+        if not courses:
+            return []
         motions = self._motions(courses)
         for stage in stages:
             if not len(motions.gamma):
