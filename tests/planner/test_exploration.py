@@ -1,44 +1,20 @@
-"""Exploration of all valleys: the courses it begins with, and motions that only it finds."""
+"""Exploration of all valleys: the changes that it makes, and the motions that it finds."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kerfpath import Certify, Tilt, audit, plan
-from kerfpath.contour import Contour
+from kerfpath import GammaWindow, Tilt, audit, plan
 from kerfpath.options import PlanOptions
-from kerfpath.planner.exploration import can_explore, ramps, smoothed, varied, waves
+from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.exploration import Exploration, can_explore, ramps, smoothed, waves
+from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import planning_task
-from kerfpath.plans import path_cost
-from kerfpath.search import Course
 from kerfpath.setup import Setup
 
-
-def course(posture):
-    K = len(posture)
-    return Course(np.linspace(0, 1, K) ** 2, np.zeros((K, 6)), np.array(posture))
-
-
-def test_a_course_in_one_posture_is_also_smoothed():
-    own, smooth = varied(course([1] * 20))
-    np.testing.assert_array_equal(own.gamma, course([1] * 20).gamma)
-    np.testing.assert_array_equal(smooth.posture, own.posture)
-    assert np.abs(np.diff(smooth.gamma, 2)).max() <= np.abs(np.diff(own.gamma, 2)).max() + 1e-12
-
-
-def test_a_change_of_posture_also_comes_sooner_and_later():
-    made = varied(course([0] * 8 + [1] * 8))
-    changes = {tuple(np.flatnonzero(np.diff(each.posture))) for each in made}
-    assert changes == {(5,), (6,), (7,), (8,), (9,)}
-    assert all(each.posture[0] == 0 and each.posture[-1] == 1 for each in made)
-
-
-def test_changes_at_the_ends_stay_inside():
-    made = varied(course([0] + [1] * 9))
-    assert all(len(np.flatnonzero(np.diff(each.posture))) == 1 for each in made)
-
-
-def test_a_course_with_many_changes_of_posture_stays_as_it_is():
-    assert len(varied(course([0, 1, 0, 1, 0, 1]))) == 1
+SAME = 1e-3
+"""Relative: refinements stop where the model promises less than 1e-4 a step, from either side."""
 
 
 @pytest.mark.parametrize("width", [1, 2, 5])
@@ -71,23 +47,23 @@ def test_tilts_and_free_joints_are_not_explored(circle, arm, tool, placement):
     assert not can_explore(task(rail))
 
 
-def known_motion(arm, tool, nodes):
-    """A contour, and a motion along it that passes the singularity of the wrist straight."""
-    dt = 0.01
-    t = (np.arange(nodes) - (nodes - 1) / 2) * dt
-    rate = np.radians([8.0, -5.0, 6.0, 0.0, 80.0, 0.0])
-    q = np.array([0.1, 0.2, 0.3, 0.4, 0.0, 0.5]) + t[:, None] * rate
-    tip = arm.forward(q) @ tool
-    return Contour(tip[:, :3, 3], tip[:, :3, 2], time=np.arange(nodes) * dt), q
-
-
 @pytest.mark.slow
-def test_a_motion_straight_through_a_singularity_is_found(arm, tool):
-    """Without the exploration the plan costs 2.6 % more than this motion, with either wrist."""
-    contour, q = known_motion(arm, tool, 32)
-    made = plan(contour, arm, tool=tool, placement=np.eye(4), certify=Certify())
-    s = made.settings
-    known = path_cost(np.diff(q, axis=0), s.weights, s.metric, s.objective)
-    assert made.cost <= known * (1 + 1e-3)
-    assert set(made.posture) == {0, 1}
-    assert not [issue for issue in audit(made) if issue.level == "error"]
+@pytest.mark.parametrize("away", [1.0, 2.0, -1.5])
+def test_the_valley_of_the_best_motion_is_found_from_another(circle, arm, tool, placement, away):
+    """From the best motion with gamma at least 0.8 rad from where it is best at the start."""
+    nodes = circle.resample(count=41)
+    where = {"tool": tool, "placement": placement, "speed": 0.1}
+    best = plan(nodes, arm, **where)
+    middle = best.gamma[0] + away
+    start = nodes.s[0]
+    window = GammaWindow(start=start, end=start, low=middle - 0.2, high=middle + 0.2)
+    poor = plan(nodes, arm, gamma_windows=[window], **where)
+    assert poor.cost > best.cost * 1.01
+    task = planning_task(nodes, Setup.of(arm, tool, placement), PlanOptions(), speed=0.1).whole()
+    starts = Starts(task, CollisionFreeSearch(task))
+    starts.start_from(replace(poor, settings=best.settings), poor.cost)
+    assert starts.best.cost_after == pytest.approx(poor.cost)
+    Exploration(task, starts).run()
+    assert starts.explored
+    assert starts.best.cost_after <= best.cost * (1 + SAME)
+    assert not [issue for issue in audit(starts.best.plan) if issue.level == "error"]

@@ -1,10 +1,13 @@
 """Exploration of all valleys: courses through them, screened together, refined, and shaken.
 
 Under (6) the cheapest course by (5) alone need not lead to the best motion, which may lie in any
-valley, in any posture, or pass a singularity from one posture to another. Courses are sought over
-samples of gamma that follow the joints, along all nodes and along every few: the fewer nodes, the
-larger the steps between them, beside which samples and kinks are fine. All are screened together;
-the best are refined, then changed by waves and smooth steps of gamma, and screened again.
+valley, in any posture. Courses are sought over samples of gamma that follow the joints, along all
+nodes and along every few: the fewer nodes, the larger the steps between them, beside which samples
+and kinks are fine. All are screened together; the best are refined, then changed by waves and
+smooth steps of gamma, and screened again.
+
+Only courses in one posture are explored. Between two nodes of different postures the arm passes a
+singularity; where the tip keeps to the path there, the joints turn much faster than at the nodes.
 """
 
 from __future__ import annotations
@@ -46,6 +49,8 @@ SHAKEN = 2
 """Best motions that are shaken."""
 SIZES = (0.15, 0.4, 0.8, 1.3)
 """rad: largest changes of gamma of a motion."""
+SMOOTHED = 12
+"""Share of the nodes over which gamma of a course is averaged in a second one."""
 WAVES = 5
 """Cosines in a change; the slower ones are larger."""
 SAME_COST = 1e-3
@@ -149,13 +154,12 @@ class Exploration:
         valleys = self._along_few
         if self._few // 2 > 1:
             valleys = [*valleys, self._valleys(1)]
-        courses = [
-            self._closed(each)
-            for through, nodes in valleys
-            for course in islice(through.courses(), COURSES)
-            for each in varied(_spread(course, nodes, len(self._frames)))
-        ]
-        courses += self._constant()
+        courses = self._constant()
+        for through, nodes in valleys:
+            for each in islice(through.courses(), COURSES):
+                course = self._closed(_spread(each, nodes, len(self._frames)))
+                width = max(2, len(course.gamma) // SMOOTHED)
+                courses += [course, course._replace(gamma=smoothed(course.gamma, width))]
         self._refine(self._screened(courses, SMOOTH, SHARP), REFINED)
         for _ in range(ROUNDS):
             self._refine(self._screened(self._shaken(), SHARP), REFINED_AGAIN)
@@ -181,8 +185,11 @@ class Exploration:
         self, courses: list[Course], *ways: tuple[Stage, ...]
     ) -> list[tuple[float, Course]]:
         """Return the motions that courses are screened to, each way, with scores, best first."""
-        every = np.arange(len(self._frames))
-        courses = [c for c in courses if self._allowed[every, c.posture].all()]
+        courses = [
+            course
+            for course in courses
+            if not np.ptp(course.posture) and self._allowed[:, course.posture[0]].all()
+        ]
         found = [c for stages in ways for c in self._screening.screened(courses, stages)]
         if not found:
             return []
@@ -250,26 +257,6 @@ def _spread(course: Course, nodes: Ints, count: int) -> Course:
         q=np.stack([np.interp(at, nodes, joint) for joint in course.q.T], axis=1),
         posture=course.posture[nearest],
     )
-
-
-def varied(course: Course) -> list[Course]:
-    """Return a course, and smoothed ones; one that changes posture also does so sooner and later.
-
-    A course with more than two changes of posture is returned alone.
-    """
-    changes, K = np.flatnonzero(np.diff(course.posture)), len(course.gamma)
-    if not len(changes):
-        return [course, course._replace(gamma=smoothed(course.gamma, max(2, K // 12)))]
-    courses = [course]
-    for shift in range(-2, 3) if len(changes) <= 2 else ():
-        posture = course.posture.copy()
-        if not (changes + shift >= 0).all() or not (changes + shift < K - 1).all():
-            continue
-        for x in changes.tolist():
-            first, last = sorted((x, x + shift))
-            posture[first + 1 : last + 1] = course.posture[x if shift > 0 else x + 1]
-        courses += [Course(smoothed(course.gamma, width), course.q, posture) for width in (2, 5)]
-    return courses
 
 
 def smoothed(gamma: Array, width: int) -> Array:
