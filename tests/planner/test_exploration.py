@@ -36,7 +36,9 @@ def test_changes_are_as_large_as_they_are_said_to_be():
     assert len(waves(rng, 50, 0, 0.4)) == 0
 
 
-def test_tilts_and_free_joints_are_not_explored(circle, arm, tool, placement):
+def test_tilts_free_joints_and_very_many_nodes_are_not_explored(
+    circle, arm, tool, placement, change_effort
+):
     def task(robot, **options):
         return planning_task(circle, Setup.of(robot, tool, placement), PlanOptions(**options),
                              speed=0.1)  # fmt: skip
@@ -45,6 +47,8 @@ def test_tilts_and_free_joints_are_not_explored(circle, arm, tool, placement):
     assert not can_explore(task(arm, tilt=Tilt(cone=0.1, steps=1)))
     rail = arm.on_rail([1, 0, 0], lower=-0.5, upper=0.5, velocity=1.0, acceleration=2.0)
     assert not can_explore(task(rail))
+    change_effort(subsampled_from=len(circle) - 1)
+    assert not can_explore(task(arm))
 
 
 @pytest.mark.slow

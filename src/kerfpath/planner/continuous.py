@@ -209,7 +209,7 @@ def _clear_motion(
         paths = [path for beam in QUICK for path in search.paths(beam)]
     begin("refinement")
     starts.refine(paths)
-    if thorough and can_explore(task):
+    if thorough and finder.is_free and can_explore(task):
         _explore(task, starts, search)
     elif thorough:
         _search_wider(task, starts, search, paths)

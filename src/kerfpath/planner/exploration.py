@@ -18,6 +18,7 @@ from itertools import islice
 import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints, freeze
+from kerfpath.effort import current_effort
 from kerfpath.kernels.continuous import Steps
 from kerfpath.kernels.metric import wrap
 from kerfpath.kernels.screening import Energy
@@ -62,8 +63,13 @@ SEED = 5
 
 
 def can_explore(task: Task) -> bool:
-    """Return whether the joints of a pose follow from gamma alone: no tilt, no free joints."""
-    return task.settings.tilt is None and not task.robot.free.size
+    """Return whether the joints of a pose follow from gamma alone, at not too many nodes.
+
+    There must be no tilt and no free joints. Very many nodes are planned from every few of them,
+    which are explored.
+    """
+    few = len(task.contour) <= current_effort().subsampled_from
+    return few and task.settings.tilt is None and not task.robot.free.size
 
 
 class Exploration:
