@@ -42,6 +42,7 @@ USUAL = Effort()
 set_effort(
     Effort(
         certified=False,
+        explored=False,
         certificate_pairs=1_500_000,
         certificate_pairs_per_node=0,
         minimax_pairs=300_000,
@@ -109,6 +110,13 @@ def ceiling_at_work():
 def certified_by_default():
     """Let plans be certified unless they are not to be, as outside the tests."""
     with changed_effort(certified=True):
+        yield
+
+
+@pytest.fixture
+def explored():
+    """Let plans explore all valleys, as outside the tests."""
+    with changed_effort(explored=True):
         yield
 
 

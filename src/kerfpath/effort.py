@@ -25,6 +25,9 @@ class Effort:
     ----------
     certified : bool
         Whether plans are certified unless their options say otherwise.
+    explored : bool
+        Whether all valleys are explored where value function or bound leave room for a better
+        motion; else wider beam searches follow.
     certificate_pairs, certificate_pairs_per_node : int
         Most steps from cell to cell in a certificate, in all and in addition for each node, unless
         a time is given.
@@ -52,6 +55,7 @@ class Effort:
     """
 
     certified: bool = True
+    explored: bool = True
     certificate_pairs: int = 10_000_000
     certificate_pairs_per_node: int = 60_000
     minimax_pairs: int = 3_000_000

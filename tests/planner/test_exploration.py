@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kerfpath import GammaWindow, Tilt, audit, plan
+from kerfpath import Band, Comfort, GammaWindow, Tilt, audit, plan
+from kerfpath.effort import changed_effort
 from kerfpath.options import PlanOptions
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.exploration import Exploration, can_explore, ramps, smoothed, waves
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import planning_task
 from kerfpath.setup import Setup
+
+pytestmark = pytest.mark.usefixtures("explored")
 
 SAME = 1e-3
 """Relative: refinements stop where the model promises less than 1e-4 a step, from either side."""
@@ -49,6 +52,29 @@ def test_tilts_free_joints_and_very_many_nodes_are_not_explored(
     assert not can_explore(task(rail))
     change_effort(subsampled_from=len(circle) - 1)
     assert not can_explore(task(arm))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"objective": "max"},
+        {"metric": "euclid"},
+        {"metric": "chebychev"},
+        {"closure": "periodic"},
+        {"comfort": Comfort(wrist=Band(margin=0.2, width=0.5, cost=0.2))},
+        {"postures": (1,)},
+    ],
+    ids=str,
+)
+def test_a_plan_that_is_explored_costs_no_more(circle, arm, tool, placement, options):
+    nodes = circle.resample(count=31)
+    where = {"tool": tool, "placement": placement, "speed": 0.45, "gamma_step": np.radians(5)}
+    made = plan(nodes, arm, **where, **options)
+    with changed_effort(explored=False):
+        before = plan(nodes, arm, **where, **options)
+    assert made.cost <= before.cost * (1 + SAME)
+    assert not [issue for issue in audit(made) if issue.level == "error"]
+    assert "postures" not in options or set(made.posture) == {1}
 
 
 @pytest.mark.slow

@@ -116,6 +116,7 @@ def test_no_end_at_all_is_said_by_the_audit(arm, tool, placement):
     assert "lower retract_mm" in row.advice
 
 
+@pytest.mark.usefixtures("explored")
 def test_the_margin_of_the_limits_is_kept_where_it_has_backed_off_to(arm, tool, placement):
     margin = np.radians(2)
     draw = np.random.default_rng(3)

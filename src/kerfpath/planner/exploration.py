@@ -68,7 +68,8 @@ def can_explore(task: Task) -> bool:
     There must be no tilt and no free joints. Very many nodes are planned from every few of them,
     which are explored.
     """
-    few = len(task.contour) <= current_effort().subsampled_from
+    effort = current_effort()
+    few = effort.explored and len(task.contour) <= effort.subsampled_from
     return few and task.settings.tilt is None and not task.robot.free.size
 
 

@@ -12,7 +12,7 @@ from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.quickest import alike
 from kerfpath.planner.refinements import plan_off_grid
 from kerfpath.planner.task import Task
-from kerfpath.plans import Plan, Proof
+from kerfpath.plans import Plan, Proof, has_room
 from kerfpath.refiner import Refinement
 from kerfpath.search import ContinuousPath, Course, find_shortest
 
@@ -86,9 +86,20 @@ class Starts:
         if not (found.done and found.cost_after <= (1 + FAR) * score):
             eased = refiner.refine(refiner.reduce_excess(made), first=FIRST_STEP)
             found = min((found, eased), key=lambda each: (not each.done, each.cost_after))
-        if found.done and self.finder.is_clear(found.plan):
+        if found.done and self.finder.is_clear(found.plan) and self._has_room(found.plan):
             self.found.append(found)
             self.best = _better(self.best, found)
+
+    def _has_room(self, made: Plan) -> bool:
+        """Return whether the tool can back off at each end where it can in the best motion."""
+        if self.best is None or made.settings.retract is None:
+            return True
+        ends, asked = [0, -1], made.settings
+        room, before = (
+            has_room(asked, plan.robot, plan.q[ends], plan.posture[ends], plan.T_flange_tip)
+            for plan in (made, self.best.plan)
+        )
+        return bool((room | ~before).all())
 
     def refine_from_grid(self, task: Task) -> None:
         """Refine the best path on the grid of a task, if there is already a motion to improve on.
