@@ -24,18 +24,9 @@ METRICS = ("manhattan", "euclid", "chebychev")
 
 
 @pytest.fixture(scope="module")
-def made(arc, arm, tool, placement):
+def made(plans):
     """Give the plan of the arc in a metric; each is made once."""
-    kept = {}
-
-    def of(metric):
-        if metric not in kept:
-            kept[metric] = plan(
-                arc, arm, tool=tool, placement=placement, speed=0.3, metric=metric, certify=None
-            )
-        return kept[metric]
-
-    return of
+    return lambda metric: plans(metric=metric)
 
 
 def steps_of(one):

@@ -286,7 +286,7 @@ def test_five_diagonals_are_solved_as_a_full_matrix():
 def screening(robot, frames, tool, step):
     limits, (_, acceleration) = robot.joint_limits(), robot.speed_limits()
     return Screening(
-        arm=robot.arm,
+        robot=robot,
         frames=frames,
         tool=tool,
         limits=limits,

@@ -14,6 +14,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, Bools, Ints, freeze
 from kerfpath.kernels.metric import increments_between, wrap
+from kerfpath.refiner.joint_curves import JointCurves
 from kerfpath.robots import Robot
 from kerfpath.search import Branches
 
@@ -107,9 +108,8 @@ class _Arm:
     def __init__(
         self, robot: Robot, frames: Array, tool: Array, postures: Sequence[int] | None
     ) -> None:
-        self._arm, self._tool = robot.arm, tool
+        self._robot, self._tool = robot, tool
         self._frames = freeze(np.array(frames, order="C"))
-        self._to_flange = np.linalg.inv(tool)
         self._limits = robot.joint_limits()
         wide = self._limits.upper - self._limits.lower > 2 * np.pi + EDGE
         self.endless = np.asarray(robot.endless | wide)
@@ -119,18 +119,14 @@ class _Arm:
 
     def on_grid(self, gamma: Array) -> tuple[Array, Bools]:
         """Return joints (K, m, P, n) at every gamma (m,), and which are admitted, (K, m, P)."""
-        q, reach = self._arm.inverse_nodes(self._frames, gamma, self._tool)
+        q, reach = self._robot.arm.inverse_nodes(self._frames, gamma, self._tool)
         return self._within(q, reach & self._wanted)
 
     def solve(self, node: Ints, gamma: Array, posture: Ints) -> tuple[Array, Bools]:
         """Return joints (B, n) of nodes at gamma in postures (B,), and which are admitted, (B,)."""
-        spin = np.tile(np.eye(4), (len(gamma), 1, 1))
-        spin[:, 0, 0] = spin[:, 1, 1] = np.cos(gamma)
-        spin[:, 1, 0] = np.sin(gamma)
-        spin[:, 0, 1] = -spin[:, 1, 0]
-        q, reach = self._arm.inverse_all(self._frames[node] @ spin @ self._to_flange)
-        each = np.arange(len(gamma))
-        return self._within(q[each, posture], reach[each, posture])
+        curves = JointCurves(self._robot, self._frames[node], self._tool, posture)
+        q = curves.at(gamma[:, None], np.zeros((len(gamma), self._robot.joints)))
+        return self._within(q, np.asarray(np.isfinite(q).all(axis=1)))
 
     def _within(self, q: Array, reach: Bools) -> tuple[Array, Bools]:
         """Bring joints in (-pi, pi] onto a turn inside their range; return where there is one."""

@@ -66,13 +66,13 @@ def better_motion(attempt: Attempt) -> Plan | None:
 
     It is for plans with a bound that lies far below their cost.
     """
-    starts, before = attempt.starts, None if attempt.starts is None else attempt.starts.best
-    if starts is None or before is None or starts.explored or not can_explore(attempt.task):
+    task, starts = attempt.task, attempt.starts
+    if starts is None or starts.best is None or starts.explored or not can_explore(task):
         return None
+    before = starts.best.cost_after
     attempt.begin("search")
-    Exploration(attempt.task.whole(), starts).run()
-    assert starts.best is not None, "there was a motion before"
-    if starts.best.cost_after > (1 - BETTER) * before.cost_after:
+    Exploration(task.whole(), starts).run()
+    if starts.best.cost_after > (1 - BETTER) * before:
         return None
     return claimed(starts.best, attempt.finder)
 

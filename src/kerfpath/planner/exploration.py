@@ -20,9 +20,9 @@ import numpy as np
 from kerfpath.arrays import Array, Bools, Ints, freeze
 from kerfpath.effort import current_effort
 from kerfpath.kernels.continuous import Steps
-from kerfpath.kernels.metric import wrap
 from kerfpath.kernels.screening import Energy
 from kerfpath.planner.branches import sample_branches
+from kerfpath.planner.refinements import waves
 from kerfpath.planner.screening import SHARP, SMOOTH, Screening, Stage
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import Task
@@ -52,8 +52,6 @@ SIZES = (0.15, 0.4, 0.8, 1.3)
 """rad: largest changes of gamma of a motion."""
 SMOOTHED = 12
 """Share of the nodes over which gamma of a course is averaged in a second one."""
-WAVES = 5
-"""Cosines in a change; the slower ones are larger."""
 SAME_COST = 1e-3
 """Relative difference of cost up to which two motions count as one when they are shaken."""
 SAME_MOTION = 0.02
@@ -91,7 +89,7 @@ class Exploration:
         limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
         self._step = freeze(s.eta_v * velocity * task.dt)
         self._screening = Screening(
-            arm=robot.arm,
+            robot=robot,
             frames=self._frames,
             tool=tool,
             limits=limits,
@@ -181,12 +179,7 @@ class Exploration:
         ]
 
     def _closed(self, course: Course) -> Course:
-        """Return a course that ends with the gamma that it begins with, if it must."""
-        if self._task.settings.closure != "periodic":
-            return course
-        gamma = course.gamma
-        off = wrap(gamma[-1] - gamma[0])
-        return course._replace(gamma=gamma - np.linspace(0.0, off, len(gamma)))
+        return course._replace(gamma=self._task.closed(course.gamma))
 
     def _screened(
         self, courses: list[Course], *ways: tuple[Stage, ...]
@@ -217,15 +210,9 @@ class Exploration:
 
     def _is_known(self, course: Course) -> bool:
         """Return whether a motion is nearly one that has been refined, or one found so."""
-        found = (
-            Course(each.plan.gamma, each.plan.q, each.plan.posture)
-            for each in self._starts.all_found
-        )
-        return any(
-            np.array_equal(course.posture, other.posture)
-            and np.abs(wrap(course.gamma - other.gamma)).max() < SAME_MOTION
-            for other in (*self._known, *found)
-        )
+        plans = (each.plan for each in self._starts.all_found)
+        found = (Course(plan.gamma, plan.q, plan.posture) for plan in plans)
+        return any(course.like(other, SAME_MOTION) for other in (*self._known, *found))
 
     def _shaken(self) -> list[Course]:
         """Return the best motions that differ in cost, changed at random."""
@@ -271,15 +258,6 @@ def smoothed(gamma: Array, width: int) -> Array:
     kernel = np.hanning(2 * width + 3)[1:-1]
     padded = np.pad(gamma, width, mode="reflect", reflect_type="odd")
     return np.asarray(np.convolve(padded, kernel / kernel.sum(), "valid"))
-
-
-def waves(rng: np.random.Generator, nodes: int, count: int, size: float) -> Array:
-    """Return random sums of slow cosines (count, K) whose largest absolute value is `size`."""
-    t, change = np.linspace(0, np.pi, nodes), np.zeros((count, nodes))
-    for m in range(WAVES):
-        phase = rng.uniform(0, 2 * np.pi, (count, 1))
-        change += rng.normal(size=(count, 1)) / (1 + m) * np.cos(m * t + phase)
-    return np.asarray(size * change / np.abs(change).max(axis=1, keepdims=True))
 
 
 def ramps(rng: np.random.Generator, nodes: int, count: int, size: float) -> Array:

@@ -128,7 +128,7 @@ def refine_from_random_starts(begun: Plan, finder: CollisionFreeSearch) -> Plan:
     """
     rng, best = np.random.default_rng(SEED), begun
     for size in islice(cycle(CHANGES), begun.settings.restarts):
-        change = _smooth(rng, len(best.q), size)
+        change = waves(rng, len(best.q), 1, size)[0]
         if best.settings.closure == "periodic":
             change -= np.linspace(change[0], change[-1], len(change))
         again = refiner.refine(replace(best, gamma=best.gamma + change), first=size)
@@ -139,12 +139,13 @@ def refine_from_random_starts(begun: Plan, finder: CollisionFreeSearch) -> Plan:
     return best
 
 
-def _smooth(rng: np.random.Generator, nodes: int, size: float) -> Array:
-    """Return a random sum of slow cosines (K,) whose largest absolute value is `size`."""
-    t, change = np.linspace(0, np.pi, nodes), np.zeros(nodes)
+def waves(rng: np.random.Generator, nodes: int, count: int, size: float) -> Array:
+    """Return random sums of slow cosines (count, K) whose largest absolute value is `size`."""
+    t, change = np.linspace(0, np.pi, nodes), np.zeros((count, nodes))
     for m in range(WAVES):
-        change += rng.normal() / (1 + m) * np.cos(m * t + rng.uniform(0, 2 * np.pi))
-    return np.asarray(size * change / np.abs(change).max())
+        height = rng.normal(size=(count, 1)) / (1 + m)
+        change += height * np.cos(m * t + rng.uniform(0, 2 * np.pi, (count, 1)))
+    return np.asarray(size * change / np.abs(change).max(axis=1, keepdims=True))
 
 
 # -----------------------------------------------------------------------------

@@ -17,7 +17,8 @@ from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, wrap
 from kerfpath.kernels.screening import Energy, energies, newton_steps
 from kerfpath.kernels.turns import JointLimits
-from kerfpath.robots import Arm
+from kerfpath.refiner.joint_curves import JointCurves
+from kerfpath.robots import Robot
 from kerfpath.search import Course
 
 
@@ -91,7 +92,8 @@ class Screening:
 
     Parameters
     ----------
-    arm : Arm
+    robot : Robot
+        Without free joints.
     frames : (K, 4, 4) m
         Task frames in the robot base.
     tool : (4, 4) m
@@ -101,7 +103,7 @@ class Screening:
         Weights, metric, objective and limits; the rest is set by the stages.
     """
 
-    arm: Arm
+    robot: Robot
     frames: Array
     tool: Array
     limits: JointLimits
@@ -140,14 +142,9 @@ class Screening:
 
     def _joints(self, gamma: Array, near: Array, posture: Ints) -> Array:
         """Return the joints (S, K, n) at gamma (S, K) on the turns near `near`, or NaN."""
-        spin = np.zeros((*gamma.shape, 4, 4))
-        spin[..., 0, 0] = spin[..., 1, 1] = np.cos(gamma)
-        spin[..., 1, 0] = np.sin(gamma)
-        spin[..., 0, 1] = -spin[..., 1, 0]
-        spin[..., 2, 2] = spin[..., 3, 3] = 1.0
-        T = (self.frames @ spin @ np.linalg.inv(self.tool)).reshape(-1, 4, 4)
-        n = near.shape[2]
-        q = self.arm.follow(T, np.ascontiguousarray(near.reshape(-1, n)), posture.ravel())
+        frames = np.tile(self.frames, (len(gamma), 1, 1))
+        curves = JointCurves(self.robot, frames, self.tool, posture.ravel())
+        q = curves.at(gamma.reshape(-1, 1), near.reshape(-1, near.shape[2]))
         return q.reshape(near.shape)
 
     def _descended(self, motions: Motions, stage: Stage) -> Motions:

@@ -209,10 +209,14 @@ class Task:
         sample = graph.sample[near].astype(np.int64)
         below, above = graph.gamma_at(sample), graph.gamma_at(sample + 1)
         gamma = below + path.share * (above - below)
-        if self.settings.closure == "periodic":
-            gamma = gamma - np.linspace(0.0, wrap(gamma[-1] - gamma[0]), len(gamma))
         posture, tilt = graph.posture[near].astype(np.int64), graph.tilt[graph.variant[near]]
-        return self.plan_at(gamma, path.q, posture, proof, tilt)
+        return self.plan_at(self.closed(gamma), path.q, posture, proof, tilt)
+
+    def closed(self, gamma: Array) -> Array:
+        """Return gamma (K,) rad, shifted along the path if it must end where it begins."""
+        if self.settings.closure != "periodic":
+            return gamma
+        return np.asarray(gamma - np.linspace(0.0, wrap(gamma[-1] - gamma[0]), len(gamma)))
 
     def plan_at(
         self, gamma: Array, q: Array, posture: Ints, proof: Proof, tilt: Array | None = None

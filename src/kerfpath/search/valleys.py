@@ -77,9 +77,10 @@ class Course(NamedTuple):
     posture: Ints
     """(K,)"""
 
-    def like(self, other: Course) -> bool:
-        """Return whether it is the same as another course but for small changes of gamma."""
-        return np.array_equal(self.posture, other.posture) and _same(self.gamma, other.gamma)
+    def like(self, other: Course, within: float = SAME_COURSE) -> bool:
+        """Return whether postures are the same, and gamma differs by less than `within` rad."""
+        same = np.array_equal(self.posture, other.posture)
+        return same and _same(self.gamma, other.gamma, within)
 
 
 class _Direction(NamedTuple):
@@ -174,9 +175,9 @@ class Valleys:
         return Course(gamma, q, branches.posture[one])
 
 
-def _same(one: Array, other: Array) -> bool:
-    """Return whether gammas differ by too little to belong to two courses."""
-    return bool(np.abs(wrap(one - other)).max() < SAME_COURSE)
+def _same(one: Array, other: Array, within: float = SAME_COURSE) -> bool:
+    """Return whether gammas differ by too little, rad, to belong to two courses."""
+    return bool(np.abs(wrap(one - other)).max() < within)
 
 
 def _course(v: int, direction: _Direction, steps: Steps) -> _Points | None:
