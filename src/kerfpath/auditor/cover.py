@@ -198,8 +198,8 @@ def _covered(
     found: list[Places] = []
     deepest = int(before.level.max(initial=-1)) if before is not None else 0
     left: Places | None = None
-    finest = max(int(stage.level.max(initial=0)), deepest) + BEYOND
-    for level in range(min(finest, DEEPEST_CELL) + 1):
+    finest = max(int(stage.level.max(initial=0)), deepest)
+    for level in range(min(finest + BEYOND, DEEPEST_CELL) + 1):
         wanted = [] if left is None else [_bisected(left)]
         if before is not None:
             wanted.append(_same_intervals(before.take(before.level == level)))
@@ -214,6 +214,9 @@ def _covered(
             left = left.take(joins(found, left))
         if not len(left) and level >= deepest:
             return found
+        if level >= finest and joins is None and (sure := _passable(where, left)).any():
+            left = left.take(sure)
+            break
     assert left is not None
     raise CertificateRefused(
         f"its cells leave out motions in posture {left.posture[0]} at node {left.node[0]}, gamma "
@@ -348,6 +351,17 @@ def _in_range(where: Reachable, at: Places) -> Bools:
         most = middle - linear_minimum(*curve, np.broadcast_to(-row, at.q.shape))
         fits &= (least <= upper + 2 * EDGE) & (most >= lower - 2 * EDGE)
     return fits
+
+
+def _passable(where: Reachable, at: Places) -> Bools:
+    """Return which places certainly have a pose within ranges in their middle.
+
+    Couplings are not tried: with them, no place is certain.
+    """
+    if len(where.rows):
+        return np.zeros(len(at), dtype=bool)
+    inside = (at.q - at.radius >= where.lower) & (at.q + at.radius <= where.upper)
+    return np.asarray(at.smooth & (inside | where.endless).all(axis=1))
 
 
 def _matched(

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath.arrays import Array, Bools, Ints, short_repr
+from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
 from kerfpath.certificate import BASE, LIFTS, cell_bounds
 from kerfpath.robots import Robot
 
@@ -154,7 +154,7 @@ class CellMaker:
         self._robot, self._frames, self._tool = robot, frames, T_flange_tip
         limits = robot.joint_limits()
         if folded is not None:
-            limits = limits._replace(endless=limits.endless | folded)
+            limits = limits._replace(endless=freeze(limits.endless | folded))
         # A coupling of an endless joint holds on one of its turns, which cells do not distinguish.
         plain = ~(limits.rows[:, limits.endless] != 0).any(axis=1)
         self._limits = limits._replace(
