@@ -9,8 +9,8 @@ from kerfpath import Band, Comfort, GammaWindow, Tilt, audit, plan
 from kerfpath.effort import changed_effort
 from kerfpath.options import PlanOptions
 from kerfpath.planner.collision_free import CollisionFreeSearch
-from kerfpath.planner.exploration import Exploration, can_explore, ramps, smoothed
-from kerfpath.planner.refinements import waves
+from kerfpath.planner.courses import can_explore, ramps, smoothed, waves
+from kerfpath.planner.exploration import Exploration
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import planning_task
 from kerfpath.setup import Setup

@@ -8,6 +8,7 @@ import pytest
 
 from kerfpath import InputError, NoFeasiblePath, audit, fastest_speed, plan, refiner
 from kerfpath.contour import Contour
+from kerfpath.effort import changed_effort
 from kerfpath.options import PlanOptions
 from kerfpath.planner import quickest as quickest_module
 from kerfpath.planner.collision_free import CollisionFreeSearch
@@ -65,6 +66,18 @@ def test_at_the_fastest_speed_and_below_there_is_a_plan(seed, method, arm, space
             **space,
         )
         assert errors(made) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_exploring_all_valleys_gives_no_lower_speed_and_a_plan_at_it(seed, arm, space):
+    nodes = drawn(seed)
+    before = fastest_speed(nodes, arm, refine=True, **space)
+    with changed_effort(explored=True):
+        fastest = fastest_speed(nodes, arm, refine=True, **space)
+        made = plan(nodes, arm, speed=fastest.speed, **space)
+    assert fastest.speed >= before.speed  # it goes on from the same motion
+    assert errors(made) == []
 
 
 @pytest.mark.parametrize("seed", range(3))

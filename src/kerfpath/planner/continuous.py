@@ -10,7 +10,8 @@ import numpy as np
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner.attempt import Attempt, Strategy, first_plan
 from kerfpath.planner.collision_free import CollisionFreeSearch
-from kerfpath.planner.exploration import Exploration, can_explore
+from kerfpath.planner.courses import can_explore
+from kerfpath.planner.exploration import Exploration
 from kerfpath.planner.on_grid import plan_on_grid
 from kerfpath.planner.quickest import clear_paths, wide
 from kerfpath.planner.refinements import refine_from_random_starts

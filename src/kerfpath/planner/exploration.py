@@ -1,45 +1,19 @@
-"""Exploration of all valleys: courses through them, screened together, refined, and shaken.
+"""Exploration of all valleys for the cheapest motion.
 
-Under (6) the cheapest course by (5) alone need not lead to the best motion, which may lie in any
-valley, in any posture. Courses are sought over samples of gamma that follow the joints, along all
-nodes and along every few: the fewer nodes, the larger the steps between them, beside which samples
-and kinks are fine. All are screened together; the best are refined, then changed by waves and
-smooth steps of gamma, and screened again.
-
-Only courses in one posture are explored. Between two nodes of different postures the arm passes a
-singularity; where the tip keeps to the path there, the joints turn much faster than at the nodes.
+Courses through all valleys are screened together; the best are refined, then changed at random,
+and screened again.
 """
 
 from __future__ import annotations
 
-from functools import cached_property
-from itertools import islice
-
-import numpy as np
-
-from kerfpath.arrays import Array, Bools, Ints, freeze
-from kerfpath.effort import current_effort
-from kerfpath.kernels.continuous import Steps
-from kerfpath.kernels.screening import Energy
-from kerfpath.planner.branches import sample_branches
-from kerfpath.planner.refinements import waves
-from kerfpath.planner.screening import SHARP, SMOOTH, Screening, Stage
+from kerfpath.planner.courses import Courses
+from kerfpath.planner.screening import SHARP, SMOOTH
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.task import Task
+from kerfpath.plans import Plan
 from kerfpath.refiner import Refinement
-from kerfpath.robots import lowest_joint
-from kerfpath.search import METRIC_CODES, Branches, Course, Valleys
-from kerfpath.windows import inside
+from kerfpath.search import Course
 
-STEP, LEAST_STEPS = np.radians(10.0), 8
-"""rad: typical largest increment along every few nodes, and fewest intervals between them."""
-SLACK = 1.02
-"""Factor of (5) along every few nodes, for contours whose intervals do not divide evenly."""
-COURSES = 40
-"""Most courses along the same nodes."""
-ANGLES = 36
-"""Angles at which gamma is constant along further courses, in every posture: where (6) binds, the
-best motion may hardly turn."""
 REFINED, REFINED_AGAIN = 5, 3
 """Motions that are refined after the first screening, and after each later one."""
 HOPELESS = 1.25
@@ -48,31 +22,14 @@ ROUNDS = 2
 """Times that the best motions are shaken."""
 SHAKEN = 2
 """Best motions that are shaken."""
-SIZES = (0.15, 0.4, 0.8, 1.3)
-"""rad: largest changes of gamma of a motion."""
-SMOOTHED = 12
-"""Share of the nodes over which gamma of a course is averaged in a second one."""
 SAME_COST = 1e-3
 """Relative difference of cost up to which two motions count as one when they are shaken."""
 SAME_MOTION = 0.02
 """rad: a screened motion whose gamma is nearer to that of a known one is not refined."""
-SEED = 5
-"""Fixed, so that the same task always gets the same changes."""
-
-
-def can_explore(task: Task) -> bool:
-    """Return whether the joints of a pose follow from gamma alone, at not too many nodes.
-
-    There must be no tilt and no free joints. Very many nodes are planned from every few of them,
-    which are explored.
-    """
-    effort = current_effort()
-    few = effort.explored and len(task.contour) <= effort.subsampled_from
-    return few and task.settings.tilt is None and not task.robot.free.size
 
 
 class Exploration:
-    """Exploration of the valleys of a task.
+    """Exploration of the valleys of a task for the cheapest motion.
 
     Parameters
     ----------
@@ -83,118 +40,21 @@ class Exploration:
     """
 
     def __init__(self, task: Task, starts: Starts) -> None:
-        self._task, self._starts = task, starts
-        s, robot, tool = task.settings, task.robot, task.setup.tool
-        self._frames = task.setup.placement @ task.contour.frames(s.frames)
-        limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
-        self._step = freeze(s.eta_v * velocity * task.dt)
-        self._screening = Screening(
-            robot=robot,
-            frames=self._frames,
-            tool=tool,
-            limits=limits,
-            energy=Energy(
-                weight=freeze(np.array(s.weights, dtype=float)),
-                metric=METRIC_CODES[s.metric],
-                minimax=s.objective == "max",
-                smooth=0.0,
-                power=0.0,
-                velocity=self._step,
-                acceleration=freeze(s.eta_a * acceleration * task.dt**2),
-                lower=freeze(np.where(limits.endless, -np.inf, limits.lower)),
-                upper=freeze(np.where(limits.endless, np.inf, limits.upper)),
-                price=0.0,
-            ),
-        )
-        self._allowed = _postures_of(task)
-        self._rng = np.random.default_rng(SEED)
+        self._task, self._starts, self._courses = task, starts, Courses(task)
         self._known: list[Course] = []
 
     @property
     def value(self) -> float:
         """Cost of the best course under (5) alone along every few nodes; infinite if none."""
-        return min(valleys.value for valleys, _ in self._along_few)
-
-    @cached_property
-    def _along_few(self) -> list[tuple[Valleys, Ints]]:
-        return [self._valleys(every) for every in sorted({self._few, max(1, self._few // 2)})]
-
-    def _valleys(self, every: int) -> tuple[Valleys, Ints]:
-        """Return the valleys along one of so many nodes, and these nodes (M,), evenly spread."""
-        last = len(self._frames) - 1
-        nodes = np.linspace(0, last, -(-last // every) + 1).round().astype(np.int64)
-        gap = int(np.diff(nodes).max())
-        step = self._step * gap * (SLACK if gap > 1 else 1.0)
-        s, robot, tool = self._task.settings, self._task.robot, self._task.setup.tool
-        branches = sample_branches(robot, self._frames[nodes], tool, step, s.postures)
-        energy = self._screening.energy
-        steps = Steps(energy.weight, energy.metric, energy.minimax, np.inf, -step, step)
-        return Valleys(branches, steps, self._cost(branches, nodes)), nodes
-
-    def _cost(self, branches: Branches, nodes: Ints) -> Array:
-        """Return the cost (N,) of samples of some nodes (M,); infinite if not admitted."""
-        asked, robot, tool = self._task.settings, self._task.robot, self._task.setup.tool
-        q, node = branches.q, nodes[branches.node]
-        cost = np.where(self._allowed[node, branches.posture], 0.0, np.inf)
-        if asked.comfort is not None:
-            cost += asked.comfort.price(robot, q, tool)
-            for near in asked.comfort.too_near(robot, q, tool).values():
-                cost[near] = np.inf
-        if asked.floor is not None:
-            cost[lowest_joint(robot, q) < asked.floor] = np.inf
-        if asked.gamma_windows:
-            s = self._task.contour.s[node]
-            cost[~inside(asked.gamma_windows, s, branches.gamma)] = np.inf
-        return cost
-
-    @property
-    def _few(self) -> int:
-        """One of this many nodes is kept so that a typical step is about `STEP`."""
-        every = int(np.ceil(STEP / np.median(self._step)))
-        return max(1, min(every, (len(self._frames) - 1) // LEAST_STEPS))
+        return self._courses.value
 
     def run(self) -> None:
         """Screen and refine courses through all valleys; shake the best motions."""
         self._starts.explored = True
-        valleys = self._along_few
-        if self._few // 2 > 1:
-            valleys = [*valleys, self._valleys(1)]
-        courses = self._constant()
-        for through, nodes in valleys:
-            for each in islice(through.courses(), COURSES):
-                course = self._closed(_spread(each, nodes, len(self._frames)))
-                width = max(2, len(course.gamma) // SMOOTHED)
-                courses += [course, course._replace(gamma=smoothed(course.gamma, width))]
-        self._refine(self._screened(courses, SMOOTH, SHARP), REFINED)
+        courses = self._courses
+        self._refine(courses.screened(courses.all(), SMOOTH, SHARP), REFINED)
         for _ in range(ROUNDS):
-            self._refine(self._screened(self._shaken(), SHARP), REFINED_AGAIN)
-
-    def _constant(self) -> list[Course]:
-        """Return courses with a constant gamma; they need not be in reach."""
-        robot, asked, K = self._task.robot, self._task.settings.postures, len(self._frames)
-        return [
-            Course(np.full(K, gamma), np.zeros((K, robot.joints)), np.full(K, posture))
-            for posture in (range(robot.postures) if asked is None else asked)
-            for gamma in 2 * np.pi * np.arange(ANGLES) / ANGLES
-        ]
-
-    def _closed(self, course: Course) -> Course:
-        return course._replace(gamma=self._task.closed(course.gamma))
-
-    def _screened(
-        self, courses: list[Course], *ways: tuple[Stage, ...]
-    ) -> list[tuple[float, Course]]:
-        """Return the motions that courses are screened to, each way, with scores, best first."""
-        courses = [
-            course
-            for course in courses
-            if not np.ptp(course.posture) and self._allowed[:, course.posture[0]].all()
-        ]
-        found = [c for stages in ways for c in self._screening.screened(courses, stages)]
-        if not found:
-            return []
-        scores = self._screening.scores(np.array([course.q for course in found]))
-        return [(float(scores[i]), found[i]) for i in np.argsort(scores, kind="stable")]
+            self._refine(courses.screened(courses.shaken(self._best()), SHARP), REFINED_AGAIN)
 
     def _refine(self, screened: list[tuple[float, Course]], most: int) -> None:
         """Refine the best motions, at most so many, that are not known."""
@@ -206,7 +66,9 @@ class Exploration:
             if not self._is_known(course):
                 tried += 1
                 self._known.append(course)
-                self._starts.refine_course(self._closed(course), score)
+                self._starts.refine_course(
+                    course._replace(gamma=self._task.closed(course.gamma)), score
+                )
 
     def _is_known(self, course: Course) -> bool:
         """Return whether a motion is nearly one that has been refined, or one found so."""
@@ -214,57 +76,10 @@ class Exploration:
         found = (Course(plan.gamma, plan.q, plan.posture) for plan in plans)
         return any(course.like(other, SAME_MOTION) for other in (*self._known, *found))
 
-    def _shaken(self) -> list[Course]:
-        """Return the best motions that differ in cost, changed at random."""
+    def _best(self) -> list[Plan]:
+        """Return the best motions that differ in cost."""
         best: list[Refinement] = []
         for found in sorted(self._starts.all_found, key=lambda each: each.cost_after):
             if all(abs(found.cost_after / o.cost_after - 1) > SAME_COST for o in best):
                 best.append(found)
-        count, K = self._task.settings.restarts, len(self._frames)
-        return [
-            self._closed(Course(np.unwrap(plan.gamma) + change, plan.unwrapped, plan.posture))
-            for plan in (found.plan for found in best[:SHAKEN])
-            for size in SIZES
-            for made in (waves, ramps)
-            for change in made(self._rng, K, count, size)
-        ]
-
-
-def _postures_of(task: Task) -> Bools:
-    """Return which postures each node may have, (K, P): those in a graph that was given, or all."""
-    allowed = np.ones((len(task.contour), task.robot.postures), np.bool_)
-    if task.placed:
-        graph = task.graph
-        allowed[:] = False
-        allowed[np.repeat(np.arange(len(allowed)), np.diff(graph.start)), graph.posture] = True
-    return allowed
-
-
-def _spread(course: Course, nodes: Ints, count: int) -> Course:
-    """Return a course along some nodes as one along all nodes, with gamma linear between them."""
-    if len(nodes) == count:
-        return course
-    at = np.arange(count)
-    nearest = np.searchsorted((nodes[1:] + nodes[:-1]) / 2, at)
-    return Course(
-        gamma=np.interp(at, nodes, course.gamma),
-        q=np.stack([np.interp(at, nodes, joint) for joint in course.q.T], axis=1),
-        posture=course.posture[nearest],
-    )
-
-
-def smoothed(gamma: Array, width: int) -> Array:
-    """Return gamma (K,) averaged over `width` nodes on either side, the near ones more."""
-    kernel = np.hanning(2 * width + 3)[1:-1]
-    padded = np.pad(gamma, width, mode="reflect", reflect_type="odd")
-    return np.asarray(np.convolve(padded, kernel / kernel.sum(), "valid"))
-
-
-def ramps(rng: np.random.Generator, nodes: int, count: int, size: float) -> Array:
-    """Return random smooth steps (count, K), from 0 to at most `size` or back, either way."""
-    centre = rng.uniform(0, nodes, (count, 1))
-    width = rng.uniform(0.03, 0.15, (count, 1)) * nodes
-    step = 1 / (1 + np.exp((centre - np.arange(nodes)) / width))
-    step = np.where(rng.random((count, 1)) < 0.5, step, 1 - step)
-    share = rng.choice([-1.0, 1.0], (count, 1)) * rng.uniform(0.5, 1, (count, 1))
-    return np.asarray(size * share * step)
+        return [found.plan for found in best[:SHAKEN]]

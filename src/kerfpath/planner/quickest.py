@@ -11,6 +11,8 @@ from kerfpath.arrays import short_repr
 from kerfpath.effort import current_effort
 from kerfpath.kernels.metric import wrap
 from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.courses import Courses, can_explore
+from kerfpath.planner.screening import QUICK
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.refiner import Binding, quicken
@@ -18,6 +20,7 @@ from kerfpath.search import (
     BeamWidth,
     ContinuousPath,
     ContinuousSearch,
+    Course,
     LeastInterval,
     edges_allowed,
     find_least_interval,
@@ -33,6 +36,14 @@ WIDE_ALIKE = (1.1, 0.5)
 """`BeamWidth.alike` of a wide search."""
 SAME_VALLEY = 0.05
 """rad: paths whose gamma differs by less are refined to the same motion."""
+FACTORS = (1.05, 1.0, 1.15)
+"""Multiples of the speed reached at which valleys are explored."""
+QUICKENED = 5
+"""Motions that are moved to their least interval after each screening."""
+HOPELESS = 1.5
+"""A screened motion that needs this many times the best interval is left."""
+ROUNDS = 2
+"""Times that the best motion is shaken."""
 MOST_SEARCHES = 40
 """Most searches for paths that are clear."""
 
@@ -102,6 +113,51 @@ def quick_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMoti
                     best = faster
                     yield best
         without_gain = 0 if best.dt < (1 - GAIN) * before else without_gain + 1
+    if can_explore(task):
+        yield from _explored(task, finder, best)
+
+
+def _explored(task: Task, finder: CollisionFreeSearch, best: QuickMotion) -> Iterator[QuickMotion]:
+    """Yield ever faster motions through all valleys, then from the best one changed at random.
+
+    Valleys are looked for at speeds about the best one.
+    """
+    known: list[Course] = []
+    for factor in FACTORS:
+        ahead = _at(task, best.dt / factor)
+        courses = Courses(ahead, quickest=True)
+        for found in _quickened(ahead, finder, courses.screened(courses.all(), QUICK), best, known):
+            best = found
+            yield best
+    for _ in range(ROUNDS):
+        ahead = _at(task, best.dt / FACTORS[0])
+        courses = Courses(ahead, quickest=True)
+        screened = courses.screened(courses.shaken([best.plan]), QUICK)
+        for found in _quickened(ahead, finder, screened, best, known):
+            best = found
+            yield best
+
+
+def _quickened(
+    ahead: Task,
+    finder: CollisionFreeSearch,
+    screened: list[tuple[float, Course]],
+    best: QuickMotion,
+    known: list[Course],
+) -> Iterator[QuickMotion]:
+    """Yield ever faster motions from the best screened ones that are not known."""
+    tried = 0
+    for needed, course in screened:
+        if tried == QUICKENED or needed * ahead.dt > HOPELESS * best.dt:
+            break
+        if any(course.like(other, SAME_VALLEY) for other in known):
+            continue
+        tried += 1
+        known.append(course)
+        faster = faster_motion(ahead, finder, ahead.plan_at(*course, _claim()), best)
+        if faster is not best:
+            best = faster
+            yield best
 
 
 def velocity_limited_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMotion]:

@@ -8,10 +8,10 @@ from itertools import cycle, islice
 import numpy as np
 
 from kerfpath import refiner
-from kerfpath.arrays import Array
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.options import PlanOptions
 from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.courses import waves
 from kerfpath.planner.quickest import QuickMotion
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof, path_cost
@@ -114,8 +114,6 @@ def plan_first_order(task: Task, finder: CollisionFreeSearch) -> Plan | None:
 
 CHANGES = (0.05, 0.1, 0.2, 0.4)
 """Largest change of gamma of each start, rad, in this order and again from the first one."""
-WAVES = 4
-"""Number of cosines in a change; the slower ones are larger."""
 SEED = 16
 """Fixed, so that the same motion always gets the same starts."""
 
@@ -137,15 +135,6 @@ def refine_from_random_starts(begun: Plan, finder: CollisionFreeSearch) -> Plan:
             statement = f"{begun.proof.statement}; {claim}"
             best = replace(again.plan, proof=replace(begun.proof, statement=statement))
     return best
-
-
-def waves(rng: np.random.Generator, nodes: int, count: int, size: float) -> Array:
-    """Return random sums of slow cosines (count, K) whose largest absolute value is `size`."""
-    t, change = np.linspace(0, np.pi, nodes), np.zeros((count, nodes))
-    for m in range(WAVES):
-        height = rng.normal(size=(count, 1)) / (1 + m)
-        change += height * np.cos(m * t + rng.uniform(0, 2 * np.pi, (count, 1)))
-    return np.asarray(size * change / np.abs(change).max(axis=1, keepdims=True))
 
 
 # -----------------------------------------------------------------------------

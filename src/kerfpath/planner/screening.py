@@ -47,6 +47,11 @@ SHARP = (
     Stage(0.03, 3e5, 15, 12),
 )  # fmt: skip
 """Stages that stay closer to the courses that they begin with."""
+QUICK = (
+    Stage(1.0, 10.0, 10, 150), Stage(0.5, 100.0, 12, 80), Stage(0.3, 1e3, 15, 40),
+    Stage(0.1, 1e4, 15, 20), Stage(0.1, 1e5, 15, 12),
+)  # fmt: skip
+"""Stages for motions that exceed the limits as little as possible, whatever they cost."""
 POWERS = ((0.4, 4.0), (0.15, 8.0), (0.0, 14.0))
 """Norms in place of the Chebychev one, each from a rounding on."""
 DERIVATIVE_STEP = 1e-4
@@ -101,6 +106,8 @@ class Screening:
     limits : JointLimits
     energy : Energy
         Weights, metric, objective and limits; the rest is set by the stages.
+    quickest : bool
+        Whether the score of a motion is the time that it needs, and not its cost.
     """
 
     robot: Robot
@@ -108,6 +115,7 @@ class Screening:
     tool: Array
     limits: JointLimits
     energy: Energy
+    quickest: bool = False
 
     __repr__ = short_repr
 
@@ -224,15 +232,23 @@ class Screening:
         return np.asarray(np.sqrt((d * d).sum(axis=2)))
 
     def scores(self, q: Array) -> Array:
-        """Return the cost (S,) of motions, more for those that break limits."""
-        lengths = self._distances(q)
-        cost = lengths.max(axis=1) if self.energy.minimax else lengths.sum(axis=1)
+        """Return the cost (S,) of motions, more for those that break limits.
+
+        With `quickest`, it is the least time of their steps under (5) and (6), in node intervals.
+        """
         dq = np.diff(q, axis=1)
-        fast = np.abs(dq / self.energy.velocity).max(axis=2) - 1
-        sharp = np.abs(np.diff(dq, axis=1) / self.energy.acceleration).max(axis=2) - 1
-        over = np.maximum(fast, 0).sum(axis=1) + np.maximum(sharp, 0).sum(axis=1)
+        fast = np.abs(dq / self.energy.velocity).max(axis=2)
+        sharp = np.abs(np.diff(dq, axis=1) / self.energy.acceleration).max(axis=2)
         out = np.maximum(self.energy.lower - q, q - self.energy.upper).max(axis=(1, 2))
         out = np.where(out > NEGLIGIBLE, out, 0.0)
+        if self.quickest:
+            return np.asarray(
+                np.maximum(fast.max(axis=1), np.sqrt(sharp.max(axis=1, initial=0.0)))
+                * (1 + OUTSIDE * out)
+            )
+        lengths = self._distances(q)
+        cost = lengths.max(axis=1) if self.energy.minimax else lengths.sum(axis=1)
+        over = np.maximum(fast - 1, 0).sum(axis=1) + np.maximum(sharp - 1, 0).sum(axis=1)
         return np.asarray(cost * (1 + OVER * over + OUTSIDE * out))
 
 
