@@ -1,11 +1,15 @@
 """No motion at any gamma: never said where a plan keeps the limits, and said where none can."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from kerfpath import NoFeasiblePath, audit, fastest_speed, plan
 from kerfpath.certifier import MotionTest
+from kerfpath.certifier.stages import Steps
 from kerfpath.contour import Contour
+from kerfpath.kernels.metric import MANHATTAN
 from kerfpath.limits import Limits
 from kerfpath.tilt import Tilt
 
@@ -89,6 +93,26 @@ def test_a_node_out_of_reach_has_no_pose(arm, tool, placement):
     assert str(closed) == "node 2 has no pose within the ranges of the joints"
 
 
+@pytest.mark.parametrize(
+    ("share", "count", "longest"),
+    [(0.5, 41, 1), (30, 41, 2), (60, 41, 3), (1e6, 41, 5), (1e6, 9, 1), (1e6, 2, 1)],
+)
+def test_layers_are_farther_apart_where_joints_take_long_to_reach_their_velocity(
+    share, count, longest
+):
+    """From the first node to the last, at most the given number of intervals apart; and rotations
+    of joints between them stay below half a turn."""
+    steps = Steps(
+        weight=np.ones(3), velocity=np.full(3, 0.3), acceleration=np.full(3, 0.3 / share),
+        metric=MANHATTAN, endless=np.zeros(3, bool),
+    )  # fmt: skip
+    found = steps.layers(3, 2 + count)
+    assert found[[0, -1]].tolist() == [3, 2 + count]
+    assert np.diff(found).max() == longest
+    fast = replace(steps, velocity=np.full(3, 1.4), acceleration=np.full(3, 1e-9))
+    assert np.diff(fast.layers(0, 40)).max() == 2
+
+
 def motion(arm, nodes, tool, placement, rng, wild):
     """Return the joints (K, n) of some motion along the nodes, gamma wandering; None where none."""
     frames = placement @ nodes.frames("rotation-minimising")
@@ -118,8 +142,12 @@ def increments(q, arm, *, first=False):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("ceiling_at_work")
-@pytest.mark.parametrize("wild", [0.0, 0.01, 0.1])
-def test_no_motion_is_ruled_out_by_limits_that_it_keeps(arm, tool, placement, wild):
+@pytest.mark.parametrize(("wild", "stride"), [(0.0, 1), (0.01, 1), (0.1, 1), (0.0, 2), (0.01, 3)])
+def test_no_motion_is_ruled_out_by_limits_that_it_keeps(
+    arm, tool, placement, wild, stride, monkeypatch
+):
+    """Whether cells are at all nodes or at some."""
+    monkeypatch.setattr(Steps, "layers", lambda _, a, b: np.append(np.arange(a, b, stride), b))
     done = 0
     for seed in range(10):
         rng = np.random.default_rng([7, seed, int(1000 * wild)])

@@ -42,24 +42,32 @@ def others(planned):
     }
 
 
+def every(stride, first, last):
+    """Nodes a number of intervals apart, the last ones closer."""
+    return np.append(np.arange(first, last, stride), last)
+
+
 def course_of(one, gap=0.1):
     return proving._Certification(one, proving._steps_of(one), gap, np.inf, False, lambda *_: None)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("metric", METRICS)
-@pytest.mark.parametrize("size", [0.0, 1.0, 30.0])
-def test_any_multipliers_bound_no_motion_too_high(metric, size, planned, others, monkeypatch):
+@pytest.mark.parametrize(("size", "stride"), [(0.0, 1), (1.0, 1), (30.0, 1), (1.0, 2), (5.0, 4)])
+def test_any_multipliers_bound_no_motion_too_high(
+    metric, size, stride, planned, others, monkeypatch
+):
     """Drawn at random, of either sign: the bound stays below every motion that is known."""
     best = planned(metric=metric)
     rng = np.random.default_rng(int(size))
 
-    def drawn(self, gamma, posture, reach, most):
-        prices = np.zeros_like(best.q)
+    def drawn(self, nodes, gamma, posture, reach, most):
+        prices = np.zeros((len(nodes), best.q.shape[1]))
         prices[1:-1] = size * rng.normal(size=prices[1:-1].shape) * best.settings.weights
         return prices
 
     monkeypatch.setattr(proving._Certification, "_prices", drawn)
+    monkeypatch.setattr(Steps, "layers", lambda self, first, last: every(stride, first, last))
     monkeypatch.setattr(proving._Certification, "_priced", True)
     bound = certify(best, checkable=False).plan.proof.bound
     assert 0 <= bound <= min(best.cost, *others[metric])
@@ -107,7 +115,7 @@ def test_multipliers_ask_for_cells_at_every_node(planned):
         lambda *_: None,
     )
     cells = one.maker.coarsest(one.nodes)
-    with pytest.raises(ValueError, match="every node"):
+    with pytest.raises(ValueError, match="at each of their nodes"):
         solve_stage(cells, one.steps, np.zeros((one.last + 1, 6)))
 
 
@@ -121,6 +129,10 @@ def steps(metric=MANHATTAN, acceleration=1.0):
     )
 
 
+EACH = np.ones(2, int)
+"""Layers at neighbouring nodes."""
+
+
 @pytest.mark.parametrize("metric", [MANHATTAN, EUCLID, CHEBYCHEV])
 @pytest.mark.parametrize(("most", "price"), [(5.0, 1.0), (0.5, 0.5)])
 def test_the_price_of_a_limit_that_binds(most, price, metric):
@@ -131,10 +143,47 @@ def test_the_price_of_a_limit_that_binds(most, price, metric):
     """
     u = np.array([[0.0, 1.0], [0.0, 0.0]])
     slope = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
-    prices = limit_prices(u, slope, steps(metric, 0.8), reach=0.5, most=most)
+    prices = limit_prices(u, slope, steps(metric, 0.8), EACH, reach=0.5, most=most)
     assert not prices[[0, -1]].any()
     # The solver's own tolerance.
     np.testing.assert_allclose(prices[1], [0.0, -price], atol=1e-5)
+
+
+@pytest.mark.parametrize(("before", "after"), [(1, 1), (2, 2), (3, 1), (2, 5)])
+def test_the_price_of_a_limit_between_long_steps(before, after):
+    """As above with means of the increments: d / after, and (6) at 0.8 between the two means.
+
+    A limit wider by e saves e times the intervals of the second step.
+    """
+    u = np.array([[0.0, float(before)], [0.0, 0.0]])
+    slope = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+    apart = (before + after) / 2
+    spans = np.array([before, after])
+    given = steps(MANHATTAN, 0.8 / apart)
+    prices = limit_prices(u, slope, given, spans, reach=0.5 * after, most=50.0)
+    np.testing.assert_allclose(prices[1], [0.0, -after], atol=1e-4)
+    # The motion with d = 0.2 after keeps (6) and costs its length: the prices add nothing.
+    keeps = np.array([0.0, before, before + 0.2 * after])
+    u = np.diff(keeps)
+    tilted = [given.tilted(prices, spans, k).tilt[1] * u[k] for k in range(2)]
+    assert sum(tilted) - given.price(prices, spans) == pytest.approx(0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(("before", "after"), [(1, 1), (2, 2), (1, 3), (4, 3)])
+def test_means_of_increments_differ_by_no_more_than_the_limit_of_long_steps(before, after):
+    """Of increments drawn at random, and with the largest acceleration throughout, where it is met.
+
+    The rest is the tolerance of the limit.
+    """
+    rng = np.random.default_rng(5)
+    bend = steps(acceleration=0.7).bend(before, after)
+    change = np.vstack([np.full(before + after - 1, 0.7), -np.full(before + after - 1, 0.7),
+                        rng.uniform(-0.7, 0.7, (500, before + after - 1))])  # fmt: skip
+    u = np.cumsum(np.pad(change, ((0, 0), (1, 0))), axis=1)
+    first, second = u[:, :before].sum(axis=1), u[:, before:].sum(axis=1)
+    differ = np.abs(bend.two * second - bend.one * first)
+    assert (differ <= bend.bound[0]).all()
+    assert differ[:2] == pytest.approx(bend.bound[0], abs=3 * LIMIT_TOLERANCE)
 
 
 def test_prices_of_the_metrics_differ_where_joints_share_a_step():
@@ -146,7 +195,7 @@ def test_prices_of_the_metrics_differ_where_joints_share_a_step():
     u = np.array([[0.3, 1.0], [0.3, 0.0]])
     slope = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
     found = [
-        -limit_prices(u, slope, steps(metric, 0.8), reach=0.5, most=5.0)[1, 1]
+        -limit_prices(u, slope, steps(metric, 0.8), EACH, reach=0.5, most=5.0)[1, 1]
         for metric in (MANHATTAN, EUCLID, CHEBYCHEV)
     ]
     assert found == pytest.approx([1.0, 0.2 / np.hypot(0.6, 0.2), 0.0], abs=1e-4)
@@ -155,7 +204,8 @@ def test_prices_of_the_metrics_differ_where_joints_share_a_step():
 def test_no_prices_where_nothing_near_breaks_the_limit():
     u = np.array([[0.0, 1.0], [0.0, 0.5], [0.0, 0.2]])
     slope = np.tile([0.0, 1.0], (4, 1))
-    assert limit_prices(u, slope, steps(acceleration=100.0), reach=0.5, most=5.0) is None
+    spans = np.ones(3, int)
+    assert limit_prices(u, slope, steps(acceleration=100.0), spans, reach=0.5, most=5.0) is None
 
 
 @pytest.mark.slow
@@ -164,25 +214,28 @@ def test_a_plan_at_the_limit_has_prices(metric, planned):
     one = course_of(planned(metric=metric), 0.005)
     posture = int(one.plan.posture[0])
     assert one._priced
+    nodes = np.arange(one.last + 1)
     for most in proving.DEAREST:
-        prices = one._prices(one.plan.gamma, posture, proving.NARROW, most)
-        assert one.steps.price(prices) > 0
+        prices = one._prices(nodes, one.plan.gamma, posture, proving.NARROW, most)
+        assert one.steps.price(prices, np.diff(nodes)) > 0
         assert (np.abs(prices) <= most * one.steps.weight * (1 + 1e-6)).all()
 
 
-def through_pairs(packed, steps, result, most):
+def through_pairs(packed, steps, spans, result, most):
     """Slow and obvious: every pair of steps is tested, and every state kept."""
-    bound, step = steps.acceleration + 2 * LIMIT_TOLERANCE, steps.over(1)
-    lead = np.argmax(np.abs(packed.slope) / bound, axis=1)
+    step, layer = steps.over(1), np.repeat(np.arange(len(packed.start) - 1), np.diff(packed.start))
+    lead = np.argmax(np.abs(packed.slope) / steps.bend(1, 1).bound, axis=1)
     begin, to, cost, behind = result
     onward = [list(range(begin[a], begin[a + 1])) for a in range(len(packed.half))]
     ending = [np.flatnonzero(to == a) for a in range(len(packed.half))]
     origin = np.repeat(np.arange(len(packed.half)), np.diff(begin))
     first, last = packed.start[1], packed.start[-2]
-    D, bent_by = np.empty((2, len(bound))), from_python(cell_elimination.bent_by)
+    D, bent_by = np.empty((2, 6)), from_python(cell_elimination.bent_by)
 
     def follows(e, f):
-        return bent_by(packed, step, bound, lead, origin[e], to[e], to[f], D) < 0
+        b = to[e]
+        bend = steps.bend(int(spans[layer[b] - 1]), int(spans[layer[b]]))
+        return bent_by(packed, step, bend, lead, origin[e], b, to[f], D) < 0
 
     until = {e: behind[origin[e]] + cost[e] for a in range(first) for e in onward[a]}
     for a in range(first, last):
@@ -205,20 +258,22 @@ def through_pairs(packed, steps, result, most):
 
 
 @pytest.mark.slow
-def test_steps_that_may_not_follow_each_other_are_left_out(planned, monkeypatch):
+@pytest.mark.parametrize("nodes", [range(9), range(0, 31, 3), (0, 3, 4, 7, 9, 13, 17, 20)])
+def test_steps_that_may_not_follow_each_other_are_left_out(nodes, planned, monkeypatch):
     """As trying all pairs says; and no cell that the plan passes costs more than the plan."""
     best = planned()
     one = course_of(best)
-    cells = one.maker.coarsest(np.arange(one.last + 1))
+    cells = one.maker.coarsest(np.array(nodes))
     for _ in range(3):
         cells = one.maker.halves(cells)
     near = np.abs(np.angle(np.exp(1j * (cell_bounds(cells.level, cells.index)[0]
                                         - best.gamma[cells.node])))) < 0.25  # fmt: skip
-    cells = cells.take(near & (cells.posture == best.posture[0]) & (cells.node < 9))
+    cells = cells.take(near & (cells.posture == best.posture[0]))
     seen = []
 
-    def kept(packed, steps, begin, to, cost, behind, ahead, most):
-        found = cross_bends(packed, steps, begin, to, cost, behind, ahead, most)
+    def kept(packed, steps, spans, begin, to, cost, behind, ahead, most):
+        assert spans.tolist() == np.diff(nodes).tolist()
+        found = cross_bends(packed, steps, spans, begin, to, cost, behind, ahead, most)
         seen.append((packed, (begin, to, cost, behind.copy()), most, found[0]))
         return found
 
@@ -226,7 +281,7 @@ def test_steps_that_may_not_follow_each_other_are_left_out(planned, monkeypatch)
     plain = solve_stage(cells, one.steps)
     result = solve_stage(cells, one.steps, most=best.cost * 1.2)
     (packed, steps_in, most, found) = seen[0]
-    slow = through_pairs(packed, one.steps, steps_in, most)
+    slow = through_pairs(packed, one.steps, np.diff(nodes), steps_in, most)
     np.testing.assert_allclose(found, slow, rtol=1e-12)  # the same sums
     assert (result.through >= plain.through * (1 - 1e-12)).all()
     assert (result.through > plain.through * (1 + 1e-3)).any()

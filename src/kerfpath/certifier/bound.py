@@ -3,28 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from time import monotonic
 
 import numpy as np
 
-from kerfpath.arrays import Array, scalar, short_repr
+from kerfpath.arrays import Array, Ints, scalar, short_repr
 from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier.cells import CellMaker, CellSet, foldable
 from kerfpath.certifier.division import between, cells_to_divide, turning_nodes
 from kerfpath.certifier.minimax import largest_step_bound
 from kerfpath.certifier.multipliers import limit_prices
 from kerfpath.certifier.parts import CARE, DEAREST, NARROW, SAME_COST, Parts
-from kerfpath.certifier.stages import StageResult, Steps, distinct_groups, linked, solve_stage
+from kerfpath.certifier.stages import (
+    LONGEST,
+    StageResult,
+    Steps,
+    distinct_groups,
+    linked,
+    solve_stage,
+)
 from kerfpath.effort import current_effort
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
 from kerfpath.search import METRIC_CODES
 
-LONGEST, TURNED = 3.0, 3e-4
-"""Largest rotation of a joint in one step of the first stage, rad: less than half a turn; and the
-share of its cost that the plan may lose with straight steps between the nodes."""
+TURNED = 3e-4
+"""Share of its cost that the plan may lose with straight steps between the nodes of the first
+stage."""
 DROPPED = 0.25
 """Share of its cells that a stage must rule out to be kept in the certificate."""
 STALLED = 0.5
@@ -240,7 +247,8 @@ class _Certification:
             slow = bool(fine) and gained < STALLED
             left = float(live.mean() + which.mean())
             ahead = self.pairs + result.pairs * left**2
-            if fine and self._late(slow, ahead) and self._fits(self.last + 1) and self._priced:
+            fits = self._fits(len(self._layers))
+            if fine and self._late(slow, ahead) and fits and self._priced:
                 self._divide(cells.take(live))
                 return
             if not low.any() or len(cells) * left > MOST_CELLS or self._spent(ahead):
@@ -279,6 +287,11 @@ class _Certification:
         return lifted
 
     @cached_property
+    def _layers(self) -> Ints:
+        """Nodes on which (6) is used."""
+        return self.steps.layers(0, self.last)
+
+    @cached_property
     def _priced(self) -> bool:
         """Whether (6) adds more to the cost of the plan than the gap that may be left."""
         if self.checkable:
@@ -287,25 +300,29 @@ class _Certification:
         if not (share > AT_LIMIT * self.plan.settings.eta_a).any():
             return False
         posture = int(np.bincount(self.plan.posture).argmax())
-        prices = (self._prices(self.plan.gamma, posture, NARROW, most) for most in DEAREST)
-        return max(map(self.steps.price, prices)) > self.cost - self.target
+        nodes = np.arange(self.last + 1)
+        near = (self._prices(nodes, self.plan.gamma, posture, NARROW, most) for most in DEAREST)
+        most = max(self.steps.price(prices, np.diff(nodes)) for prices in near)
+        return most > self.cost - self.target
 
-    def _prices(self, gamma: Array, posture: int, reach: float, most: float) -> Array | None:
-        """Return multipliers of (6) for the motion with gamma (K,) in a posture; None if none."""
+    def _prices(
+        self, nodes: Ints, gamma: Array, posture: int, reach: float, most: float
+    ) -> Array | None:
+        """Return multipliers of (6) for the motion with gamma (M,) at nodes; None if none."""
         if self._spent(self.pairs):
             return None
-        motion = self.maker.motion(gamma, posture)
+        motion = self.maker.motion(nodes, gamma, posture)
         if motion is None:
             return None
         q, slope = motion
         u = np.diff(q, axis=0)
         u -= 2 * np.pi * np.rint(u / (2 * np.pi))
-        return limit_prices(u, slope, self.steps, reach, most)
+        return limit_prices(u, slope, self.steps, np.diff(nodes), reach, most)
 
     def _divide(self, cells: CellSet) -> None:
-        """Continue at all nodes, with multipliers of (6), part by part."""
-        self.nodes = np.arange(self.last + 1)
-        cells = self._with_nodes(cells, COARSE)
+        """Continue at the layers of (6), with its multipliers, part by part."""
+        self.nodes = self._layers
+        cells = self._with_nodes(cells.take(np.isin(cells.node, self.nodes)), COARSE)
         before = self.pairs
 
         def enough(pairs: int, held: int) -> bool:
@@ -316,8 +333,8 @@ class _Certification:
         parts = Parts(
             self.maker,
             self.steps,
-            self._prices,
-            self.plan.gamma,
+            partial(self._prices, self._layers),
+            self.plan.gamma[self.nodes],
             cost=self.cost,
             target=self.target,
             enough=enough,

@@ -177,13 +177,13 @@ class CellMaker:
             sets.append(self.lifted(self._enclosed(node[part], level[part], index[part])))
         return CellSet.join(sets)
 
-    def motion(self, gamma: Array, posture: int) -> tuple[Array, Array] | None:
-        """Return the approximate joints of the motion with gamma (K,) in a posture, and slopes.
+    def motion(self, nodes: Ints, gamma: Array, posture: int) -> tuple[Array, Array] | None:
+        """Return the approximate joints with gamma (M,) at nodes, in a posture, and the slopes.
 
-        Both are (K, n), rad and rad/rad; None if the posture does not reach some node.
+        Both are (M, n), rad and rad/rad; None if the posture does not reach some node.
         """
-        node, half = np.arange(len(gamma)), np.full(len(gamma), SLIGHT)
-        found = self._robot.arm.enclose(self._frames, node, gamma, half, self._tool)
+        half = np.full(len(gamma), SLIGHT)
+        found = self._robot.arm.enclose(self._frames, nodes, gamma, half, self._tool)
         if not (found.status[:, posture] > 0).all():
             return None
         return found.center[:, posture], found.slope[:, posture]

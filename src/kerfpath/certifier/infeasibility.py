@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -103,29 +104,32 @@ class MotionTest:
         which, or to which, no step or pair of steps leads. The other cells are halved until a node
         has none left, or until the limit of work. With `around`, only the part of the contour
         around that node is tested, with finer cells: a motion that cannot pass a part cannot pass
-        the whole contour.
+        the whole contour. Cells are at some nodes only where joints take many intervals to reach
+        their velocity limit (`Steps.layers`).
         """
         steps = Steps(
             weight=freeze(np.ones(len(self._endless))),
             velocity=limits.velocity.per_interval(dt) + 2 * LIMIT_TOLERANCE,
-            acceleration=limits.acceleration.per_interval(dt) + 4 * LIMIT_TOLERANCE,
+            acceleration=limits.acceleration.per_interval(dt) + 2 * LIMIT_TOLERANCE,
             metric=MANHATTAN,
             endless=self._endless,
         )
         most_pairs = current_effort().infeasibility_pairs
         first, last = 0, self._count - 1
         if around is not None:
-            first, last = max(first, around - NODES_AROUND), min(last, around + NODES_AROUND)
-        cells, work = self._coarsest, 0
-        cells = cells.take((cells.node >= first) & (cells.node <= last))
+            near = NODES_AROUND * int(np.diff(steps.layers(first, last)).max(initial=1))
+            first, last = max(first, around - near), min(last, around + near)
+        nodes, cells, work = np.arange(first, last + 1), self._coarsest, 0
         for _ in range(DEEPEST):
-            present = np.bincount(cells.node - first, minlength=last - first + 1) > 0
-            if not present.all():
-                return Closed(node=first + int(np.argmin(present)) - 1, joint=None, limit="pose")
+            missing = np.setdiff1d(nodes, cells.node)
+            if len(missing):
+                return Closed(node=int(missing[0]) - 1, joint=None, limit="pose")
+            nodes = steps.layers(first, last)
+            cells = cells.take(np.isin(cells.node, nodes))
             one = _Round(cells, steps)
             found = one.forward()
             if found is not None:
-                return replace(found, node=first + found.node)
+                return replace(found, node=int(nodes[found.node]))
             work += one.pairs
             if one.left or work > most_pairs:
                 return None
@@ -137,13 +141,15 @@ class _Round:
     """One forward and one backward sweep over cells of all nodes."""
 
     def __init__(self, cells: CellSet, steps: Steps) -> None:
-        self.cells, self._packed, _, _ = arranged(cells, steps)
-        self._step, self._bound = steps.over(1), steps.acceleration
+        self.cells, self._packed, nodes, _ = arranged(cells, steps)
+        spans = np.diff(nodes).tolist()
+        self._steps = [steps.over(span) for span in spans]
+        self._bends = [steps.bend(*pair) for pair in pairwise(spans)]
         moved = np.abs(self.cells.slope)
         self._lead_v = np.argmax(moved / steps.velocity, axis=1)
         self._lead_a = np.argmax(moved / steps.acceleration, axis=1)
         self._layers: list[_Layer] = []
-        self.pairs, self.left, self._steps = 0, False, 0
+        self.pairs, self.left, self._number = 0, False, 0
 
     def forward(self) -> Closed | None:
         """Keep the steps that motions from the first node may make; return where all end."""
@@ -159,7 +165,7 @@ class _Round:
                 before = self._layers[-1]
                 layer.kept[:] = False
                 self.pairs += keep_on(
-                    self._packed, self._step, self._bound, self._lead_a, k - 1,
+                    self._packed, self._steps[k], self._bends[k - 1], self._lead_a, k - 1,
                     before.begin, before.to, before.kept, layer.begin, layer.to, layer.kept,
                 )  # fmt: skip
                 if not layer.kept.any():
@@ -182,7 +188,7 @@ class _Round:
             if k + 1 < len(self._layers) and self._few(layer, self._layers[k + 1], k + 1):
                 ahead = self._layers[k + 1]
                 self.pairs += keep_back(
-                    self._packed, self._step, self._bound, self._lead_a, k,
+                    self._packed, self._steps[k], self._bends[k], self._lead_a, k,
                     layer.begin, layer.to, ahead.begin, ahead.to, ahead.kept, layer.kept,
                 )  # fmt: skip
             # Cells of the next layer stay only if a kept step leads to them, too.
@@ -197,14 +203,14 @@ class _Round:
         """Return the steps from the live cells of layer k; None if there are too many."""
         start = self._packed.start
         count = np.zeros(start[k + 1] - start[k], np.int64)
-        count_steps(self._packed, self._step, self._lead_v, k, live, count)
+        count_steps(self._packed, self._steps[k], self._lead_v, k, live, count)
         begin = np.concatenate([[0], np.cumsum(count)])
-        self._steps += int(begin[-1])
-        if self._steps > current_effort().infeasibility_steps:
+        self._number += int(begin[-1])
+        if self._number > current_effort().infeasibility_steps:
             self.left = True
             return None
         to = np.empty(begin[-1], np.int64)
-        list_steps(self._packed, self._step, self._lead_v, k, live, begin, to)
+        list_steps(self._packed, self._steps[k], self._lead_v, k, live, begin, to)
         return _Layer(begin, to, np.ones(len(to), np.bool_))
 
     def _few(self, layer: _Layer, ahead: _Layer, k: int) -> bool:
@@ -214,13 +220,13 @@ class _Round:
 
     def _closed(self, k: int, limit: Literal["velocity", "acceleration"], live: Bools) -> Closed:
         """Return the closed place at node k, from which no step continues."""
-        blame = np.zeros(len(self._bound), np.int64)
+        blame = np.zeros(self.cells.center.shape[1], np.int64)
         if limit == "velocity":
-            count_rejections(self._packed, self._step, k, live, blame)
+            count_rejections(self._packed, self._steps[k], k, live, blame)
         else:
             before, layer = self._layers[-2:]
             blame_bends(
-                self._packed, self._step, self._bound, self._lead_a, k - 1,
+                self._packed, self._steps[k], self._bends[k - 1], self._lead_a, k - 1,
                 before.begin, before.to, before.kept, layer.begin, layer.to, blame,
             )  # fmt: skip
         return Closed(node=k, joint=int(np.argmax(blame)), limit=limit)

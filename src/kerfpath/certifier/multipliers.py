@@ -12,7 +12,7 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-from kerfpath.arrays import Array
+from kerfpath.arrays import Array, Ints
 from kerfpath.certifier.stages import Steps
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
 
@@ -24,29 +24,38 @@ SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
 _Rows = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
 
 
-def limit_prices(u: Array, slope: Array, steps: Steps, reach: float, most: float) -> Array | None:
-    """Return prices (K, n) of (6) for a motion, zero at the first and the last node.
+def limit_prices(
+    u: Array, slope: Array, steps: Steps, spans: Ints, reach: float, most: float
+) -> Array | None:
+    """Return prices (M, n) of (6) for a motion at M layers, zero at the first and the last.
 
     None if (6) cannot bind, or if the program has no solution.
 
     Parameters
     ----------
-    u : (K-1, n) rad
-        Increments of the motion.
-    slope : (K, n) rad/rad
+    u : (M-1, n) rad
+        Increments of the motion from layer to layer.
+    slope : (M, n) rad/rad
         Derivatives of its joints by gamma.
     steps : Steps
+    spans : (M-1,)
+        Number of intervals between the layers.
     reach : float rad
-        Largest change of gamma at each node.
+        Largest change of gamma at each layer.
     most : float
-        The largest price, in weights, which is the penalty for breaking (6) in the program. Large
-        prices give better bounds close to the motion, and worse ones farther away from it.
+        The largest price per interval, in weights, which is the penalty for breaking (6) in the
+        program. Large prices give better bounds close to the motion, and worse ones farther away.
     """
     edges, n = u.shape
     weight, own = np.tile(steps.weight, edges), u.ravel()
     moved = _moved(slope * reach, n)
-    bent, bend = moved[n:] - moved[:-n], (u[1:] - u[:-1]).ravel()
-    bound, velocity = np.tile(steps.acceleration, edges - 1), np.tile(steps.velocity, edges)
+    each, apart = np.repeat(spans / 1.0, n), np.repeat((spans[:-1] + spans[1:]) / 2, n)
+    mean = sparse.diags_array(1 / each) @ moved
+    bent, bend = mean[n:] - mean[:-n], np.diff(u / spans[:, None], axis=0).ravel()
+    bound, velocity = (
+        apart * np.tile(steps.acceleration, edges - 1),
+        each * np.tile(steps.velocity, edges),
+    )
     span = abs(moved).sum(axis=1)
     # Constraints that can bind: joints that reverse, increments near (5), changes near (6).
     turns = np.flatnonzero(np.abs(own) <= span)
@@ -67,7 +76,7 @@ def limit_prices(u: Array, slope: Array, steps: Steps, reach: float, most: float
             cost @ moved,
             np.ones(len(turns)),
             FAST * most * weight[fast],
-            most * weight[: len(bend)][acts],
+            most * (apart * weight[: len(bend)])[acts],
             np.ones(edges if lengths else 0),
         ]
     )

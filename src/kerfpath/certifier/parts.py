@@ -44,7 +44,7 @@ DEEPEST = 16
 class _Part:
     """Cells, their own bound, and the number of successive divisions that gained little.
 
-    `prices` (K, n) are the multipliers with the best bound; None if the bound without multipliers
+    `prices` (M, n) are the multipliers with the best bound; None if the bound without multipliers
     is the best.
     """
 
@@ -64,11 +64,11 @@ class Parts:
     maker : CellMaker
     steps : Steps
     prices : callable
-        Takes gamma (K,), a posture, the largest change of gamma, rad, and the largest multiplier,
-        in weights; returns multipliers (K, n) of (6) for that motion, or None. Any multipliers give
-        a valid bound.
-    gamma : (K,) rad
-        Gamma of the plan.
+        Takes gamma (M,) at the layers, a posture, the largest change of gamma, rad, and the largest
+        multiplier, in weights; returns multipliers (M, n) of (6) for that motion, or None. Any
+        multipliers give a valid bound.
+    gamma : (M,) rad
+        Gamma of the plan at the layers.
     cost, target : float
         Cost of the plan, and the bound to reach.
     enough : callable
@@ -96,7 +96,7 @@ class Parts:
     def bound(self, cells: CellSet, known: float) -> float:
         """Return a lower bound on the cost of motions through the cells, at most the plan's cost.
 
-        There must be cells at all nodes; `known` is a known lower bound.
+        The cells are those of the layers; `known` is a known lower bound.
         """
         self._wait(known, _Part(cells))
         while self._open and self._open[0][0] < min(self._target, self._closed):

@@ -22,6 +22,7 @@ from kerfpath.certificate import Stage
 from kerfpath.certifier.cells import CellMaker, CellSet
 from kerfpath.effort import thread_count
 from kerfpath.kernels.bends import cross_back, cross_on
+from kerfpath.kernels.cell_elimination import Bend
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import MANHATTAN
 from kerfpath.kernels.potentials import cross_cells, lay_potential, link_cells, reach_cells
@@ -30,6 +31,12 @@ from kerfpath.kernels.reduced import Cells, Potential, Step, tangents
 # -----------------------------------------------------------------------------
 # Costs and limits of the steps of a motion, and the prices of (6).
 
+LONGEST = 3.0
+"""rad: largest rotation of a joint in a step over several intervals, less than half a turn."""
+QUICK, LONGEST_STRIDE, FEWEST = 5.5, 5, 8
+"""Median number of intervals in which joints reach their velocity limit from rest, up to which
+neighbouring intervals tell most by (6); the most intervals of a step where (6) is used; and the
+fewest steps along a part of a contour."""
 ROUNDED = 1e-14
 """Relative rounding error of adding one term to a sum, as a share of the largest term."""
 
@@ -65,18 +72,45 @@ class Steps:
         tilt, most = np.zeros_like(velocity), intervals * self.most
         return Step(self.weight, tilt, velocity, self.metric, self.endless, most)
 
-    def tilted(self, multipliers: Array | None, k: int) -> Step:
-        """Return the step from node k to the next, tilted by the multipliers (K, n) of (6)."""
-        step = self.over(1)
+    def layers(self, first: int, last: int) -> Ints:
+        """Return nodes (M,) from one to another between which steps tell most by (6).
+
+        Pairs of steps tell motions apart only if cells are small against the change that (6)
+        allows, which grows with the square of the time of a step: the longer joints take to reach
+        their velocity limit, the longer the steps.
+        """
+        wanted = np.sqrt(np.median(self.velocity / self.acceleration) / QUICK)
+        within = LONGEST / self.velocity.max(), LONGEST_STRIDE, (last - first) / FEWEST
+        stride = max(1, int(min(np.rint(wanted), *within)))
+        count = -(-(last - first) // stride)
+        return np.rint(np.linspace(first, last, count + 1)).astype(np.int64)
+
+    def tilted(self, multipliers: Array | None, spans: Ints, k: int) -> Step:
+        """Return the step from layer k to the next, tilted by the multipliers (M, n) of (6).
+
+        ``spans`` (M - 1,) are the intervals between the layers.
+        """
+        step = self.over(int(spans[k]))
         if multipliers is None:
             return step
-        return step._replace(tilt=multipliers[k] - multipliers[k + 1])
+        return step._replace(tilt=(multipliers[k] - multipliers[k + 1]) / spans[k])
 
-    def price(self, multipliers: Array | None) -> float:
-        """Return the price of the multipliers (K, n): the most that they add where (6) holds."""
+    def price(self, multipliers: Array | None, spans: Ints) -> float:
+        """Return the price of the multipliers (M, n): the most that they add where (6) holds.
+
+        It includes the rounding of the tilts of all steps.
+        """
         if multipliers is None:
             return 0.0
-        return float((np.abs(multipliers) @ self.acceleration).sum()) * (1 + ROUNDED)
+        apart = (spans[:-1] + spans[1:]) / 2
+        size = np.abs(multipliers)
+        most = apart @ (size[1:-1] @ self.acceleration)
+        return float(most + ROUNDED * (most + (size @ self.velocity).sum()))
+
+    def bend(self, before: int, after: int) -> Bend:
+        """Return limit (6) of a step over some intervals and the next one."""
+        bound = self.acceleration * ((before + after) / 2) + 2 * LIMIT_TOLERANCE
+        return Bend(bound, 1 / before, 1 / after)
 
 
 # -----------------------------------------------------------------------------
@@ -84,7 +118,7 @@ class Steps:
 
 
 def cross_bends(
-    packed: Cells, steps: Steps, begin: Ints, to: Ints, cost: Array,
+    packed: Cells, steps: Steps, spans: Ints, begin: Ints, to: Ints, cost: Array,
     behind: Array, ahead: Array, most: float,
 ) -> tuple[Array, int]:  # fmt: skip
     """Return the least cost through each cell (C,), infinite beyond `most`; and the tests of (6).
@@ -92,8 +126,10 @@ def cross_bends(
     Parameters
     ----------
     packed : Cells
-        Cells at neighbouring nodes.
+        Cells at the nodes of M layers.
     steps : Steps
+    spans : (M - 1,)
+        Number of intervals between the layers.
     begin, to, cost : (C + 1,), (E,), (E,)
         The steps of cell a are begin[a]..begin[a+1]-1, each to a cell and at a reduced cost.
     behind, ahead : (C,)
@@ -102,8 +138,8 @@ def cross_bends(
         Largest cost of the motions of interest.
     """
     start, step = packed.start, steps.over(1)
-    bound = steps.acceleration + 2 * LIMIT_TOLERANCE
-    lead = np.argmax(np.abs(packed.slope) / bound, axis=1)
+    lead = np.argmax(np.abs(packed.slope) / steps.bend(1, 1).bound, axis=1)
+    bends = [steps.bend(*pair) for pair in pairwise(spans.tolist())]
     origin = np.repeat(np.arange(len(behind)), np.diff(begin))
     until = np.full(len(to), np.inf)  # up to the end of each step
     onward = np.full(len(to), np.inf)  # from there on
@@ -118,7 +154,7 @@ def cross_bends(
         ending = ending[np.lexsort((until[ending], to[ending]))]
         in_begin = np.searchsorted(to[ending], np.arange(first, last + 1))
         tests += cross_on(
-            packed, step, bound, lead, first, last, begin, to, origin, ending, in_begin,
+            packed, step, bends[k - 1], lead, first, last, begin, to, origin, ending, in_begin,
             cost, ahead, most, until,
         )  # fmt: skip
     onward[edges[-1]] = 0.0
@@ -132,7 +168,7 @@ def cross_bends(
         on_begin = np.searchsorted(origin[leaving], np.arange(first, last + 1))
         ending = np.arange(edges[k - 1].start, edges[k - 1].stop)
         tests += cross_back(
-            packed, step, bound, lead, first, last, to, origin, leaving, on_begin,
+            packed, step, bends[k - 1], lead, first, last, to, origin, leaving, on_begin,
             ending[np.isfinite(until[ending])], cost, until, most, onward,
         )  # fmt: skip
     through = np.full(len(behind), np.inf)
@@ -163,7 +199,7 @@ class StageResult:
         Lower bound on the cost of a motion through each cell; infinite if no motion passes.
     level, dual : (C, 2), (C, 2, n)
         The potential.
-    multipliers : (K, n), optional
+    multipliers : (M, n), optional
     begin, to : (C + 1,), (E,)
         The steps of cell a are begin[a]..begin[a+1]-1, each to a cell.
     tests : int
@@ -233,24 +269,24 @@ def solve_stage(
     Parameters
     ----------
     cells : CellSet
-        Their nodes are the layers; at the nodes in between, the motion is arbitrary.
+        Their nodes are the M layers; at the nodes in between, the motion is arbitrary.
     steps : Steps
-    multipliers : (K, n), optional
-        Multipliers of (6), zero at the first and the last node; they need cells at all nodes.
+    multipliers : (M, n), optional
+        Multipliers of (6) at the layers, zero at the first and the last.
     care : float
         Cost beyond the cheapest step of a cell up to which steps are bounded with care.
     most : float, optional
-        If given, pairs of steps that break (6) are excluded for motions that cost at most this; it
-        needs cells at all nodes.
+        If given, pairs of steps that break (6) are excluded for motions that cost at most this.
 
     Raises
     ------
     ValueError
-        Multipliers without cells at every node.
+        Multipliers that are not those of the layers.
     """
     cells, packed, nodes, _ = arranged(cells, steps)
-    if multipliers is not None and len(nodes) < len(multipliers):
-        raise ValueError("multipliers of (6) need cells at every node")
+    spans = np.diff(nodes)
+    if multipliers is not None and len(nodes) != len(multipliers):
+        raise ValueError("multipliers of (6) need cells at each of their nodes, and at no other")
     start = packed.start
     C, n = cells.center.shape
     potential = Potential(
@@ -261,15 +297,17 @@ def solve_stage(
         np.zeros(C),
     )
     potential.level[start[-2] :] = 0.0
-    begin, to, cost = _lay(packed, nodes, potential, steps, multipliers, care)
+    begin, to, cost = _lay(packed, spans, potential, steps, multipliers, care)
     ahead, behind = np.zeros(C), np.full(C, np.inf)
     first = slice(start[0], start[1])
     behind[first] = _least_at_first(cells.take(first), potential, first)
     cross_cells(start, begin, to, cost, ahead, behind)
-    through, price = ahead + behind, steps.price(multipliers)
+    through, price = ahead + behind, steps.price(multipliers, spans)
     tests = 0
     if most is not None and len(start) > 2 and np.isfinite(through).any():
-        through, tests = cross_bends(packed, steps, begin, to, cost, behind, ahead, most + price)
+        through, tests = cross_bends(
+            packed, steps, spans, begin, to, cost, behind, ahead, most + price
+        )
     through -= price
     finite = np.isfinite(through)
     largest = np.abs(potential.level[np.isfinite(potential.level)]).max(initial=0.0)
@@ -342,7 +380,7 @@ def _widest_apart(cells: CellSet, box: Array, steps: Steps) -> int:
 
 def _lay(
     packed: Cells,
-    nodes: Ints,
+    spans: Ints,
     potential: Potential,
     steps: Steps,
     multipliers: Array | None,
@@ -359,8 +397,7 @@ def _lay(
     with ThreadPoolExecutor(threads) as pool:
         for k in range(len(start) - 3, -1, -1):
             first, last = int(start[k]), int(start[k + 1])
-            stride = int(nodes[k + 1] - nodes[k])
-            step = steps.over(stride) if stride > 1 else steps.tilted(multipliers, int(nodes[k]))
+            step = steps.tilted(multipliers, spans, k)
             reach_cells(packed, step, k, first, last, potential.level, count)
             begin = np.zeros(last - first + 1, np.int64)
             np.cumsum(count[first:last], out=begin[1:])

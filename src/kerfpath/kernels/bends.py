@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from kerfpath.arrays import Array, Ints
-from kerfpath.kernels.cell_elimination import bent_by
+from kerfpath.kernels.cell_elimination import Bend, bent_by
 from kerfpath.kernels.jit import jit
 from kerfpath.kernels.reduced import Cells, Step
 
@@ -18,7 +18,7 @@ __all__ = ["cross_back", "cross_on"]
 
 @jit
 def cross_on(
-    cells: Cells, step: Step, bound: Array, lead: Ints, first: int, last: int,
+    cells: Cells, step: Step, bend: Bend, lead: Ints, first: int, last: int,
     begin: Ints, to: Ints, origin: Ints, sorted_in: Ints, in_begin: Ints,
     cost: Array, rest: Array, most: float, out_behind: Array,
 ) -> int:  # fmt: skip
@@ -28,7 +28,7 @@ def cross_on(
     ``out_behind`` (E,), which is already filled. Steps whose cost with the ``rest`` (C,) exceeds
     ``most`` get infinity.
     """
-    D, tests = np.empty((2, len(bound))), 0
+    D, tests = np.empty((2, len(bend.bound))), 0
     for b in range(first, last):
         for e in range(begin[b], begin[b + 1]):
             out_behind[e] = np.inf
@@ -38,7 +38,7 @@ def cross_on(
                 if not total + rest[to[e]] <= most:
                     break
                 tests += 1
-                if bent_by(cells, step, bound, lead, origin[i], b, to[e], D) < 0:
+                if bent_by(cells, step, bend, lead, origin[i], b, to[e], D) < 0:
                     out_behind[e] = total
                     break
     return tests
@@ -46,7 +46,7 @@ def cross_on(
 
 @jit
 def cross_back(
-    cells: Cells, step: Step, bound: Array, lead: Ints, first: int, last: int,
+    cells: Cells, step: Step, bend: Bend, lead: Ints, first: int, last: int,
     to: Ints, origin: Ints, sorted_on: Ints, on_begin: Ints, steps_in: Ints,
     cost: Array, behind: Array, most: float, out_ahead: Array,
 ) -> int:  # fmt: skip
@@ -55,7 +55,7 @@ def cross_back(
     The steps that begin in cell b are sorted_on[on_begin[b - first]..], cheapest first by the sum
     of cost and ``out_ahead`` (E,), which is already filled for them.
     """
-    D, tests = np.empty((2, len(bound))), 0
+    D, tests = np.empty((2, len(bend.bound))), 0
     for i in steps_in:
         b = to[i]
         out_ahead[i] = np.inf
@@ -65,7 +65,7 @@ def cross_back(
             if not behind[i] + total <= most:
                 break
             tests += 1
-            if bent_by(cells, step, bound, lead, origin[i], b, to[e], D) < 0:
+            if bent_by(cells, step, bend, lead, origin[i], b, to[e], D) < 0:
                 out_ahead[i] = total
                 break
     return tests

@@ -10,6 +10,12 @@ steps from a over b to c keep (6) only if
 
     |B_i - f B_r| <= a_i + |f| a_r + w(a) + 2 w(b) + w(c),    B = D_bc - D_ab.
 
+If the steps span m and m' intervals, D / m is the mean of the increments from a to b. The middles
+of both groups are (m + m') / 2 intervals apart, so that the means differ by that many times a:
+
+    |B_i - f B_r| <= (a_i + |f| a_r) (m + m') / 2 + w(a) / m + w(b) (1 / m + 1 / m') + w(c) / m',
+    B = D_bc / m' - D_ab / m.
+
 With f = 0 both are tests of one joint. With f = s_i / s_r, where r is the joint that gamma moves
 most, the unknown gamma drops out except for curvature: these tests find what no choice of gamma can
 repair.
@@ -18,6 +24,7 @@ repair.
 from __future__ import annotations
 
 from math import inf, pi
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +34,7 @@ from kerfpath.kernels.metric import extend, finish, increment
 from kerfpath.kernels.reduced import SLACK, Cells, Step, near, window
 
 __all__ = [
+    "Bend",
     "bent_by",
     "blame_bends",
     "count_rejections",
@@ -36,6 +44,17 @@ __all__ = [
     "list_steps",
     "may_step",
 ]
+
+
+class Bend(NamedTuple):
+    """Limit (6) of two steps: the most by which their mean increments differ.
+
+    ``bound`` is (n,); ``one`` and ``two`` are 1 by the number of intervals of each step.
+    """
+
+    bound: Array
+    one: float
+    two: float
 
 
 @jit_inline
@@ -96,19 +115,21 @@ def _increment(cells: Cells, step: Step, a: int, b: int, i: int) -> tuple[float,
 
 @jit_inline
 def bent_by(
-    cells: Cells, step: Step, bound: Array, lead: Ints, a: int, b: int, c: int, D: Array
+    cells: Cells, step: Step, bend: Bend, lead: Ints, a: int, b: int, c: int, D: Array
 ) -> int:
     """Return a joint that breaks (6) in the two steps from cell a over b to c; -1 if none does.
 
     ``D`` (2, n) is scratch for the bends and for whether their direction is certain.
     """
-    n = len(bound)
+    bound, one, two = bend
+    n, both = len(bound), one + two
     for i in range(n):
-        d, one = _increment(cells, step, a, b, i)
-        e, two = _increment(cells, step, b, c, i)
-        D[0, i], D[1, i] = e - d, 1.0 if one and two else 0.0
-        wide = bound[i] + cells.box[a, i] + 2.0 * cells.box[b, i] + cells.box[c, i]
-        if one and two and abs(e - d) > wide * (1.0 + SLACK):
+        d, first = _increment(cells, step, a, b, i)
+        e, second = _increment(cells, step, b, c, i)
+        d, e = d * one, e * two
+        D[0, i], D[1, i] = e - d, 1.0 if first and second else 0.0
+        wide = bound[i] + one * cells.box[a, i] + both * cells.box[b, i] + two * cells.box[c, i]
+        if first and second and abs(e - d) > wide + SLACK * (abs(d) + abs(e) + wide):
             return i
     r = lead[b]
     if D[1, r] == 0.0:
@@ -116,8 +137,8 @@ def bent_by(
     for i in range(n):
         f = _factor(cells, b, i, r)
         if f != 0.0 and D[1, i] > 0.0:
-            wide = bound[i] + abs(f) * bound[r] + _wide(cells, a, i, r, f)
-            wide += 2.0 * _wide(cells, b, i, r, f) + _wide(cells, c, i, r, f)
+            wide = bound[i] + abs(f) * bound[r] + one * _wide(cells, a, i, r, f)
+            wide += both * _wide(cells, b, i, r, f) + two * _wide(cells, c, i, r, f)
             size = abs(D[0, i]) + abs(f * D[0, r]) + wide
             if abs(D[0, i] - f * D[0, r]) > wide + SLACK * size:
                 return i
@@ -158,7 +179,7 @@ def list_steps(
 
 @jit
 def keep_on(
-    cells: Cells, step: Step, bound: Array, lead: Ints, k: int,
+    cells: Cells, step: Step, bend: Bend, lead: Ints, k: int,
     begin: Ints, to: Ints, kept: Bools, begin_on: Ints, to_on: Ints, out_kept: Bools,
 ) -> int:  # fmt: skip
     """Mark the steps from layer k + 1 that keep (6) after some kept step from k; count the tests.
@@ -167,7 +188,7 @@ def keep_on(
     layer k + 1.
     """
     first, second, tests = cells.start[k], cells.start[k + 1], 0
-    D, missing = np.empty((2, len(bound))), np.diff(begin_on)
+    D, missing = np.empty((2, len(bend.bound))), np.diff(begin_on)
     for a in range(first, second):
         for p in range(begin[a - first], begin[a - first + 1]):
             b = to[p]
@@ -176,7 +197,7 @@ def keep_on(
             for e in range(begin_on[b - second], begin_on[b - second + 1]):
                 if not out_kept[e]:
                     tests += 1
-                    if bent_by(cells, step, bound, lead, a, b, to_on[e], D) < 0:
+                    if bent_by(cells, step, bend, lead, a, b, to_on[e], D) < 0:
                         out_kept[e] = True
                         missing[b - second] -= 1
     return tests
@@ -184,12 +205,12 @@ def keep_on(
 
 @jit
 def keep_back(
-    cells: Cells, step: Step, bound: Array, lead: Ints, k: int,
+    cells: Cells, step: Step, bend: Bend, lead: Ints, k: int,
     begin: Ints, to: Ints, begin_on: Ints, to_on: Ints, kept_on: Bools, out_kept: Bools,
 ) -> int:  # fmt: skip
     """Drop the steps from layer k that break (6) with every kept step on; count the tests."""
     first, second, tests = cells.start[k], cells.start[k + 1], 0
-    D = np.empty((2, len(bound)))
+    D = np.empty((2, len(bend.bound)))
     for a in range(first, second):
         for p in range(begin[a - first], begin[a - first + 1]):
             if not out_kept[p]:
@@ -198,7 +219,7 @@ def keep_back(
             for e in range(begin_on[b - second], begin_on[b - second + 1]):
                 if kept_on[e]:
                     tests += 1
-                    if bent_by(cells, step, bound, lead, a, b, to_on[e], D) < 0:
+                    if bent_by(cells, step, bend, lead, a, b, to_on[e], D) < 0:
                         goes = True
                         break
             out_kept[p] = goes
@@ -224,17 +245,17 @@ def count_rejections(cells: Cells, step: Step, k: int, live: Bools, out_blame: I
 
 @jit
 def blame_bends(
-    cells: Cells, step: Step, bound: Array, lead: Ints, k: int,
+    cells: Cells, step: Step, bend: Bend, lead: Ints, k: int,
     begin: Ints, to: Ints, kept: Bools, begin_on: Ints, to_on: Ints, out_blame: Ints,
 ) -> None:  # fmt: skip
     """Count, by joint, the pairs of steps over layer k + 1 that break (6)."""
     first, second = cells.start[k], cells.start[k + 1]
-    D = np.empty((2, len(bound)))
+    D = np.empty((2, len(bend.bound)))
     for a in range(first, second):
         for p in range(begin[a - first], begin[a - first + 1]):
             if kept[p]:
                 b = to[p]
                 for e in range(begin_on[b - second], begin_on[b - second + 1]):
-                    joint = bent_by(cells, step, bound, lead, a, b, to_on[e], D)
+                    joint = bent_by(cells, step, bend, lead, a, b, to_on[e], D)
                     if joint >= 0:
                         out_blame[joint] += 1
