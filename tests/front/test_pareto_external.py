@@ -97,17 +97,17 @@ def test_windows_for_the_range_of_all_joints_leave_the_courses_alone(problem):
     known = problem.evaluate(made)
     from kerfpath.front.problem import Gap, Solution
 
-    worse = Solution(losses=known.losses, spans=known.spans, number=0, run=problem.unbounded)
+    worse = Solution(losses=known.losses, course=known.course, number=0, run=problem.unbounded)
     criterion = problem.criteria[1]
     gap = Gap(criterion=1, better=None, worse=worse)
     value, spans = 0.8 * known.losses[1], np.ptp(known.spans, axis=1)
     run = criterion.bound(problem.unbounded, value, gap, problem, np.random.default_rng(0))
     width = np.ptp(run.window, axis=1)
     velocity = problem.robot.velocity
-    # Windows are wider by 1e-9 on both sides.
+    # Windows are wider by 1e-8 on both sides.
     assert (width / velocity).sum() == pytest.approx(value, rel=1e-6)
-    assert width[6] == pytest.approx(spans[6], abs=1e-8)
-    assert (width[:6] <= spans[:6] + 1e-8).all()
+    assert width[6] == pytest.approx(spans[6], abs=3e-8)
+    assert (width[:6] <= spans[:6] + 3e-8).all()
 
 
 def test_an_axis_without_travel_is_none(arm, line, options):

@@ -34,8 +34,9 @@ ROUNDING = 1e-9
 """Share by which limits are widened against rounding."""
 TRIES = 8
 """Number of windows tried to find one with a pose of every node before a run uses it."""
-ROOM = 1e-9
-"""rad: by how much windows are wider than the motion that they hold, against rounding."""
+ROOM = 1e-8
+"""rad, and share of a limit: by how much windows and shares are wider than in the motion that they
+hold. A refinement leaves as much free, so that it begins within them and ends as good."""
 
 
 class PerJoint(Criterion):
@@ -163,7 +164,7 @@ class Velocity(Criterion):
         return replace(run, eta_v=value)
 
     def hold(self, run: Subproblem, value: float, *_: object) -> Subproblem:
-        return replace(run, eta_v=min(run.eta_v, value))
+        return replace(run, eta_v=min(run.eta_v, value * (1 + ROOM)))
 
 
 class Acceleration(Criterion):
@@ -182,7 +183,7 @@ class Acceleration(Criterion):
         return replace(run, eta_a=value)
 
     def hold(self, run: Subproblem, value: float, *_: object) -> Subproblem:
-        return replace(run, eta_a=min(run.eta_a, value))
+        return replace(run, eta_a=min(run.eta_a, value * (1 + ROOM)))
 
 
 class Speed(Criterion):
@@ -209,7 +210,8 @@ class Speed(Criterion):
     def hold(
         self, run: Subproblem, value: float, spans: Array, problem: ParetoProblem
     ) -> Subproblem:
-        fast = problem.unbounded.quicker(value * problem.dt / longest_step(problem.contour))
+        slower = value * (1 - ROOM)
+        fast = problem.unbounded.quicker(slower * problem.dt / longest_step(problem.contour))
         return replace(run, eta_v=min(run.eta_v, fast.eta_v), eta_a=min(run.eta_a, fast.eta_a))
 
 

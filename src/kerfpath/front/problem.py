@@ -26,12 +26,13 @@ from kerfpath.planner import (
     layered_graph,
     node_interval,
     plan,
+    refined_motion,
     relaxations,
     require_rates_alone,
 )
 from kerfpath.plans import Plan, on_turns
 from kerfpath.robots import Robot
-from kerfpath.search import Metric, ObjectiveKind, Relaxations
+from kerfpath.search import Course, Metric, ObjectiveKind, Relaxations
 from kerfpath.setup import Setup
 
 # -----------------------------------------------------------------------------
@@ -57,6 +58,30 @@ class SubproblemData(TypedDict):
     window: list[list[float] | None]
     clearance: float
     continuous: NotRequired[bool]
+    begin: NotRequired[list[CourseData]]
+
+
+class CourseData(TypedDict):
+    """A motion as JSON data: gamma (K,) and joints (K, n) in rad, posture (K,)."""
+
+    gamma: list[float]
+    q: list[list[float]]
+    posture: list[int]
+
+
+def course_data(course: Course) -> CourseData:
+    """Return a motion as JSON data, from which `course_from` restores it exactly."""
+    return {
+        "gamma": course.gamma.tolist(),
+        "q": course.q.tolist(),
+        "posture": course.posture.tolist(),
+    }
+
+
+def course_from(data: CourseData) -> Course:
+    """Return the motion that `course_data` wrote."""
+    gamma, q, posture = (np.array(data[name]) for name in ("gamma", "q", "posture"))
+    return Course(gamma, q, posture)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,6 +101,8 @@ class Subproblem:
         Clearance of robot and head from all other bodies, beyond the near-miss distance.
     continuous : bool
         Whether gamma is continuous instead of on its grid.
+    begin : tuple of Course
+        Known motions from which a continuous run is refined; none: it searches everywhere.
     """
 
     objective: ObjectiveKind
@@ -86,6 +113,7 @@ class Subproblem:
     window: Array
     clearance: float = 0.0
     continuous: bool = False
+    begin: tuple[Course, ...] = ()
 
     __repr__ = short_repr
 
@@ -151,7 +179,11 @@ class Subproblem:
             "window": [p if np.isfinite(p).all() else None for p in self.window.tolist()],
             "clearance": self.clearance,
         }
-        return {**data, "continuous": True} if self.continuous else data
+        if self.continuous:
+            data["continuous"] = True
+        if self.begin:
+            data["begin"] = [course_data(course) for course in self.begin]
+        return data
 
     @classmethod
     def from_data(cls, data: SubproblemData) -> Subproblem:
@@ -168,6 +200,7 @@ class Subproblem:
             window=freeze(np.array(window)),
             clearance=data["clearance"],
             continuous=data.get("continuous", False),
+            begin=tuple(course_from(course) for course in data.get("begin", ())),
         )
 
 
@@ -293,7 +326,8 @@ def plan_run(
         As `kerfpath.plan`.
     """
     robot, cell = setup.robot, run.cell(setup.cell)
-    asked, graph = run.applied_to(options), run.graph(graph, robot.endless)
+    asked, whole = run.applied_to(options), graph
+    graph = run.graph(graph, robot.endless)
     if not run.continuous:
         return plan(
             contour,
@@ -307,19 +341,25 @@ def plan_run(
             phase=phase,
         )
     narrowed, windowed = robot, run.windowed(robot.endless)
+    if run.begin:
+        graph = whole
     if windowed:
         _require_ranges(asked, windowed)
         narrowed, graph = _narrowed(robot, graph, run.window, windowed, asked)
         cell = cell and replace(cell, endless=narrowed.endless)
-    empty = robot.externals and not np.diff(graph.start).all()
-    made = best_motion(
-        contour,
-        replace(setup, robot=narrowed, cell=cell),
-        asked,
-        speed=speed,
-        graph=None if empty else graph,
-        phase=phase,
-    )
+    there = replace(setup, robot=narrowed, cell=cell)
+    if run.begin:
+        made = refined_motion(contour, there, asked, speed=speed, graph=graph, begin=run.begin)
+    else:
+        empty = robot.externals and not np.diff(graph.start).all()
+        made = best_motion(
+            contour,
+            there,
+            asked,
+            speed=speed,
+            graph=None if empty else graph,
+            phase=phase,
+        )
     limits = replace(made.settings, eta_v=options.eta_v, eta_a=options.eta_a)
     return replace(_widened(made, robot) if windowed else made, settings=limits)
 
@@ -440,16 +480,21 @@ class Criterion:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evaluation:
-    """The data of a plan that the search uses: losses (C,) and joint spans (n, 2).
+    """The data of a plan that the search uses: losses (C,) and its motion.
 
-    Losses are the criteria with signs such that less is better. Spans are the lowest and highest
-    joint values in rad; endless joints are not wrapped.
+    Losses are the criteria with signs such that less is better.
     """
 
     losses: Array
-    spans: Array
+    course: Course
 
     __repr__ = short_repr
+
+    @property
+    def spans(self) -> Array:
+        """Lowest and highest joint values (n, 2) in rad; endless joints are not wrapped."""
+        q = self.course.q
+        return np.stack([q.min(axis=0), q.max(axis=0)], axis=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -543,6 +588,11 @@ class ParetoProblem:
         return self.options.method == "continuous" and self.robot.family.free_rotation
 
     @property
+    def refinable(self) -> bool:
+        """Whether runs may begin with known motions: joints follow from gamma and posture alone."""
+        return self.continuous and self.options.tilt is None and not self.robot.free.size
+
+    @property
     def free_joints(self) -> int:
         """Number of leading joints that windows may narrow: those that follow no given course."""
         along = follows_courses(self.robot, self.options)
@@ -612,8 +662,7 @@ class ParetoProblem:
         rounding errors counts once.
         """
         values = [each.sense * each.value(made, self) for each in self.criteria]
-        q = made.q[0] + np.vstack([np.zeros(made.q.shape[1]), np.cumsum(made.increments, axis=0)])
         return Evaluation(
             losses=freeze(np.array([float(f"{value:.{DIGITS}g}") for value in values])),
-            spans=freeze(np.stack([q.min(axis=0), q.max(axis=0)], axis=1)),
+            course=Course(made.gamma, made.unwrapped, made.posture),
         )

@@ -264,6 +264,7 @@ class AdaptiveRuns:
     def propose(self, front: Sequence[Solution], scale: Array) -> Subproblem:
         """Return the next run, given the front (at least one plan) and the scale (C,)."""
         self._proposed += 1
+        front = [replace(each, run=replace(each.run, begin=())) for each in front]
         if self._proposed % RANDOM:
             claim, gap = max(self._gaps(front, scale), key=lambda claimed: claimed[0])
             if claim > 0:
@@ -340,6 +341,10 @@ SearchKind = Literal["adaptive", "grid"]
 
 AHEAD = 8
 """Number of runs in progress. A run depends on the results this far before it, not on timing."""
+REFINING = 1 / 3
+"""Share of the runs, the last ones, in which plans of the front are refined again."""
+NEAREST = 3
+"""Plans of the front, itself included, from which each is refined again."""
 LEAST_ROOM = 0.1
 """Least distance of the reference beyond the worst value, as a share of the ideal value."""
 TINY = 1e-9
@@ -373,7 +378,9 @@ class FrontSearch:
         self.runs, self._ahead = whole_number(runs, "runs"), whole_number(ahead, "ahead")
         self._problem, self._search, self._seed = problem, search, seed
         self._beginning = 1
+        self._begun = 0
         self._tried: set[int] = set()
+        self._refined: set[int] = set()
         self._found: list[Solution] = []
         self._failures: Counter[str] = Counter()
 
@@ -402,6 +409,8 @@ class FrontSearch:
                 if adaptive and self._found:
                     run = self._held() or off_grid.propose(_front(self._found), self._scale)
                 yield replace(run, continuous=True)
+            while adaptive and self._late and (again := self._refined_again()) is not None:
+                yield again
 
     def _held(self) -> Subproblem | None:
         """Return a run that tries to beat a plan of the grid on the front, once for each plan."""
@@ -409,6 +418,26 @@ class FrontSearch:
             if not solution.run.continuous and solution.number not in self._tried:
                 self._tried.add(solution.number)
                 return self._problem.as_good(solution)
+        return None
+
+    @property
+    def _late(self) -> bool:
+        """Whether only the runs are left in which the front is refined."""
+        return self._problem.refinable and self._begun >= self.runs * (1 - REFINING)
+
+    def _refined_again(self) -> Subproblem | None:
+        """Return a run that refines a plan of the front once more; None if all have been.
+
+        It begins with the plan and with those nearest to it, and stays as good in all criteria that
+        can be bounded. Plans that such a run has found come last.
+        """
+        front = sorted(_front(self._found), key=lambda each: bool(each.run.begin))
+        for solution in front:
+            if solution.number not in self._refined:
+                self._refined.add(solution.number)
+                apart = [np.abs((o.losses - solution.losses) / self._scale).max() for o in front]
+                begin = tuple(front[i].course for i in np.argsort(apart, kind="stable")[:NEAREST])
+                return replace(self._problem.as_good(solution), continuous=True, begin=begin)
         return None
 
     def run(self, submit: Callable[[int, Subproblem], Callable[[], Evaluation | str]]) -> Front:
@@ -423,20 +452,20 @@ class FrontSearch:
         NoFeasiblePath
             No run has a plan.
         """
-        proposed, begun = self._proposed(), 0
+        proposed = self._proposed()
         flying: deque[tuple[int, Subproblem, Callable[[], Evaluation | str]]] = deque()
         for done in range(self.runs):
-            while len(flying) < (self._ahead if done else 1) and begun < self.runs:
+            while len(flying) < (self._ahead if done else 1) and self._begun < self.runs:
                 run = next(proposed)
-                flying.append((begun, run, submit(begun, run)))
-                begun += 1
+                flying.append((self._begun, run, submit(self._begun, run)))
+                self._begun += 1
             number, run, wait = flying.popleft()
             found = wait()
             if isinstance(found, str):
                 self._failures[found] += 1
             else:
                 self._found.append(
-                    Solution(losses=found.losses, spans=found.spans, number=number, run=run)
+                    Solution(losses=found.losses, course=found.course, number=number, run=run)
                 )
         return self._result()
 

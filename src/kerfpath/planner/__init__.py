@@ -16,6 +16,7 @@ from kerfpath.planner.layers import samples_of as samples_of
 from kerfpath.planner.planning import best_motion as best_motion
 from kerfpath.planner.planning import plan as plan
 from kerfpath.planner.planning import plan_in_pieces as plan_in_pieces
+from kerfpath.planner.planning import refined_motion as refined_motion
 from kerfpath.planner.planning import with_bound as with_bound
 from kerfpath.planner.refinements import warm_start as warm_start
 from kerfpath.planner.statements import FINER as FINER

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Unpack
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.cell import Cell
@@ -22,18 +23,21 @@ from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.continuous import (
     OVER_CONTINUOUS_GAMMA,
     better_motion,
+    claimed,
     clear_motion,
     grid_reason,
 )
 from kerfpath.planner.external_motion import along_a_course, best_external_motion
 from kerfpath.planner.on_grid import ON_GRID
 from kerfpath.planner.refinements import refine_plan
+from kerfpath.planner.screening import within
+from kerfpath.planner.starts import Starts
 from kerfpath.planner.statements import add_window_note, limits_named
 from kerfpath.planner.task import Task, planning_task
 from kerfpath.plans import Plan, Proof
 from kerfpath.progress import Progress, no_progress
 from kerfpath.robots import Robot
-from kerfpath.search import Piece, find_interrupted
+from kerfpath.search import Course, Piece, find_interrupted
 from kerfpath.setup import Setup
 
 # -----------------------------------------------------------------------------
@@ -84,6 +88,48 @@ def best_motion(
         )
     claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
     return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
+
+
+def refined_motion(
+    contour: Contour,
+    setup: Setup,
+    options: PlanOptions,
+    *,
+    speed: float | None,
+    graph: LayeredGraph,
+    begin: Sequence[Course],
+) -> Plan:
+    """Return the plan of the best motion that refinements from known motions lead to.
+
+    Parameters
+    ----------
+    contour, speed, options, graph
+        As in `kerfpath.plan`, method "continuous"; no tilt.
+    setup : Setup
+        Its robot has no free joints.
+    begin : sequence of Course
+        The motions to begin with, which need not keep the limits.
+
+    Raises
+    ------
+    NoFeasiblePath
+        No refinement ends with a motion that keeps all limits and is clear.
+    InputError
+        As `kerfpath.plan`.
+    """
+    options = replace(options, certify=None)
+    task = planning_task(contour, setup, options, speed=speed, graph=graph)
+    starts, limits = Starts(task, CollisionFreeSearch(task)), setup.robot.joint_limits()
+    for course in begin:
+        starts.refine_course(course._replace(q=within(limits, course.q)), np.inf)
+    if starts.best is None:
+        raise NoFeasiblePath(
+            f"contour {contour.name!r}: no refinement of a known motion keeps the limits",
+            proved=False,
+            node=-1,
+            counts={},
+        )
+    return claimed(starts.best, starts.finder)
 
 
 # -----------------------------------------------------------------------------

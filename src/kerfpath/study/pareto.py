@@ -21,6 +21,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.front import (
     AHEAD,
+    CourseData,
     Evaluation,
     Front,
     FrontSearch,
@@ -28,6 +29,8 @@ from kerfpath.front import (
     SearchKind,
     Subproblem,
     SubproblemData,
+    course_data,
+    course_from,
     criteria_named,
     follows_courses,
     graph_of_runs,
@@ -139,7 +142,7 @@ class SolvedData(TypedDict, total=False):
 
     why: str
     losses: list[float]
-    spans: list[list[float]]
+    course: CourseData
 
 
 def solve(
@@ -163,7 +166,7 @@ def solve(
     if isinstance(made, str):
         return {"why": made}
     found = problem.evaluate(made)
-    return {"losses": found.losses.tolist(), "spans": found.spans.tolist()}
+    return {"losses": found.losses.tolist(), "course": course_data(found.course)}
 
 
 def _evaluation(result: Result) -> Evaluation | str:
@@ -172,7 +175,7 @@ def _evaluation(result: Result) -> Evaluation | str:
         found: SolvedData = result.value
         if "why" in found:
             return found["why"]
-        return Evaluation(losses=np.array(found["losses"]), spans=np.array(found["spans"]))
+        return Evaluation(losses=np.array(found["losses"]), course=course_from(found["course"]))
     if failure.kind == "NoFeasiblePath":
         raise NoFeasiblePath(failure.message, proved=False, node=-1)
     if failure.kind == "InputError":
