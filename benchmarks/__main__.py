@@ -22,6 +22,7 @@ NAMES = (
     "collision",
     "cad",
     "corpus",
+    "bent_parts",
     "large_drawings",
     "mutants",
     "first_runs",
@@ -96,6 +97,10 @@ def _run(name: str, *, quick: bool) -> list[Report]:
         from benchmarks import corpus
 
         return [corpus.run(quick=quick)]
+    if name == "bent_parts":
+        from benchmarks import bent_parts
+
+        return [bent_parts.run(quick=quick)]
     if name == "large_drawings":
         from benchmarks import large_drawings
 

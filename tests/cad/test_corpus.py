@@ -19,8 +19,9 @@ def test_a_drawing_of_every_family_and_format_is_read_right(tmp_path: Path) -> N
     assert {name: fault for name, fault in faults.items() if fault} == {}
 
 
-def test_progress_goes_from_the_file_to_the_last_face(tmp_path: Path) -> None:
+def test_progress_goes_from_the_file_to_the_sides(tmp_path: Path) -> None:
     said: list[tuple[str, int, int]] = []
     read(write_step(tmp_path / "plate.step", plate()), progress=lambda *state: said.append(state))
     assert said[0] == ("reading plate.step", 0, 0)
-    assert said[1:] == [("looking for loops", k, 8) for k in range(1, 9)]
+    assert said[1:-1] == [("looking for loops", k, 8) for k in range(1, 9)]
+    assert said[-1] == ("looking for the sides of sheets", 0, 0)

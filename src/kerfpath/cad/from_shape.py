@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -21,7 +21,7 @@ from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS, TopoDS_Edge
 from scipy.interpolate import BSpline
 
-from kerfpath.arrays import Array, freeze
+from kerfpath.arrays import Array, Ints, freeze
 from kerfpath.cad.build import named_loops
 from kerfpath.cad.chains import part_of_strokes
 from kerfpath.cad.curves import Arc, Curve, Line, Spline
@@ -29,6 +29,7 @@ from kerfpath.cad.left_out import LeftOut, counted, nothing_drawn
 from kerfpath.cad.loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad.part import Loop, Part
 from kerfpath.cad.shape import (
+    Mesh,
     NamedFace,
     NamedShape,
     list_shapes,
@@ -36,13 +37,15 @@ from kerfpath.cad.shape import (
     triangulate_apart,
     unique,
 )
-from kerfpath.cad.skins import Skin, skins_of
+from kerfpath.cad.skins import Skin, SkinLoop, skins_of
 from kerfpath.cad.units import MM
 from kerfpath.errors import InputError
 from kerfpath.progress import Progress
 
-MESHES = 2
-"""Number of meshes of a part that are kept: one for its cell, one for its pictures."""
+MESHES = 3
+"""Number of meshes of a part that are kept: for its sides, for its cell, and for its pictures."""
+MOST_LISTED = 8
+"""Most loops that a note names."""
 
 SURFACES = {
     GeomAbs_SurfaceType.GeomAbs_Plane: "plane",
@@ -97,8 +100,9 @@ def part_of_shape(
     if axis is not None:
         raise InputError("axis: expected a drawing of lines, got one of faces")
     mesh = triangulate if size is None else partial(triangulate_apart, size=size)
-    part = _part_of_faces(path, drawn, gap, outer_towards, progress)
-    return replace(part, _triangulate=lru_cache(MESHES)(partial(mesh, drawn.shape)))
+    triangulated = lru_cache(MESHES)(partial(mesh, drawn.shape))
+    part = _part_of_faces(path, drawn, gap, outer_towards, triangulated, progress)
+    return replace(part, _triangulate=triangulated)
 
 
 # -----------------------------------------------------------------------------
@@ -110,50 +114,83 @@ def _part_of_faces(
     drawn: NamedShape,
     gap: float,
     outer_towards: tuple[float, float, float] | None,
+    triangulated: Callable[[float], Mesh],
     progress: Progress,
 ) -> Part:
     """Return the part, with names for every face, skin and loop."""
     faces, found, unread = _readable(drawn.faces, progress)
     towards = None if outer_towards is None else np.array(outer_towards)
-    skins = skins_of([named.face for named in faces], found, towards)
+    progress("looking for the sides of sheets", 0, 0)
+    numbers = _in_order(drawn, faces)
+    box = bounds_of(drawn.shape)
+    deflection = max(DEFLECTION, COARSE * float(np.linalg.norm(box[1] - box[0])))
+    try:
+        corners, owner = _triangles(triangulated(deflection), numbers)
+        unsure = list[str]()
+    except InputError as error:
+        corners, owner = np.empty((0, 3, 3)), np.empty(0, dtype=np.int64)
+        unsure = [f"sides of sheets, and what goes through, are not looked for: {error}"]
+    skins, of_faces = skins_of(found, corners, owner, towards)
     names = _names(faces)
     skin_names = _skin_names(skins, set(names))
-    piece_of = {f: name for skin, name in zip(skins, skin_names, strict=True) for f in skin.faces}
+    piece_of, bent_of = dict[int, str](), dict[int, str]()
+    for skin, name in zip(skins, skin_names, strict=True):
+        (bent_of if skin.is_bent else piece_of).update(dict.fromkeys(skin.faces, name))
     loops: list[Loop] = []
+
+    def add(
+        name: str, surface: str, around: Sequence[SkinLoop], of: Sequence[int], skin: str
+    ) -> None:
+        loops.extend(
+            _named(name, surface, around, gap, [faces[f] for f in of], skin, bent_of.get(of[0], ""))
+        )
+
     for skin, name in zip(skins, skin_names, strict=True):
         if name:
-            around = _named(name, "skin", skin.loops(found), gap, [faces[f] for f in skin.faces])
-            loops += [replace(loop, side=skin.side) for loop in around]
-    side_of = {f: skin.side for skin in skins for f in skin.faces}
-    for f, (name, named) in enumerate(zip(names, faces, strict=True)):
-        surface = SURFACES[BRepAdaptor_Surface(named.face).GetType()]
-        around = _named(name, surface, found[f], gap, [named])
-        loops += [replace(loop, side=side_of[f], skin=piece_of[f]) for loop in around]
+            add(name, "skin", skin.loops, skin.faces, "")
+    for f, name in enumerate(names):
+        surface = SURFACES[BRepAdaptor_Surface(faces[f].face).GetType()]
+        add(name, surface, of_faces[f], [f], piece_of[f])
     left_out = tuple(sorted([*drawn.left_out, *unread], key=lambda each: not each.may_cut))
     return Part(
         path=path,
         unit=drawn.unit,
-        bounding_box=freeze(bounds_of(drawn.shape) * MM),
+        bounding_box=freeze(box * MM),
         faces=len(faces),
         loops=tuple(loops),
-        notes=(*drawn.notes, *map(str, left_out), *_doubts(skins, skin_names, names)),
+        notes=(
+            *drawn.notes,
+            *map(str, left_out),
+            *unsure,
+            *_doubts(skins, skin_names, names),
+            *_blind_notes(loops),
+        ),
         left_out=left_out,
         frames=drawn.frames,
         _gap=gap,
-        _face_names=_in_order(drawn, faces, [piece_of[f] or name for f, name in enumerate(names)]),
+        _face_names=tuple("" if f < 0 else piece_of[f] or names[f] for f in numbers),
     )
 
 
-def _in_order(
-    drawn: NamedShape, faces: Sequence[NamedFace], names: Sequence[str]
-) -> tuple[str, ...]:
-    """Return the names of faces in the order in which they are meshed, "" for those left out."""
+DEFLECTION, COARSE = 0.2, 1e-4
+"""Largest distance from faces of the mesh on which sides are found: mm, below half a sheet, or that
+share of the diagonal of a large part."""
+
+
+def _in_order(drawn: NamedShape, faces: Sequence[NamedFace]) -> list[int]:
+    """Return the indices of faces in the order in which they are meshed, -1 for those left out."""
     numbered = ShapeMap()
     for named in faces:
         numbered.Add(named.face)
     meshed = list_shapes(drawn.shape, TopAbs_ShapeEnum.TopAbs_FACE)
-    found = [numbered.FindIndex(face) for face in meshed]  # from 1 on, 0: not there
-    return tuple(names[number - 1] if number else "" for number in found)
+    return [numbered.FindIndex(face) - 1 for face in meshed]  # FindIndex: from 1 on, 0: not there
+
+
+def _triangles(mesh: Mesh, numbers: Sequence[int]) -> tuple[Array, Ints]:
+    """Return the corners (M, 3, 3) mm of triangles, and the face (M,) of each."""
+    vertices, triangles, sizes = mesh
+    face = np.repeat(np.array(numbers, dtype=np.int64), sizes)
+    return vertices[triangles[face >= 0]].reshape(-1, 3, 3), face[face >= 0]
 
 
 def _readable(
@@ -188,15 +225,45 @@ def _doubts(skins: Sequence[Skin], skin_names: Sequence[str], names: Sequence[st
     ]
 
 
+def _blind_notes(loops: Sequence[Loop]) -> list[str]:
+    """Return notes on the holes that do not go through, or not as wide as they begin."""
+    notes = []
+    for side, words in (
+        ("blind", "does not go through (pocket, blind hole or engraving)"),
+        ("sunk", "is the border of a countersink or chamfer, not of the hole in it"),
+    ):
+        names = [loop.name for loop in loops if loop.side == side and loop.kind == "inner"]
+        if names:
+            more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
+            notes.append(
+                f"{', '.join(names[:MOST_LISTED])}{more}: {words}; picked only by name or side"
+            )
+    return notes
+
+
 def _named(
-    name: str, surface: str, found: list[FaceLoop], gap: float, faces: Sequence[NamedFace]
+    name: str,
+    surface: str,
+    found: Sequence[SkinLoop],
+    gap: float,
+    faces: Sequence[NamedFace],
+    skin: str,
+    bent: str,
 ) -> list[Loop]:
     """Return the loops of a face or skin, with the layer and colour that all its faces have."""
     layers, colours = {named.layer for named in faces}, {named.colour for named in faces}
     layer = layers.pop() if len(layers) == 1 else ""
     colour = colours.pop() if len(colours) == 1 else ""
-    around = [(kind, chain, colour) for kind, chain in found]
-    return named_loops(around, face=name, surface=surface, gap=gap, layer=layer)
+    around = [(loop.kind, loop.chain, colour) for loop in found]
+    of = {id(loop.chain): loop for loop in found}
+    return [
+        replace(
+            loop,
+            side=of[id(loop._trace)].side,
+            skin=skin or (bent if of[id(loop._trace)].is_piece else ""),
+        )
+        for loop in named_loops(around, face=name, surface=surface, gap=gap, layer=layer)
+    ]
 
 
 def _names(faces: Sequence[NamedFace]) -> list[str]:

@@ -113,8 +113,8 @@ def _vector(at: gp_XYZ) -> Array:
 FORWARD, REVERSED = TopAbs_Orientation.TopAbs_FORWARD, TopAbs_Orientation.TopAbs_REVERSED
 
 SINGULAR = 1e-9
-"""Sine of the angle between the two directions of a surface below which they define no normal, as
-at a pole or the tip of a cone."""
+"""Area that the two directions of a surface span, as a share of the square of the longer one, below
+which they define no normal, as at a pole or the tip of a cone."""
 EVENLY = np.linspace(0.0, 1.0, AROUND + 1)
 """Places at which an edge is evaluated, from its start to its end."""
 NUDGE = 1e-4
@@ -229,7 +229,7 @@ class OrientedEdge:
         normal = du.Crossed(dv)
         size = normal.Magnitude()
         at = (point.X(), point.Y(), point.Z())
-        if not size > SINGULAR * du.Magnitude() * dv.Magnitude():
+        if not size > SINGULAR * max(du.SquareMagnitude(), dv.SquareMagnitude()):
             return at, None
         return at, np.array([normal.X(), normal.Y(), normal.Z()]) * (self.outward / size)
 
@@ -259,8 +259,12 @@ def loops_of(face: TopoDS_Face) -> list[FaceLoop]:
         wire = TopoDS.Wire(found)
         runs, has_seam = _runs(wire, forward, face, surface)
         for edges in join_runs(runs):
-            outer = _winds(edges) or (wire.IsSame(outer_wire) and not has_seam)
-            loops.append(("outer" if outer else "inner", EdgeChain(edges=edges)))
+            chain = EdgeChain(edges=edges)
+            if _winds(edges):  # the rim of a tube, or a hole about the pole of a sphere
+                outer = not is_hole(chain)
+            else:
+                outer = wire.IsSame(outer_wire) and not has_seam
+            loops.append(("outer" if outer else "inner", chain))
     return loops
 
 
@@ -314,6 +318,20 @@ def join_runs(runs: list[list[OrientedEdge]]) -> Iterator[list[OrientedEdge]]:
             following = first if far[first] <= far.min() else int(np.argmin(far))
         left[first] = False
         yield chain
+
+
+HOLE = -0.25
+"""Cosine between a loop's vector area and its mean normal below which it runs about a hole: for
+holes it is near -1, for a trim line near 1, for the rim of a tube near 0."""
+
+
+def is_hole(loop: EdgeChain[OrientedEdge]) -> bool:
+    """Return whether a closed chain runs about a hole of its skin, by its normals."""
+    area = loop.area
+    middles = [(edge.start + edge.end) / 2 for edge in loop.edges]
+    normals = [e.evaluate(np.array([t]))[1][0] for e, t in zip(loop.edges, middles, strict=True)]
+    facing = loop.lengths @ np.array(normals) / loop.lengths.sum()
+    return bool(area @ facing < HOLE * np.linalg.norm(area))
 
 
 def _winds(edges: list[OrientedEdge]) -> bool:

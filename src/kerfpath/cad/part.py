@@ -100,7 +100,9 @@ def _distance(p0: Array, p1: Array, q0: Array, q1: Array) -> tuple[Array, Array]
 # Loops, and the part that has them.
 
 Kind = Literal["outer", "inner", "open"]
-Side = Literal["outer", "inner", "edge", ""]
+Side = Literal["outer", "inner", "edge", "blind", "sunk", ""]
+NO_CUT: tuple[Side, ...] = ("edge", "blind", "sunk")
+"""Sides of loops that are picked only if asked for: they are not to be cut as they are."""
 
 TOUCH = 1e-5
 """Stretches of one loop that are closer than this (m) cross or touch."""
@@ -134,8 +136,10 @@ class Loop:
         Whether it is a closed line whose largest gap is small enough to be cut.
     diameter : float m or None
         Diameter, if the loop is a circle seen along its mean normal.
-    side : {"outer", "inner", "edge", ""}
-        Side of a sheet that the loop is on: outer, inner, or its thickness; "" if it is no sheet.
+    side : {"outer", "inner", "edge", "blind", "sunk", ""}
+        Side of a sheet that the loop is on: outer, inner, or its thickness; blind for a loop that
+        does not go through it, around a pocket, a blind hole or an engraving; sunk for the border
+        of a countersink or chamfer, which is wider than the hole; "" if it is no sheet.
     skin : str
         Name of the skin that the face of the loop is a piece of, or "".
     layer, colour : str
@@ -161,6 +165,11 @@ class Loop:
     _trace: Trace = field(repr=False)
 
     __repr__ = short_repr
+
+    @property
+    def is_main(self) -> bool:
+        """Whether it is picked by default: no piece of a skin, and to be cut as it is."""
+        return not self.skin and self.side not in NO_CUT
 
     def line(self, chord_tolerance: float = 1e-4) -> Array:
         """Return points (K, 3) m along the loop for pictures, even if it cannot be cut.
@@ -278,8 +287,8 @@ class Part:
     ) -> tuple[Loop, ...]:
         """Return the loops that meet all given criteria, in the order of `loops`.
 
-        Loops of faces that are pieces of a skin, and those around the thickness of a sheet, are
-        left out unless `face` or `side` selects them.
+        Loops of faces that are pieces of a skin are left out unless `face` selects them, and those
+        around the thickness of a sheet, blind and sunk ones unless `face` or `side` does.
 
         Parameters
         ----------
@@ -287,7 +296,7 @@ class Part:
             Name of a face or a skin.
         kind : {"outer", "inner", "open"}
             Trim lines, holes, or open lines.
-        side : {"outer", "inner", "edge"}
+        side : {"outer", "inner", "edge", "blind", "sunk"}
             Side of a sheet.
         diameter : (float, float) m
             Smallest and largest diameter of round loops, both included.
@@ -311,7 +320,10 @@ class Part:
         found = [
             loop
             for loop in self.loops
-            if (face is not None or (not loop.skin and (side is not None or loop.side != "edge")))
+            if (
+                face is not None
+                or (not loop.skin and (side is not None or loop.side not in NO_CUT))
+            )
             and all(want is None or getattr(loop, key) == want for key, want in asked.items())
             and all(_within(getattr(loop, key), want) for key, want in ranges.items())
         ]

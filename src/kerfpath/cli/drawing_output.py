@@ -113,7 +113,7 @@ def drawing_entry(part: Part) -> dict[str, object]:
 
 def list_contours(part: Part, html: Path | None, *, everything: bool) -> None:
     """Print the size of a part, and the name, surface, length, edges and place of every loop."""
-    main = [loop for loop in part.loops if not loop.skin and loop.side != "edge"]
+    main = [loop for loop in part.loops if loop.is_main]
     if html is not None:
         with busy(f"drawing {html.name}"):
             write_program(html, _page(part, main))

@@ -407,7 +407,7 @@ def part_message(job: Job, part: Part, revision: int) -> PartMessage:
     As in `Part.pick`, loops of the pieces of a skin and loops around the thickness of a sheet are
     left out.
     """
-    asked = [loop for loop in part.loops if not loop.skin and loop.side != "edge"]
+    asked = [loop for loop in part.loops if loop.is_main]
     told = sorted(asked, key=lambda loop: -loop.length)[:MOST_LOOPS]
     kept = {loop.name for loop in told}
     return PartMessage(

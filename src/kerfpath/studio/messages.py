@@ -256,7 +256,7 @@ class LoopEntry(Message):
     face: str
     kind: Literal["outer", "inner", "open"]
     """`inner`: a hole."""
-    side: Literal["outer", "inner", "edge", ""]
+    side: Literal["outer", "inner", "edge", "blind", "sunk", ""]
     """Of a sheet."""
     closed: bool
     """False for a loop that cannot be cut because of its gap."""

@@ -42,7 +42,8 @@ class PickTable(Table):
     ] = None
     face: Annotated[Text | None, key("the name of a face or skin", '"skin"')] = None
     side: Annotated[
-        Literal["outer", "inner", "edge"] | None, key("a side of the sheet", '"outer"')
+        Literal["outer", "inner", "edge", "blind", "sunk"] | None,
+        key("a side of the sheet", '"outer"'),
     ] = None
     diameter_mm: Annotated[
         Range | None, key("2 numbers above 0, from and to, in mm", "[8, 12]")
