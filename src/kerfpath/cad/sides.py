@@ -145,6 +145,8 @@ THIN = 0.2
 """A sheet is thinner than this share of the square root of the area of its shell."""
 AROUND = 0.7
 """Least share of the border of a face that a shell around it has."""
+CLOSER = 32
+"""How many times as many rays leave shells that are about as open."""
 SURE = 3.0
 """Standard deviations by which the shares of rays that leave must differ."""
 OPEN = 0.99
@@ -239,9 +241,11 @@ class _Mesh:
         shape = len(faces), RAYS
         return (far + OFF).reshape(shape), met.reshape(shape), square.reshape(shape)
 
-    def openness(self, faces: Sequence[int]) -> tuple[float, int]:
+    def openness(self, faces: Sequence[int], times: int = 1) -> tuple[float, int]:
         """Return the share of rays in all directions from faces that leave, and their number."""
-        counts = 4 + np.round(ALL_ROUND * self.size[list(faces)] / self.size[list(faces)].sum())
+        counts = 4 + np.round(
+            times * ALL_ROUND * self.size[list(faces)] / self.size[list(faces)].sum()
+        )
         points, k = (
             np.concatenate(each)
             for each in zip(*map(self.places, faces, counts.astype(np.int64).tolist()), strict=True)
@@ -375,16 +379,19 @@ def _ordered(
     while left:
         best, why = left[0], ""
         other = max(across[best], key=lambda number: across[best][number])
-        (share, count), (its, number) = leave[best], leave[other]
         if other in left:
-            noise = np.sqrt(share * (1 - share) / count + its * (1 - its) / number)
+            if _is_unsure(leave[best], leave[other]) and leave[other][0] < OPEN:
+                for each in (best, other):
+                    leave[each] = mesh.openness(members[each], CLOSER)
+                best, other = sorted((best, other), key=lambda number: -leave[number][0])
+            share, its = leave[best][0], leave[other][0]
             leaning = 0.0
             if towards is not None:
                 leaning = float((vector[best] - vector[other]) @ towards)
                 leaning /= (area[best] + area[other]) * float(np.linalg.norm(towards))
             if abs(leaning) > LEANING:
                 best = best if leaning > 0 else other
-            elif share - its <= SURE * noise + 1 / min(count, number):
+            elif _is_unsure(leave[best], leave[other]):
                 best = best if _faces_up(vector[best]) else other
                 if min(share, its) < OPEN:
                     why = (
@@ -394,6 +401,13 @@ def _ordered(
         left.remove(best)
         order.append((best, why))
     return order
+
+
+def _is_unsure(one: tuple[float, int], other: tuple[float, int]) -> bool:
+    """Return whether two shares of rays may be the same, by the numbers of rays."""
+    (a, count), (b, number) = one, other
+    noise = np.sqrt(a * (1 - a) / count + b * (1 - b) / number)
+    return bool(abs(a - b) <= SURE * noise + 1 / min(count, number))
 
 
 def _join_surrounded(of: Surfaces, shell: Ints, side: list[Side]) -> None:
