@@ -79,9 +79,13 @@ def read_apt(
 
 def _statements(lines: Sequence[str]) -> Iterator[tuple[int, str, str]]:
     """Yield line, major word and rest of each statement, with continued lines joined."""
-    begun, whole = 0, ""
+    begun, whole, in_comment = 0, "", False
     for number, line in enumerate(lines, start=1):
-        bare = line.partition("$$")[0].strip(BLANK)
+        bare, mark, comment = line.partition("$$")
+        if in_comment:  # Creo continues its comments, as statements, after a $ at the end
+            bare, mark, comment = "", "$$", line
+        in_comment = bool(mark) and comment.rstrip(BLANK).endswith("$")
+        bare = bare.strip(BLANK)
         begun = begun if whole else number
         whole += bare.removesuffix("$")
         if bare and not bare.endswith("$"):
@@ -172,7 +176,8 @@ class _Reader:
         if len(values) != 1 or values[0] not in UNITS:
             raise InputError(f"{where}: UNITS: expected one of {', '.join(UNITS)}")
         unit = UNITS[values[0]]
-        if self.unit != unit and (self.unit or self.moves):
+        has_points = any(move.kind in ("feed", "rapid") for move in self.moves)
+        if self.unit != unit and (self.unit or has_points):
             was = f"other than {self.unit} before" if self.unit else "after points without one"
             raise InputError(f"{where}: UNITS {was}; use one unit for the whole file")
         self.unit = unit

@@ -332,6 +332,8 @@ def part_of_strokes(
         ]
         surface = "plane" if axis is None else "lines"
         loops += named_loops(drawn_here, face=layer, surface=surface, gap=gap, layer=layer)
+    if axis is None and (note := _height_note(loops)):
+        notes.append(note)
     notes += [*_coincident_notes(loops), *_open_end_notes(loops)]
     return part_without_faces(path, unit, loops, gap=gap, notes=notes, left_out=left_out)
 
@@ -354,6 +356,21 @@ def _coincident_notes(loops: Sequence[Loop]) -> Iterator[str]:
     """Yield a note for each loop that lies on one of another layer or colour."""
     for i, j in coincident_pairs([loop._trace for loop in loops]):
         yield f"{loops[i].name} and {loops[j].name} lie on each other: cut twice if both are picked"
+
+
+HEIGHTS = 1e-3
+"""Difference (mm) of the heights of a flat drawing from which a note gives them."""
+
+
+def _height_note(loops: Sequence[Loop]) -> str:
+    """Return a note if a flat drawing has lines at several heights, else ""."""
+    z = np.array([loop.bounding_box[:, 2] for loop in loops]) / MM
+    if z.max() - z.min() <= HEIGHTS:
+        return ""
+    return (
+        f"lines at several heights, z from {z.min():g} to {z.max():g} mm: loops nest as seen along "
+        "the tool axis, and each is cut at its own height; check it"
+    )
 
 
 def _open_end_notes(loops: Sequence[Loop]) -> Iterator[str]:
@@ -385,7 +402,9 @@ def _chained(strokes: Sequence[Stroke], gap: float, R: Array) -> tuple[list[Chai
                 else:
                     left += together
             continue
-        if on_others:
+        if on_others and _marks(on_others) == _marks(own):  # an open line drawn twice
+            left += on_others
+        elif on_others:
             together = [*own, *on_others]
             its = _junctions(_ends(together), gap)
             if _is_even(its):
@@ -404,6 +423,11 @@ def _chained(strokes: Sequence[Stroke], gap: float, R: Array) -> tuple[list[Chai
     if count := sum(times > 1 for times in marks.values()):
         repaired.append(f"{count} sides shared by two loops, which are cut twice")
     return chains, repaired
+
+
+def _marks(strokes: Sequence[Stroke]) -> Counter[Mark]:
+    """Return how often each curve is drawn."""
+    return Counter(curve.mark for stroke in strokes for curve in stroke)
 
 
 def _count_curves(strokes: Sequence[Sequence[Curve]]) -> int:
@@ -633,7 +657,9 @@ def _are_holes(chains: Sequence[Chain]) -> list[bool]:
     crossed = np.zeros(len(chains), dtype=np.int64)
     for k, segment in ray_crossings(points, p, q):
         j = owner[segment]
-        larger = np.concatenate([boxes[k, 0] - boxes[j, 0], boxes[j, 1] - boxes[k, 1]], axis=1)
+        # Seen along the axis: a hole may be drawn at another height.
+        low, high = boxes[k, 0, :2] - boxes[j, 0, :2], boxes[j, 1, :2] - boxes[k, 1, :2]
+        larger = np.concatenate([low, high], axis=1)
         # Of two chains in one box, such as a circle and an inscribed one, the larger is around.
         is_around = (larger > -COINCIDENT).all(axis=1) & (j != k)
         is_around &= (larger > COINCIDENT).any(axis=1) | (areas[j] > LARGER * areas[k])

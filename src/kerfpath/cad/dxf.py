@@ -50,6 +50,10 @@ from kerfpath.errors import InputError, printable
 # Convert the entities of a DXF that are lines to cut to curves.
 
 
+FRAME = 16
+"""Flag of the vertices of a splined polyline that control its curve and are not drawn."""
+
+
 def curves_of(entity: DXFGraphic, T: Array) -> Iterator[Curve]:
     """Yield the curves (mm) of an entity, or none if it is no line to cut.
 
@@ -89,6 +93,8 @@ def curves_of(entity: DXFGraphic, T: Array) -> Iterator[Curve]:
     elif isinstance(entity, LWPolyline) or (
         isinstance(entity, Polyline) and (entity.is_2d_polyline or entity.is_3d_polyline)
     ):
+        if isinstance(entity, Polyline) and entity.dxf.flags & Polyline.SPLINE_FIT_VERTICES_ADDED:
+            entity.vertices[:] = [v for v in entity.vertices if not v.dxf.flags & FRAME]
         for piece in entity.virtual_entities():
             yield from curves_of(piece, T)
     elif isinstance(entity, DxfSpline):
@@ -123,6 +129,9 @@ MARKED = re.compile(
     % b"|".join(MARKERS),
     re.MULTILINE | re.DOTALL,
 )
+VERSION = re.compile(rb"^[ \t]*9[ \t]*\r?\n[ \t]*\$ACADVER[ \t]*\r?$", re.MULTILINE)
+HEADER = re.compile(rb"^[ \t]*2[ \t]*\r?\n[ \t]*HEADER[ \t]*\r?\n", re.MULTILINE)
+"""The version that a file states, and the start of the section that states it."""
 MOST = 100_000
 """Most curves, spans of splines and other entities in a drawing, blocks wherever inserted."""
 TOO_MUCH = (
@@ -179,7 +188,7 @@ def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, 
             document = Drawing.load(binary_tags_loader(content))
             auditor: Auditor = document.audit()
         else:
-            document, auditor = recover.read(BytesIO(MARKED.sub(_with_markers, content)))
+            document, auditor = recover.read(BytesIO(_dated(MARKED.sub(_with_markers, content))))
     if wrong := [message for message in logged if message.startswith("recovered invalid")]:
         raise InputError(f"the file is damaged: {wrong[0]}; save the drawing as DXF again")
     faults = [*logged, *(fault.message for fault in (*auditor.fixes, *auditor.errors))]
@@ -198,6 +207,19 @@ def _require_text(content: bytes) -> None:
             raise InputError(
                 f"the file is damaged: line {line} has {what}; save the drawing as DXF again"
             )
+
+
+def _dated(content: bytes) -> bytes:
+    """Return a file with lines of a later version than it states as one of that version.
+
+    ezdxf drops the markers of classes from files without a version, which it takes for R12.
+    """
+    if not MARKED.search(content) or VERSION.search(content):
+        return content
+    stated = b"9\n$ACADVER\n1\nAC1015\n"
+    if HEADER.search(content):
+        return HEADER.sub(lambda found: found[0] + stated, content, count=1)
+    return b"0\nSECTION\n2\nHEADER\n" + stated + b"0\nENDSEC\n" + content
 
 
 def _with_markers(entity: re.Match[bytes]) -> bytes:
@@ -340,6 +362,13 @@ def read_dxf(
     return replace(part, frames=frames)
 
 
+def _is_wide(entity: DXFGraphic) -> bool:
+    """Return whether a polyline has a width: its middle line is not the border that is shown."""
+    if isinstance(entity, LWPolyline):
+        return bool(entity.has_width)
+    return isinstance(entity, Polyline) and bool(entity.has_width)
+
+
 def _size(curve: Curve) -> int:
     """Return how much work a curve is, in lines."""
     return len(curve.breaks()) - 1 if isinstance(curve, Spline) else 1
@@ -409,9 +438,13 @@ class _Sheet:
         look = self._look(entity, inside)
         if self.document.layers.has_entry(look[0]):
             drawn = self.document.layers.get(look[0])
-            if drawn.is_off() or drawn.is_frozen():
+            # The layer of a block that is off hides only what the block has on layer 0.
+            if drawn.is_frozen() or (drawn.is_off() and not isinstance(entity, Insert)):
                 self.put_aside[kind, f"on hidden layer {look[0]}"] += 1
                 return
+        if entity.dxf.get("invisible", 0):
+            self.put_aside[kind, "invisible"] += 1
+            return
         if isinstance(entity, Insert):
             self._insert(entity, T, look, depth)
             return
@@ -422,6 +455,8 @@ class _Sheet:
         if not curves:
             self.left_out[kind, "not a line to cut"] += 1
         self._counted(max(0, sum(map(_size, curves)) - 1))
+        if curves and _is_wide(entity):
+            self.left_out[kind, "only its width: its middle line is read"] += 1
         for curve in curves:
             self._require_flat(curve, kind, look[0])
         if curves:
@@ -460,6 +495,8 @@ class _Sheet:
 
     def _look(self, entity: DXFGraphic, inside: Style) -> Style:
         layer = inside[0] if entity.dxf.layer == "0" else printable(str(entity.dxf.layer))
+        if self.document.layers.has_entry(layer):  # whatever the case of its letters
+            layer = printable(str(self.document.layers.get(layer).dxf.name))
         if entity.dxf.hasattr("true_color"):
             return layer, "#{:02x}{:02x}{:02x}".format(*int2rgb(entity.dxf.true_color))
         index = int(entity.dxf.color)
