@@ -392,6 +392,16 @@ def _solve(
         for g, h in waiting:
             model.add(place[g] < place[h])
     model.minimize(sum(round(time[ends] / TICK) * way for ends, way in taken.items()))
+    start = _nearest_first(group, time, earlier)
+    if start is not None:
+        steps = {0: 0} | {int(i) + 1: k for k, i in enumerate(start.tolist())}
+        legs = set(pairwise([0, *(start + 1).tolist(), 0]))
+        for leg, variable in taken.items():
+            model.add_hint(variable, leg in legs)
+        for i, variable in enumerate(without):
+            model.add_hint(variable, i + 1 not in steps)
+        for k, h in enumerate(group[start].tolist() if waiting else []):
+            model.add_hint(place[h], k)
     solver = cp_model.CpSolver()
     solver.parameters.max_time_in_seconds = seconds
     solver.parameters.num_workers = 1  # reproducible
@@ -399,31 +409,71 @@ def _solve(
     # Circuit cuts prove a plain tour about ten times faster; with places they only cost time.
     solver.parameters.linearization_level = 1 if waiting else 2
     status = solver.solve(model)
-    if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
+    least = float(time[:, 0].min()) + sum(
+        float(time[:, 1:][:, group == h].min()) for h in range(G)
+    )  # each group is reached, and home is, in no less
+    if status in (cp_model.OPTIMAL, cp_model.FEASIBLE):
+        following = {a: b for (a, b), way in taken.items() if solver.boolean_value(way)}
+        chosen, here = [], following[0]
+        while here:
+            chosen.append(here - 1)
+            here = following[here]
+        order = np.array(chosen)
+        least = max(least, solver.best_objective_bound * TICK)
+        if start is not None and _duration(start, time) < _duration(order, time):
+            order = start
+    elif start is not None and status != cp_model.INFEASIBLE:
+        order = start
+    else:
         proved = status == cp_model.INFEASIBLE
         why = (
             "its constraints (which contour may follow or must come before another) contradict "
             "each other"
             if proved
-            else f"none that keeps the constraints was found within {seconds:g} s"
+            else f"none that keeps the constraints was found within {seconds:g} s; give more with "
+            "seconds in [sequence]"
         )
-        raise NoFeasiblePath(
-            f"no order of cutting: {why}",
-            proved=proved,
-            node=-1,
-        )
-    following = {a: b for (a, b), way in taken.items() if solver.boolean_value(way)}
-    chosen, here = [], following[0]
-    while here:
-        chosen.append(here - 1)
-        here = following[here]
-    order = np.array(chosen)
-    duration = enter[order[0]] + own[order].sum() + move[order[:-1], order[1:]].sum()
-    return Order(
-        candidates=order,
-        duration=float(duration + leave[order[-1]]),
-        at_least=float(min(solver.best_objective_bound * TICK, duration + leave[order[-1]])),
-    )
+        raise NoFeasiblePath(f"no order of cutting: {why}", proved=proved, node=-1)
+    duration = _duration(order, time)
+    return Order(candidates=order, duration=duration, at_least=min(least, duration))
+
+
+def _duration(order: Ints, time: Array) -> float:
+    """Return the time (s) of an order of candidates, from home and back."""
+    around = np.concatenate([[0], order + 1, [0]])
+    return float(time[around[:-1], around[1:]].sum())
+
+
+STARTS = 32
+"""Number of candidates from which orders are begun that go to the nearest one each."""
+
+
+def _nearest_first(group: Ints, time: Array, earlier: Bools) -> Ints | None:
+    """Return the best of some orders that go to the nearest allowed candidate, None if all end.
+
+    The solver starts from it, so an order is there however little time it has.
+    """
+    best: Ints | None = None
+    firsts = np.argsort(time[0, 1:], kind="stable")
+    for first in firsts[np.isfinite(time[0, 1:][firsts])][:STARTS].tolist():
+        order, left, missing = list[int](), np.ones(len(group), bool), earlier.sum(axis=0)
+        here, following = 0, first
+        while np.isfinite(time[here, following + 1]):
+            order.append(following)
+            left &= group != group[following]
+            missing = missing - earlier[group[following]]
+            here = following + 1
+            if not left.any():
+                break
+            reach = np.where(left & (missing[group] == 0), time[here, 1:], np.inf)
+            following = int(np.argmin(reach))
+            if not np.isfinite(reach[following]):
+                break
+        found = np.array(order, dtype=np.int64)
+        is_whole = not left.any() and np.isfinite(time[here, 0])
+        if is_whole and (best is None or _duration(found, time) < _duration(best, time)):
+            best = found
+    return best
 
 
 def _times(

@@ -1,0 +1,49 @@
+"""An order of very many cuts is there however little time its search has, and keeps the rules."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.sequence.order import best_order
+
+
+def nest(parts: int, seed: int) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Return times between the loops of plates, two holes and an outline each, and the rules."""
+    rng = np.random.default_rng(seed)
+    at = (
+        np.repeat(rng.uniform(0, 5, (parts, 2)), 3, axis=0) + rng.normal(size=(3 * parts, 2)) * 0.05
+    )
+    apart = np.linalg.norm(at[:, None] - at[None], axis=2) + 0.1
+    np.fill_diagonal(apart, np.inf)
+    return apart, [(3 * k + i, 3 * k + 2) for k in range(parts) for i in (0, 1)]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_nest_has_an_order_within_the_rules_at_once(seed: int) -> None:
+    apart, rules = nest(25, seed)
+    count = len(apart)
+    order = best_order(range(count), np.ones(count), apart, before=rules, seconds=0.01)
+    place = np.argsort(order.candidates)
+    assert sorted(order.candidates.tolist()) == list(range(count))
+    assert all(place[a] < place[b] for a, b in rules)
+    taken = order.candidates
+    assert order.duration == pytest.approx(count + apart[taken[:-1], taken[1:]].sum())
+    assert count < order.at_least <= order.duration
+
+
+def test_more_time_is_never_worse() -> None:
+    apart, rules = nest(4, 0)
+    short, long = (
+        best_order(range(12), np.ones(12), apart, before=rules, seconds=s) for s in (0.001, 5)
+    )
+    assert long.duration <= short.duration
+    assert short.at_least <= long.duration + 1e-9  # a bound of any search holds for all orders
+
+
+def test_rules_that_contradict_each_other_are_told_from_too_little_time() -> None:
+    apart, _ = nest(1, 0)
+    with pytest.raises(NoFeasiblePath, match="contradict") as refused:
+        best_order(range(3), np.ones(3), apart, before=[(0, 1), (1, 2), (2, 0)], seconds=5)
+    assert refused.value.proved
