@@ -176,11 +176,13 @@ def clear_motion(
     begin: Callable[[str], None] = lambda what: None,
     *,
     thorough: bool = True,
+    explored: bool = True,
 ) -> Refinement | None:
     """Return the best clear motion found; None if there is none.
 
     The value function shows whether a wider search may find a better motion; without `thorough`,
-    the refined first paths are enough. With very many nodes, a motion is first planned along some
+    the refined first paths are enough. Without `explored`, wider beams follow instead of all
+    valleys. With very many nodes, a motion is first planned along some
     of them, and the graph of all nodes is built only if that is not enough.
 
     Raises
@@ -189,11 +191,16 @@ def clear_motion(
         A node has no pose.
     """
     starts = Starts(task, finder)
-    return _clear_motion(task, starts, begin, thorough=thorough)
+    return _clear_motion(task, starts, begin, thorough=thorough, explored=explored)
 
 
 def _clear_motion(
-    task: Task, starts: Starts, begin: Callable[[str], None], *, thorough: bool = True
+    task: Task,
+    starts: Starts,
+    begin: Callable[[str], None],
+    *,
+    thorough: bool = True,
+    explored: bool = True,
 ) -> Refinement | None:
     """Return the best clear motion found, which `starts` keep; None if there is none."""
     finder = starts.finder
@@ -210,7 +217,7 @@ def _clear_motion(
         paths = [path for beam in QUICK for path in search.paths(beam)]
     begin("refinement")
     starts.refine(paths)
-    if thorough and finder.is_free and can_explore(task):
+    if thorough and explored and finder.is_free and can_explore(task):
         _explore(task, starts, search)
     elif thorough:
         _search_wider(task, starts, search, paths)

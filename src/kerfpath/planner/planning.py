@@ -55,7 +55,8 @@ def best_motion(
 ) -> Plan:
     """Return the plan of the best motion found over continuous gamma.
 
-    It is that of `kerfpath.plan`, but not certified. Where `kerfpath.plan` would go to the grid,
+    It is for plans that are made in number: not certified, and not after an exploration of all
+    valleys, so that it may cost more than that of `kerfpath.plan`. Where `kerfpath.plan` would go to the grid,
     this raises NoFeasiblePath and spends no time on a proof.
 
     Parameters
@@ -77,7 +78,7 @@ def best_motion(
     finder, begin = CollisionFreeSearch(task), phase or (lambda what: None)
     why = grid_reason(task)
     begin("search")
-    found = None if why else clear_motion(task, finder, begin)
+    found = None if why else clear_motion(task, finder, begin, explored=False)
     if found is None:
         raise NoFeasiblePath(
             f"contour {contour.name!r}: no motion over continuous rotation"

@@ -384,9 +384,12 @@ def rows_of_run(run: Subproblem, robot: Robot) -> list[tuple[str, str]]:
     """Return the settings of a run as rows of name and value in words."""
     each = run.weights * robot.speed_limits()[0]
     relative = each / np.exp(np.log(each).mean())
+    rotation = "continuous" if run.continuous else "on its grid"
+    if run.begin:
+        rotation += ", refined from known plans"
     rows = [
         ("minimise", f"{run.objective} of {run.metric} distances"),
-        ("rotation", "continuous" if run.continuous else "on its grid"),
+        ("rotation", rotation),
         ("limits", f"{run.eta_v:.1%} of velocity, {run.eta_a:.1%} of acceleration"),
         ("joints weigh", " ".join(f"{weight:.3g}" for weight in relative)),
     ]
