@@ -142,6 +142,30 @@ def test_inches_and_an_upright_axis(tmp_path: Path) -> None:
     assert other.contour("cut1", closed=False).length == pytest.approx(0.04)
 
 
+PATH = "RAPID\nGOTO/0,0,0,0,0,1\nGOTO/0,30,0\nGOTO/40,30,0\n"
+
+
+@pytest.mark.parametrize("before", ["TOOL PATH/TRIM,TOOL,BEAM", "LOADTL/1", "LOAD/TOOL,1"])
+def test_the_unit_may_come_after_words_without_points(tmp_path: Path, before: str) -> None:
+    (tmp_path / "path.cls").write_text(f"{before}\nUNITS/MM\n{PATH}")
+    assert read(tmp_path / "path.cls").loop("cut1").length == pytest.approx(0.07)
+    (tmp_path / "path.cls").write_text(f"{PATH}UNITS/MM\n")
+    with pytest.raises(InputError, match="line 5: UNITS after points without one"):
+        read(tmp_path / "path.cls")
+
+
+def test_a_comment_goes_on_in_lines_of_numbers_only(tmp_path: Path) -> None:
+    creo = "$$-> CSYS / 1.0, 0.0, 0.0, 0.0, $\n 0.0, 1.0, 0.0, 0.0, $\n 0.0, -1.0E-02, 1.0, 0.0\n"
+    (tmp_path / "path.cl").write_text(f"UNITS/MM\n{creo}{PATH}")
+    assert read(tmp_path / "path.cl").loop("cut1").length == pytest.approx(0.07)
+    # A statement after such a comment is one, and numbers that continue nothing are refused.
+    (tmp_path / "path.cl").write_text(f"$$ in dollars: 5 $\nUNITS/INCHES\n{PATH}")
+    assert read(tmp_path / "path.cl").loop("cut1").length == pytest.approx(0.07 * 25.4)
+    (tmp_path / "path.cl").write_text(f"UNITS/MM\n{creo} 0.0, 1.0\n{PATH}")
+    with pytest.raises(InputError, match="line 5"):
+        read(tmp_path / "path.cl")
+
+
 def test_the_axis_is_the_last_that_was_said(tmp_path: Path) -> None:
     text = PLAIN.replace("MULTAX/OFF", "MULTAX/ON\nTLAXIS/0,0.6,0.8")
     contour = path(tmp_path, text).contour("cut1", closed=False)

@@ -143,7 +143,7 @@ def test_units_after_the_start_of_an_operation_are_those_of_the_file(
 
 def test_a_comment_that_goes_on_is_a_comment(tmp_path: Path) -> None:
     (tmp_path / "a.cl").write_text(
-        "$$-> CSYS / 1, 0, 0, $\n  0, 1, 0, $ \n  GOTO/1,2,3\nUNITS / MM\n"
+        "$$-> CSYS / 1, 0, 0, $\n  0, 1, 0, $ \n  0, 0, 1\nUNITS / MM\n"
         "GOTO / 80, 40, 10, 0, 0, 1 $$ no $ here\nGOTO / 20, 40, 10\n"
     )
     (cut,) = read(tmp_path / "a.cl").loops

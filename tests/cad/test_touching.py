@@ -145,14 +145,18 @@ def test_lines_on_each_other_in_two_layers_or_colours_are_said(tmp_path: Path) -
         space.add_circle((10, 10), 4, dxfattribs={"layer": "CUT"})
         space.add_arc((10, 10), 4, 30, 200, dxfattribs={"layer": "OLD"})
         space.add_arc((10, 10), 4, 200, 30, dxfattribs={"layer": "OLD"})
-        space.add_circle((10, 10), 4.01, dxfattribs={"layer": "NEAR"})
+        space.add_circle((10, 10), 4.01, dxfattribs={"layer": "NEAR"})  # gap: 0.05 mm
+        space.add_circle((10, 10), 4.2, dxfattribs={"layer": "APART"})
         # Halves of one square: alike in size and length, but elsewhere.
         space.add_lwpolyline([(50, 0), (60, 0), (60, 10)], close=True, dxfattribs={"color": 1})
         space.add_lwpolyline([(50, 0), (50, 10), (60, 10)], close=True, dxfattribs={"color": 2})
 
     part = drawn(tmp_path, draw)
     said = [note for note in part.notes if "lie on each other" in note]
-    assert said == ["CUT/hole1 and OLD/hole1 lie on each other: cut twice if both are picked"]
+    pairs = itertools.combinations(["CUT/hole1", "OLD/hole1", "NEAR/hole1"], 2)
+    words = "lie on each other: cut twice if both are picked"
+    assert said == [f"{one} and {other} {words}" for one, other in pairs]
+    assert part.loop("APART/outer").kind == "outer"
 
 
 def hanging(part: Part) -> list[str]:

@@ -23,6 +23,8 @@ from kerfpath.text import upper
 
 BLANK = " \t"
 UNITS = {"MM": "mm", "CM": "cm", "INCHES": "in", "INCH": "in", "IN": "in", "FEET": "ft", "M": "m"}
+NUMBERS = re.compile(r"[-+.,0-9DE \t]+\$?[ \t]*", re.IGNORECASE)
+"""A line of numbers, continued or not."""
 TEXTS = ("PARTNO", "PPRINT", "REMARK", "TPRINT")
 """Words that any text may follow, with or without a slash."""
 HARMLESS = (
@@ -78,14 +80,18 @@ def read_apt(
 
 
 def _statements(lines: Sequence[str]) -> Iterator[tuple[int, str, str]]:
-    """Yield line, major word and rest of each statement, with continued lines joined."""
+    """Yield line, major word and rest of each statement, with continued lines joined.
+
+    A comment that ends with $ goes on in lines of numbers, as Creo writes it; a line with a word is
+    always a statement.
+    """
     begun, whole, in_comment = 0, "", False
     for number, line in enumerate(lines, start=1):
-        bare, mark, comment = line.partition("$$")
-        if in_comment:  # Creo continues its comments, as statements, after a $ at the end
-            bare, mark, comment = "", "$$", line
-        in_comment = bool(mark) and comment.rstrip(BLANK).endswith("$")
-        bare = bare.strip(BLANK)
+        in_comment = not whole and (
+            line.strip(BLANK).startswith("$$") or (in_comment and bool(NUMBERS.fullmatch(line)))
+        )
+        bare = "" if in_comment else line.partition("$$")[0].strip(BLANK)
+        in_comment = in_comment and line.rstrip(BLANK).endswith("$")
         begun = begun if whole else number
         whole += bare.removesuffix("$")
         if bare and not bare.endswith("$"):
@@ -176,7 +182,7 @@ class _Reader:
         if len(values) != 1 or values[0] not in UNITS:
             raise InputError(f"{where}: UNITS: expected one of {', '.join(UNITS)}")
         unit = UNITS[values[0]]
-        has_points = any(move.kind in ("feed", "rapid") for move in self.moves)
+        has_points = any(move.point for move in self.moves)
         if self.unit != unit and (self.unit or has_points):
             was = f"other than {self.unit} before" if self.unit else "after points without one"
             raise InputError(f"{where}: UNITS {was}; use one unit for the whole file")

@@ -42,10 +42,12 @@ MOST_COMPARED = 100
 """Largest number of points of a line that are compared with the other."""
 MOST_COINCIDENT = 10_000
 """Largest number of pairs of lines that are compared, which takes milliseconds for each."""
+LONG = 10.0
+"""Lines longer than this, in gaps, are the same within a gap, as no beam parts them."""
 
 
-def coincident_pairs(traces: Sequence[Trace]) -> Iterator[tuple[int, int]]:
-    """Yield pairs (i, j) of traces with i < j that lie on each other.
+def coincident_pairs(traces: Sequence[Trace], gap: float) -> list[tuple[int, int]]:
+    """Return pairs (i, j) of traces with i < j that lie on each other, within `gap` (mm) if long.
 
     Raises
     ------
@@ -53,18 +55,29 @@ def coincident_pairs(traces: Sequence[Trace]) -> Iterator[tuple[int, int]]:
         Far too many of them.
     """
     if len(traces) < 2:
-        return
-    facts = np.array(
-        [[*trace.bounds().ravel().tolist(), float(trace.lengths.sum())] for trace in traces]
-    )
-    tree = cKDTree(facts)
-    if _pair_count(tree, tree, COINCIDENT) > 2 * MOST_COINCIDENT + len(traces):
-        raise InputError(
-            f"more than {MOST_COINCIDENT} pairs of lines lie on each other; draw each line once"
-        )
-    for i, j in sorted(tree.query_pairs(COINCIDENT, p=np.inf)):
-        if _lies_on(traces[i].around, traces[j]) and _lies_on(traces[j].around, traces[i]):
-            yield i, j
+        return []
+    lengths = np.array([float(trace.lengths.sum()) for trace in traces])
+    boxes = [trace.bounds().ravel() for trace in traces]
+    # A loop around another at some distance is longer by 2 pi times as much.
+    facts = np.column_stack([boxes, lengths / (2 * np.pi)])
+    found: set[tuple[int, int]] = set()
+    for within, those in (
+        (COINCIDENT, np.arange(len(traces))),
+        (max(gap, COINCIDENT), np.flatnonzero(lengths > LONG * gap)),
+    ):
+        if not those.size:
+            continue
+        tree = cKDTree(facts[those])
+        if _pair_count(tree, tree, within) > 2 * MOST_COINCIDENT + len(those):
+            raise InputError(
+                f"more than {MOST_COINCIDENT} pairs of lines lie on each other; draw each line once"
+            )
+        for pair in tree.query_pairs(within, p=np.inf):
+            i, j = sorted(those[list(pair)].tolist())
+            one, other = traces[i], traces[j]
+            if _lies_on(one.around, other, within) and _lies_on(other.around, one, within):
+                found.add((i, j))
+    return sorted(found)
 
 
 def _pair_count(one: cKDTree, other: cKDTree, within: float, p: float = np.inf) -> int:
@@ -72,13 +85,13 @@ def _pair_count(one: cKDTree, other: cKDTree, within: float, p: float = np.inf) 
     return int(one.count_neighbors(other, within, p=p))
 
 
-def _lies_on(points: Array, trace: Trace) -> bool:
+def _lies_on(points: Array, trace: Trace, within: float) -> bool:
     chords = trace.sample(CHORD, np.pi)[0]
     if trace.gaps.size == len(trace.lengths):
         chords = np.vstack([chords, chords[:1]])
     step = -(-len(points) // MOST_COMPARED)
     return all(
-        off_chord(chords[:-1], chords[1:], point).min() <= COINCIDENT for point in points[::step]
+        off_chord(chords[:-1], chords[1:], point).min() <= within for point in points[::step]
     )
 
 
@@ -311,7 +324,7 @@ def part_of_strokes(
     if not chains:
         why = f"; {left_out[0]}" if left_out else ""
         raise InputError(f"holds nothing to cut: no line, arc, polyline, ellipse or spline{why}")
-    holes = iter(_are_holes([chain for _, chain in chains if chain.is_closed]))
+    holes = iter(_are_holes([chain for _, chain in chains if chain.is_closed], gap / MM))
     kinds: list[Kind] = []
     for k, (style, chain) in enumerate(chains):
         kind: Kind = "open"
@@ -334,7 +347,7 @@ def part_of_strokes(
         loops += named_loops(drawn_here, face=layer, surface=surface, gap=gap, layer=layer)
     if axis is None and (note := _height_note(loops)):
         notes.append(note)
-    notes += [*_coincident_notes(loops), *_open_end_notes(loops)]
+    notes += [*_coincident_notes(loops, gap / MM), *_open_end_notes(loops)]
     return part_without_faces(path, unit, loops, gap=gap, notes=notes, left_out=left_out)
 
 
@@ -352,9 +365,9 @@ def _rotated_back(chain: Chain, R: Array) -> Chain:
     return replace(chain, edges=[turned(curve, R.T, up) for curve in chain.edges])
 
 
-def _coincident_notes(loops: Sequence[Loop]) -> Iterator[str]:
+def _coincident_notes(loops: Sequence[Loop], gap: float) -> Iterator[str]:
     """Yield a note for each loop that lies on one of another layer or colour."""
-    for i, j in coincident_pairs([loop._trace for loop in loops]):
+    for i, j in coincident_pairs([loop._trace for loop in loops], gap):
         yield f"{loops[i].name} and {loops[j].name} lie on each other: cut twice if both are picked"
 
 
@@ -389,45 +402,52 @@ def _chained(strokes: Sequence[Stroke], gap: float, R: Array) -> tuple[list[Chai
     A stroke that lies on another is left out, unless it is a side that two loops share.
     """
     drawn = [stroke for given in strokes if (stroke := _head_to_tail(given))]
-    kept, spare, left = _split_duplicates(drawn)
+    same = _same_marks(drawn, gap)
+    kept, spare, left = _split_duplicates(drawn, same)
     chains = [EdgeChain(edges=stroke) for stroke in kept if _is_closed(stroke)]
     loose = [stroke for stroke in kept if not _is_closed(stroke)]
     next_end = _OpenEnds(loose, gap, R)
     for own, place, on_others in _connected_groups(loose, spare, gap):
         if _is_even(place):
-            chains += _trace_chains(own, place, next_end)
+            chains += _trace_chains(own, place, same, next_end)
             for together, its, _ in _connected_groups(on_others, [], gap):
                 if _is_even(its):
-                    chains += _trace_chains(together, its, next_end)
+                    chains += _trace_chains(together, its, same, next_end)
                 else:
                     left += together
             continue
-        if on_others and _marks(on_others) == _marks(own):  # an open line drawn twice
-            left += on_others
-        elif on_others:
+        if on_others:
             together = [*own, *on_others]
             its = _junctions(_ends(together), gap)
             if _is_even(its):
-                chains += _trace_chains(together, its, next_end)
+                found = list(_trace_chains(together, its, same, next_end))
+                twice = _run_both_ways(found, same)
+                if not twice:
+                    chains += found
+                    continue
+                # Lines with the same region on both sides bound nothing: the rest is chained alone.
+                within = [twice.issuperset(_marks(stroke, same)) for stroke in together]
+                alone = [stroke for stroke, bare in zip(own, within, strict=False) if bare]
+                bare = within[len(own) :]
+                left += [stroke for stroke, bare in zip(on_others, bare, strict=True) if bare]
+                rest = [stroke for stroke, bare in zip(together, within, strict=True) if not bare]
+                for apart in (alone, rest):
+                    for group, at, _ in _connected_groups(apart, [], gap):
+                        chains += _trace_chains(group, at, same, next_end)
                 continue
             left += on_others
-        chains += _trace_chains(own, place, next_end)
-    again = {j for _, j in coincident_pairs(chains)}
+        chains += _trace_chains(own, place, same, next_end)
+    again = {j for _, j in coincident_pairs(chains, gap)}
     repaired = []
     if count := _count_curves(strokes) - _count_curves(drawn):
         repaired.append(f"{count} curves without length left out")
     if count := _count_curves(left) + _count_curves([chains[j].edges for j in again]):
         repaired.append(f"{count} curves drawn twice left out")
     chains = [chain for k, chain in enumerate(chains) if k not in again]
-    marks = Counter(curve.mark for chain in chains for curve in chain.edges)
+    marks = Counter(mark for chain in chains for mark in _marks(chain.edges, same))
     if count := sum(times > 1 for times in marks.values()):
         repaired.append(f"{count} sides shared by two loops, which are cut twice")
     return chains, repaired
-
-
-def _marks(strokes: Sequence[Stroke]) -> Counter[Mark]:
-    """Return how often each curve is drawn."""
-    return Counter(curve.mark for stroke in strokes for curve in stroke)
 
 
 def _count_curves(strokes: Sequence[Sequence[Curve]]) -> int:
@@ -457,21 +477,44 @@ def _is_closed(stroke: Stroke) -> bool:
     return bool(np.linalg.norm(stroke[0].ends[0] - stroke[-1].ends[1]) <= NOTHING)
 
 
-def _split_duplicates(strokes: Sequence[Stroke]) -> tuple[list[Stroke], list[Stroke], list[Stroke]]:
+def _same_marks(strokes: Sequence[Stroke], gap: float) -> dict[Mark, Mark]:
+    """Return the mark of the first of the curves that lie on each other, for those after it."""
+    alone = {curve.mark: curve for stroke in strokes for curve in stroke}
+    marks = list(alone)
+    traces = [EdgeChain(edges=(curve,), is_closed=False) for curve in alone.values()]
+    same: dict[Mark, Mark] = {}
+    for i, j in coincident_pairs(traces, gap):
+        same.setdefault(marks[j], same.get(marks[i], marks[i]))
+    return same
+
+
+def _marks(curves: Sequence[Curve], same: Mapping[Mark, Mark]) -> tuple[Mark, ...]:
+    return tuple(same.get(curve.mark, curve.mark) for curve in curves)
+
+
+def _run_both_ways(chains: Sequence[Chain], same: Mapping[Mark, Mark]) -> set[Mark]:
+    """Return the marks of curves that one of the chains has more than once."""
+    counts = [Counter(_marks(chain.edges, same)) for chain in chains]
+    return {mark for count in counts for mark, times in count.items() if times > 1}
+
+
+def _split_duplicates(
+    strokes: Sequence[Stroke], same: Mapping[Mark, Mark]
+) -> tuple[list[Stroke], list[Stroke], list[Stroke]]:
     """Return single strokes, open strokes drawn a second time, and those to leave out."""
-    marks = [tuple(curve.mark for curve in stroke) for stroke in strokes]
+    marks = [_marks(stroke, same) for stroke in strokes]
     within = {mark for each in marks if len(each) > 1 for mark in each}
     times: Counter[tuple[Mark, ...]] = Counter()
     kept, spare, left = list[Stroke](), list[Stroke](), list[Stroke]()
     for stroke, own in zip(strokes, marks, strict=True):
-        same = tuple(sorted(own))
-        if len(same) == 1 and same[0] in within:
-            times[same] = max(times[same], 1)
-        times[same] += 1
-        if times[same] == 1:
+        key = tuple(sorted(own))
+        if len(key) == 1 and key[0] in within:
+            times[key] = max(times[key], 1)
+        times[key] += 1
+        if times[key] == 1:
             kept.append(stroke)
         else:
-            (spare if times[same] == 2 and not _is_closed(stroke) else left).append(stroke)
+            (spare if times[key] == 2 and not _is_closed(stroke) else left).append(stroke)
     return kept, spare, left
 
 
@@ -519,11 +562,13 @@ def _is_even(place: Ints) -> bool:
     return not any(count % 2 for count in Counter(place.tolist()).values())
 
 
-def _trace_chains(strokes: Sequence[Stroke], place: Ints, next_end: _OpenEnds) -> Iterator[Chain]:
+def _trace_chains(
+    strokes: Sequence[Stroke], place: Ints, same: Mapping[Mark, Mark], next_end: _OpenEnds
+) -> Iterator[Chain]:
     """Yield the chains of connected open strokes; `place` numbers the junctions of their ends."""
     marks: dict[tuple[Mark, ...], int] = {}
     alike = [
-        marks.setdefault(tuple(sorted(curve.mark for curve in s)), len(marks)) for s in strokes
+        marks.setdefault(tuple(sorted(_marks(stroke, same))), len(marks)) for stroke in strokes
     ]
     partner = continuations(strokes, alike, place)
     used = np.zeros(len(strokes), dtype=bool)
@@ -641,27 +686,27 @@ class _OpenEnds:
         return min(breaks)
 
 
-def _are_holes(chains: Sequence[Chain]) -> list[bool]:
-    """Return for each closed chain whether an odd number of the others enclose it.
+def _are_holes(chains: Sequence[Chain], gap: float) -> list[bool]:
+    """Return for each closed chain whether an odd number of the others enclose it, from above.
 
-    Chains may touch or coincide, so a point inside each decides.
+    Chains may touch or coincide, so a point inside each decides; those whose boxes differ by less
+    than `gap` (mm) are the same line, in two layers, unless one is much larger.
     """
     if not chains:
         return []
-    boxes = np.array([chain.bounds() for chain in chains])
+    boxes = np.array([chain.bounds()[:, :2] for chain in chains])
     areas = np.array([abs(chain.area[2]) for chain in chains])
     points = np.array([interior_point(chain.around) for chain in chains])
     owner = np.repeat(np.arange(len(chains)), [len(chain.around) for chain in chains])
     p = np.vstack([chain.around for chain in chains])
     q = np.vstack([np.roll(chain.around, -1, axis=0) for chain in chains])
     crossed = np.zeros(len(chains), dtype=np.int64)
+    within = max(gap, COINCIDENT)
     for k, segment in ray_crossings(points, p, q):
         j = owner[segment]
-        # Seen along the axis: a hole may be drawn at another height.
-        low, high = boxes[k, 0, :2] - boxes[j, 0, :2], boxes[j, 1, :2] - boxes[k, 1, :2]
-        larger = np.concatenate([low, high], axis=1)
+        larger = np.concatenate([boxes[k, 0] - boxes[j, 0], boxes[j, 1] - boxes[k, 1]], axis=1)
         # Of two chains in one box, such as a circle and an inscribed one, the larger is around.
         is_around = (larger > -COINCIDENT).all(axis=1) & (j != k)
-        is_around &= (larger > COINCIDENT).any(axis=1) | (areas[j] > LARGER * areas[k])
+        is_around &= (larger > within).any(axis=1) | (areas[j] > LARGER * areas[k])
         crossed += np.bincount(k[is_around], minlength=len(chains))
     return [bool(count % 2) for count in crossed]

@@ -29,7 +29,7 @@ from ezdxf.entities.ellipse import Ellipse
 from ezdxf.entities.insert import Insert
 from ezdxf.entities.line import Line as DxfLine
 from ezdxf.entities.lwpolyline import LWPolyline
-from ezdxf.entities.polyline import Polyline
+from ezdxf.entities.polyline import DXFVertex, Polyline
 from ezdxf.entities.spline import Spline as DxfSpline
 from ezdxf.entities.ucs import UCSTableEntry
 from ezdxf.lldxf.const import DXFError
@@ -48,10 +48,6 @@ from kerfpath.errors import InputError, printable
 
 # -----------------------------------------------------------------------------
 # Convert the entities of a DXF that are lines to cut to curves.
-
-
-FRAME = 16
-"""Flag of the vertices of a splined polyline that control its curve and are not drawn."""
 
 
 def curves_of(entity: DXFGraphic, T: Array) -> Iterator[Curve]:
@@ -93,8 +89,12 @@ def curves_of(entity: DXFGraphic, T: Array) -> Iterator[Curve]:
     elif isinstance(entity, LWPolyline) or (
         isinstance(entity, Polyline) and (entity.is_2d_polyline or entity.is_3d_polyline)
     ):
-        if isinstance(entity, Polyline) and entity.dxf.flags & Polyline.SPLINE_FIT_VERTICES_ADDED:
-            entity.vertices[:] = [v for v in entity.vertices if not v.dxf.flags & FRAME]
+        if isinstance(entity, Polyline) and entity.dxf.flags & entity.SPLINE_FIT_VERTICES_ADDED:
+            # Its first vertices are the frame of the spline, which is not drawn.
+            frame = DXFVertex.SPLINE_FRAME_CONTROL_POINT
+            entity.vertices[:] = [v for v in entity.vertices if not v.dxf.flags & frame]
+            if not entity.vertices:
+                raise DXFError("a splined polyline without its curve")
         for piece in entity.virtual_entities():
             yield from curves_of(piece, T)
     elif isinstance(entity, DxfSpline):
@@ -129,9 +129,10 @@ MARKED = re.compile(
     % b"|".join(MARKERS),
     re.MULTILINE | re.DOTALL,
 )
-VERSION = re.compile(rb"^[ \t]*9[ \t]*\r?\n[ \t]*\$ACADVER[ \t]*\r?$", re.MULTILINE)
-HEADER = re.compile(rb"^[ \t]*2[ \t]*\r?\n[ \t]*HEADER[ \t]*\r?\n", re.MULTILINE)
-"""The version that a file states, and the start of the section that states it."""
+VERSION = re.compile(rb"(\$ACADVER[ \t]*\r?\n[ \t]*1[ \t]*\r?\n[ \t]*)(AC[0-9]{4})")
+HEADER = re.compile(rb"^[ \t]*2[ \t]*\r?\nHEADER[ \t]*\r?\n", re.MULTILINE)
+OLDEST, NEWER = b"AC1009", b"AC1015"
+"""Version without these kinds, of which ezdxf drops their markers, and a version that has them."""
 MOST = 100_000
 """Most curves, spans of splines and other entities in a drawing, blocks wherever inserted."""
 TOO_MUCH = (
@@ -188,7 +189,7 @@ def document_of(content: bytes) -> tuple[Drawing, list[str], Counter[tuple[str, 
             document = Drawing.load(binary_tags_loader(content))
             auditor: Auditor = document.audit()
         else:
-            document, auditor = recover.read(BytesIO(_dated(MARKED.sub(_with_markers, content))))
+            document, auditor = recover.read(BytesIO(_as_ezdxf_reads(content)))
     if wrong := [message for message in logged if message.startswith("recovered invalid")]:
         raise InputError(f"the file is damaged: {wrong[0]}; save the drawing as DXF again")
     faults = [*logged, *(fault.message for fault in (*auditor.fixes, *auditor.errors))]
@@ -209,17 +210,20 @@ def _require_text(content: bytes) -> None:
             )
 
 
-def _dated(content: bytes) -> bytes:
-    """Return a file with lines of a later version than it states as one of that version.
-
-    ezdxf drops the markers of classes from files without a version, which it takes for R12.
-    """
-    if not MARKED.search(content) or VERSION.search(content):
-        return content
-    stated = b"9\n$ACADVER\n1\nAC1015\n"
-    if HEADER.search(content):
-        return HEADER.sub(lambda found: found[0] + stated, content, count=1)
-    return b"0\nSECTION\n2\nHEADER\n" + stated + b"0\nENDSEC\n" + content
+def _as_ezdxf_reads(content: bytes) -> bytes:
+    """Return a file with the markers of its entities, and of the version that these have."""
+    marked = MARKED.sub(_with_markers, content)
+    stated = VERSION.search(content)
+    if not MARKED.search(content) or (stated and stated[2] > OLDEST):
+        return marked
+    if stated:
+        return VERSION.sub(rb"\g<1>" + NEWER, marked, count=1)
+    end = b"\r\n" if b"\r\n" in content else b"\n"
+    version = end.join([b"  9", b"$ACADVER", b"  1", NEWER, b""])
+    if HEADER.search(marked):
+        return HEADER.sub(lambda header: header[0] + version, marked, count=1)
+    start, stop = ([b"  0", b"SECTION", b"  2", b"HEADER", b""], [b"  0", b"ENDSEC", b""])
+    return end.join(start) + version + end.join(stop) + marked
 
 
 def _with_markers(entity: re.Match[bytes]) -> bytes:
@@ -362,16 +366,14 @@ def read_dxf(
     return replace(part, frames=frames)
 
 
-def _is_wide(entity: DXFGraphic) -> bool:
-    """Return whether a polyline has a width: its middle line is not the border that is shown."""
-    if isinstance(entity, LWPolyline):
-        return bool(entity.has_width)
-    return isinstance(entity, Polyline) and bool(entity.has_width)
-
-
 def _size(curve: Curve) -> int:
     """Return how much work a curve is, in lines."""
     return len(curve.breaks()) - 1 if isinstance(curve, Spline) else 1
+
+
+def _is_wide(entity: DXFGraphic) -> bool:
+    """Return whether a polyline has a width: its middle line is not the border that is shown."""
+    return isinstance(entity, LWPolyline | Polyline) and bool(entity.has_width)
 
 
 def _frame(ucs: UCSTableEntry, scale: float) -> Array:
@@ -396,6 +398,11 @@ class _Sheet:
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
     put_aside: Counter[tuple[str, str]] = field(default_factory=Counter)
     count: int = 0
+    layers: dict[str, str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        named = [str(layer.dxf.name) for layer in self.document.layers]
+        self.layers = {name.casefold(): printable(name) for name in named}
 
     def summed(self) -> tuple[LeftOut, ...]:
         """Return what was left out by kind and reason, first what may have been a line to cut."""
@@ -436,15 +443,15 @@ class _Sheet:
 
     def _entity(self, entity: DXFGraphic, kind: str, T: Array, inside: Style, depth: int) -> None:
         look = self._look(entity, inside)
-        if self.document.layers.has_entry(look[0]):
-            drawn = self.document.layers.get(look[0])
-            # The layer of a block that is off hides only what the block has on layer 0.
-            if drawn.is_frozen() or (drawn.is_off() and not isinstance(entity, Insert)):
-                self.put_aside[kind, f"on hidden layer {look[0]}"] += 1
-                return
         if entity.dxf.get("invisible", 0):
             self.put_aside[kind, "invisible"] += 1
             return
+        if self.document.layers.has_entry(look[0]):
+            drawn = self.document.layers.get(look[0])
+            # A block on a layer that is off shows what it has on other layers.
+            if drawn.is_frozen() or (drawn.is_off() and not isinstance(entity, Insert)):
+                self.put_aside[kind, f"on hidden layer {look[0]}"] += 1
+                return
         if isinstance(entity, Insert):
             self._insert(entity, T, look, depth)
             return
@@ -494,9 +501,7 @@ class _Sheet:
             raise InputError(f"holds more than {MOST} curves and blocks, {TOO_MUCH}")
 
     def _look(self, entity: DXFGraphic, inside: Style) -> Style:
-        layer = inside[0] if entity.dxf.layer == "0" else printable(str(entity.dxf.layer))
-        if self.document.layers.has_entry(layer):  # whatever the case of its letters
-            layer = printable(str(self.document.layers.get(layer).dxf.name))
+        layer = inside[0] if entity.dxf.layer == "0" else self._layer(str(entity.dxf.layer))
         if entity.dxf.hasattr("true_color"):
             return layer, "#{:02x}{:02x}{:02x}".format(*int2rgb(entity.dxf.true_color))
         index = int(entity.dxf.color)
@@ -506,6 +511,10 @@ class _Sheet:
             known = self.document.layers.has_entry(layer)
             index = abs(int(self.document.layers.get(layer).dxf.color)) if known else 7
         return layer, COLOURS.get(index, f"aci{index}")
+
+    def _layer(self, name: str) -> str:
+        """Return a layer as its table spells it, or as it is first used: case does not matter."""
+        return self.layers.setdefault(name.casefold(), printable(name))
 
     def _require_flat(self, curve: Curve, kind: str, layer: str) -> None:
         box = curve.bounds()

@@ -229,7 +229,7 @@ def sewn_shape(
     if not (faces or lines):
         raise nothing_drawn(left_out)
     if lines and faces:
-        lost = LeftOut(kind="curve", reason="it bounds no face", count=lines, may_cut=False)
+        lost = LeftOut(kind="curve", reason="it bounds no face", count=lines, may_cut=True)
         left_out = [*left_out, lost]
     solids = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
     if not solids and len(faces) > 1:
