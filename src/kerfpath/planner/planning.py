@@ -56,8 +56,8 @@ def best_motion(
     """Return the plan of the best motion found over continuous gamma.
 
     It is for plans that are made in number: not certified, and not after an exploration of all
-    valleys, so that it may cost more than that of `kerfpath.plan`. Where `kerfpath.plan` would go to the grid,
-    this raises NoFeasiblePath and spends no time on a proof.
+    valleys, so that it may cost more than that of `kerfpath.plan`. Where `kerfpath.plan` would go
+    to the grid, this raises NoFeasiblePath and spends no time on a proof.
 
     Parameters
     ----------
