@@ -137,17 +137,21 @@ class Closed:
     node : int
         No motion that keeps the limits up to this node continues from it to the end.
     joint : int or None
-        The joint that rules out most of the steps left there, 0-based; None with "pose".
-    limit : {"velocity", "acceleration", "pose"}
-        The limit that rules them out; "pose" if the next node has no pose within the joint ranges.
+        The joint that rules out most of the steps left there, 0-based; None with "pose" and "both".
+    limit : {"velocity", "acceleration", "pose", "both"}
+        The limit that rules them out; "pose" if the next node has no pose within the joint ranges,
+        "both" if each of its poses is ruled out by the velocities or the accelerations.
     """
 
     node: int
     joint: int | None
-    limit: Literal["velocity", "acceleration", "pose"]
+    limit: Literal["velocity", "acceleration", "pose", "both"]
 
     def __str__(self) -> str:
         """Return the place in words."""
+        if self.limit == "both":
+            limits = "the velocity and acceleration limits"
+            return f"no motion within {limits} passes node {self.node + 1}"
         if self.joint is None:
             return f"node {self.node + 1} has no pose within the ranges of the joints"
         return (

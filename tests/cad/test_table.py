@@ -35,6 +35,45 @@ def test_rows_are_the_contour(tmp_path: Path) -> None:
     np.testing.assert_array_equal(contour.axes, np.tile([0.0, 0.0, -1.0], (4, 1)))
 
 
+def line_of_points(x: float, count: int = 5) -> str:
+    """Return rows of points 1 mm apart in y, at x mm."""
+    return "".join(f"{x},{k},0,0,0,1\n" for k in range(count))
+
+
+HEADER = "x_mm,y_mm,z_mm,nx,ny,nz\n"
+
+
+@pytest.mark.parametrize("between", ["\n", "\n\n", "# second\n"])
+def test_runs_with_an_empty_line_or_a_comment_before_a_jump_are_contours(
+    tmp_path: Path, between: str
+) -> None:
+    part = table(tmp_path, HEADER + between.join(line_of_points(x) for x in (0, 50, 90)))
+    assert [loop.name for loop in part.loops] == ["run1", "run2", "run3"]
+    assert [loop.length for loop in part.loops] == pytest.approx([0.004] * 3)
+    assert "3 runs of points, separated by empty lines or comments" in part.notes
+
+
+def test_an_empty_line_without_a_jump_says_nothing(tmp_path: Path) -> None:
+    rows = line_of_points(0).splitlines(keepends=True)
+    part = table(tmp_path, HEADER + "".join(rows[:2]) + "\n" + "".join(rows[2:]))
+    assert [loop.name for loop in part.loops] == ["contour"]
+    # Nor do empty lines everywhere, where a long edge is one.
+    twice = HEADER + (line_of_points(0) + line_of_points(50)).replace("\n", "\n\n")
+    part = table(tmp_path, twice)
+    assert [loop.name for loop in part.loops] == ["contour"]
+
+
+def test_a_jump_that_is_cut_is_said_with_its_line(tmp_path: Path) -> None:
+    part = table(tmp_path, HEADER + line_of_points(0) + line_of_points(50))
+    assert [loop.name for loop in part.loops] == ["contour"]
+    (note,) = part.notes
+    assert note.startswith(
+        "line 7: 50.16 mm from the point before, 50 times the usual step, is cut"
+    )
+    # A corner to corner table has no usual step that is much shorter.
+    assert table(tmp_path, SQUARE).notes == ()
+
+
 def test_a_line_that_ends_where_it_began_is_closed(tmp_path: Path) -> None:
     part = table(tmp_path, SQUARE + "0,0.04,0,0,0,1\n")
     assert part.loops[0].kind == "outer"

@@ -9,6 +9,7 @@ from kerfpath import NoFeasiblePath, audit, fastest_speed, plan
 from kerfpath.certifier import MotionTest
 from kerfpath.certifier.stages import Steps
 from kerfpath.contour import Contour
+from kerfpath.errors import Closed
 from kerfpath.kernels.metric import MANHATTAN
 from kerfpath.limits import Limits
 from kerfpath.tilt import Tilt
@@ -138,6 +139,11 @@ def increments(q, arm, *, first=False):
     q = np.asarray(q)
     dq = q[1:] - q[0] if first else np.diff(q, axis=0)
     return np.where(arm.endless, dq - 2 * np.pi * np.rint(dq / (2 * np.pi)), dq)
+
+
+def test_where_both_limits_rule_a_node_out_no_joint_is_named():
+    closed = Closed(node=3, joint=None, limit="both")
+    assert str(closed) == "no motion within the velocity and acceleration limits passes node 4"
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -151,6 +151,9 @@ EXPECTED = (
     "x y z, then nx ny nz (outward normal), axis_x axis_y axis_z (tool axis) or qx qy qz qw (pose, "
     "its z the tool axis)"
 )
+JUMP, FAR = 5.0, 20.0
+"""Multiples of the usual step: after an empty line a longer one begins another run; without one it
+is said that it is cut."""
 UNIT_QUATERNION = 1e-2
 """Largest deviation of a quaternion's length from one: rounded digits pass, other columns fail."""
 
@@ -186,7 +189,10 @@ def read_table(
         notes.append(f"columns not used: {', '.join(unknown)}")
     points, normals = _numbers(names, table, UNITS_MM[unit or declared], axis)
     loops = []
-    for name, chosen in _contours(names, table):
+    runs = _contours(names, table, points)
+    if NAME not in names:
+        notes += _notes_on_jumps(table, points, runs)
+    for name, chosen in runs:
         lines = np.array(table.lines)[chosen]
         trace, repaired = trace_of_points(points[chosen], normals[chosen], lines, gap / MM)
         notes += [f"contour {name!r}: {what}" for what in repaired]
@@ -334,12 +340,55 @@ def _numbers(
     return points, directions / (length if axes == NORMAL else -length)[:, None]
 
 
-def _contours(columns: Sequence[str], table: TableCells) -> Iterator[tuple[str, slice]]:
-    """Yield each contour's name and rows."""
-    if NAME not in columns:
+def _contours(columns: Sequence[str], table: TableCells, points: Array) -> list[tuple[str, slice]]:
+    """Return each contour's name and rows."""
+    return list(_by_name(columns.index(NAME), table) if NAME in columns else _runs(table, points))
+
+
+def _runs(table: TableCells, points: Array) -> Iterator[tuple[str, slice]]:
+    """Yield runs of points: an empty line or a comment before a jump begins another one.
+
+    Where every line is followed by an empty one, these say nothing.
+    """
+    apart = np.diff(table.lines) > 1
+    ends = np.flatnonzero(apart & (_steps(points) > JUMP)) + 1
+    if not ends.size or 2 * apart.sum() > len(apart):
         yield NAME, slice(len(table.rows))
         return
-    column = columns.index(NAME)
+    borders = [0, *ends.tolist(), len(points)]
+    for k, (first, last) in enumerate(pairwise(borders), start=1):
+        yield f"run{k}", slice(first, last)
+
+
+def _steps(points: Array) -> Array:
+    """Return the steps (K-1,) from point to point, as multiples of their median."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    return steps / usual if usual > 0 else np.zeros(len(steps))
+
+
+def _notes_on_jumps(
+    table: TableCells, points: Array, runs: Sequence[tuple[str, slice]]
+) -> list[str]:
+    """Return what is said of runs, and of the longest step far beyond the usual inside one."""
+    notes = []
+    if len(runs) > 1:
+        notes.append(f"{len(runs)} runs of points, separated by empty lines or comments")
+    steps = _steps(points)
+    steps[[chosen.stop - 1 for _, chosen in runs[:-1]]] = 0.0
+    far = int(np.argmax(steps)) if len(steps) else 0
+    if len(steps) and steps[far] > FAR:
+        size = float(np.linalg.norm(points[far + 1] - points[far]))
+        notes.append(
+            f"line {table.lines[far + 1]}: {size:.4g} mm from the point before, {steps[far]:.0f} "
+            "times the usual step, is cut; if another contour begins there, put an empty line "
+            "before it, or name contours in a column contour"
+        )
+    return notes
+
+
+def _by_name(column: int, table: TableCells) -> Iterator[tuple[str, slice]]:
+    """Yield the contours that a column names."""
     first, seen = 0, set()
     for name, group in groupby(row[column] for row in table.rows):
         last = first + len(list(group))

@@ -120,10 +120,13 @@ class MotionTest:
             near = NODES_AROUND * int(np.diff(steps.layers(first, last)).max(initial=1))
             first, last = max(first, around - near), min(last, around + near)
         nodes, cells, work = np.arange(first, last + 1), self._coarsest, 0
-        for _ in range(DEEPEST):
+        for halved in range(DEEPEST):
             missing = np.setdiff1d(nodes, cells.node)
             if len(missing):
-                return Closed(node=int(missing[0]) - 1, joint=None, limit="pose")
+                # Halves may be missing because limits ruled out the others.
+                return Closed(
+                    node=int(missing[0]) - 1, joint=None, limit="both" if halved else "pose"
+                )
             nodes = steps.layers(first, last)
             cells = cells.take(np.isin(cells.node, nodes))
             one = _Round(cells, steps)

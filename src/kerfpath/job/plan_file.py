@@ -266,7 +266,7 @@ class ClosedData(TypedDict):
 
     node: int
     joint: int | None
-    limit: Literal["velocity", "acceleration", "pose"]
+    limit: Literal["velocity", "acceleration", "pose", "both"]
 
 
 class RelaxationData(TypedDict):
