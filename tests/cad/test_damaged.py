@@ -103,7 +103,7 @@ def test_curves_beside_a_solid_are_counted(tmp_path: Path) -> None:
     part = read(write_step(tmp_path / "both.step", compound(box(1, 2, 3), *lines)))
     assert part.faces == 6
     (only,) = part.left_out
-    assert (only.kind, only.count, only.may_cut) == ("curve", 2, False)
+    assert (only.kind, only.count, only.may_cut) == ("curve", 2, True)
 
 
 def test_a_damaged_surface_of_an_iges_file_is_one_face_less(tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ def test_a_damaged_surface_of_an_iges_file_is_one_face_less(tmp_path: Path) -> N
     path.write_text("\n".join(lines) + "\n", "ascii")
     part = read(path)
     assert part.faces == 7
-    assert all(each.may_cut == (each.kind != "curve") for each in part.left_out)
+    assert all(each.may_cut for each in part.left_out)
     lost = [each.count for each in part.left_out if each.reason == "no face could be made from it"]
     assert lost == [1]
     # Of the surface and what bounds it, which belong to nothing any more.

@@ -198,7 +198,7 @@ export interface LoopEntry {
   /** `inner`: a hole. */
   kind: "outer" | "inner" | "open";
   /** Of a sheet. */
-  side: "outer" | "inner" | "edge" | "";
+  side: "outer" | "inner" | "edge" | "blind" | "sunk" | "";
   /** False for a loop that cannot be cut because of its gap. */
   closed: boolean;
   /** m */
