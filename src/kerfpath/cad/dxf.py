@@ -212,9 +212,9 @@ def _require_text(content: bytes) -> None:
 
 def _as_ezdxf_reads(content: bytes) -> bytes:
     """Return a file with the markers of its entities, and of the version that these have."""
-    marked = MARKED.sub(_with_markers, content)
+    marked, count = MARKED.subn(_with_markers, content)
     stated = VERSION.search(content)
-    if not MARKED.search(content) or (stated and stated[2] > OLDEST):
+    if not count or (stated and stated[2] > OLDEST):
         return marked
     if stated:
         return VERSION.sub(rb"\g<1>" + NEWER, marked, count=1)

@@ -71,7 +71,7 @@ def read(
         faces (IGES) are sewn together.
     outer_towards : (3,), optional
         Direction in the part that the outer sides of sheets face on the whole. By default the outer
-        side is the one that lies less deep in the part, or faces up if the sheet is flat.
+        side is the one that less of the part hides, or that faces up if the sheet is flat.
     axis : (3,), optional
         Tool axis for drawings without one: lines in space of a DXF, STEP or IGES file, a table
         without axes, or moves of a tool path without one.

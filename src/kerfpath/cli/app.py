@@ -215,7 +215,7 @@ def contours(
         tuple[float, float, float] | None,
         typer.Option(
             help="Direction that the outer sides of sheets face, in the part. Default: the side "
-            "that lies less deep in the part; for a flat sheet, the side that faces up."
+            "that less of the part hides; for a flat sheet, the side that faces up."
         ),
     ] = None,
     axis: Annotated[

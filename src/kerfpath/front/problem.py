@@ -326,8 +326,9 @@ def plan_run(
         As `kerfpath.plan`.
     """
     robot, cell = setup.robot, run.cell(setup.cell)
-    asked, whole = run.applied_to(options), graph
-    graph = run.graph(graph, robot.endless)
+    asked = run.applied_to(options)
+    if not run.begin:
+        graph = run.graph(graph, robot.endless)
     if not run.continuous:
         return plan(
             contour,
@@ -341,8 +342,6 @@ def plan_run(
             phase=phase,
         )
     narrowed, windowed = robot, run.windowed(robot.endless)
-    if run.begin:
-        graph = whole
     if windowed:
         _require_ranges(asked, windowed)
         narrowed, graph = _narrowed(robot, graph, run.window, windowed, asked)

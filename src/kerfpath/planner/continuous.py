@@ -204,7 +204,7 @@ def _clear_motion(
 ) -> Refinement | None:
     """Return the best clear motion found, which `starts` keep; None if there is none."""
     finder = starts.finder
-    made, least = _from_fewer_nodes(task, finder)
+    made, least = _from_fewer_nodes(task, finder, explored=explored)
     starts.start_from(made, least)
     if starts.best is not None and not starts.above(least, ENOUGH):
         return starts.best
@@ -256,7 +256,9 @@ def _search_wider(
         starts.best = replace(starts.best, plan=made, cost_after=made.cost)
 
 
-def _from_fewer_nodes(task: Task, finder: CollisionFreeSearch) -> tuple[Plan | None, float]:
+def _from_fewer_nodes(
+    task: Task, finder: CollisionFreeSearch, *, explored: bool
+) -> tuple[Plan | None, float]:
     """Return the motion along some of very many nodes, extended to all, and a cost to compare with.
 
     None if there is none, or a node has no pose. No motion along all nodes costs less than the best
@@ -265,7 +267,11 @@ def _from_fewer_nodes(task: Task, finder: CollisionFreeSearch) -> tuple[Plan | N
     """
     thin = subsampled(task)
     try:
-        found = None if thin is None else clear_motion(thin.task, finder.of(thin.task))
+        found = (
+            None
+            if thin is None
+            else clear_motion(thin.task, finder.of(thin.task), explored=explored)
+        )
     except NoFeasiblePath:
         found = None
     if thin is None or found is None:

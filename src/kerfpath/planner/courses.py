@@ -149,7 +149,7 @@ class Courses:
         courses = self._constant()
         for through, nodes in valleys:
             for each in islice(through.courses(), COURSES):
-                course = self._closed(_spread(each, nodes, len(self._frames)))
+                course = self.closed(_spread(each, nodes, len(self._frames)))
                 width = max(2, len(course.gamma) // SMOOTHED)
                 courses += [course, course._replace(gamma=smoothed(course.gamma, width))]
         return courses
@@ -163,7 +163,8 @@ class Courses:
             for gamma in 2 * np.pi * np.arange(ANGLES) / ANGLES
         ]
 
-    def _closed(self, course: Course) -> Course:
+    def closed(self, course: Course) -> Course:
+        """Return a course, shifted along the path if it must end where it begins."""
         return course._replace(gamma=self._task.closed(course.gamma))
 
     def screened(
@@ -188,7 +189,7 @@ class Courses:
         """Return motions changed at random."""
         count, K = self._task.settings.restarts, len(self._frames)
         return [
-            self._closed(Course(np.unwrap(plan.gamma) + change, plan.unwrapped, plan.posture))
+            self.closed(Course(np.unwrap(plan.gamma) + change, plan.unwrapped, plan.posture))
             for plan in plans
             for size in SIZES
             for made in (waves, ramps)

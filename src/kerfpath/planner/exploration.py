@@ -40,7 +40,7 @@ class Exploration:
     """
 
     def __init__(self, task: Task, starts: Starts) -> None:
-        self._task, self._starts, self._courses = task, starts, Courses(task)
+        self._starts, self._courses = starts, Courses(task)
         self._known: list[Course] = []
 
     @property
@@ -66,9 +66,7 @@ class Exploration:
             if not self._is_known(course):
                 tried += 1
                 self._known.append(course)
-                self._starts.refine_course(
-                    course._replace(gamma=self._task.closed(course.gamma)), score
-                )
+                self._starts.refine_course(self._courses.closed(course), score)
 
     def _is_known(self, course: Course) -> bool:
         """Return whether a motion is nearly one that has been refined, or one found so."""

@@ -87,8 +87,7 @@ def best_motion(
             node=-1,
             counts={},
         )
-    claim = f"the best motion found over continuous rotation: cost {found.cost_after:.6g}"
-    return replace(found.plan, proof=Proof(optimal=False, statement=finder.claimed(claim)))
+    return claimed(found, finder)
 
 
 def refined_motion(

@@ -129,10 +129,12 @@ def _explored(task: Task, finder: CollisionFreeSearch, best: QuickMotion) -> Ite
         for found in _quickened(ahead, finder, courses.screened(courses.all(), QUICK), best, known):
             best = found
             yield best
+    shaken, screened = None, list[tuple[float, Course]]()
     for _ in range(ROUNDS):
-        ahead = _at(task, best.dt / FACTORS[0])
-        courses = Courses(ahead, quickest=True)
-        screened = courses.screened(courses.shaken([best.plan]), QUICK)
+        if best is not shaken:  # else the changes are the same, and the next of them are tried
+            shaken, ahead = best, _at(task, best.dt / FACTORS[0])
+            courses = Courses(ahead, quickest=True)
+            screened = courses.screened(courses.shaken([best.plan]), QUICK)
         for found in _quickened(ahead, finder, screened, best, known):
             best = found
             yield best
