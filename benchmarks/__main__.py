@@ -15,6 +15,7 @@ NAMES = (
     "kinematics",
     "demo",
     "search",
+    "invariance",
     "scale",
     "retiming",
     "contours",
@@ -59,6 +60,10 @@ def main() -> None:
     )
     parser.add_argument("--date", default="", help="date that the written file bears")
     parser.add_argument("--note", default="", help="what else to say of the run, as its commit")
+    parts = parser.add_argument_group("parts of invariance")
+    parts.add_argument("--tasks", type=int, help="number of tasks")
+    parts.add_argument("--first", type=int, default=0, help="seed of the first one")
+    parts.add_argument("--rows", type=Path, help="file to which the results of tasks are added")
     given = parser.parse_args()
     if unknown := set(given.names) - set(NAMES):
         parser.error(f"unknown benchmark {', '.join(sorted(unknown))}; known: {', '.join(NAMES)}")
@@ -72,7 +77,7 @@ def main() -> None:
         if given.names and name not in given.names:
             continue
         with console.status(name):
-            made = _run(name, quick=given.quick)
+            made = _run(name, given)
         for report in made:
             show(report, console)
         reports += made
@@ -82,8 +87,13 @@ def main() -> None:
         console.print(f"wrote {RESULTS}")
 
 
-def _run(name: str, *, quick: bool) -> list[Report]:
+def _run(name: str, given: argparse.Namespace) -> list[Report]:
     """Import a benchmark and run it; each imports libraries that the others do not need."""
+    quick: bool = given.quick
+    if name == "invariance":
+        from benchmarks import invariance
+
+        return [invariance.run(quick=quick, tasks=given.tasks, first=given.first, rows=given.rows)]
     if name == "kinematics":
         from benchmarks import _enclosures, _families, kinematics
 

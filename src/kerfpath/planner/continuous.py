@@ -31,8 +31,6 @@ OTHERWISE = (0.5, 0.5)
 ENOUGH, POOR = 5e-3, 1e-2
 """Relative gap to the value function: below the first a motion is good; beyond the second (6) binds
 so much that the promised costs say little, and all paths are refined."""
-BY_FEW = 0.05
-"""The same along every few nodes, whose steps pass over what a course turns back between them."""
 BETTER = 1e-4
 """Relative gain from which a motion replaces one that has a bound: that of a converged descent."""
 COARSE_STEP = np.radians(1.5)
@@ -225,13 +223,15 @@ def _clear_motion(
 
 
 def _explore(task: Task, starts: Starts, search: ContinuousSearch) -> None:
-    """Explore all valleys if there may be a better motion than the best one.
+    """Refine courses through the cheapest valleys; explore all if there may be a better motion.
 
-    Along every few nodes the value function sees courses that it misses along all of them. Where
+    The samples of these valleys follow the joints, whatever the step of gamma, so that what is
+    found hardly depends on it: values between coarse samples are often above the best cost. Where
     there is no motion to improve on, the grid is a better start, or the speed is too high.
     """
     exploration = Exploration(task, starts)
-    if starts.above(search.value, ENOUGH) or starts.above(exploration.value, BY_FEW):
+    exploration.begin()
+    if starts.above(search.value, ENOUGH) or exploration.promises:
         starts.refine([*search.paths(wide(task))])
         if starts.best is not None:
             exploration.run()

@@ -12,6 +12,7 @@ singularity; where the tip keeps to the path there, the joints turn much faster 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from itertools import islice
 
@@ -44,6 +45,8 @@ SMOOTHED = 12
 """Share of the nodes over which gamma of a course is averaged in a second one."""
 WAVES = 4
 """Number of cosines in a change; the slower ones are larger."""
+EQUAL_SCORES = 1e-6
+"""Relative difference of scores up to which courses of the same gamma are one motion."""
 SEED = 5
 """Fixed, so that the same task always gets the same changes."""
 
@@ -99,13 +102,24 @@ class Courses:
         self._rng = np.random.default_rng(SEED)
 
     @property
-    def value(self) -> float:
+    def value_along_few(self) -> float:
         """Cost of the best course under (5) alone along every few nodes; infinite if none."""
         return min(valleys.value for valleys, _ in self._along_few)
 
+    @property
+    def value(self) -> float:
+        """Cost of the best course under (5) alone along all nodes; infinite if none."""
+        return self._along_all[0].value
+
     @cached_property
     def _along_few(self) -> list[tuple[Valleys, Ints]]:
-        return [self._valleys(every) for every in sorted({self._few, max(1, self._few // 2)})]
+        half = max(1, self._few // 2)
+        fewer = [] if half == self._few else [self._valleys(self._few)]
+        return [self._along_all if half == 1 else self._valleys(half), *fewer]
+
+    @cached_property
+    def _along_all(self) -> tuple[Valleys, Ints]:
+        return self._valleys(1)
 
     def _valleys(self, every: int) -> tuple[Valleys, Ints]:
         """Return the valleys along one of so many nodes, and these nodes (M,), evenly spread."""
@@ -145,14 +159,32 @@ class Courses:
         """Return courses through all valleys, smoothed ones too, and those of constant gamma."""
         valleys = self._along_few
         if self._few // 2 > 1:
-            valleys = [*valleys, self._valleys(1)]
+            valleys = [*valleys, self._along_all]
         courses = self._constant()
         for through, nodes in valleys:
-            for each in islice(through.courses(), COURSES):
-                course = self.closed(_spread(each, nodes, len(self._frames)))
+            for course in islice(self._through(through, nodes), COURSES):
                 width = max(2, len(course.gamma) // SMOOTHED)
                 courses += [course, course._replace(gamma=smoothed(course.gamma, width))]
         return courses
+
+    def cheapest(self) -> Iterator[Course]:
+        """Yield courses through the valleys, the cheapest first.
+
+        Where joints 4 to 6 of one course have the other pose of the same wrist, only one is
+        yielded.
+        """
+        known = list[tuple[float, Course]]()
+        for course in self._through(*self._along_few[0]):
+            score = float(self._screening.scores(course.q[None])[0])
+            alike = (c for s, c in known if abs(s - score) <= EQUAL_SCORES * score)
+            if not any(course._replace(posture=c.posture).like(c) for c in alike):
+                known.append((score, course))
+                yield course
+
+    def _through(self, valleys: Valleys, nodes: Ints) -> Iterator[Course]:
+        """Yield courses through valleys along some nodes as ones along all nodes."""
+        for each in valleys.courses():
+            yield self.closed(_spread(each, nodes, len(self._frames)))
 
     def _constant(self) -> list[Course]:
         """Return courses with a constant gamma; they need not be in reach."""

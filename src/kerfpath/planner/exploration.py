@@ -6,6 +6,10 @@ and screened again.
 
 from __future__ import annotations
 
+from itertools import islice
+
+import numpy as np
+
 from kerfpath.planner.courses import Courses
 from kerfpath.planner.screening import SHARP, SMOOTH
 from kerfpath.planner.starts import Starts
@@ -14,6 +18,11 @@ from kerfpath.plans import Plan
 from kerfpath.refiner import Refinement
 from kerfpath.search import Course
 
+FIRST = 3
+"""Courses through the cheapest valleys that are refined before all are explored."""
+GOOD, GOOD_BY_FEW = 1e-2, 0.04
+"""Relative gaps to the value functions along all nodes, and along every few nodes, whose steps pass
+over what a course turns back between them: below both a motion is good."""
 REFINED, REFINED_AGAIN = 5, 3
 """Motions that are refined after the first screening, and after each later one."""
 HOPELESS = 1.25
@@ -43,10 +52,20 @@ class Exploration:
         self._starts, self._courses = starts, Courses(task)
         self._known: list[Course] = []
 
+    def begin(self) -> None:
+        """Refine the courses through the cheapest valleys that may lead to better motions."""
+        for course in islice(self._courses.cheapest(), FIRST):
+            if not (self._is_known(course) or self._starts.is_hopeless(course)):
+                self._starts.refine_course(course, np.inf)
+
     @property
-    def value(self) -> float:
-        """Cost of the best course under (5) alone along every few nodes; infinite if none."""
-        return self._courses.value
+    def promises(self) -> bool:
+        """Whether there may be a better motion than the best one.
+
+        Along every few nodes the value function sees courses that it misses along all of them.
+        """
+        above, courses = self._starts.above, self._courses
+        return above(courses.value, GOOD) or above(courses.value_along_few, GOOD_BY_FEW)
 
     def run(self) -> None:
         """Screen and refine courses through all valleys; shake the best motions."""

@@ -19,7 +19,7 @@ from kerfpath.search import ContinuousPath, Course, find_shortest
 FIRST_STEP = 5e-3
 """rad: first change of gamma when a path between the samples is refined."""
 GAIN = 5e-3
-"""Relative gain that a refinement may reach beyond the promised cost of a path."""
+"""Relative gain that a refinement may reach beyond the cost of a course or a promised one."""
 FAR = 0.05
 """Relative cost above its score from which the refinement of a course is repeated from nearer the
 limits."""
@@ -67,14 +67,21 @@ class Starts:
         plans = [self._task.plan_between(path, _CLAIM) for path in paths]
         for promised, i in sorted((refiner.promise(plan), i) for i, plan in enumerate(plans)):
             best, made = self.best, plans[i]
-            hopeless = best is not None and promised * (1 - GAIN) >= best.cost_after
-            if hopeless and not unpromising:
+            if self._is_hopeless(promised) and not unpromising:
                 break
             known = self._tried if best is None else [*self._tried, best.plan]
             if not any(alike(made, other) for other in known):
                 self._tried.append(made)
                 found = _refine_path(self._task, self.finder, paths[i], made)
                 self.best = _better(best, found)
+
+    def is_hopeless(self, course: Course) -> bool:
+        """Return whether a course, inside the limits or not, costs too much to be refined."""
+        return self._is_hopeless(self._task.plan_at(*course, _CLAIM).cost)
+
+    def _is_hopeless(self, cost: float) -> bool:
+        best = self.best
+        return best is not None and cost * (1 - GAIN) >= best.cost_after
 
     def refine_course(self, course: Course, score: float) -> None:
         """Refine a course whose cost is about `score`; if need be, first bring it near the limits.
