@@ -29,6 +29,7 @@ NAMES = (
     "first_runs",
     "kerf",
     "part",
+    "whole_parts",
     "programs",
     "program_edits",
     "program_characters",
@@ -223,6 +224,10 @@ def _run(name: str, given: argparse.Namespace) -> list[Report]:
         from benchmarks import studio
 
         return [studio.run(quick=quick)]
+    if name == "whole_parts":
+        from benchmarks import whole_parts
+
+        return whole_parts.run(quick=quick)
     if name == "part":
         from benchmarks import part
 

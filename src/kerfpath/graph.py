@@ -82,6 +82,11 @@ class LayeredGraph:
         K, _, P = self.reason.shape
         return np.asarray(self.reason.reshape(K, -1, len(self.gamma), P).min(axis=1))
 
+    @property
+    def postures_throughout(self) -> Ints:
+        """Numbers of the postures that have a pose at every node."""
+        return np.flatnonzero((self.reason == 0).any(axis=1).all(axis=0))
+
     def gamma_at(self, place: Ints) -> Array:
         """Return gamma (...) rad of sample numbers, which go on beyond a full turn."""
         m = len(self.gamma)

@@ -1,12 +1,14 @@
 """Order of cutting and transfer moves."""
 
 import re
+from dataclasses import replace
 from itertools import permutations, product
 from time import monotonic
 
 import numpy as np
 import pytest
 
+import kerfpath
 from kerfpath import Contour, InputError, NoFeasiblePath, plan
 from kerfpath.auditor import transfer_checks
 from kerfpath.cell import box_between, cell_of
@@ -14,11 +16,13 @@ from kerfpath.operations import start_at
 from kerfpath.post import JointMove, build_program, post, preflight
 from kerfpath.sequence import (
     best_order,
+    common_postures,
     inner_first,
     longest_search,
     order_plans,
     plan_part,
 )
+from kerfpath.sequence.part import on_near_turns
 from kerfpath.transfer import back_off, least_time, transfer_move
 from programs import read_text, text_of
 
@@ -164,6 +168,47 @@ def test_a_part_is_cut_in_less_time_than_in_the_order_given(part, arm, tool, pla
         np.testing.assert_allclose(move.q[-1], back_off(after, "start", 0.05), atol=1e-9)
 
 
+@pytest.mark.slow
+def test_a_part_in_one_posture_never_takes_less_time_than_the_free_one(part, arm, tool, placement):
+    asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    home = np.radians([0, -20, 10, 0, 60, 0])
+    rested, kept = [rest(c) for c in part], 0
+    free = plan_part(rested, arm, home=home, **asked)
+    for posture in range(arm.postures):
+        try:
+            one = plan_part(rested, arm, home=home, postures=(posture,), **asked)
+        except NoFeasiblePath:
+            continue
+        kept += 1
+        # The solver counts in ticks of 0.1 ms, one rounding for each candidate and move.
+        assert free.cycle_time <= one.cycle_time + 1e-3
+    assert kept > 1
+
+
+def test_postures_are_common_that_half_of_the_contours_can_have():
+    assert common_postures([[0, 1], [0, 2], [0, 1], [3]], [None] * 4) == [[0, 1], [0], [0, 1], []]
+    assert common_postures([[0, 1], [0, 1]], [(1,), None]) == [[1], [0, 1]]
+
+
+def test_plans_are_offered_on_the_turns_that_are_near(part, tool, placement):
+    arm = kerfpath.robot("abb_irb4600_60_205", acceleration_ratio="iontec_20_to_70kg")
+    wide = arm.with_limits(lower=np.full(6, -2 * np.pi), upper=np.full(6, 2 * np.pi))
+    made = plan(
+        rest(part[0]), arm, tool=tool, placement=placement, speed=0.1, gamma_step=STEP, certify=None
+    )
+    q, turn = made.q.copy(), made.turn.copy()
+    up = -np.sign(q[:, 5].mean())  # away from the limit that is nearer
+    q[:, 5] += up * 2 * np.pi
+    away = replace(made, robot=wide, q=q, turn=turn + up.astype(int) * np.eye(6, dtype=int)[5])
+    assert (np.abs(q) < 2 * np.pi).all()
+    near = on_near_turns(away, None)
+    assert len(near) == 2
+    assert near[0] is away
+    np.testing.assert_allclose(near[1].q, made.q, atol=1e-12)
+    np.testing.assert_array_equal(near[1].turn, made.turn)
+    assert len(on_near_turns(replace(made, robot=wide), None, made.q[0])) == 1
+
+
 @pytest.mark.parametrize("home", [None, np.radians([0, -20, 10, 0, 60, 0])])
 def test_moves_of_open_cuts_run_from_the_end_of_each_to_the_start_of_the_next(
     arm, tool, placement, home
@@ -215,6 +260,7 @@ def walled(part, arm, tool, placement):
     wall = box_between(middle - [0.3, 0.005, 0.1], [middle[0] + 0.3, middle[1] + 0.005, top + 0.05])
     cell = cell_of(arm, tool=tool, placement=placement, fixtures={"wall": wall})
     asked = {"tool": tool, "placement": placement, "speed": 0.1, "gamma_step": STEP}
+    asked["postures"] = (0,)  # in another one, all moves are clear
     home = np.radians([0, -20, 10, 0, 60, 0])
     rested = [rest(c) for c in part]
     return cell, plan_part(rested, arm, home=home, cell=cell, retract=0.01, **asked)

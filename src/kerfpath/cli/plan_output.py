@@ -40,6 +40,8 @@ from kerfpath.job import (
 )
 from kerfpath.names import identifiers
 from kerfpath.planner import FastestSpeed, at_least, at_most
+from kerfpath.plans import Plan
+from kerfpath.robots import posture_name
 
 # -----------------------------------------------------------------------------
 # `kerfpath speed`: find the fastest constant speed of each contour, and the limit that binds.
@@ -226,6 +228,7 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
     criteria = cut.plan.criteria
     return entry | {
         "time_s": float(cut.plan.time[-1]),
+        "posture": _postures(cut.plan),
         "cost": cut.plan.cost,
         "grid_cost": cut.plan.proof.grid_cost,
         "optimal": cut.plan.proof.optimal,
@@ -260,12 +263,13 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
         ]
         sampling = _sampling(cut)
         if cut.plan is None:
-            rows.append([*row, *"--------", *sampling, "no feasible path"])
+            rows.append([*row, *"---------", *sampling, "no feasible path"])
             continue
         criteria = cut.plan.criteria
         rows.append(
             [
                 *row,
+                _postures(cut.plan),
                 f"{cut.plan.time[-1]:.2f}",
                 "" if cut.as_run.timing is None else f"{cut.as_run.timing.seconds:.2f}",
                 "" if cut.plan.proof.grid_cost is None else f"{cut.plan.proof.grid_cost:.2f}",
@@ -278,7 +282,7 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
                 "passed" if cut.passed else "FAILED",
             ]
         )
-    columns = ["contour", "mm", "nodes", "m/min", "s", "run s", "grid", "cost"]
+    columns = ["contour", "mm", "nodes", "m/min", "posture", "s", "run s", "grid", "cost"]
     columns += ["bound", "gap %", "vel", "acc", "chord mm", "step deg", "audit"]
     spare = ["step deg", "chord mm", "grid", "bound", "m/min", "run s"]
     table(columns, rows, numbers=columns[1:-1], whole=["audit"], spare=spare)
@@ -286,7 +290,8 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
         "run s: time from rest to rest, with rounded corners and every joint limit kept; "
         "cost: value of the objective; grid: lowest cost on the grid of rotations, before the "
         "refinement; bound: no motion that keeps the limits at the nodes costs less, at any "
-        "rotation, posture and turn; gap: largest share of the cost that may lie above the best "
+        "rotation and turn, in any posture (for a whole part, in the posture that was chosen for "
+        "its cycle time); gap: largest share of the cost that may lie above the best "
         "motion; vel, acc: highest share of a joint's velocity and acceleration limit; chord: "
         "largest distance of the CAD curve from the chords between nodes; step: largest rotation "
         "of the tool axis from node to node"
@@ -308,6 +313,12 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
         out.print(f"rounded corners leave the drawing by up to {max(rounded) * 1e3:.4f} mm")
     if any(each.against == "points of the drawing" for each in found + loops):
         out.print("if the drawing has points, the lines through them are taken as the CAD curve")
+
+
+def _postures(plan: Plan) -> str:
+    """Return the names of the postures of a plan, in the order in which it takes them."""
+    first = np.flatnonzero(np.diff(plan.posture, prepend=-1))
+    return " > ".join(posture_name(int(p)) for p in plan.posture[first])
 
 
 def _is_unbound(cut: CutResult) -> bool:

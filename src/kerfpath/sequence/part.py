@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -17,24 +18,73 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
-from kerfpath.planner import plan, with_bound
+from kerfpath.planner import best_motion, layered_graph, plan, with_bound
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot, posture_name
 from kerfpath.sequence.order import HOME, PATIENCE, MoveTimes, Order, best_order
+from kerfpath.setup import Setup
 from kerfpath.transfer import End, TransferMove, back_off, explain_collision
 
 # -----------------------------------------------------------------------------
 # Select the candidates that the tool can approach and leave, and plan more where none is left.
 
+SAME_TURN = 1e-9
+"""Share of a turn by which rounding may take a joint beyond the room that it keeps."""
 BACK_BY = (0.0, 0.1, 0.4, 0.7, 1.0)
 """Shares of the retract between which the joints are assumed to move linearly."""
 
 
-def unused_postures(made: Sequence[Plan], wanted: Sequence[int] | None) -> list[int]:
-    """Return the wanted postures (None: all) in which no plan of a contour begins or ends."""
-    used = {int(p) for one in made for p in one.posture[[0, -1]]}
+def unused_postures(made: Sequence[Plan], wanted: Iterable[int] | None) -> list[int]:
+    """Return the wanted postures (None: all) in which no plan of a contour stays."""
+    used = {int(one.posture[0]) for one in made if not np.ptp(one.posture)}
     every = range(made[0].robot.postures) if wanted is None else wanted
     return [int(p) for p in every if p not in used]
+
+
+def common_postures(
+    served: Sequence[Iterable[int]], wanted: Sequence[Sequence[int] | None]
+) -> list[list[int]]:
+    """Return the postures in which each contour is planned so that a part may keep to one.
+
+    They are the wanted ones (None: all) in which at least half of the contours can be cut.
+
+    Parameters
+    ----------
+    served : sequence of iterables of int
+        The postures that have a pose at every node of each contour.
+    wanted : sequence of sequences of int, or None
+    """
+    able = [
+        {int(p) for p in here if asked is None or p in asked}
+        for here, asked in zip(served, wanted, strict=True)
+    ]
+    shared = {p for p, n in Counter(p for each in able for p in each).items() if 2 * n >= len(able)}
+    return [sorted(each & shared) for each in able]
+
+
+def on_near_turns(made: Plan, *aims: Array | None) -> list[Plan]:
+    """Return a plan, and on the turns of its joints that are nearest to aims (n,) rad.
+
+    None stands for the middle of the joint ranges. Joints keep as far from their limits as before,
+    or half a turn.
+    """
+    robot, limits = made.robot, made.robot.joint_limits()
+    free = ~limits.endless & (np.arange(robot.joints) < robot.family.joints)
+    for coupling in robot.couplings:
+        free &= coupling.row[: len(free)] == 0
+    low, high = made.q.min(axis=0), made.q.max(axis=0)
+    room = np.minimum(np.minimum(low - limits.lower, limits.upper - high), np.pi)
+    least = np.ceil((limits.lower + room - low) / (2 * np.pi) - SAME_TURN)
+    most = np.floor((limits.upper - room - high) / (2 * np.pi) + SAME_TURN)
+    found, known = [made], {(0,) * robot.joints}
+    for aim in aims:
+        centre = (limits.lower + limits.upper) / 2 if aim is None else aim
+        wanted = np.where(free, np.round((centre - made.q.mean(axis=0)) / (2 * np.pi)), 0)
+        turns = np.where(free, np.clip(wanted, least, most), 0).astype(np.int64)
+        if tuple(turns.tolist()) not in known:
+            known.add(tuple(turns.tolist()))
+            found.append(replace(made, q=made.q + 2 * np.pi * turns, turn=made.turn + turns))
+    return found
 
 
 class MorePlans:
@@ -102,6 +152,15 @@ def _reachable(
     return broken, found
 
 
+def _can_back_off(made: Plan, retract: float) -> bool:
+    """Return whether the tool can back off from both ends within the joint limits."""
+    try:
+        _require_clear_ends(made, None, retract)
+    except NoFeasiblePath:
+        return False
+    return True
+
+
 def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
     """Raise NoFeasiblePath where the tool cannot approach a cut or back off from it."""
     ends: tuple[tuple[End, int], ...] = (("start", 0), ("end", len(made.q) - 1))
@@ -125,6 +184,8 @@ def _require_clear_ends(made: Plan, cell: Cell | None, retract: float) -> None:
 # -----------------------------------------------------------------------------
 # Plan the whole part.
 
+FEW = 9
+"""Nodes of a contour at which a posture needs a pose for the contour to be tried in it."""
 T = TypeVar("T")
 
 
@@ -326,23 +387,39 @@ def plan_part(
         if broken is not None and not tried[i]:
             raise broken
 
-    def in_posture(i: int, posture: int) -> Plan:
-        return planned(i, groups[i][0], replace(wanted, postures=(posture,)))
+    def in_posture(i: int, posture: int, quick: bool) -> Plan:
+        contour, own = groups[i][0], replace(wanted, postures=(posture,))
+        if not (quick and own.method == "continuous"):
+            return planned(i, contour, own)
+        setup = Setup.of(robot, tool, placement, order.get("cell"))
+        return best_motion(
+            contour, setup, own, speed=None if contour.time is not None else speeds[i]
+        )
 
     postures = [wanted.postures] * len(groups)
-    found = order_candidates(tried, lambda made: made, in_posture, postures, **order)
+    served: list[Iterable[int]] = [()] * len(groups)
+    if not robot.free.size:
+        for i, candidates in enumerate(groups):
+            few = np.unique(np.linspace(0, len(candidates[0]) - 1, FEW).astype(int))
+            graph = layered_graph(
+                candidates[0], robot, tool=tool, placement=placement, options=wanted, nodes=few
+            )
+            served[i] = graph.postures_throughout.tolist()
+    common = common_postures(served, postures)
+    found = order_candidates(tried, lambda made: made, in_posture, postures, common, **order)
     return replace(found, plans=tuple(with_bound(made, asked.certify) for made in found.plans))
 
 
 def order_candidates(
     tried: Sequence[list[T]],
     plan_of: Callable[[T], Plan],
-    in_posture: Callable[[int, int], T | None],
+    in_posture: Callable[[int, int, bool], T | None],
     postures: Sequence[Sequence[int] | None],
+    common: Sequence[Sequence[int]],
     progress: Callable[[int, int, int], None] = lambda contour, done, total: None,
     **order: Unpack[OrderKeywords],
 ) -> PartPlan:
-    """Order candidates by `order_plans`, and plan contours in other postures where needed.
+    """Order candidates by `order_plans`, planned in common postures, and in others where needed.
 
     Parameters
     ----------
@@ -351,10 +428,12 @@ def order_candidates(
     plan_of : callable
         Returns the plan of a candidate.
     in_posture : callable
-        Plans a contour in one posture, both given by number; returns None or raises NoFeasiblePath
-        where that is not possible.
+        Plans a contour in one posture, both given by number, and quickly or thoroughly; returns
+        None or raises NoFeasiblePath where that is not possible.
     postures : sequence of sequences of int, or None
         Postures that each contour may be cut in; None: all.
+    common : sequence of sequences of int
+        Postures that each contour is planned in before the order is sought, see `common_postures`.
     progress : callable
         Called with the number of a contour, how many other postures of it are done, and how many
         there are.
@@ -371,17 +450,21 @@ def order_candidates(
         As `order_plans`.
     """
 
-    def more(i: int) -> list[Plan]:
+    def add(i: int, wanted: Iterable[int] | None, *, quick: bool = False) -> list[Plan]:
         made = len(tried[i])
-        unused = unused_postures([plan_of(one) for one in tried[i]], postures[i])
+        unused = unused_postures([plan_of(one) for one in tried[i]], wanted)
         for k, posture in enumerate(unused):
             progress(i, k, len(unused))
+            one = None
             with suppress(NoFeasiblePath):
-                one = in_posture(i, posture)
-                tried[i] += [] if one is None else [one]
+                one = in_posture(i, posture, quick)
+            tried[i] += [] if one is None else [one]
         return [plan_of(one) for one in tried[i][made:]]
 
-    return order_plans([[plan_of(one) for one in each] for each in tried], more=more, **order)
+    for i, offered in enumerate(common):
+        add(i, offered, quick=True)
+    plans = [[plan_of(one) for one in each] for each in tried]
+    return order_plans(plans, more=lambda i: add(i, postures[i]), **order)
 
 
 def order_plans(
@@ -392,7 +475,8 @@ def order_plans(
 ) -> PartPlan:
     """Return one plan for each contour, chosen from its candidates, in the order of least time.
 
-    Order, candidates and moves are chosen together. Each move is first assumed to be straight,
+    Order, candidates and moves are chosen together; candidates are also offered on near turns of
+    their joints, see `on_near_turns`. Each move is first assumed to be straight,
     which no way around beats. The moves of the best order are then planned in the cell, until all
     moves of the best order are planned. A move for which no way is found is not used. Where no
     order is left without it, `more` plans of the two contours are requested, once.
@@ -423,18 +507,29 @@ def order_plans(
     if options.given_order:
         before = [*before, *((i, i + 1) for i in range(len(every) - 1))]
     warm = _too_warm([c[0].contour for c in every], options.heat_spacing)
+    home = (
+        None if options.home is None else floats(options.home, "home", (every[0][0].robot.joints,))
+    )
     air: MoveTimes | None = None
+    plans: list[Plan] = []
+    offered: list[tuple[int, int]] = []
+    near: dict[int, Array] = {}
     while True:
-        plans = [every[i][c] for i, c in places]
-        group = np.array([i for i, _ in places])
+        for i, c in places:
+            one = every[i][c]
+            aim = near.setdefault(int(one.posture[0]), one.q.mean(axis=0))
+            turned = [p for p in on_near_turns(one, home, aim) if _can_back_off(p, options.retract)]
+            plans = [*plans, *turned]
+            offered += [(i, c)] * len(turned)
+        group = np.array([i for i, _ in offered])
         air = (
             MoveTimes(plans, group, cell, options.retract, options.seconds, options.air_speed)
             if air is None
             else air.extended(plans, group)
         )
         air.forbid(warm[np.ix_(group, group)])
-        if options.home is not None and air.home is None:
-            air.home = floats(options.home, "home", (plans[0].robot.joints,))
+        if home is not None and air.home is None:
+            air.home = home
         own = np.array([p.time[-1] - p.time[0] for p in plans])
         own += options.pierce_time + 2 * options.retract / options.approach_speed
         found = _settle_order(air, group, own, before, options.seconds)
@@ -442,18 +537,17 @@ def order_plans(
             order = found
             break
         contours = sorted({int(group[c]) for leg in air.failed for c in leg if c != HOME})
-        fresh = (
+        places = (
             more_reachable(every, cell, options.retract, further, contours) if air.failed else []
         )
-        if not fresh:
+        if not places:
             raise further.mentioned_in(found)
-        places += fresh
     made, moves = air.unrolled(order.candidates)
     return PartPlan(
         plans=made,
         moves=moves,
         order=order,
-        chosen=tuple(places[k] for k in order.candidates.tolist()),
+        chosen=tuple(offered[k] for k in order.candidates.tolist()),
         retract=options.retract,
         approach_speed=options.approach_speed,
         pierce_time=options.pierce_time,

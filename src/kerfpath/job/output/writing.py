@@ -402,7 +402,9 @@ def order_note(part: PartPlan) -> str:
     return (
         f"Cycle time {part.cycle_time:.1f} s: cutting {part.cutting_time:.1f} s, air "
         f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; with these candidates and "
-        f"moves {proved}."
+        f"moves {proved}. Each contour was planned in its best posture and in those that at least "
+        "half of the contours can have; not compared: the other postures, and more than one "
+        "rotation about the beam in each."
     )
 
 

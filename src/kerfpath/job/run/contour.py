@@ -20,6 +20,7 @@ from kerfpath.job.run.remedy import Remedy, find_remedy, opens_without_windows
 from kerfpath.job.run.results import CutResult
 from kerfpath.options import PlanOptions
 from kerfpath.planner import (
+    best_motion,
     clearance_map,
     plan,
     plan_in_pieces,
@@ -174,8 +175,12 @@ def course_of_plans(job: Job, nodes: Contour, plans: Sequence[Plan]) -> Array:
     return x
 
 
-def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> CutResult | None:
+def cut_in_posture(
+    prepared: PreparedJob, request: CutRequest, posture: int, *, quick: bool
+) -> CutResult | None:
     """Return a contour's first candidate cut in one posture; None where its audit fails.
+
+    If `quick`, it is given up where it would be planned on the grid.
 
     Raises
     ------
@@ -185,10 +190,17 @@ def cut_in_posture(prepared: PreparedJob, request: CutRequest, posture: int) -> 
     candidate = request.candidates[0]
     job = replace(prepared.job, options=replace(request.options, postures=(posture,), certify=None))
     graph = job.graph(candidate.nodes)
-    made = plan(
-        candidate.nodes, job.robot, tool=job.tool, placement=job.placement, speed=candidate.speed,
-        options=_at_nodes(job), cell=prepared.cell, graph=None if job.robot.free.size else graph,
-    )  # fmt: skip
+    if quick and job.options.method == "continuous":
+        made = best_motion(
+            candidate.nodes, job.setup_in(prepared.cell), _at_nodes(job), speed=candidate.speed,
+            graph=graph,
+        )  # fmt: skip
+    else:
+        made = plan(
+            candidate.nodes, job.robot, tool=job.tool, placement=job.placement,
+            speed=candidate.speed, options=_at_nodes(job), cell=prepared.cell,
+            graph=None if job.robot.free.size else graph,
+        )  # fmt: skip
     cut = _audited(prepared, CutResult(request=request, candidate=candidate, graph=graph), made)
     return cut if cut.passed else None
 

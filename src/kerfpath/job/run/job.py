@@ -18,7 +18,7 @@ from kerfpath.planner import (
 )
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
-from kerfpath.sequence import longest_search, order_candidates
+from kerfpath.sequence import common_postures, longest_search, order_candidates
 
 # -----------------------------------------------------------------------------
 # The order in which the contours of a job are cut, and the transfer moves between them.
@@ -56,12 +56,20 @@ def order_cuts(
         () if r.run is not None or owner.count(i) > 1 else r.options.postures
         for r, i in zip(requests, owner, strict=True)
     ]
+    served = [
+        () if r.run is not None or owner.count(i) > 1 or job.robot.free.size
+        else units[u][0].graph.postures_throughout.tolist()
+        for u, (r, i) in enumerate(zip(requests, owner, strict=True))
+    ]  # fmt: skip
     try:
         part = order_candidates(
             units,
             _plan,
-            lambda unit, posture: cut_in_posture(prepared, requests[unit], posture),
+            lambda unit, posture, quick: cut_in_posture(
+                prepared, requests[unit], posture, quick=quick
+            ),
             others,
+            common_postures(served, others),
             progress=lambda unit, done, total: progress(
                 f"{requests[unit].task.name}: other postures", done, total
             ),
