@@ -162,6 +162,22 @@ def test_of_a_hopeless_speed_a_motion_is_found_without_the_exact_search(
     assert errors(plan(nodes, arm, speed=needed * fastest.speed, **space)) == []
 
 
+def test_far_above_the_fastest_speed_no_refinement_is_tried(arm, space):
+    """A proof about a few nodes takes less time than refinements that cannot end in the limits."""
+    nodes, speed, phases = drawn(0, nodes=41), 0.4, []
+    arm = arm.with_limits(acceleration=arm.speed_limits()[1] / 50)  # velocities do not matter
+    with pytest.raises(NoFeasiblePath) as caught:
+        plan(nodes, arm, speed=speed, phase=phases.append, **space)
+    none = caught.value
+    assert phases == ["search"]
+    assert none.proved
+    assert none.scope == "every gamma"
+    assert none.node == none.closed.node
+    assert 0 < none.relaxation.speed < 0.5
+    made = plan(nodes, arm, speed=none.relaxation.speed * speed, **space)
+    assert errors(made) == []
+
+
 @pytest.mark.parametrize("kind", ["rail", "positioner"])
 def test_with_an_external_axis_motions_grow_quicker_too(kind, arm, tool, placement):
     limits = {"lower": -1.0, "upper": 1.0, "velocity": 2.0, "acceleration": 4.0, "step": 0.25}

@@ -221,6 +221,7 @@ class _Certification:
         self.at_node = 0.0  # cells of level 0
         self.stages: list[Stage] = []
         self.plan, self.checkable = plan, checkable
+        self.by_fewer = 0.0  # the bound by fewer nodes; a stage that proves less lacks finer cells
         self.proved = 0.0  # by the stages that are kept
         self.loose: tuple[int, StageResult] | None = None  # the best one left out, and its place
 
@@ -232,6 +233,7 @@ class _Certification:
         fresh = True  # new cells, which the certificate must contain
         while True:
             result = solve_stage(cells, self.steps, care=CARE * self.cost)
+            coarse = result.bound < self.by_fewer
             if not self.checkable:
                 result = result.floored()
             gained, cells = self._take(result), result.cells
@@ -263,8 +265,9 @@ class _Certification:
                 kept = np.ones(len(live), np.bool_)
             which &= kept
             more = between(self.nodes)
-            if (slow or not which.any()) and len(more) > len(self.nodes) and self._fits(len(more)):
-                self.nodes, fresh = more, True
+            wanted = (slow and (self._priced or not coarse)) or not which.any()
+            if wanted and len(more) > len(self.nodes) and self._fits(len(more)):
+                self.nodes, self.by_fewer, fresh = more, self.best, True
                 cells = self._with_nodes(cells.take(kept))
             elif not which.any():
                 self._finish(result)
@@ -382,8 +385,13 @@ class _Certification:
         return pairs > self.most_pairs
 
     def _with_nodes(self, cells: CellSet, most: int = DEEPEST) -> CellSet:
-        """Return the cells plus those of further nodes, similarly fine where motions may pass."""
-        level = min(most, int(np.median(cells.level))) if len(cells) else 0
+        """Return the cells plus those of further nodes, similarly fine where motions may pass.
+
+        They are one level coarser, as many drop out before they are halved; few do if (6) decides.
+        """
+        level = 0
+        if len(cells):
+            level = min(most, int(np.median(cells.level)) - (not self._priced))
         missing = np.setdiff1d(self.nodes, cells.node)
         if not len(missing):
             return cells

@@ -30,6 +30,8 @@ DEEPEST = 12
 """Largest level: cells of 0.001 deg."""
 NODES_AROUND = 12
 """Nodes on either side of a node in a part of the contour that is tested."""
+MOST_NODES = 5_000
+"""Most nodes of a contour that is tested as a whole: the cells of all are held, some 200 MB."""
 MOST_CELLS = 2_000
 """Most cells of one node that may have a pose, before the test ends undecided."""
 EACH_PAIRS = 1_000_000
@@ -95,7 +97,7 @@ class MotionTest:
         self._endless = robot.endless
         self._maker = CellMaker(robot, frames, T_flange_tip, postures)
         self._count = len(frames)
-        self._coarsest = self._maker.coarsest(np.arange(self._count))
+        self._made, self._coarsest = np.zeros(self._count, np.bool_), list[CellSet]()
 
     def closed(self, limits: Limits, dt: float, around: int | None = None) -> Closed | None:
         """Return the place that no motion passes, with nodes `dt` s apart; None if not proved.
@@ -104,8 +106,8 @@ class MotionTest:
         which, or to which, no step or pair of steps leads. The other cells are halved until a node
         has none left, or until the limit of work. With `around`, only the part of the contour
         around that node is tested, with finer cells: a motion that cannot pass a part cannot pass
-        the whole contour. Cells are at some nodes only where joints take many intervals to reach
-        their velocity limit (`Steps.layers`).
+        the whole contour. More than `MOST_NODES` nodes are not tested as a whole. Cells are at some
+        nodes only where joints take many intervals to reach their velocity limit (`Steps.layers`).
         """
         steps = Steps(
             weight=freeze(np.ones(len(self._endless))),
@@ -119,7 +121,10 @@ class MotionTest:
         if around is not None:
             near = NODES_AROUND * int(np.diff(steps.layers(first, last)).max(initial=1))
             first, last = max(first, around - near), min(last, around + near)
-        nodes, cells, work = np.arange(first, last + 1), self._coarsest, 0
+        if last - first >= MOST_NODES:
+            return None
+        nodes, work = np.arange(first, last + 1), 0
+        cells = self._coarsest_at(nodes)
         for halved in range(DEEPEST):
             missing = np.setdiff1d(nodes, cells.node)
             if len(missing):
@@ -138,6 +143,15 @@ class MotionTest:
                 return None
             cells = self._maker.halves(one.cells.take(one.backward()))
         return None
+
+    def _coarsest_at(self, nodes: Ints) -> CellSet:
+        """Return the coarsest cells at some nodes, which are made once."""
+        missing = nodes[~self._made[nodes]]
+        if len(missing):
+            self._coarsest.append(self._maker.coarsest(missing))
+            self._made[missing] = True
+        cells = CellSet.join(self._coarsest)
+        return cells.take(np.isin(cells.node, nodes))
 
 
 class _Round:

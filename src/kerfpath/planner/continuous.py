@@ -12,6 +12,7 @@ from kerfpath.planner.attempt import Attempt, Strategy, first_plan
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.courses import can_explore
 from kerfpath.planner.exploration import Exploration
+from kerfpath.planner.impossible import refuse_impossible
 from kerfpath.planner.on_grid import plan_on_grid
 from kerfpath.planner.quickest import clear_paths, wide
 from kerfpath.planner.refinements import refine_from_random_starts
@@ -186,7 +187,7 @@ def clear_motion(
     Raises
     ------
     NoFeasiblePath
-        A node has no pose.
+        A node has no pose, or the speed is proved to be much too high.
     """
     starts = Starts(task, finder)
     return _clear_motion(task, starts, begin, thorough=thorough, explored=explored)
@@ -213,6 +214,8 @@ def _clear_motion(
     search, paths = searched
     if starts.best is not None and starts.above(search.value, ENOUGH):
         paths = [path for beam in QUICK for path in search.paths(beam)]
+    if starts.best is None and task.settings.feed == "constant":
+        refuse_impossible(task, finder, paths)
     begin("refinement")
     starts.refine(paths)
     if thorough and explored and finder.is_free and can_explore(task):
@@ -272,7 +275,9 @@ def _from_fewer_nodes(
             if thin is None
             else clear_motion(thin.task, finder.of(thin.task), explored=explored)
         )
-    except NoFeasiblePath:
+    except NoFeasiblePath as none:
+        if thin is not None and none.closed is not None:
+            raise thin.along_all_nodes(none, none.closed) from None
         found = None
     if thin is None or found is None:
         return None, 0.0

@@ -10,15 +10,18 @@ import numpy as np
 from kerfpath.certifier import MotionTest
 from kerfpath.compiling import finish_compiling
 from kerfpath.effort import current_effort
-from kerfpath.errors import NoFeasiblePath, Relaxation
+from kerfpath.errors import Closed, NoFeasiblePath, Relaxation
 from kerfpath.limits import rates_of
-from kerfpath.planner.quickest import QuickMotion
+from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.quickest import QuickMotion, quickest_along
 from kerfpath.planner.statements import at_least, at_most
 from kerfpath.planner.task import Task
+from kerfpath.plans import Plan, Proof
+from kerfpath.search import ContinuousPath
 from kerfpath.tolerances import LIMIT_MARGIN
 
-MOST_NODES = 5_000
-"""Most nodes whose cells are all held in memory at once: some 200 MB."""
+FAR_OUTSIDE = 4.0
+"""Share of (6) that a path must need somewhere before a proof that none is possible is tried."""
 BINDS, APART = 0.9, 3
 """Share of the limits, in speed, from which they bind at a node; and distance in nodes that further
 binding nodes keep."""
@@ -33,7 +36,7 @@ def motion_test(task: Task) -> MotionTest | None:
     Other constraints of a plan (cell, comfort, closure, rotation limits) only leave fewer motions.
     """
     asked = task.settings
-    if not task.robot.encloses or asked.tilt is not None or len(task.contour) > MOST_NODES:
+    if not task.robot.encloses or asked.tilt is not None:
         return None
     finish_compiling()
     frames = task.setup.placement @ task.contour.frames(asked.frames)
@@ -46,20 +49,68 @@ def at_any_gamma(broken: NoFeasiblePath, task: Task) -> NoFeasiblePath:
     if test is None or task.settings.feed == "dip":
         return broken
     limits = task.problem.limits
-    closed = test.closed(limits, task.dt) or test.closed(limits, task.dt, broken.node + 1)
+    closed = test.closed(limits, task.dt, broken.node + 1) or test.closed(limits, task.dt)
     if closed is None:
         return broken.with_message(f"{broken}; whether there is a motion off the grid is undecided")
     return broken.with_message(f"{broken}; proved for every rotation: {closed}", closed=closed)
 
 
-def with_relaxation(broken: NoFeasiblePath, task: Task, quick: QuickMotion) -> NoFeasiblePath:
+def refuse_impossible(
+    task: Task, finder: CollisionFreeSearch, paths: Sequence[ContinuousPath]
+) -> None:
+    """Raise NoFeasiblePath if all paths exceed (6) by far and, where they do, no motion can pass.
+
+    It is for speeds that are much too high: a proof about a few nodes takes little time compared
+    with refinements of all of them that cannot end inside the limits. With a path at a lower speed,
+    the answer says which.
+    """
+    claim = Proof(optimal=False, statement="a path of the search over continuous rotation")
+    made = [task.plan_between(path, claim) for path in paths]
+    needed = [np.abs(plan.acceleration_share).max(axis=1) for plan in made]
+    if not made or min(float(share.max()) for share in needed) <= FAR_OUTSIDE * task.settings.eta_a:
+        return
+    test = motion_test(task)
+    if test is None:
+        return
+    gentlest = sorted(range(len(made)), key=lambda i: float(np.median(needed[i])))
+    closed = test.closed(task.problem.limits, task.dt, int(needed[gentlest[0]].argmax()) + 1)
+    if closed is None:
+        return
+    broken = proved_impossible(task, closed)
+    for i in gentlest if can_be_slower(task) else ():
+        slower = quickest_along(task, finder, paths[i])
+        if slower is not None:
+            raise with_relaxation(broken, task, slower)
+    raise broken
+
+
+def proved_impossible(task: Task, closed: Closed) -> NoFeasiblePath:
+    """Return the answer that no motion passes a place."""
+    return NoFeasiblePath(
+        f"contour {task.contour.name!r}: no motion keeps the limits at any rotation, which is "
+        f"proved: {closed}",
+        proved=True,
+        node=closed.node,
+        closed=closed,
+    )
+
+
+def can_be_slower(task: Task) -> bool:
+    """Return whether the search for quickest motions supports all that a task asks for."""
+    asked, held = task.settings, task.problem.limits
+    priced = asked.comfort is not None and asked.comfort.prices_clearance
+    unknown = held.torque is not None or held.jerk is not None
+    return not (asked.closure == "periodic" or priced or unknown)
+
+
+def with_relaxation(broken: NoFeasiblePath, task: Task, quick: Plan) -> NoFeasiblePath:
     """Return an answer without a path, with the lower speed or higher limits that would suffice.
 
     They are those of the quickest motion found, which is slower than asked for; the figures are
     rounded so that they hold as printed.
     """
     limits = task.problem.limits
-    v, a = rates_of(quick.plan.increments, np.full(len(task.contour) - 1, task.dt))
+    v, a = rates_of(quick.increments, np.full(len(task.contour) - 1, task.dt))
     shares = (
         float((np.abs(rates) / limit.usable).max(initial=0.0))
         for rates, limit in ((v, limits.velocity), (a, limits.acceleration))

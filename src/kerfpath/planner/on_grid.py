@@ -8,7 +8,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner.attempt import Attempt, Strategy, first_plan
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.feed_reduction import plan_slowed
-from kerfpath.planner.impossible import at_any_gamma, with_relaxation
+from kerfpath.planner.impossible import at_any_gamma, can_be_slower, with_relaxation
 from kerfpath.planner.quickest import quick_motions, velocity_limited_motions
 from kerfpath.planner.refinements import plan_from_faster, plan_off_grid, refine_plan
 from kerfpath.planner.statements import ON_THIS_GRID, limits_named
@@ -114,14 +114,11 @@ def _from_quickest(
         limits a motion was found.
     """
     asked = task.settings
-    # The search for quickest motions supports no closure, torque, jerk or cost of clearance. On a
-    # grid of external axes its first motion may take minutes: the long steps between samples leave
-    # the arm nearly every edge, and the exact search for the fastest path keeps each as a state.
-    priced = asked.comfort is not None and asked.comfort.prices_clearance
-    held = task.problem.limits
-    unknown = held.torque is not None or held.jerk is not None
+    # On a grid of external axes the first quickest motion may take minutes: the long steps between
+    # samples leave the arm nearly every edge, and the exact search for the fastest path keeps each
+    # as a state.
     on_a_grid = task.robot.free.size and task.external is None
-    if asked.closure == "periodic" or priced or unknown or on_a_grid:
+    if on_a_grid or not can_be_slower(task):
         raise _judged(broken, task, begin) from None
     judged, best = None, None
     begin("search for the quickest motion")
@@ -143,7 +140,7 @@ def _from_quickest(
         judged = _judged(broken, task, begin)
     if best is None or asked.rotation is not None:
         raise judged
-    raise with_relaxation(judged, task, best)
+    raise with_relaxation(judged, task, best.plan)
 
 
 def _judged(broken: NoFeasiblePath, task: Task, begin: Callable[[str], None]) -> NoFeasiblePath:

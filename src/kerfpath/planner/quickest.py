@@ -216,17 +216,37 @@ def faster_motion(
     task: Task, finder: CollisionFreeSearch, start: Plan, best: QuickMotion
 ) -> QuickMotion:
     """Return the better of the best motion so far and a start with its interval minimised."""
+    found = _at_least_interval(start)
+    if found is None or found[0].dt >= best.dt or not _allowed(task, finder, found[0]):
+        return best
+    return replace(best, plan=found[0], at=found[1])
+
+
+def quickest_along(task: Task, finder: CollisionFreeSearch, path: ContinuousPath) -> Plan | None:
+    """Return a path between the samples, moved to its least interval; the speed does not matter.
+
+    None if it leaves the reach of its posture, or is not clear.
+    """
+    task = _without_aim(task)
+    found = _at_least_interval(task.plan_between(path, _claim()))
+    return None if found is None or not _allowed(task, finder, found[0]) else found[0]
+
+
+def _at_least_interval(start: Plan) -> tuple[Plan, Binding] | None:
+    """Return a motion moved to its least interval, and what binds it there."""
     quickened = quicken(start)
     if quickened is None:
-        return best
+        return None
     made, at = quickened
-    made = replace(made, time=made.time * (1 + LIMIT_MARGIN))
+    return replace(made, time=made.time * (1 + LIMIT_MARGIN)), at
+
+
+def _allowed(task: Task, finder: CollisionFreeSearch, made: Plan) -> bool:
+    """Return whether a motion keeps the margins of comfort and is clear."""
     comfort = task.settings.comfort
-    if made.dt >= best.dt:
-        return best
     if comfort is not None and comfort.broken(task.robot, made.q, task.setup.tool):
-        return best
-    return replace(best, plan=made, at=at) if finder.is_clear(made) else best
+        return False
+    return finder.is_clear(made)
 
 
 def wide(task: Task) -> BeamWidth:

@@ -10,7 +10,8 @@ from scipy.interpolate import CubicSpline
 from kerfpath.arrays import Ints, short_repr
 from kerfpath.contour import Contour
 from kerfpath.effort import current_effort
-from kerfpath.errors import NoFeasiblePath
+from kerfpath.errors import Closed, NoFeasiblePath
+from kerfpath.planner.impossible import proved_impossible
 from kerfpath.planner.task import Layered, Task
 from kerfpath.plans import Plan, Proof, on_turns
 
@@ -67,6 +68,23 @@ class SubsampledTask:
             cost=made.cost,
             proof=claim,
             counts=made.counts,
+        )
+
+    def along_all_nodes(self, none: NoFeasiblePath, closed: Closed) -> NoFeasiblePath:
+        """Return the answer that no motion passes a place, which is proved along the kept nodes.
+
+        The lower speed or higher limits of a motion along them may not be enough for all nodes, so
+        that they are only named.
+        """
+        nodes = self.nodes
+        named = nodes[closed.node + 1] - 1 if closed.joint is None else nodes[closed.node]
+        broken = proved_impossible(self.whole, replace(closed, node=int(named)))
+        if none.relaxation is None:
+            return broken
+        every = int(nodes[1] - nodes[0])
+        return broken.with_message(
+            f"{broken}; along one node of every {every} a motion was found at "
+            f"{none.relaxation.speed:g} of the speed"
         )
 
 
