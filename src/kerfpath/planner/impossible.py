@@ -66,8 +66,9 @@ def refuse_impossible(
     """
     claim = Proof(optimal=False, statement="a path of the search over continuous rotation")
     made = [task.plan_between(path, claim) for path in paths]
-    needed = [np.abs(plan.acceleration_share).max(axis=1) for plan in made]
-    if not made or min(float(share.max()) for share in needed) <= FAR_OUTSIDE * task.settings.eta_a:
+    needed = [np.abs(plan.acceleration_share).max(axis=1, initial=0.0) for plan in made]
+    most = min((float(share.max(initial=0.0)) for share in needed), default=0.0)
+    if most <= FAR_OUTSIDE * task.settings.eta_a:
         return
     test = motion_test(task)
     if test is None:
