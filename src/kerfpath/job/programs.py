@@ -85,6 +85,7 @@ def program_of(
     options: ProgramOptions,
     moves: Sequence[TransferMove] = (),
     *,
+    missing: Sequence[str] = (),
     expected: Expected,
     strict: bool = False,
     dry_share: float | None = None,
@@ -92,7 +93,8 @@ def program_of(
     """Return the files of the program that cuts `plans`, and the warnings of its preflight.
 
     Between the cuts the robot makes `moves`; without any, it moves straight to each cut. With
-    `dry_share` the program is a dry run at that share of the speed. The text is read back and
+    `dry_share` the program is a dry run at that share of the speed. Its head names the contours
+    that are missing because they have no path. The text is read back and
     audited as by `kerfpath audit`; for a dry run, the text at full speed is audited.
 
     The caller must have audited the plans.
@@ -111,6 +113,9 @@ def program_of(
     if refusal := chosen.refusal(plans[0].robot):
         raise InputError(f"no program: {refusal}")
     program = build_program(plans, options, moves=moves)
+    if missing:
+        lacks = f"Not cut, as no path was found: {', '.join(missing)}."
+        program = replace(program, caveats=(lacks, *program.caveats))
     written = post_and_read(program, options.language, options.settings, strict=strict)
     if written.read is not None:
         audit = Audit(expected=replace(expected, job=replace(expected.job, program=options)))
@@ -197,8 +202,12 @@ def program_from_file(
         moves around obstacles cannot be moved to a measured part.
     """
     file = read_plan_file(plan_file)
-    if file.missing:
-        raise AuditFailed(f"no program: {', '.join(file.missing)} has no plan")
+    current = None if job_file is None else read_job(job_file)
+    if file.missing and not _accepts_incomplete(file, current):
+        raise AuditFailed(
+            f"no program: {', '.join(file.missing)} has no plan; for a program without, write "
+            'incomplete = "accept" in [program]'
+        )
     if file.failed:
         raise AuditFailed(
             f"no program: {', '.join(file.failed)} failed the audit against the drawing when it "
@@ -206,16 +215,16 @@ def program_from_file(
         )
     notes: list[str] = []
     by_job = None
-    if job_file is not None:
+    if current is not None:
         if frame is not None:
             raise InputError(
                 f"{job_file}: expected a job or a measured part, got both, but the cell of a job "
                 "is not known at a measured placement; remove one"
             )
-        prepared = _planned_requirements(prepare(read_job(job_file)), file)
+        prepared = _planned_requirements(prepare(current), file)
         required = Expected.of(prepared)
         _require_plans_passed(Audit(expected=required).plan_file(plan_file))
-        if prepared.job.options.interruptions == "none":
+        if prepared.job.options.interruptions == "none" and not file.missing:
             by_job = required
         file = replace(file, job=prepared.job.source)
     given = job_file or plan_file
@@ -236,11 +245,19 @@ def program_from_file(
         file.plans,
         options,
         file.moves,
+        missing=file.missing,
         expected=by_job or expected_of_plans(_job_of(file, options), file.plans),
         strict=strict,
         dry_share=dry_share,
     )
     return files, [*notes, *map(str, warnings)]
+
+
+def _accepts_incomplete(file: PlanFile, current: Job | None) -> bool:
+    """Return whether the job accepts a program without the contours that have no path."""
+    if current is not None:
+        return current.accepts_incomplete
+    return file.table("program", ProgramTable).incomplete == "accept"
 
 
 def program_language(source: Mapping[str, Any], path: Path) -> str:

@@ -76,7 +76,7 @@ def exports_of(result: JobResult, *, settled: bool) -> list[Export]:
         False while bounds of its plans are still to be computed.
     """
     program = ""
-    if not result.passed:
+    if not result.may_be_written:
         program = "a contour has no plan that passes its audit, or a transfer move is missing"
     elif result.job.program.language == "none":
         program = 'the job has language = "none" in [program]; set a language there'

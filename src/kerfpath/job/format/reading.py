@@ -82,6 +82,8 @@ class Job:
         The parsed file: its tables and keys, with values that JSON can hold.
     text : str
         The text of the file, with its comments.
+    accepts_incomplete : bool
+        Whether a program may lack contours that have no path.
     """
 
     path: Path
@@ -99,6 +101,7 @@ class Job:
     program: ProgramOptions
     source: Mapping[str, Any]
     text: str = ""
+    accepts_incomplete: bool = False
 
     __repr__ = short_repr
 
@@ -253,6 +256,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         program=file.program.resolve((copy_of or path).stem, file.audit.resolve().path),
         source=source,
         text=text,
+        accepts_incomplete=file.program.incomplete == "accept",
     )
 
 

@@ -334,12 +334,15 @@ def program_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     notes += closer_sampling(outcome) + short_pieces(outcome)
     faults = [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
     faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
-    if outcome.passed and job.program.language != "none":
+    if job.program.language != "none":
+        notes += incomplete_note(outcome)
+    if outcome.may_be_written and job.program.language != "none":
         try:
             expected = expected_of_cuts(job, outcome.cuts, outcome.cell)
             program, warnings = program_of(
-                outcome.plans, job.program, moves, expected=expected, strict=strict
-            )
+                outcome.plans, job.program, moves,
+                missing=outcome.missing, expected=expected, strict=strict,
+            )  # fmt: skip
             # What the tables of the cuts say already is not said again.
             failed = {row.code for cut in outcome.cuts for row in cut.as_run.checks if not row.ok}
             notes += [str(warning) for warning in warnings if warning.code not in failed]
@@ -406,6 +409,21 @@ def order_note(part: PartPlan) -> str:
         "half of the contours can have; not compared: the other postures, and more than one "
         "rotation about the beam in each."
     )
+
+
+def incomplete_note(outcome: JobResult) -> list[str]:
+    """Return the note on contours that the program lacks, or that keep it from being written."""
+    missing = ", ".join(outcome.missing)
+    if not missing:
+        return []
+    if outcome.may_be_written:
+        return [f"The program does not cut {missing}: no path was found."]
+    if outcome.job.accepts_incomplete:
+        return []
+    return [
+        f"No program is written, as there is no path for {missing}; for a program without, write "
+        'incomplete = "accept" in [program].'
+    ]
 
 
 def closer_sampling(outcome: JobResult) -> list[str]:

@@ -31,7 +31,8 @@ def order_cuts(
 ) -> JobResult:
     """Return one cut (or its pieces) of each contour's candidates, in the requested order.
 
-    The result has the moves between them if the job asks for moves and every contour has a plan.
+    The result has the moves between them if the job asks for moves and every contour has a plan, or
+    the job accepts a program without the others. Cuts without a path are the last ones.
 
     Parameters
     ----------
@@ -43,7 +44,15 @@ def order_cuts(
     job = prepared.job
     result = JobResult(job=job, cuts=(), mesh=prepared.part.mesh(), cell=prepared.cell)
     passed = [[cuts for cuts in each if all(cut.passed for cut in cuts)] for each in tried]
-    if job.sequence is None or not all(passed):
+    missing = [
+        each[0][0]
+        for fine, each in zip(passed, tried, strict=True)
+        if not fine and all(cut.broken is not None for cuts in each for cut in cuts)
+    ]
+    complete = all(passed) or (
+        job.accepts_incomplete and 0 < sum(map(bool, passed)) == len(passed) - len(missing)
+    )
+    if job.sequence is None or not complete:
         first = [(fine or each)[0] for fine, each in zip(passed, tried, strict=True)]
         return replace(result, cuts=tuple(cut for cuts in first for cut in cuts))
     units, owner, before = _units(passed, prepared.inner_first)
@@ -85,7 +94,7 @@ def order_cuts(
             seconds=job.sequence.seconds,
         )
     except NoFeasiblePath as stuck:
-        return replace(result, cuts=tuple(unit[0] for unit in units), stuck=stuck)
+        return replace(result, cuts=(*(unit[0] for unit in units), *missing), stuck=stuck)
     cuts = [
         replace(units[unit][candidate], plan=made)
         for (unit, candidate), made in zip(part.chosen, part.plans, strict=True)
@@ -95,7 +104,7 @@ def order_cuts(
         transfer_checks(job.robot, m.q, m.time, cell=prepared.cell, eta_v=o.eta_v, eta_a=o.eta_a)
         for m in part.moves
     )
-    return replace(result, cuts=tuple(cuts), part=part, air=tuple(worst_of(audited)))
+    return replace(result, cuts=(*cuts, *missing), part=part, air=tuple(worst_of(audited)))
 
 
 def _units(
@@ -103,14 +112,15 @@ def _units(
 ) -> tuple[list[list[CutResult]], list[int], list[tuple[int, int]]]:
     """Return the units to order, the contour of each, and the pairs in a required order.
 
-    A unit is the candidates of a contour that are cut in one go, or a single piece.
+    A unit is the candidates of a contour that are cut in one go, or a single piece. A contour
+    without any has no unit.
     """
     units: list[list[CutResult]] = []
     owner: list[int] = []
     pieces: list[tuple[int, int]] = []
     for i, fine in enumerate(passed):
         whole = [cuts[0] for cuts in fine if len(cuts) == 1]
-        new = [whole] if whole else [[piece] for piece in fine[0]]
+        new = [whole] if whole else [[piece] for piece in (fine[0] if fine else ())]
         pieces += pairwise(range(len(units), len(units) + len(new)))
         units += new
         owner += [i] * len(new)

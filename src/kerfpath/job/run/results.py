@@ -153,6 +153,23 @@ class JobResult:
         moves = self.stuck is None and all(check.ok for check in self.air)
         return moves and all(cut.passed for cut in self.cuts)
 
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of the contours that have no path."""
+        return tuple(cut.name for cut in self.cuts if cut.broken is not None)
+
+    @property
+    def may_be_written(self) -> bool:
+        """Whether there may be a program.
+
+        Every contour and move has passed, or the job accepts a program without those that have no
+        path, and all else has passed.
+        """
+        if not (self.missing and self.job.accepts_incomplete):
+            return self.passed
+        rest = tuple(cut for cut in self.cuts if cut.broken is None)
+        return len(rest) > 0 and replace(self, cuts=rest).passed
+
     def with_cuts(self, cuts: tuple[CutResult, ...]) -> JobResult:
         """Return the result with other results of its cuts, in the same order."""
         if self.part is None:

@@ -227,6 +227,10 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
     request: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["shutter"]')] = None
     wait_for: Annotated[list[Partner] | None, key(PARTNERS_SAID, '["ready"]')] = None
     wait_timeout_s: Annotated[Positive, key("a number from 0 to 600, in s", "5", le=600)] = 5.0
+    incomplete: Annotated[
+        Literal["refuse", "accept"],
+        key("what to do if contours have no path: write no program, or one without", '"accept"'),
+    ] = "refuse"
 
     @field_validator("request", "wait_for")
     @classmethod
