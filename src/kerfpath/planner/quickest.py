@@ -77,7 +77,9 @@ class QuickMotion:
         return self.dt * (1 - LIMIT_MARGIN / 2) <= dt
 
 
-def quick_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMotion]:
+def quick_motions(
+    task: Task, finder: CollisionFreeSearch, *, explore: bool = True
+) -> Iterator[QuickMotion]:
     """Yield successively faster motions along the contour of a task, clear and within its margins.
 
     The first is the fastest path on the grid. The second, if the robot leaves a rotation free, is
@@ -113,7 +115,7 @@ def quick_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMoti
                     best = faster
                     yield best
         without_gain = 0 if best.dt < (1 - GAIN) * before else without_gain + 1
-    if can_explore(task):
+    if explore and can_explore(task):
         yield from _explored(task, finder, best)
 
 

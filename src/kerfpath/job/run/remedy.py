@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 from kerfpath.arrays import short_repr
 from kerfpath.cell import Cell
@@ -25,6 +25,8 @@ from kerfpath.planner import (
 
 GIVE = (0.0, 2e-3, 1e-2, 3e-2)
 """Relative amounts by which a value is relaxed until a plan is found with it."""
+ANY_PLAN: Mapping[str, Any] = {"between_nodes": "reported", "certify": None, "restarts": 0}
+"""Options of trials, whose plans need not be good."""
 Share = Literal["eta_velocity", "eta_acceleration"]
 """Keys of a job for the share of a limit that may be used."""
 
@@ -119,8 +121,7 @@ class _Trial:
         try:
             plan(
                 nodes, self.job.robot, tool=self.job.tool, placement=self.job.placement,
-                speed=at, options=replace(options, between_nodes="reported"), cell=self.cell,
-                graph=graph,
+                speed=at, options=replace(options, **ANY_PLAN), cell=self.cell, graph=graph,
             )  # fmt: skip
         except NoFeasiblePath:
             return False
@@ -181,8 +182,9 @@ def find_remedy(
     ceiling = continuous and request.task.time_step is None
     try:
         fastest = fastest_along(
-            job, candidate.nodes, cell, refine=leaves_grid(job), graph=graph, ceiling=ceiling
-        )
+            job, candidate.nodes, cell, refine=leaves_grid(job), graph=graph, ceiling=ceiling,
+            explore=False,
+        )  # fmt: skip
     except NoFeasiblePath:
         return None
     grid = fastest.speed if fastest.on_grid is None else fastest.on_grid
