@@ -155,7 +155,7 @@ def test_no_motion_is_ruled_out_by_limits_that_it_keeps(
     """Whether cells are at all nodes or at some."""
     monkeypatch.setattr(Steps, "layers", lambda _, a, b: np.append(np.arange(a, b, stride), b))
     done = 0
-    for seed in range(10):
+    for seed in range(6):
         rng = np.random.default_rng([7, seed, int(1000 * wild)])
         nodes = drawn(seed)
         q = motion(arm, nodes, tool, placement, rng, wild)
@@ -168,7 +168,7 @@ def test_no_motion_is_ruled_out_by_limits_that_it_keeps(
         limits = Limits.of(fast, sharp)
         assert test_of(nodes, arm, tool, placement).closed(limits, 1.0) is None
         done += 1
-    assert done >= 5
+    assert done >= 3
 
 
 @pytest.mark.slow

@@ -444,7 +444,7 @@ def test_a_plan_of_the_front_refined_from_its_neighbours_is_no_better(task, off_
     refined = 0
     for number, (each, run) in enumerate(zip(known, off_grid.runs, strict=True)):
         solution = Solution(losses=each.losses, course=each.course, number=number, run=run)
-        for begin in known:
+        for begin in known[max(number - 1, 0) : number + 2]:
             again = replace(problem.as_good(solution), continuous=True, begin=(begin.course,))
             made = problem.solve(again)
             if isinstance(made, str):
