@@ -252,10 +252,16 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
         made = _divided(made, candidate.path, job.options.refine_parts)
     kept = None if whole.picked else kept_between_nodes(job, made)
     made = made if kept is None else kept.plan
-    checks = job.tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
-    checks += candidate.drawing_checks(made.contour, job.tolerances.path)
-    cut = replace(whole, candidate=candidate, graph=graph, plan=made, checks=tuple(checks))
+    cut = with_checks(prepared, replace(whole, candidate=candidate, graph=graph), made)
     return replace(cut, as_run=as_run(job, made, candidate.path, kept))
+
+
+def with_checks(prepared: PreparedJob, cut: CutResult, made: Plan) -> CutResult:
+    """Return a cut with a plan and the audit of that plan; how it runs is not looked at again."""
+    tolerances, candidate = prepared.job.tolerances, cut.candidate
+    checks = tolerances.checks(made, reference=candidate.path, cell=prepared.cell)
+    checks += candidate.drawing_checks(made.contour, tolerances.path)
+    return replace(cut, plan=made, checks=tuple(checks))
 
 
 def _divided(made: Plan, path: Contour, parts: int) -> Plan:

@@ -10,7 +10,7 @@ from kerfpath.auditor import bound_checks, transfer_checks, worst_of
 from kerfpath.cad import Part
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.format import Job, PreparedJob, prepare
-from kerfpath.job.run.contour import advised, cut_candidate, cut_in_posture
+from kerfpath.job.run.contour import advised, cut_candidate, cut_in_posture, with_checks
 from kerfpath.job.run.foresee import require_foreseen
 from kerfpath.job.run.results import CutResult, JobResult
 from kerfpath.planner import (
@@ -95,9 +95,10 @@ def order_cuts(
         )
     except NoFeasiblePath as stuck:
         return replace(result, cuts=(*(unit[0] for unit in units), *missing), stuck=stuck)
+    chosen = [units[unit][candidate] for unit, candidate in part.chosen]
     cuts = [
-        replace(units[unit][candidate], plan=made)
-        for (unit, candidate), made in zip(part.chosen, part.plans, strict=True)
+        cut if made is cut.plan else with_checks(prepared, cut, made)  # on other turns
+        for cut, made in zip(chosen, part.plans, strict=True)
     ]
     o = job.options
     audited = (
