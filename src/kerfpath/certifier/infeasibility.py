@@ -148,9 +148,9 @@ class MotionTest:
         """Return the coarsest cells at some nodes, which are made once."""
         missing = nodes[~self._made[nodes]]
         if len(missing):
-            self._coarsest.append(self._maker.coarsest(missing))
+            self._coarsest = [CellSet.join([*self._coarsest, self._maker.coarsest(missing)])]
             self._made[missing] = True
-        cells = CellSet.join(self._coarsest)
+        (cells,) = self._coarsest
         return cells.take(np.isin(cells.node, nodes))
 
 

@@ -108,8 +108,11 @@ def with_relaxation(broken: NoFeasiblePath, task: Task, quick: Plan) -> NoFeasib
     """Return an answer without a path, with the lower speed or higher limits that would suffice.
 
     They are those of the quickest motion found, which is slower than asked for; the figures are
-    rounded so that they hold as printed.
+    rounded so that they hold as printed. With a limit on the rotation, which quickest motions need
+    not keep, the answer stays as it is.
     """
+    if task.settings.rotation is not None:
+        return broken
     limits = task.problem.limits
     v, a = rates_of(quick.increments, np.full(len(task.contour) - 1, task.dt))
     shares = (

@@ -113,7 +113,6 @@ def _from_quickest(
         No motion was found; the message says what is proved, and with which lower speed or higher
         limits a motion was found.
     """
-    asked = task.settings
     # On a grid of external axes the first quickest motion may take minutes: the long steps between
     # samples leave the arm nearly every edge, and the exact search for the fastest path keeps each
     # as a state.
@@ -138,7 +137,7 @@ def _from_quickest(
         best = None
     if judged is None:
         judged = _judged(broken, task, begin)
-    if best is None or asked.rotation is not None:
+    if best is None:
         raise judged
     raise with_relaxation(judged, task, best.plan)
 

@@ -402,12 +402,14 @@ def order_note(part: PartPlan) -> str:
         if order.optimal
         else f"an order of {order.at_least:.1f} s is not ruled out"
     )
+    common = " and in those that at least half of the contours can have"
+    if part.plans[0].robot.free.size:
+        common = ""  # with external axes, other postures are planned only where moves need them
     return (
         f"Cycle time {part.cycle_time:.1f} s: cutting {part.cutting_time:.1f} s, air "
         f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; with these candidates and "
-        f"moves {proved}. Each contour was planned in its best posture and in those that at least "
-        "half of the contours can have; not compared: the other postures, and more than one "
-        "rotation about the beam in each."
+        f"moves {proved}. Each contour was planned in its best posture{common}; not compared: the "
+        "other postures, and more than one rotation about the beam in each."
     )
 
 

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
+
 from kerfpath.auditor import bound_checks, transfer_checks, worst_of
 from kerfpath.cad import Part
 from kerfpath.errors import NoFeasiblePath
@@ -96,10 +98,7 @@ def order_cuts(
     except NoFeasiblePath as stuck:
         return replace(result, cuts=(*(unit[0] for unit in units), *missing), stuck=stuck)
     chosen = [units[unit][candidate] for unit, candidate in part.chosen]
-    cuts = [
-        cut if made is cut.plan else with_checks(prepared, cut, made)  # on other turns
-        for cut, made in zip(chosen, part.plans, strict=True)
-    ]
+    cuts = [_as_ordered(prepared, *each) for each in zip(chosen, part.plans, strict=True)]
     o = job.options
     audited = (
         transfer_checks(job.robot, m.q, m.time, cell=prepared.cell, eta_v=o.eta_v, eta_a=o.eta_a)
@@ -128,6 +127,17 @@ def _units(
     members = [[u for u, i in enumerate(owner) if i == k] for k in range(len(passed))]
     inner = [(a, b) for i, j in inner_first for a in members[i] for b in members[j]]
     return units, owner, inner + pieces
+
+
+def _as_ordered(prepared: PreparedJob, cut: CutResult, made: Plan) -> CutResult:
+    """Return a cut with its plan on the turns that the order has chosen.
+
+    It is audited again only if joints with limits are on other turns, where their margins differ.
+    """
+    limited = ~made.robot.endless
+    if np.array_equal(made.q[:, limited], _plan(cut).q[:, limited]):
+        return replace(cut, plan=made)
+    return with_checks(prepared, cut, made)
 
 
 def _plan(cut: CutResult) -> Plan:
