@@ -9,6 +9,7 @@ import pytest
 from browser import dom_of, figures, needs_chromium, without_scripts
 from kerfpath.errors import InputError
 from kerfpath.report import FrontAxis, FrontPlan, render_front
+from kerfpath.report.style import DARK_SCALE, INK, SCALE
 
 AXES = (
     FrontAxis(name="displacement", words="total displacement", unit="s", sense=1),
@@ -183,6 +184,10 @@ def seen(page, folder, acts):
     return found
 
 
+def _lightness(colour):
+    return sum(bytes.fromhex(colour[1:]))
+
+
 @pytest.mark.slow
 @needs_chromium
 def test_views_are_linked(tmp_path):
@@ -228,6 +233,19 @@ def test_views_are_linked(tmp_path):
         seen.x = SCATTER.data[1].x;
         seen.title = SCATTER.layout.xaxis.title.text;
         seen.labels = SCATTER.layout.annotations.map((label) => label.text);
+        const look = () => ({
+          best: SCATTER.data[1].marker.colorscale[0][1],
+          page: SCATTER.layout.paper_bgcolor,
+          ink: SCATTER.layout.annotations[0].font.color,
+        });
+        await wait(300);
+        seen.light = look();
+        // The page becomes dark, as far as its script knows; the colours of its style stay light.
+        Object.defineProperty(DARK, "matches", { value: true });
+        DARK.dispatchEvent(new Event("change"));
+        await wait(300);
+        seen.dark = look();
+        seen.bar = SCATTER.data[1].marker.colorbar.title.text;
         """,
     )
     low, high = found["brush"]
@@ -251,6 +269,12 @@ def test_views_are_linked(tmp_path):
     assert found["x"] == [3, 6, 12, 9]
     assert found["title"] == "cutting speed (m/min), better →"
     assert found["labels"] == ["least displacement", "balanced"]
+    # In both themes the best colour stands out most: the darkest on white, the lightest on black.
+    assert found["light"] == {"best": SCALE[0], "page": "white", "ink": INK}
+    assert found["dark"] == {"best": DARK_SCALE[0], "page": "#fff", "ink": INK}
+    assert _lightness(SCALE[0]) < _lightness(SCALE[-1])
+    assert _lightness(DARK_SCALE[0]) > _lightness(DARK_SCALE[-1])
+    assert found["bar"] == "cutting speed (m/min), better ↑"
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
-from browser import CHROMIUM, dom_of
+from browser import CHROMIUM, dom_of, figures
 from commands import assert_refused, run
 from jobs import speeds_on_grid
 from kerfpath.cad import read as read_drawing
@@ -395,6 +395,9 @@ def test_the_command_says_why_no_placement_is_feasible(tmp_path):
     # The nearest of those out of reach alike is the one nearest to the robot.
     assert re.search(r"nearest: x_mm = -\d", said.stdout)
     assert not (tmp_path / "job-layout" / "placed.toml").exists()
+    (drawn,) = figures((tmp_path / "job-layout" / "layout.html").read_text())
+    (why,) = drawn["layout"]["annotations"]
+    assert "no placement is feasible" in why["text"].replace("<br>", " ")
 
 
 def test_the_command_refuses_what_it_does_not_know(coarse, tmp_path):

@@ -14,6 +14,8 @@ let inside = VALUES.map(() => true); // which plans are within all brushes
 
 const column = (i) => VALUES.map((values) => values[i]);
 const choice = (key) => Number(document.querySelector(`[data-choice="${key}"]`).value); // -1: none
+// The best colour of a scale, which is the first, stands out most from the page.
+const scale = () => FRONT.look.scale[DARK.matches ? "dark" : "light"];
 const isDrawn = (plot) => plot?.dataset.state === "drawn";
 
 // ---- Scatter plot
@@ -27,11 +29,13 @@ function showScatter() {
     x: shown[k].map((values) => values[x]),
     y: shown[k].map((values) => (y < 0 ? 0 : values[y])),
   }));
-  const marker = { ...data[PLANS].marker, color: FRONT.look.accent, showscale: false };
+  const stops = scale().map((shade, k, { length }) => [k / (length - 1), shade]);
+  const marker = { ...data[PLANS].marker, color: colourOf("--accent"), colorscale: stops, showscale: false };
   if (colour >= 0) {
     const { title, sense } = FRONT.axes[colour];
     Object.assign(marker, { color: column(colour), reversescale: sense < 0, showscale: true });
-    marker.colorbar = { ...marker.colorbar, title: { ...marker.colorbar.title, text: title } };
+    const text = `${title}, better ${sense > 0 ? "↓" : "↑"}`;
+    marker.colorbar = { ...marker.colorbar, title: { ...marker.colorbar.title, text } };
   }
   const kept = inside.every(Boolean) ? null : VALUES.flatMap((_, i) => (inside[i] || i === picked ? [i] : []));
   Object.assign(data[PLANS], { marker, selectedpoints: kept, text: FRONT.plans.map(inWords) });
@@ -78,7 +82,8 @@ function labels({ x, y }) {
     const best = PLACES.map(([right, down, r]) => [right * (r + w / 2), down * (r + h / 2)]).reduce((a, b) => (cost(b) < cost(a) ? b : a));
     const [left, top] = boxAt(best);
     boxes.push([left, top, left + w, top + h]);
-    return [{ ...FRONT.look.label, x: x[i], y: y[i], ax: best[0], ay: best[1], text: marks.join("<br>") }];
+    const colours = { arrowcolor: colourOf("--quiet"), bgcolor: colourOf("--label"), font: { size: 12, color: colourOf("--ink") } };
+    return [{ ...FRONT.look.label, ...colours, x: x[i], y: y[i], ax: best[0], ay: best[1], text: marks.join("<br>") }];
   });
 }
 
@@ -98,9 +103,10 @@ function showParallel() {
     change[`dimensions[${i}].values`] = [[...column(i), ...beside.map((k) => VALUES[picked][i] + k * step)]];
   });
   const colour = choice("colour");
-  const shades = colour < 0 ? [FRONT.look.accent, FRONT.look.accent] : FRONT.look.scale;
-  const scale = shades.map((shade, k) => [(0.98 * k) / (shades.length - 1), shade]);
-  change["line.colorscale"] = [[...scale, [0.99, FRONT.look.chosen], [1, FRONT.look.chosen]]];
+  const [accent, chosen] = ["--accent", "--chosen"].map(colourOf);
+  const shades = colour < 0 ? [accent, accent] : scale();
+  const stops = shades.map((shade, k) => [(0.98 * k) / (shades.length - 1), shade]);
+  change["line.colorscale"] = [[...stops, [0.99, chosen], [1, chosen]]];
   change["line.color"] = [[...VALUES.map((values) => (colour < 0 ? 0 : 0.98 * share(values, colour))), ...beside.map(() => 1)]];
   Plotly.restyle(PARALLEL, change);
 }
@@ -209,6 +215,8 @@ document.querySelectorAll("[data-choice]").forEach((box) =>
     if (box.dataset.choice === "colour") showParallel();
   }),
 );
+SCATTER.addEventListener("themed", showScatter);
+PARALLEL?.addEventListener("themed", showParallel);
 KEPT?.lastElementChild.addEventListener("click", unbrush);
 SCATTER.addEventListener("drawn", () => {
   SCATTER.on("plotly_click", ({ points: [point] }) => point.curveNumber === PLANS && pick(point.pointNumber));

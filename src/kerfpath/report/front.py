@@ -18,8 +18,8 @@ from kerfpath.arrays import Array, floats, short_repr
 from kerfpath.errors import InputError
 from kerfpath.report.page import PageKeywords, number, render_page, shown_unit
 from kerfpath.report.style import (
-    ACCENT,
     CHOSEN,
+    DARK_SCALE,
     FAINT,
     INK,
     QUIET,
@@ -112,15 +112,7 @@ class FrontPlan:
 # -----------------------------------------------------------------------------
 # The plots of a Pareto set; the script of the page fills and links them.
 
-LABEL_LOOK = {
-    "showarrow": True,
-    "arrowhead": 0,
-    "arrowwidth": 1,
-    "arrowcolor": QUIET,
-    "standoff": 6,
-    "font": {"size": 12, "color": INK},
-    "bgcolor": "rgba(255, 255, 255, 0.85)",
-}
+LABEL_LOOK = {"showarrow": True, "arrowhead": 0, "arrowwidth": 1, "standoff": 6}
 """Style of the labels of marked plans."""
 LABEL = 16
 """Number of characters in a line of an axis label."""
@@ -140,7 +132,6 @@ def scatter(axes: Sequence[FrontAxis]) -> go.Figure:
         marker={
             "size": 10,
             "line": {"width": 1, "color": "white"},
-            "colorscale": SCALE,
             "colorbar": {
                 "thickness": 12,
                 "outlinewidth": 0,
@@ -363,7 +354,7 @@ def _data(
         ],
         "dominated": beaten.tolist(),
         "command": command,
-        "look": {"accent": ACCENT, "chosen": CHOSEN, "scale": SCALE, "label": LABEL_LOOK},
+        "look": {"scale": {"light": SCALE, "dark": DARK_SCALE}, "label": LABEL_LOOK},
     }
     # Nothing in a text may end the element.
     return Markup(json.dumps(data, ensure_ascii=False).replace("<", "\\u003c"))

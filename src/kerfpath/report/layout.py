@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from typing import Literal, TypedDict
 
 import numpy as np
@@ -10,7 +11,17 @@ import plotly.graph_objects as go
 from markupsafe import Markup
 
 from kerfpath.report.page import FAIL, PASS, WARN, number, render_page, with_minus
-from kerfpath.report.style import ACCENT, ALERT, FAINT, INK, QUIET, axis, axis_title, base_layout
+from kerfpath.report.style import (
+    ACCENT,
+    ALERT,
+    FAINT,
+    INK,
+    QUIET,
+    axis,
+    axis_title,
+    base_layout,
+    say_why_empty,
+)
 
 # -----------------------------------------------------------------------------
 # The data of layout.json: `kerfpath.study` writes them, the page and the command read them.
@@ -197,6 +208,13 @@ def _shown(entry: LayoutEntry, square: MapSquare) -> float | None:
     return promise(entry["goal"], square) if square["status"] == "feasible" else None
 
 
+def _say_no_value(figure: go.Figure, placements: Sequence[TriedPlacement | MapSquare]) -> None:
+    """Say in a figure without values why none of its placements has one."""
+    counts = Counter(placement["status"] for placement in placements)
+    reasons = "; ".join(f"{words}: {counts[s]}" for s, words in STATUSES.items() if counts[s])
+    say_why_empty(figure, f"No value to draw: no placement is feasible ({reasons})")
+
+
 def _plane(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
     first, second = drawn["variables"]
     shape = len(drawn["y"]), len(drawn["x"])
@@ -223,6 +241,8 @@ def _plane(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
         text=[[_hover(entry, c) for c in row] for row in cells],
         hovertemplate="%{text}<extra></extra>",
     )  # fmt: skip
+    if all(value is None for row in bound for value in row):
+        _say_no_value(figure, drawn["cells"])
     tried = [t["offsets"] for t in entry["tried"][: entry["evolved"]]]
     dots = {"size": 4, "color": "rgba(29, 37, 48, 0.45)"}
     figure.add_scatter(
@@ -267,6 +287,8 @@ def _line(entry: LayoutEntry, drawn: LayoutMap) -> go.Figure:
         x=drawn["x"], y=bounds, mode="lines+markers", line={"color": ACCENT}, name=_known(entry),
         text=[_hover(entry, c) for c in drawn["cells"]], hovertemplate="%{text}<extra></extra>",
     )  # fmt: skip
+    if all(value is None for value in bounds):
+        _say_no_value(figure, drawn["cells"])
     half = _half(drawn["x"])
     for x, square in zip(drawn["x"], drawn["cells"], strict=True):
         if square["status"] != "feasible":
@@ -327,6 +349,8 @@ def convergence(entry: LayoutEntry) -> go.Figure:
             text=[t["status"] for t in (tried[i] for i in lost)],
             hovertemplate="placement %{x}: %{text}<extra></extra>",
         )  # fmt: skip
+    if not feasible:
+        _say_no_value(figure, tried)
     figure.update_xaxes(**axis(title=axis_title("placement")))
     figure.update_yaxes(**axis(title=axis_title(WORDS[entry["goal"]])))
     return figure

@@ -16,6 +16,27 @@ async function unpacked(id) {
   return JSON.parse(await new Response(stream).text());
 }
 
+// Figures with a scale of colours are drawn in the colours of the page, which is light on paper.
+const DARK = matchMedia("screen and (prefers-color-scheme: dark)");
+const PAGE_COLOURS = { "#1d2530": "--ink", "#5b6675": "--quiet", "#98a1ad": "--rule", "#e6e9ee": "--line", "#d3d8df": "--rule", white: "--page" };
+const scaled = new Map(); // each by its element, as packed
+
+const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+function inTheme(figure) {
+  if (!DARK.matches) return figure;
+  const text = JSON.stringify(figure);
+  return JSON.parse(text, (_, value) => (Object.hasOwn(PAGE_COLOURS, value) ? colourOf(PAGE_COLOURS[value]) : value));
+}
+
+DARK.addEventListener("change", () => {
+  for (const [element, figure] of scaled) {
+    const { data, layout } = inTheme(figure);
+    Plotly.react(element, data, layout);
+    element.dispatchEvent(new Event("themed"));
+  }
+});
+
 const underway = new Map();
 
 // Draws a figure once; a second call waits for the first.
@@ -27,7 +48,10 @@ function draw(element) {
 async function drawn(element) {
   element.dataset.state = "drawing";
   try {
-    const figure = await unpacked(element.dataset.figure);
+    const packed = await unpacked(element.dataset.figure);
+    const isScaled = element.classList.contains("scaled");
+    if (isScaled) scaled.set(element, packed);
+    const figure = isScaled ? inTheme(packed) : packed;
     await Plotly.newPlot(element, figure.data, figure.layout, CONFIG);
     if (element.classList.contains("map")) explain(element);
     element.dataset.state = "drawn";

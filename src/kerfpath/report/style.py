@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
 from itertools import cycle
+from textwrap import wrap
 from typing import Any
 
 import plotly.graph_objects as go
@@ -15,6 +17,8 @@ INK, QUIET, FAINT, GRID = "#1d2530", "#5b6675", "#98a1ad", "#e6e9ee"
 ACCENT, ALERT, CHOSEN = "#0b6b66", "#b3261e", "#e8590c"
 SCALE = ("#440154", "#414487", "#2a788e", "#22a884", "#7ad151")
 """Viridis up to four fifths; lighter colours do not show on white."""
+DARK_SCALE = ("#fde725", "#7ad151", "#22a884", "#2a788e", "#414487")
+"""Viridis from its light end down to a fifth; darker colours do not show on a dark page."""
 
 # Six hues with a light and a dark shade each, from a search in which all pairs differ by a CIELAB
 # distance of 12 for normal, protan and deutan sight (Machado, Oliveira, Fernandes 2009).
@@ -95,6 +99,19 @@ def axis(**more: Any) -> dict[str, object]:
 def axis_title(text: str) -> dict[str, object]:
     """Return an axis title."""
     return {"text": text, "font": {"size": 12, "color": QUIET}, "standoff": 8}
+
+
+def say_why_empty(figure: go.Figure, why: str) -> None:
+    """Say in the middle of a figure why nothing is drawn in it."""
+    figure.add_annotation(
+        text="<br>".join(wrap(escape(why, quote=False), 90)),
+        font={"size": 14, "color": QUIET},
+        x=0.5,
+        y=0.5,
+        xref="paper",
+        yref="paper",
+        showarrow=False,
+    )
 
 
 def band(x0: float, x1: float, **where: Any) -> dict[str, object]:

@@ -133,10 +133,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
         ("Method", f"{options.method}, {options.frames} frames"),
         ("Limits used", f"{options.eta_v:.0%} velocity, {options.eta_a:.0%} acceleration"),
         ("Joint velocity limits", f"{_row(velocity)} deg/s"),
-        (
-            "Joint acceleration limits",
-            f"{_row(acceleration)} deg/s^2 ({robot.acceleration_source})",
-        ),
+        ("Joint acceleration limits", f"{_row(acceleration)} deg/s^2"),  # the footer says whence
         *_more_limits(robot),
         ("Endless axes", _row(np.flatnonzero(robot.endless[:n]) + 1) or "none"),
         *_external_facts(robot),
