@@ -38,13 +38,14 @@ class Hole:
     """A hole: its middle (3,) mm on the outer side, the outward normal there, and its radius, mm.
 
     Of the holes of a part that has no outer side (a zigzag, a web), `either` says that they may be
-    listed on either side.
+    listed on either side. `sunk` says that the hole has a countersink or counterbore.
     """
 
     at: np.ndarray
     outward: np.ndarray
     radius: float
     either: bool = False
+    sunk: bool = False
 
 
 @dataclass
@@ -55,7 +56,6 @@ class BentPart:
     shape: TopoDS_Shape
     holes: list[Hole] = field(default_factory=list)
     blind: int = 0
-    sunk: int = 0
 
 
 def bent_part(family: str, seed: int) -> BentPart:
@@ -164,10 +164,10 @@ def _pierced(
     *,
     either: bool = False,
 ) -> None:
-    """Make a hole about `at` on the outer side: through, blind from outside, or countersunk."""
+    """Make a hole about `at` on the outer side: through, blind, or sunk from one or both sides."""
     radius = float(rng.uniform(0.15, 0.4)) * room
     what = rng.choice(["through", "through", "through", "blind", "sunk"])
-    if what == "sunk" and (radius + 1.5 > 0.45 * room or wall < 1.2 or either):
+    if what == "sunk" and (radius + wall + 0.6 > 0.47 * room or wall < 1.2):
         what = "through"
     depth = wall / 2 if what == "blind" else 1.5 * wall
     top = at + 0.5 * wall * outward
@@ -175,13 +175,19 @@ def _pierced(
     part.shape = BRepAlgoAPI_Cut(part.shape, tool).Shape()
     if what == "blind":
         part.blind += 1
-    elif what == "sunk":
-        axes = gp_Ax2(gp_Pnt(*at.tolist()), gp_Dir(*(-outward).tolist()))
-        cone = BRepPrimAPI_MakeCone(axes, radius + 0.5 * wall + 0.6, radius, wall / 2).Shape()
-        part.shape = BRepAlgoAPI_Cut(part.shape, cone).Shape()
-        part.sunk += 1
-    else:
-        part.holes.append(Hole(at, outward, radius, either))
+        return
+    if what == "sunk":
+        ends = [(at, -outward), (at - wall * outward, outward)]  # outside, inside, both
+        for start, way in ends[slice(*((0, 1), (1, 2), (0, 2))[rng.integers(3)])]:
+            deep = float(rng.uniform(0.2, 0.4)) * wall
+            if rng.random() < 0.5:
+                step = _cylinder(start - way, way, radius + 0.6 + deep, deep + 1.0)
+                part.shape = BRepAlgoAPI_Cut(part.shape, step).Shape()
+            else:
+                axes = gp_Ax2(gp_Pnt(*start.tolist()), gp_Dir(*way.tolist()))
+                cone = BRepPrimAPI_MakeCone(axes, radius + 0.6 + deep, radius, deep).Shape()
+                part.shape = BRepAlgoAPI_Cut(part.shape, cone).Shape()
+    part.holes.append(Hole(at, outward, radius, either, sunk=what == "sunk"))
 
 
 def _on_flats(

@@ -25,8 +25,9 @@ HOW = """\
 {count} parts, {seeds} of each family: sheets with 1 to 3 bends to one side or to both, tubes of
 rectangular, hexagonal and L-shaped section, drawn pans, I beams, plates with a rib, and sheets
 with all edges rounded; inner radii of bends from 0, outer ones from 0. Holes go through, end
-halfway, or are countersunk. Right is a part of which `pick(kind="inner", side="outer")` gives
-every through hole once, with its tool axis from outside, and nothing else."""
+halfway, or have a countersink or counterbore outside, inside or on both sides. Right is a part of
+which `pick(kind="inner", side="outer")` gives every hole that goes through once, with its tool axis
+from outside and its countersink named, and nothing else."""
 
 
 def run(*, quick: bool = False) -> Report:
@@ -65,6 +66,8 @@ def faults_of(made: BentPart) -> str:
         found = [loop for loop in left if _is(part, loop.name, hole)]
         if len(found) != 1:
             return f"a hole at {hole.at.round(1).tolist()} mm is listed {len(found)} times"
+        if bool(found[0].countersink) != hole.sunk:
+            return f"{found[0].name}: its countersink is {found[0].countersink!r}"
         left.remove(found[0])
     if left:
         return f"{left[0].name} is no hole to cut"

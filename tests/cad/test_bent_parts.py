@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from benchmarks._bent_parts import FAMILIES, bent_part
 from benchmarks.bent_parts import faults_of
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCone, BRepPrimAPI_MakeSphere
+from OCP.BRepPrimAPI import (
+    BRepPrimAPI_MakeBox,
+    BRepPrimAPI_MakeCone,
+    BRepPrimAPI_MakeCylinder,
+    BRepPrimAPI_MakeSphere,
+)
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 from OCP.TopoDS import TopoDS_Shape
 from tests.cad.test_part import cut, cylinder
@@ -91,15 +96,72 @@ def test_what_does_not_go_through_is_named_and_not_picked() -> None:
     assert all(name in note for name in blind)
 
 
-def test_a_countersink_is_told_from_its_hole() -> None:
-    axes = gp_Ax2(gp_Pnt(50, 30, 3), gp_Dir(0, 0, -1))
-    cone = BRepPrimAPI_MakeCone(axes, 6, 3, 2).Shape()
-    part = read(cut(block(100, 60, 3, (0, 0, 0)), cylinder(3, 9, (50, 30, -3)), cone))
-    (sunk,) = part.pick(side="sunk")
-    assert sunk.diameter == pytest.approx(0.012, abs=EXACT)
-    assert sunk.name in part.notes[0]
-    (hole,) = part.pick(kind="inner")
-    assert (hole.diameter, hole.side) == (pytest.approx(0.006, abs=EXACT), "inner")
+def cone(
+    at: tuple[float, float, float], way: tuple[float, float, float], wide: float, deep: float
+) -> TopoDS_Shape:
+    """Return a cone of 90 deg, `wide` (mm radius) at its start."""
+    axes = gp_Ax2(gp_Pnt(*at), gp_Dir(*way))
+    return BRepPrimAPI_MakeCone(axes, wide, wide - deep, deep).Shape()
+
+
+def test_a_sunk_hole_is_cut_from_outside_along_its_bore() -> None:
+    up, down = (0, 0, 1), (0, 0, -1)
+    sunk = {
+        20: [cone((20, 30, 3), down, 5, 2)],
+        45: [cone((45, 30, 0), up, 5, 2)],
+        70: [cone((70, 30, 0), up, 4, 1), cone((70, 30, 3), down, 4, 1)],
+        95: [cylinder(5, 9, (95, 30, 1.5))],  # a counterbore
+        120: [cylinder(5, 9, (120, 30, 2)), cylinder(5, 9, (120, 30, -8))],
+        145: [cone((145, 30, 3), down, 6, 3)],  # through the whole sheet
+        170: [cylinder(4, 9, (170, 30, 2.8))],
+    }
+    bores = [cylinder(3, 9, (x, 30, -3)) for x in (*sunk, 195)]
+    tools = [tool for tools in sunk.values() for tool in tools]
+    part = read(cut(block(220, 60, 3, (0, 0, 0)), *bores, *tools))
+    holes = part.pick(kind="inner", side="outer")
+    by_place = {round(1e3 * hole.bounding_box[:, 0].mean()): hole for hole in holes}
+    assert sorted(by_place) == [*sunk, 195]
+    assert by_place[195].countersink == ""
+    for x, hole in by_place.items():
+        assert hole.diameter == pytest.approx(0.006, abs=EXACT), x
+        assert hole.length == pytest.approx(0.006 * np.pi, abs=EXACT), x
+        contour = part.contour(hole.name)
+        assert contour.points[:, 2] == pytest.approx(0.003, abs=EXACT), x
+        assert contour.axes == pytest.approx(np.tile(down, (len(contour), 1)), abs=EXACT), x
+        # Clockwise about the outward normal, as around any hole.
+        assert np.cross(contour.points[0] - [x / 1e3, 0.03, 0.003], contour.along[0])[2] < 0
+        assert part.departure(hole.name, contour).chord_error < 2e-6
+        if x != 195:
+            border = part.loop(hole.countersink)
+            assert (border.side, border.face) == ("sunk", "face5" if x == 45 else hole.face)
+    assert len(part.pick(side="sunk")) == 9
+    (note,) = part.notes
+    assert all(hole.name in note for hole in holes if hole.countersink)
+
+
+def test_a_sunk_hole_in_a_round_tube_lies_on_its_outside() -> None:
+    """The bore is round along its axis, so it is where a bore without a sink meets the tube."""
+    tube = cut(cylinder(30, 200, (0, 0, 0)), cylinder(26, 220, (0, 0, -10)))
+    drill = gp_Ax2(gp_Pnt(0, 0, 100), gp_Dir(1, 0, 0))
+    bore = BRepPrimAPI_MakeCylinder(drill, 4, 60).Shape()
+    plain, part = (
+        read(cut(tube, bore, *sinks)) for sinks in ([], [cone((31, 0, 100), (-1, 0, 0), 9, 3)])
+    )
+    (hole,), (like,) = (each.pick(kind="inner", side="outer") for each in (part, plain))
+    assert (bool(hole.countersink), like.countersink) == (True, "")
+    assert hole.length == pytest.approx(like.length, abs=EXACT)
+    assert plain.departure(like.name, part.contour(hole.name)).chord_error < 3e-6
+    # Leads are laid on the tube, which goes on over the hole.
+    middle, _ = part.surface(hole.name).project(np.array([[0.031, 0.0, 0.1]]))
+    assert middle[0] == pytest.approx([0.03, 0, 0.1], abs=1e-9)
+
+
+def test_a_hole_drilled_askew_is_no_countersink() -> None:
+    axes = gp_Ax2(gp_Pnt(50, 30, -5), gp_Dir(1, 0, 1))
+    drill = BRepPrimAPI_MakeCylinder(axes, 4, 60).Shape()
+    part = read(cut(block(100, 60, 3, (0, 0, 0)), drill))
+    (hole,) = part.pick(kind="inner", side="outer")
+    assert hole.countersink == ""
 
 
 def test_rays_meet_first_what_each_triangle_alone_says() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -121,8 +121,10 @@ def kind_of_points(trace: Points) -> Kind:
 # -----------------------------------------------------------------------------
 # Named loops, and parts without faces.
 
-STEMS: dict[Kind, str] = {"outer": "outer", "inner": "hole", "open": "line"}
+STEMS: Mapping[Kind, str] = {"outer": "outer", "inner": "hole", "open": "line"}
 """Last part of the names of loops, before their number."""
+SUNK: Mapping[Kind, str] = {"inner": "sunk"}
+"""The same, of the borders of countersinks."""
 
 
 def loop_of(
@@ -169,7 +171,13 @@ def loop_of(
 
 
 def named_loops(
-    found: Sequence[tuple[Kind, Trace, str]], *, face: str, surface: str, gap: float, layer: str
+    found: Sequence[tuple[Kind, Trace, str]],
+    *,
+    face: str,
+    surface: str,
+    gap: float,
+    layer: str,
+    stems: Mapping[Kind, str] = STEMS,
 ) -> list[Loop]:
     """Return the loops of a face, a skin or a layer, outer before inner, numbered by position.
 
@@ -178,9 +186,11 @@ def named_loops(
     found : sequence of (kind, trace, colour)
     face, surface, gap, layer
         As in `loop_of`.
+    stems : mapping of kind to str
+        Last part of the names, before their number.
     """
     loops = []
-    for kind, stem in STEMS.items():
+    for kind, stem in stems.items():
         alike = [(trace, colour) for k, trace, colour in found if k == kind]
         # Middles are rounded, so that last bits do not decide an order.
         alike.sort(key=lambda one: tuple((one[0].around.mean(axis=0).round(3) + 0.0).tolist()))

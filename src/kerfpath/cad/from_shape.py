@@ -22,12 +22,13 @@ from OCP.TopoDS import TopoDS, TopoDS_Edge
 from scipy.interpolate import BSpline
 
 from kerfpath.arrays import Array, Ints, freeze
-from kerfpath.cad.build import named_loops
+from kerfpath.cad.build import STEMS, SUNK, named_loops
 from kerfpath.cad.chains import part_of_strokes
 from kerfpath.cad.curves import Arc, Curve, Line, Spline
 from kerfpath.cad.left_out import LeftOut, counted, nothing_drawn
 from kerfpath.cad.loops import FaceLoop, bounds_of, loops_of
 from kerfpath.cad.part import Loop, Part
+from kerfpath.cad.rims import SkinLoop
 from kerfpath.cad.shape import (
     Mesh,
     NamedFace,
@@ -37,7 +38,7 @@ from kerfpath.cad.shape import (
     triangulate_apart,
     unique,
 )
-from kerfpath.cad.skins import Skin, SkinLoop, skins_of
+from kerfpath.cad.skins import Skin, skins_of
 from kerfpath.cad.units import MM
 from kerfpath.errors import InputError
 from kerfpath.progress import Progress
@@ -136,12 +137,12 @@ def _part_of_faces(
     piece_of, bent_of = dict[int, str](), dict[int, str]()
     for skin, name in zip(skins, skin_names, strict=True):
         (bent_of if skin.is_bent else piece_of).update(dict.fromkeys(skin.faces, name))
-    loops: list[Loop] = []
+    named: list[tuple[Loop, SkinLoop]] = []
 
     def add(
         name: str, surface: str, around: Sequence[SkinLoop], of: Sequence[int], skin: str
     ) -> None:
-        loops.extend(
+        named.extend(
             _named(name, surface, around, gap, [faces[f] for f in of], skin, bent_of.get(of[0], ""))
         )
 
@@ -151,6 +152,14 @@ def _part_of_faces(
     for f, name in enumerate(names):
         surface = SURFACES[BRepAdaptor_Surface(faces[f].face).GetType()]
         add(name, surface, of_faces[f], [f], piece_of[f])
+    borders: dict[int, str] = {}  # those of skins come first
+    for loop, around in named:
+        if around.side == "sunk":
+            borders.setdefault(id(around.chain), loop.name)
+    loops = [
+        loop if around.border is None else replace(loop, countersink=borders[id(around.border)])
+        for loop, around in named
+    ]
     left_out = tuple(sorted([*drawn.left_out, *unread], key=lambda each: not each.may_cut))
     return Part(
         path=path,
@@ -226,19 +235,31 @@ def _doubts(skins: Sequence[Skin], skin_names: Sequence[str], names: Sequence[st
 
 
 def _blind_notes(loops: Sequence[Loop]) -> list[str]:
-    """Return notes on the holes that do not go through, or not as wide as they begin."""
-    notes = []
-    for side, words in (
-        ("blind", "does not go through (pocket, blind hole or engraving)"),
-        ("sunk", "is the border of a countersink or chamfer, not of the hole in it"),
-    ):
-        names = [loop.name for loop in loops if loop.side == side and loop.kind == "inner"]
-        if names:
-            more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
-            notes.append(
-                f"{', '.join(names[:MOST_LISTED])}{more}: {words}; picked only by name or side"
-            )
-    return notes
+    """Return notes on the holes that do not go through, or are wider at their border."""
+    blind = [loop.name for loop in loops if loop.side == "blind" and loop.kind == "inner"]
+    sunk = [
+        f"{loop.name} ({loop.countersink})"
+        for loop in loops
+        if loop.is_main and loop.side == "outer" and loop.countersink
+    ]
+    return [
+        f"{', '.join(names[:MOST_LISTED])}"
+        + (f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else "")
+        + f": {words}"
+        for names, words in (
+            (
+                blind,
+                "does not go through (pocket, blind hole or engraving); picked only by name or "
+                "side",
+            ),
+            (
+                sunk,
+                "has a countersink, counterbore or chamfer, the loop in brackets, which is picked "
+                "only by name or side; what is cut is the hole in it",
+            ),
+        )
+        if names
+    ]
 
 
 def _named(
@@ -249,20 +270,27 @@ def _named(
     faces: Sequence[NamedFace],
     skin: str,
     bent: str,
-) -> list[Loop]:
+) -> list[tuple[Loop, SkinLoop]]:
     """Return the loops of a face or skin, with the layer and colour that all its faces have."""
     layers, colours = {named.layer for named in faces}, {named.colour for named in faces}
     layer = layers.pop() if len(layers) == 1 else ""
     colour = colours.pop() if len(colours) == 1 else ""
-    around = [(loop.kind, loop.chain, colour) for loop in found]
-    of = {id(loop.chain): loop for loop in found}
-    return [
-        replace(
-            loop,
-            side=of[id(loop._trace)].side,
-            skin=skin or (bent if of[id(loop._trace)].is_piece else ""),
+    of = {id(loop.bore or loop.chain): loop for loop in found}
+    loops = [
+        loop
+        for is_sunk, stems in ((False, STEMS), (True, SUNK))
+        for loop in named_loops(
+            [
+                (its.kind, its.bore or its.chain, colour)
+                for its in found
+                if (its.side == "sunk") == is_sunk
+            ],
+            face=name, surface=surface, gap=gap, layer=layer, stems=stems,
         )
-        for loop in named_loops(around, face=name, surface=surface, gap=gap, layer=layer)
+    ]  # fmt: skip
+    return [
+        (replace(loop, side=its.side, skin=skin or (bent if its.is_piece else "")), its)
+        for loop, its in ((loop, of[id(loop._trace)]) for loop in loops)
     ]
 
 

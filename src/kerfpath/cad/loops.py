@@ -394,16 +394,18 @@ class HealedSurface:
     def project(self, points: Array) -> tuple[Array, Array]:
         asked = np.asarray(points, dtype=np.float64) / MM
         away, nearest = (np.asarray(found) for found in self._tree.query(asked))
-        found, normals = np.empty_like(asked), np.empty_like(asked)
-        for k, (point, far, place) in enumerate(zip(asked, away, nearest, strict=True)):
-            on, normal = self._surfaces[self._edge[place]].nearest(point)
-            at, flat = self._points[place], self._normals[place]
-            foot = point - ((point - at) @ flat) * flat
-            way = point - on
-            ended = np.linalg.norm(way - (way @ normal) * normal) > BESIDE or np.linalg.norm(
-                on - foot
-            ) > ENDS * (far + STEP)
-            found[k], normals[k] = (foot, flat) if ended else (on, normal)
+        at, flat = self._points[nearest], self._normals[nearest]
+        on, normals = np.empty_like(asked), np.empty_like(asked)
+        for k in np.unique(self._edge[nearest]).tolist():
+            own = self._edge[nearest] == k
+            on[own], normals[own] = self._surfaces[k].nearest(asked[own])
+        foot = asked - ((asked - at) * flat).sum(1, keepdims=True) * flat
+        way = asked - on
+        beside = way - (way * normals).sum(1, keepdims=True) * normals
+        ended = np.linalg.norm(beside, axis=1) > BESIDE
+        ended |= np.linalg.norm(on - foot, axis=1) > ENDS * (away + STEP)
+        found = np.where(ended[:, None], foot, on)
+        normals = np.where(ended[:, None], flat, normals)
         return found * MM, normals
 
 
@@ -414,13 +416,20 @@ class _Untrimmed:
         self._edge = edge
         self._surface = ShapeAnalysis_Surface(BRep_Tool.Surface_s(edge.face))
 
-    def nearest(self, point: Array) -> tuple[Array, Array]:
-        """Return the nearest point (3,) mm and the outward normal (3,) there."""
-        uv = self._surface.ValueOfUV(gp_Pnt(*point.tolist()), PRECISION)
-        at, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
-        self._edge.surface.D1(uv.X(), uv.Y(), at, du, dv)
-        normal = du.Crossed(dv)
-        way = np.array([normal.X(), normal.Y(), normal.Z()])
-        size = float(np.linalg.norm(way))
-        on = np.array([at.X(), at.Y(), at.Z()])
-        return on, way * (self._edge.outward / size) if size > 0 else way
+    def nearest(self, points: Array) -> tuple[Array, Array]:
+        """Return the nearest points (K, 3) mm and the outward normals (K, 3) there."""
+        if self._edge.surface.GetType() == PLANE:
+            plane = self._edge.surface.Plane().Position()
+            normal = _vector(plane.XDirection().XYZ().Crossed(plane.YDirection().XYZ()))
+            off = (points - _vector(plane.Location().XYZ())) @ normal
+            normals = np.tile(self._edge.outward * normal, (len(points), 1))
+            return points - off[:, None] * normal, normals
+        on, normals = np.empty_like(points), np.empty_like(points)
+        for k, point in enumerate(points.tolist()):
+            uv = self._surface.ValueOfUV(gp_Pnt(*point), PRECISION)
+            at, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
+            self._edge.surface.D1(uv.X(), uv.Y(), at, du, dv)
+            normal = _vector(du.Crossed(dv).XYZ())
+            size = float(np.linalg.norm(normal))
+            on[k], normals[k] = _vector(at.XYZ()), normal * (self._edge.outward / (size or 1.0))
+        return on, normals

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from kerfpath.arrays import Array, Ints, floats, freeze, scalar, short_repr
 from kerfpath.cad.curves import EdgeChain, Trace, distance
 from kerfpath.cad.departure import ON_CURVE, Departure, departure
+from kerfpath.cad.laid import LaidEdge
 from kerfpath.cad.left_out import LeftOut
 from kerfpath.cad.units import MM
 from kerfpath.contour import Contour
@@ -139,7 +140,11 @@ class Loop:
     side : {"outer", "inner", "edge", "blind", "sunk", ""}
         Side of a sheet that the loop is on: outer, inner, or its thickness; blind for a loop that
         does not go through it, around a pocket, a blind hole or an engraving; sunk for the border
-        of a countersink or chamfer, which is wider than the hole; "" if it is no sheet.
+        of a countersink, counterbore or chamfer; "" if it is no sheet.
+    countersink : str
+        Name of the loop at the border of its countersink, counterbore or chamfer, on its own side
+        of the sheet or on the other; "" for a plain hole. If on its own, the loop is the narrowest
+        line of the hole, moved along the hole to the surface of this side.
     skin : str
         Name of the skin that the face of the loop is a piece of, or "".
     layer, colour : str
@@ -159,6 +164,7 @@ class Loop:
     closed: bool
     diameter: float | None
     side: Side = ""
+    countersink: str = ""
     skin: str = ""
     layer: str = ""
     colour: str = ""
@@ -436,6 +442,8 @@ class Part:
 
             if all(isinstance(edge, OrientedEdge) for edge in trace.edges):
                 return HealedSurface(trace.edges)
+            if isinstance(trace.edges[0], LaidEdge):
+                return trace.edges[0].surface
         return Ribbon(self.contour(name, closed=False))
 
     def mesh(self, deflection: float = 5e-4) -> tuple[Array, Ints]:

@@ -2,44 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
 
 from kerfpath.arrays import Array, Ints, short_repr
-from kerfpath.cad.curves import EdgeChain, label_connected
+from kerfpath.cad.curves import EdgeChain
 from kerfpath.cad.loops import FaceLoop, OrientedEdge, is_hole, join_runs
 from kerfpath.cad.part import Side
+from kerfpath.cad.rims import SHEET, Bore, Rims, SkinLoop, Use, edge_of, groups
 from kerfpath.cad.sides import Sides, Surfaces, sides_of
 
 SMOOTH = float(np.radians(2.0))
 """Faces whose normals differ by less (rad) along their whole shared edge belong to one skin."""
-BROKEN = 0.5
-"""Width (mm) of broken edges: a hole that is wider by more at its border is sunk."""
 FREE = 0.25
 """A body with a larger share of its edges at one face only is an open surface, and no sheet."""
-SHEET: tuple[Side, ...] = ("outer", "inner")
-"""The two sides of a sheet."""
-
-Use = tuple[int, int, int]
-"""The numbers of a face, of its loop, and of an edge of that."""
-
-
-class SkinLoop(NamedTuple):
-    """A loop of a skin, its side, and whether it is a piece.
-
-    The side is "blind" if it does not go through, "sunk" if it is wider than the hole across.
-
-    A piece runs partly along a sharp edge inside the side of a sheet, which is not cut.
-    """
-
-    kind: Literal["outer", "inner"]
-    chain: EdgeChain[OrientedEdge]
-    side: Side
-    is_piece: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,9 +73,11 @@ def skins_of(
     """
     uses = _uses(found)
     pairs = [(a, b) for at in uses if len(at) == 2 for a, b in [at] if a[0] != b[0]]
-    smooth = [pair for pair in pairs if _is_smooth(*(_edge(found, use) for use in pair))]
-    body = _groups(pairs, len(found))
+    smooth = [pair for pair in pairs if _is_smooth(*(edge_of(found, use) for use in pair))]
+    body = groups(pairs, len(found))
     sides = _sides(found, uses, smooth, body, (corners, face), outer_towards)
+    for f in Rims(found, pairs, sides.side, sides.across).floors():
+        sides.side[f], sides.doubt[f] = "edge", ""
     smooth = [pair for pair in smooth if sides.side[pair[0][0]] == sides.side[pair[1][0]]]
     known = set(smooth)
     sharp = [
@@ -105,23 +87,23 @@ def skins_of(
         and sides.side[a[0]] in SHEET
         and sides.side[a[0]] == sides.side[b[0]]
     ]
-    group, shell = _groups(smooth, len(found)), _groups([*smooth, *sharp], len(found))
+    group, shell = groups(smooth, len(found)), groups([*smooth, *sharp], len(found))
     firsts = np.unique(group, return_index=True)[1]
     side = list(sides.side)
     is_alone = np.bincount(body[firsts], minlength=len(found))[body] == 1
     for f in np.flatnonzero(is_alone).tolist():
         side[f] = side[f] or "outer"
-    ends = _Ends(found, pairs, side, sides.across)
+    rims = Rims(found, pairs, side, sides.across)
     within = {use for pair in smooth for use in pair}
     creases = {use for pair in sharp for use in pair}
-    crease_edges = {id(_edge(found, use)) for use in creases}
+    crease_edges = {id(edge_of(found, use)) for use in creases}
     group_of = {
         id(e): int(group[f]) for f, loops in enumerate(found) for _, c in loops for e in c.edges
     }
 
     def looked_at(kind: Literal["outer", "inner"], chain: EdgeChain[OrientedEdge]) -> SkinLoop:
         is_piece = any(id(edge) in crease_edges for edge in chain.edges)
-        return SkinLoop(kind, chain, ends.side_of(kind, chain), is_piece)
+        return SkinLoop(kind, chain, rims.side_of(kind, chain), is_piece)
 
     skins: list[Skin] = []
     for members in _members(group):
@@ -145,27 +127,31 @@ def skins_of(
         ]
         skins.append(Skin(faces=members, side=side[members[0]], loops=around, is_bent=True))
     of_faces = [[looked_at(*loop) for loop in loops] for loops in found]
-    sunk = ends.sunk([loop for skin in skins for loop in skin.loops])
-    return [replace(skin, loops=_told(skin.loops, sunk)) for skin in skins], [
-        _told(loops, sunk) for loops in of_faces
+    holes = [
+        (loop.chain, loop.side) for skin in skins for loop in skin.loops if loop.kind == "inner"
+    ]
+    bores = rims.bores(holes)
+    return [replace(skin, loops=_with_bores(skin.loops, bores)) for skin in skins], [
+        _with_bores(loops, bores) for loops in of_faces
     ]
 
 
-def _told(loops: Sequence[SkinLoop], sunk: set[int]) -> list[SkinLoop]:
-    """Return loops with the side "sunk" where their first edge is that of a sunk one."""
-    return [
-        loop._replace(side="sunk") if id(loop.chain.edges[0]) in sunk else loop for loop in loops
-    ]
-
-
-def _edge(found: Sequence[list[FaceLoop]], use: Use) -> OrientedEdge:
-    face, loop, edge = use
-    return found[face][loop][1].edges[edge]
-
-
-def _groups(pairs: Iterable[tuple[Use, Use]], count: int) -> Ints:
-    """Return the number (F,) of the group of each face, which pairs of edges join."""
-    return label_connected(np.array([[a[0], b[0]] for a, b in pairs], dtype=np.int64), count)
+def _with_bores(loops: Sequence[SkinLoop], bores: Mapping[int, Bore]) -> list[SkinLoop]:
+    """Return loops, with those to cut of countersunk holes, whose borders have the side "sunk"."""
+    told = []
+    for loop in loops:
+        bore = bores.get(id(loop.chain.edges[0]))
+        if bore is None:
+            told.append(loop)
+            continue
+        border, own = ({id(edge) for edge in chain.edges} for chain in (bore.border, loop.chain))
+        if own <= border:
+            told.append(loop._replace(side="sunk"))
+        if own == border:
+            told.append(loop._replace(border=bore.border, bore=bore.line))
+        if not own & border:
+            told.append(loop._replace(border=bore.border))
+    return told
 
 
 def _members(group: Ints) -> list[tuple[int, ...]]:
@@ -230,88 +216,6 @@ def _sides(
         ),
         outer_towards,
     )  # fmt: skip
-
-
-class _Ends:
-    """Where the rims around loops of a sheet end.
-
-    Parameters
-    ----------
-    found : sequence of list of FaceLoop
-    pairs : sequence of (Use, Use)
-        Edges that two faces share.
-    side : sequence of Side
-        Side of each face.
-    across : sequence of set of int
-        The faces across the sheet from each face.
-    """
-
-    def __init__(
-        self,
-        found: Sequence[list[FaceLoop]],
-        pairs: Sequence[tuple[Use, Use]],
-        side: Sequence[Side],
-        across: Sequence[set[int]],
-    ) -> None:
-        self._side, self._across = side, across
-        self._own = {
-            id(e): f for f, loops in enumerate(found) for _, chain in loops for e in chain.edges
-        }
-        self._faces: dict[int, tuple[int, int]] = {}
-        for a, b in pairs:
-            self._faces[id(_edge(found, a))] = a[0], b[0]
-            self._faces[id(_edge(found, b))] = b[0], a[0]
-        self._rim = _groups(
-            [pair for pair in pairs if all(side[f] == "edge" for f, _, _ in pair)], len(side)
-        )
-        self._at: dict[int, set[int]] = {}  # by rim, and by face of one: the sheet faces there
-        self._beside: dict[int, set[int]] = {}
-        for a, b in pairs:
-            for rim, sheet in ((a[0], b[0]), (b[0], a[0])):
-                if side[rim] == "edge" and side[sheet] in SHEET:
-                    self._at.setdefault(int(self._rim[rim]), set()).add(sheet)
-                    self._beside.setdefault(rim, set()).add(sheet)
-
-    def side_of(self, kind: str, chain: EdgeChain[OrientedEdge]) -> Side:
-        """Return the side of a loop: "blind" if it lies on a sheet but its rim ends within it."""
-        sharing = [self._faces[id(edge)] for edge in chain.edges if id(edge) in self._faces]
-        side = self._side[self._own[id(chain.edges[0])]]
-        if side not in SHEET or len(sharing) < len(chain.edges):
-            return side
-        for own, other in sharing:
-            if self._side[other] == side and kind == "outer":
-                return side  # a crease: the sheet goes on
-            if self._side[other] == "edge":
-                ends = self._at.get(int(self._rim[other]), set())
-                across = self._across[own] or {f for f in ends if self._side[f] != side}
-                if any(f in across and self._side[f] in SHEET for f in ends):
-                    return side
-        return "blind"
-
-    def sunk(self, loops: Sequence[SkinLoop]) -> set[int]:
-        """Return the ids of the edges of holes that are wider than the same hole across.
-
-        What lies next to such a hole ends within the sheet, unlike the wall of a hole drilled
-        askew or across a bend.
-        """
-        of_rim: dict[int, list[tuple[SkinLoop, bool]]] = {}
-        for loop in loops:
-            if loop.kind == "inner" and loop.side in SHEET:
-                others = {self._faces[id(e)][1] for e in loop.chain.edges if id(e) in self._faces}
-                others = {f for f in others if self._side[f] == "edge"}
-                is_wall = any(
-                    self._side[g] != loop.side for f in others for g in self._beside.get(f, ())
-                )
-                for rim in {int(self._rim[f]) for f in others}:
-                    of_rim.setdefault(rim, []).append((loop, is_wall))
-        found = set[int]()
-        for around in of_rim.values():
-            for loop, is_wall in around:
-                across = [one.chain.lengths.sum() for one, _ in around if one.side != loop.side]
-                wider = loop.chain.lengths.sum() - max(across, default=np.inf)
-                if not is_wall and wider > 2 * np.pi * BROKEN:
-                    found |= {id(edge) for edge in loop.chain.edges}
-        return found
 
 
 def _uses(found: Sequence[list[FaceLoop]]) -> list[list[Use]]:

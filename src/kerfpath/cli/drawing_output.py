@@ -121,8 +121,8 @@ def list_contours(part: Part, html: Path | None, *, everything: bool) -> None:
     show_drawing(part)
     shown = part.loops if everything else main
     optional = [
-        (head, key)
-        for head, key in (("side", "side"), ("layer", "layer"), ("colour", "colour"))
+        key
+        for key in ("side", "countersink", "layer", "colour")
         if any(getattr(loop, key) for loop in shown)
     ]
     rows = []
@@ -137,12 +137,12 @@ def list_contours(part: Part, html: Path | None, *, everything: bool) -> None:
                 str(loop.edges),
                 f"{loop.largest_gap * 1000:.4f}",
                 " ".join(f"{v:.1f}" for v in middle),
-                *(escape(getattr(loop, key)) for _, key in optional),
+                *(escape(getattr(loop, key)) for key in optional),
                 "" if loop.closed else "open",
             ]
         )
     columns = ["loop", "surface", "length mm", "diameter mm", "edges", "gap mm", "middle mm"]
-    heads = [*columns, *(head for head, _ in optional), "ends"]
+    heads = [*columns, *optional, "ends"]
     spare = ["gap mm", "edges", "middle mm"]
     table(heads, rows, numbers=columns[2:6], whole=["ends"], spare=spare)
     if len(shown) < len(part.loops):
@@ -192,6 +192,7 @@ def _contours_entry(part: Part, html: Path | None) -> dict[str, object]:
                 "shortest_edge_m": loop.shortest_edge,
                 "bounding_box_m": loop.bounding_box.tolist(),
                 "side": loop.side,
+                "countersink": loop.countersink,
                 "skin": loop.skin,
                 "layer": loop.layer,
                 "colour": loop.colour,
