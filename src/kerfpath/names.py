@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
 LONGEST_NAME = 32
 """Most characters of an identifier made from a contour's name; ABB's limit."""
+MOST_NEAR = 6
+"""Most names in an answer to a wrong one."""
 
 
 def identifiers(
@@ -38,7 +40,21 @@ def identifier(text: str) -> str:
     return name[:LONGEST_NAME]
 
 
-def nearest(name: str, known: tuple[str, ...]) -> str:
-    """Return the known names most similar to `name`, in words for messages."""
-    near = get_close_matches(name, known, n=3, cutoff=0.4)
-    return f"nearest: {', '.join(near)}" if near else "no id there is similar"
+def squeezed(text: str) -> str:
+    """Return the letters and digits of a text in lower case: "KR 30 HA" and "kr30_ha" are one."""
+    return re.sub(r"[\W_]+", "", text.casefold())
+
+
+def nearest(name: str, known: Sequence[str]) -> str:
+    """Return the known names that contain `name`, or else are similar, in words for messages.
+
+    Blanks, dashes, underscores and case make no difference.
+    """
+    near = [one for one in known if squeezed(name) and squeezed(name) in squeezed(one)]
+    if not near:
+        plain = {squeezed(one): one for one in known}
+        near = [plain[one] for one in get_close_matches(squeezed(name), plain, n=3, cutoff=0.4)]
+    if not near:
+        return "no id there is similar"
+    more = f" and {len(near) - MOST_NEAR} more" if len(near) > MOST_NEAR else ""
+    return f"nearest: {', '.join(near[:MOST_NEAR])}{more}"

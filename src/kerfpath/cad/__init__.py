@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from kerfpath.cad.reading import read as read
     from kerfpath.cad.reading import read_measured as read_measured
     from kerfpath.cad.units import GAP as GAP
+    from kerfpath.cad.units import SUFFIXES as SUFFIXES
     from kerfpath.cad.units import UNITS_MM as UNITS_MM
+    from kerfpath.cad.units import unit_question as unit_question
 
 _HOME = {
     "Departure": "departure",
@@ -23,10 +25,12 @@ _HOME = {
     "LeftOut": "left_out",
     "Loop": "part",
     "Part": "part",
+    "SUFFIXES": "units",
     "UNITS_MM": "units",
     "departure_from": "departure",
     "read": "reading",
     "read_measured": "reading",
+    "unit_question": "units",
 }
 
 __all__ = sorted(_HOME)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from kerfpath.arrays import Array, floats, freeze, scalar, short_repr
 from kerfpath.cad.part import Part
 from kerfpath.cad.table import TableCells, cells_of
-from kerfpath.cad.units import GAP, MM, UNITS_MM, require_unit
+from kerfpath.cad.units import GAP, MM, SUFFIXES, UNITS_MM, require_unit, unit_question
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
 from kerfpath.isolated import call_apart, seconds_for, stand_by, too_slow
@@ -103,16 +103,20 @@ def read(
         return _read_shape(path, options, progress)
     path = Path(path)
     content = content_of(path, _EXPECTED)
-    kind = _KINDS.get(path.suffix.lower())
+    kind = SUFFIXES.get(path.suffix.lower())
     if kind is None:
-        raise InputError(f"{path}: expected {_EXPECTED} by its suffix, got {path.suffix!r}")
+        is_job = path.suffix.lower() == ".toml"
+        cure = "; the key file in [part] of a job names its drawing" if is_job else ""
+        raise InputError(f"{path}: expected {_EXPECTED} by its suffix, got {path.suffix!r}{cure}")
     if not content.strip():
         raise InputError(f"{path}: the file is empty; expected {_EXPECTED}")
     if outer_towards is not None and kind not in ("STEP", "IGES"):
         raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
     if columns is not None and kind != "table":
         raise InputError(f"{path}: columns: expected a table, got a {kind} file")
-    return _read_file(kind, path, content, options, progress)
+    part = _read_file(kind, path, content, options, progress)
+    question = None if unit is not None else unit_question(part.unit, part.bounding_box)
+    return part if question is None else replace(part, notes=(*part.notes, question))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -259,26 +263,7 @@ def _part_of(
 
 
 _cache: dict[tuple[object, ...], Part] = {}
-_KINDS = {
-    ".step": "STEP",
-    ".stp": "STEP",
-    ".iges": "IGES",
-    ".igs": "IGES",
-    ".dxf": "DXF",
-    ".csv": "table",
-    ".tsv": "table",
-    ".txt": "table",
-    ".apt": "tool path",
-    ".aptsource": "tool path",
-    ".cl": "tool path",
-    ".cls": "tool path",
-    ".h": "NC program",
-    ".mpf": "NC program",
-    ".nc": "NC program",
-    ".spf": "NC program",
-    ".tap": "NC program",
-}
-_EXPECTED = f"a drawing ({', '.join(_KINDS)})"
+_EXPECTED = f"a drawing ({', '.join(SUFFIXES)})"
 
 
 # -----------------------------------------------------------------------------

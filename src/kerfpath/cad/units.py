@@ -1,8 +1,10 @@
-"""Length units, and the tolerance within which ends of curves meet."""
+"""Suffixes of drawings, length units, and the tolerance within which ends of curves meet."""
 
 from __future__ import annotations
 
-from kerfpath.arrays import require_one_of
+import numpy as np
+
+from kerfpath.arrays import Array, require_one_of
 
 MM = 1e-3
 """OCCT and this package work in mm; every length that leaves the package is in m."""
@@ -23,9 +25,65 @@ UNITS_MM = {
     "ft": 304.8,
 }
 """Length units by the name that users give, in mm."""
+SUFFIXES = {
+    ".step": "STEP",
+    ".stp": "STEP",
+    ".iges": "IGES",
+    ".igs": "IGES",
+    ".dxf": "DXF",
+    ".csv": "table",
+    ".tsv": "table",
+    ".txt": "table",
+    ".apt": "tool path",
+    ".aptsource": "tool path",
+    ".cl": "tool path",
+    ".cls": "tool path",
+    ".h": "NC program",
+    ".mpf": "NC program",
+    ".nc": "NC program",
+    ".spf": "NC program",
+    ".tap": "NC program",
+}
+"""The kind of drawing by the suffix of its file, in lower case."""
+LEAST_SIZE, MOST_SIZE = 0.005, 20.0
+"""Sizes (m) between which a part may be; beyond them its unit is asked for."""
+LIKELY = ("mm", "in", "m", "cm", "um")
+"""Units that may be meant where that of a drawing is unlikely, the most usual first."""
+LIKELY_SIZE = 0.02, 6.0
+"""Sizes (m) of a part in a unit that may be meant."""
 
 
 def require_unit(unit: str | None) -> None:
     """Raise InputError for a unit that is not known; None passes."""
     if unit is not None:
         require_one_of(unit, "unit", UNITS_MM)
+
+
+def unit_question(unit: str, bounding_box: Array) -> str | None:
+    """Return a question about the unit of a drawing, if its part is too large or small to be cut.
+
+    Parameters
+    ----------
+    unit : str
+        The unit of the numbers in the file, one of `UNITS_MM`.
+    bounding_box : (2, 3) m
+        Least and greatest coordinates in that unit.
+    """
+    size = float((bounding_box[1] - bounding_box[0]).max())
+    if not size > 0 or LEAST_SIZE <= size <= MOST_SIZE:
+        return None
+    number = size / (UNITS_MM[unit] * MM)
+    said = f"unit? the part is {_length(size)} long in the unit of the file ({unit})"
+    for other in LIKELY:
+        meant = number * UNITS_MM[other] * MM
+        if other != unit and LIKELY_SIZE[0] <= meant <= LIKELY_SIZE[1]:
+            said += f', and {_length(meant)} in {other}; set unit = "{other}" if that is meant'
+            break
+    else:
+        said += "; set the unit that is meant"
+    return f'{said}, or unit = "{unit}" if it is right (in [part] of a job, or --unit)'
+
+
+def _length(value: float) -> str:
+    """Return a length in the unit in which it is read easily."""
+    return f"{value:g} m" if value >= 1 else f"{np.round(value * 1e3, 6):g} mm"

@@ -27,8 +27,8 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     help="Plan laser-cutting robots: from a CAD drawing to an audited robot program.\n\n"
     "Begin with **kerfpath demo**: it plans the shipped part and writes everything. "
-    "Then copy its job file, put in your part (see **kerfpath contours**) and your robot "
-    "(see **kerfpath robots**), and run **kerfpath plan**.\n\n"
+    "Then write a first job for your part with **kerfpath new** part.step, change what it guesses "
+    "(see **kerfpath contours** and **kerfpath robots**), and run **kerfpath plan**.\n\n"
     "Exit codes: 0 done, 1 no feasible plan or failed audit, 2 bad input; stopped by Ctrl-C 130, "
     "SIGTERM 143, SIGHUP 129.",
 )
@@ -119,6 +119,37 @@ def demo(to: Out = None, as_json: Json = False) -> None:
 
     with as_file(files("kerfpath").joinpath("demo")) as folder:
         plan_job(folder / "b_pillar.toml", to or Path("kerfpath-demo"))
+
+
+@app.command()
+def new(
+    drawing: Annotated[
+        Path, typer.Argument(metavar="PART", help="STEP, IGES, DXF, or a table of points (CSV).")
+    ],
+    robot: Annotated[
+        str | None,
+        typer.Option(metavar="ID", help="Robot of the library; default: a placeholder to change."),
+    ] = None,
+    unit: Annotated[
+        str | None,
+        typer.Option(help="Length unit, if the file has none or a wrong one: mm, cm, m, in."),
+    ] = None,
+    to: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="JOB.toml", help="Job to write; default: PART.toml."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Write a first job for a drawing, with comments; what is guessed in it is marked.
+
+    The job cuts the longest loops of the outer side at a guessed speed, with the beam from above
+    and the part in front of the robot. A file that exists already is never overwritten.
+
+    Example: kerfpath new door.step --robot kuka_kr30_ha
+    """
+    from kerfpath.cli.first_job import write_new
+
+    write_new(drawing, to, robot=robot, unit=unit)
 
 
 @app.command()

@@ -233,6 +233,11 @@ def _run_audit(file: Path, job: Path | None) -> AuditReport:
     if file.suffix.lower() == ".json":
         with about(file):
             return audit_file(file, job)
+    if file.suffix.lower() == ".toml":
+        raise InputError(
+            f"{file}: expected a plan.json or a program, got a job; plan it first: kerfpath plan "
+            f"{file}"
+        )
     if job is None:
         raise InputError(f"{file}: a program is compared with its job; give it with --job JOB.toml")
     with about(file), busy("auditing the program"):

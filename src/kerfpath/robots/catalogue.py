@@ -12,7 +12,7 @@ import numpy as np
 
 from kerfpath.arrays import Array
 from kerfpath.errors import InputError
-from kerfpath.names import nearest
+from kerfpath.names import nearest, squeezed
 from kerfpath.robots.arm import Arm
 from kerfpath.robots.limits import Coupling, RobotLimits
 
@@ -38,19 +38,26 @@ def acceleration_ratios() -> dict[str, tuple[float, ...]]:
 
 @cache
 def entry(name: str) -> dict[str, Any]:
-    """Return the data of a robot of the library by its id.
+    """Return the data of a robot of the library by its id, in any spelling, or without the maker.
 
     Raises
     ------
     InputError
         The robot is unknown; the message names the nearest ones.
     """
-    if name not in robot_ids():
+    if not isinstance(name, str):
+        raise InputError(
+            f"robot: expected the id of a robot, such as {robot_ids()[0]!r}, got "
+            f"{type(name).__name__}; 'kerfpath robots' lists all"
+        )
+    spelled = [(one, squeezed(one), squeezed(one.partition("_")[2])) for one in robot_ids()]
+    same = [one for one, *spellings in spelled if squeezed(name) in spellings]
+    if len(same) != 1:
         raise InputError(
             f"robot {name!r} is not in the library of {len(robot_ids())} robots; "
             f"{nearest(name, robot_ids())}; 'kerfpath robots' lists all"
         )
-    return tomllib.loads((_HERE / "library" / f"{name}.toml").read_text(encoding="utf-8"))
+    return tomllib.loads((_HERE / "library" / f"{same[0]}.toml").read_text(encoding="utf-8"))
 
 
 def arm_of(data: Mapping[str, Any]) -> Arm:

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from kerfpath.arrays import Array, Ints, freeze, short_repr
-from kerfpath.cad import Part
+from kerfpath.cad import SUFFIXES, Part, unit_question
 from kerfpath.cell import Cell
 from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour
@@ -116,9 +116,12 @@ class Job:
         Raises
         ------
         InputError
-            The file cannot be read, or geometry that may have to be cut is left out.
+            The file cannot be read, its unit is surely wrong and not confirmed, or geometry that
+            may have to be cut is left out.
         """
         part = self.drawing.read()
+        if self.drawing.unit is None and (question := unit_question(part.unit, part.bounding_box)):
+            raise refusal_at(self.path, ("part", "file"), question)
         doubtful = [str(one) for one in part.left_out if one.may_cut]
         if doubtful and not self.drawing.accept_left_out:
             said = (
@@ -325,6 +328,10 @@ def _comfort(file: JobFile, robot: Robot) -> Comfort | None:
 
 
 def _text(path: Path) -> str:
+    kind = SUFFIXES.get(path.suffix.lower())
+    if kind is not None and path.is_file():
+        said = f"expected a job file, got a drawing ({kind}); write a first job for it: "
+        raise error_at(path, None, f"{said}kerfpath new {path}")
     try:
         endless = path.exists() and not (path.is_file() or path.is_dir())  # a device
         raw = b"" if endless else path.read_bytes()
