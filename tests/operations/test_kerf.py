@@ -8,7 +8,8 @@ from benchmarks._closed_curves import EXACT, curve, judge
 from shapely import Polygon
 
 from kerfpath import Contour, InputError
-from kerfpath.operations import offset
+from kerfpath.job.format.prepared import chord_error
+from kerfpath.operations import Side, offset
 
 
 def regular(count: int, radius: float, more: int = 1) -> Contour:
@@ -54,3 +55,41 @@ def test_offsets_are_those_of_geos() -> None:
         wrong += not verdict.right
     # Curves only just as wide as the beam are refused now and then: 1 % in the benchmark.
     assert wrong <= 2
+
+
+def polygon(rng: np.random.Generator) -> Contour:
+    """Return a random polygon with sharp corners and sides of at least 8 mm, anyhow in a plane."""
+    while True:
+        count = int(rng.integers(3, 9))
+        angle = np.sort(rng.uniform(0, 2 * np.pi, count))
+        corners = rng.uniform(0.015, 0.08, (count, 1)) * np.stack(
+            [np.cos(angle), np.sin(angle)], axis=1
+        )
+        corners = np.roll(corners, int(rng.integers(count)), axis=0) + rng.uniform(-1, 1, 2)
+        way = np.roll(corners, -1, axis=0) - corners
+        heading = np.unwrap(np.arctan2(way[:, 1], way[:, 0]), period=2 * np.pi)
+        turn = np.abs((np.diff(heading, append=heading[0]) + np.pi) % (2 * np.pi) - np.pi)
+        ring = Polygon(corners)
+        if (
+            ring.is_valid
+            and np.linalg.norm(way, axis=1).min() > 0.008
+            and np.radians(25) < turn.min()
+            and turn.max() < np.radians(140)
+            and ring.buffer(-2e-3).geom_type == "Polygon"
+        ):
+            points = np.column_stack([corners, np.zeros(count)])
+            return Contour(points, np.tile([0, 0, -1.0], (count, 1)), closed=True)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("seed", range(15))
+def test_few_nodes_keep_to_the_path_around_sharp_corners(seed: int, side: Side) -> None:
+    """However coarse the spacing, wherever the polygon lies and wherever it begins."""
+    rng = np.random.default_rng(seed)
+    drawn, distance = polygon(rng), float(rng.uniform(0.05e-3, 0.2e-3))
+    spacing = float(rng.uniform(0.8e-3, 4e-3))
+    path = offset(drawn, distance, side=side)
+    nodes = path.resample(spacing=spacing)
+    # Chords to the middle of an arc leave its ends by less than the arc leaves its corner.
+    assert chord_error(path, nodes) < 0.66 * distance
+    assert len(nodes) < 2 * path.length / spacing + 2 * len(drawn)

@@ -170,7 +170,8 @@ class Contour:
     def feature_ends(self) -> Ints:
         """Nodes that sampling by `spacing` or `dt` keeps: ends, corners and changes of kind.
 
-        Of a rounded corner only the middle is kept, the point nearest to the drawn corner.
+        Of a rounded corner only the middle is kept, the point nearest to the drawn corner; or its
+        other node that is kept, where the contour begins or changes its kind in it.
         """
         kind = self._stretch_kind()
         ends = np.flatnonzero(np.diff(kind)) + 1
@@ -178,8 +179,9 @@ class Contour:
         rounded = np.flatnonzero(kind[runs[:-1]] == CORNER_KIND)
         first, last = runs[rounded], runs[rounded + 1]
         plain = np.diff(np.where(kind == CORNER_KIND, KINDS.index("cut"), kind))
-        kept = np.concatenate([self.corners, np.flatnonzero(plain) + 1, (first + last) // 2])
-        return np.unique(np.concatenate([[0], kept, [len(self) - 1]]))
+        kept = np.concatenate([[0], np.flatnonzero(plain) + 1, [len(self) - 1]])
+        whole = ~(np.isin(first, kept) | np.isin(last, kept))
+        return np.unique(np.concatenate([self.corners, kept, ((first + last) // 2)[whole]]))
 
     def resample(
         self,

@@ -10,7 +10,7 @@ import numpy as np
 from kerfpath.arrays import Array, not_negative, scalar
 from kerfpath.contour import KINDS, Contour, angle_between, join, slerp, unit
 from kerfpath.errors import InputError
-from kerfpath.operations.kerf import smoothest_start, start_at, with_nodes
+from kerfpath.operations.kerf import is_plain, smoothest_start, start_at, with_nodes
 from kerfpath.operations.surface import Side, Surface, lateral, lay_on, lean_axes, require_in_scrap
 
 STRAIGHT_BACK = np.radians(179)
@@ -147,7 +147,7 @@ def slow_corners(
 
 def _begin_off_corners(contour: Contour) -> Contour:
     """Return the contour begun at its smoothest place if it is closed and begins in a corner."""
-    if contour.kind.any():
+    if not is_plain(contour.kind):
         raise InputError(
             f"corners of {contour.name!r}: expected a cut without leads, micro joints or loops; "
             "treat its corners before adding those"

@@ -31,7 +31,9 @@ SAME_START = 1e-7
 """m: nodes closer than this are the same."""
 ALIKE = 1e-6
 """rad: windows whose turns differ by less are equally smooth."""
-MICRO_JOINT, OVERLAP = (KINDS.index(word) for word in ("micro joint", "overlap"))
+CUT, MICRO_JOINT, OVERLAP, CORNER_ARC = (
+    KINDS.index(word) for word in ("cut", "micro joint", "overlap", "corner")
+)
 
 
 def reverse(contour: Contour) -> Contour:
@@ -201,13 +203,18 @@ def micro_joints(
     marked = with_nodes(contour, ends)
     place = np.searchsorted(ends, marked.s + SAME_START, side="right")
     joint = place % 2 == 1
-    if marked.kind[joint].any():
+    if not is_plain(marked.kind[joint]):
         raise InputError(
             f"micro_joints: a joint of {contour.name!r} lies in a lead, loop or overlap; add "
             "micro joints before those, or elsewhere"
         )
     kind = np.where(joint, MICRO_JOINT, marked.kind)
     return replace(marked, kind=kind)
+
+
+def is_plain(kind: Ints) -> bool:
+    """Return whether stretches are cut and no more: neither leads, joints, overlaps nor loops."""
+    return bool(np.isin(kind, (CUT, CORNER_ARC)).all())
 
 
 def with_nodes(contour: Contour, s: Array) -> Contour:
@@ -250,8 +257,9 @@ def offset(
 ) -> Contour:
     """Return the contour moved sideways by `distance` (m) in the planes across its tool axes.
 
-    Outer corners become arcs around the corner; at inner corners the sides are cut back to where
-    they meet. A closed contour begins at the point nearest to its previous start.
+    Outer corners become arcs around the corner, of which sampling keeps the middle; at inner
+    corners the sides are cut back to where they meet. A closed contour begins at the point nearest
+    to its previous start.
 
     Parameters
     ----------
@@ -279,14 +287,14 @@ def offset(
             "corners; offset it before adding those"
         )
     contour = _with_middles(contour)
-    points, axes, source = _move_nodes(contour, distance, side, sharp)
+    points, axes, kind, source = _move_nodes(contour, distance, side, sharp)
     if contour.closed:
         k = _amid_what_fits(contour, points, distance)
         around = (np.arange(len(points) + 1) + k) % len(points)
-        points, axes, source = points[around], axes[around], source[around]
-    points, axes = _without_loops(contour, points, axes, source, distance, side)
+        points, axes, kind, source = points[around], axes[around], kind[around], source[around]
+    points, axes, kind = _without_loops(contour, points, axes, kind, source, distance, side)
     apart = np.append(np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME_NODE, True)
-    points, axes = points[apart], axes[apart]
+    points, axes, kind = points[apart], axes[apart], kind[apart]
     if len(points) < (4 if contour.closed else 2):
         raise _too_tight(contour, contour.points[0], distance, "is too small")
     middles = (points[:-1] + points[1:]) / 2
@@ -297,8 +305,21 @@ def offset(
         )
     if contour.closed:
         k = int(np.argmin(np.linalg.norm(points[:-1] - contour.points[0], axis=1)))
-        points, axes = np.roll(points[:-1], -k, axis=0), np.roll(axes[:-1], -k, axis=0)
-    return Contour(points, axes, closed=contour.closed, name=contour.name)
+        k = _middle_of_arc(kind[:-1], k)
+        points, axes, kind = (np.roll(each[:-1], -k, axis=0) for each in (points, axes, kind))
+    else:
+        kind[-1] = kind[-2]
+    return Contour(points, axes, closed=contour.closed, kind=kind, name=contour.name)
+
+
+def _middle_of_arc(kind: Ints, k: int) -> int:
+    """Return the middle of the arc that a node of a closed chain belongs to, or the node itself."""
+    first = last = k
+    while kind[first - 1] == CORNER_ARC and first > k - len(kind):
+        first -= 1
+    while kind[last % len(kind)] == CORNER_ARC and last < k + len(kind):
+        last += 1
+    return (first + last) // 2 % len(kind)
 
 
 def _with_middles(contour: Contour) -> Contour:
@@ -333,26 +354,28 @@ def _ways_at(contour: Contour) -> tuple[Array, Array]:
 
 def _move_nodes(
     contour: Contour, distance: float, side: Side, sharp: bool
-) -> tuple[Array, Array, Ints]:
-    """Return the offset points, the axis and the source node of each; corners give several."""
+) -> tuple[Array, Array, Ints, Ints]:
+    """Return the offset points, the axis, kind and source node of each; corners give several."""
     before, after = _ways_at(contour)
     across = [lateral(contour.axes, t, side) for t in (before, after)]
     turn = angle_between(*across)
     outer = (after * across[0]).sum(1) < 0
-    points, axes, source = [], [], []
+    points, axes, kind, source = [], [], list[int](), list[int]()
     for k in range(len(contour) - contour.closed):
         l0, l1 = across[0][k], across[1][k]
         if turn[k] <= ARC_STEP or (sharp and outer[k] and turn[k] <= SLOT):
             ways = (l0 + l1)[None] / (1.0 + float(l0 @ l1))
         elif outer[k]:
-            part = np.linspace(0, 1, int(np.ceil(turn[k] / ARC_STEP - 1e-9)) + 1)[:, None]
+            part = np.linspace(0, 1, 2 * int(np.ceil(turn[k] / ARC_STEP / 2 - 1e-9)) + 1)[:, None]
             ways = slerp(np.tile(l0, (len(part), 1)), np.tile(l1, (len(part), 1)), part)
         else:
             ways = np.array([l0, l1])  # what lies between them is cut off where the sides meet
         points.append(contour.points[k] + distance * ways)
         axes.append(np.tile(contour.axes[k], (len(ways), 1)))
+        is_corner = outer[k] and turn[k] > CORNER
+        kind += [CORNER_ARC if is_corner else CUT] * (len(ways) - 1) + [CUT]
         source += [k] * len(ways)
-    return np.vstack(points), np.vstack(axes), np.array(source)
+    return np.vstack(points), np.vstack(axes), np.array(kind), np.array(source)
 
 
 def _amid_what_fits(contour: Contour, points: Array, distance: float) -> int:
@@ -369,10 +392,16 @@ def _amid_what_fits(contour: Contour, points: Array, distance: float) -> int:
 
 
 def _without_loops(
-    contour: Contour, points: Array, axes: Array, source: Ints, distance: float, side: Side
-) -> tuple[Array, Array]:
+    contour: Contour,
+    points: Array,
+    axes: Array,
+    kind: Ints,
+    source: Ints,
+    distance: float,
+    side: Side,
+) -> tuple[Array, Array, Ints]:
     """Return the chain without the loops at its crossings with itself."""
-    kept, kept_axes = [], []
+    kept, kept_axes, kept_kind = [], [], []
     first, place = 0, 0.0  # the next node to keep, and its place along the chain, in nodes
     far = min(LOOK * distance, contour.length / 2)
     for i, f, j, g in _crossings(points, axes, far):
@@ -382,8 +411,13 @@ def _without_loops(
         part = np.array([[f]])
         kept += [points[first : i + 1], points[[i]] + f * (points[[i + 1]] - points[[i]])]
         kept_axes += [axes[first : i + 1], slerp(axes[[i]], axes[[i + 1]], part)]
+        kept_kind += [kind[first : i + 1], kind[[j]]]
         first, place = j + 1, j + g
-    return np.vstack([*kept, points[first:]]), np.vstack([*kept_axes, axes[first:]])
+    return (
+        np.vstack([*kept, points[first:]]),
+        np.vstack([*kept_axes, axes[first:]]),
+        np.concatenate([*kept_kind, kind[first:]]),
+    )
 
 
 def _crossings(points: Array, axes: Array, far: float) -> list[tuple[int, float, int, float]]:
