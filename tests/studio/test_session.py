@@ -328,6 +328,7 @@ def test_a_fault_is_said_with_its_key_and_undone(studio):
     job = page.until("job", revision=2)
     (fault,) = job["faults"]
     assert fault["key"] == ["plan", "metric"]
+    assert job["text"].split("\n")[fault["line"] - 1] == 'metric = "nonsense"'
     assert fault["message"].startswith("expected 'manhattan'")
     assert job["values"] is None
     page.say("edit", path=["contour", 1, "speed_m_min"], value=-1)
@@ -361,7 +362,7 @@ def test_no_path_says_why_and_its_relaxations_open_the_way(studio):
     assert soon["statement"]
     program = page.until("program", revision=2)
     assert program["segments"] == []
-    assert "no plan for slot" in program["notes"][0]
+    assert "no path for slot" in program["notes"][0]
     found = page.until("nopath", contour="slot")
     assert found["relaxations"]
     labels = [option["label"] for option in found["relaxations"]]

@@ -42,13 +42,15 @@ LIGHT = _concerning("proof", "search")
 """Keys of [plan] that change neither the nodes nor the layered graph."""
 GRAPH = _concerning("graph")
 """Keys of [plan] that the layered graph depends on."""
+OFF = "switched_off"
+"""Key of [part] that only decides which contours are cut."""
 PINS = "gamma_windows"
 """Key of [[contour]] that changes neither the nodes nor their speed."""
 
 
 def part_key(job: Job) -> str:
     """Return the key of the content of a job's drawing."""
-    read = {k: v for k, v in job.source["part"].items() if k not in ("xyz_mm", "rpy_deg")}
+    read = _but(job.source["part"], ("xyz_mm", "rpy_deg", OFF))
     return _digest(read, _stamp(job.part_file))
 
 
@@ -71,6 +73,7 @@ def motion_key(job: Job) -> str:
     ]
     for name in ("sequence", "layout", "program", "audit"):
         source.pop(name, None)
+    source["part"] = _but(source["part"], (OFF,))
     return _digest(source, _stamps(job))
 
 
@@ -97,6 +100,7 @@ def cut_key(job: Job, request: CutRequest) -> str:
     for name in ("contour", "sequence", "layout", "program"):
         source.pop(name, None)
     source["plan"] = _but(source.get("plan", {}), PROVING)
+    source["part"] = _but(source["part"], (OFF,))
     # A table that picks several loops makes one request for each of them, by its name.
     own = [request.task.name, request.task.pick, request.task.table.model_dump(mode="json")]
     return _digest(source, own, job.options.retract, _stamps(job))

@@ -308,21 +308,22 @@ def job_message(
 
 
 def faults_of(error: InputError, text: str) -> list[Fault]:
-    """Return the errors of a job, each with the key that its message names, if any."""
+    """Return the errors of a job once each, with line and key that the message names, if any."""
     lines = text.split("\n")
-    return [_fault(said, lines) for said in (str(error), *error.others)]
+    first = str(error).removesuffix(f" (and {len(error.others)} more)")
+    return [_fault(said, lines) for said in dict.fromkeys((first, *error.others))]
 
 
 def _fault(said: str, lines: list[str]) -> Fault:
     found = _PLACE.match(said)
     if found is None:
-        return Fault(key=[], message=said)
+        return Fault(key=[], line=None, message=said)
     line, key, words = found.groups()
     way: list[str | int] = [] if key is None else list(key.split("."))
     if line is not None and way[:1] == ["contour"]:
         number = sum(map(bool, map(_TABLE.match, lines[: int(line)]))) - 1
         way[1:1] = [max(number, 0)]
-    return Fault(key=way, message=words)
+    return Fault(key=way, line=None if line is None else int(line), message=words)
 
 
 def job_file(job: Job) -> JobFile:

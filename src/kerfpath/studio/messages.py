@@ -54,6 +54,8 @@ class Fault(Message):
 
     key: list[str | int]
     """The key that it concerns, as a path; possibly empty."""
+    line: int | None
+    """The line of the text, from 1 on; null if it concerns none."""
     message: str
 
 
@@ -506,6 +508,10 @@ class Export(Message):
     href: str
     ready: bool
     why: str = ""
+    remedy: str = ""
+    """What `edits` do, in words."""
+    edits: list[EditEntry] = []
+    """Changes of the job that make it ready, as far as is known."""
 
 
 class Cycle(Message):

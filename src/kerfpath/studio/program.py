@@ -39,6 +39,7 @@ from kerfpath.post import (
 from kerfpath.robots import Robot
 from kerfpath.studio.messages import (
     Cycle,
+    EditEntry,
     Export,
     FileEntry,
     FindingEntry,
@@ -77,16 +78,19 @@ def exports_of(result: JobResult, *, settled: bool) -> list[Export]:
     """
     program = ""
     if not result.may_be_written:
-        program = "a contour has no plan that passes its audit, or a transfer move is missing"
+        program = _why_none(result)
     elif result.job.program.language == "none":
         program = 'the job has language = "none" in [program]; set a language there'
     files = "" if settled else WAIT
     script = script_refusal(result.job, [cut.request for cut in result.cuts])
-    return [
+    partial = ""
+    if result.missing or result.job.switched_off:
+        partial = f", of {', '.join(dict.fromkeys(cut.contour for cut in result.cuts if cut.plan))}"
+    made = [
         Export(name=name, about=about, href=href, ready=not why, why=why)
         for name, about, href, why in (
             ("job", "the job file with its comments", "/export/job", ""),
-            ("program", "in the language of the job", "/export/program", program),
+            ("program", f"in the language of the job{partial}", "/export/program", program),
             ("plan.json", "", "/export/plan.json", files),
             ("trajectory.csv", "one row for each node", "/export/trajectory.csv", files),
             (
@@ -98,6 +102,39 @@ def exports_of(result: JobResult, *, settled: bool) -> list[Export]:
             ("report", "on a separate page", "/report", files),
         )
     ]
+    if not result.may_be_written:
+        made[1] = made[1].model_copy(update=_without_the_rest(result))
+    return made
+
+
+def _why_none(result: JobResult) -> str:
+    """Return why a result has no program."""
+    reasons = []
+    if result.missing:
+        reasons.append(f"no path for {', '.join(result.missing)}")
+    if failed := _failed(result):
+        reasons.append(f"the audit failed for {', '.join(failed)}")
+    return "; ".join(reasons) or "a transfer move is missing or fails its audit"
+
+
+def _failed(result: JobResult) -> list[str]:
+    """Return the contours whose plans fail their audit."""
+    failed = (cut.contour for cut in result.cuts if cut.plan is not None and not cut.passed)
+    return list(dict.fromkeys(failed))
+
+
+def _without_the_rest(result: JobResult) -> dict[str, object]:
+    """Return the changes that make a program of the contours that may be cut, if there are any."""
+    missing, failed = dict.fromkeys(result.missing), _failed(result)
+    if not {cut.contour for cut in result.cuts} - {*missing, *failed}:
+        return {}
+    edits = []
+    if missing and not result.job.accepts_incomplete:
+        edits.append(EditEntry(path=["program", "incomplete"], value="accept"))
+    if failed:
+        off = [*result.job.switched_off, *failed]
+        edits.append(EditEntry(path=["part", "switched_off"], value=off))
+    return {"remedy": f"Without {', '.join([*missing, *failed])}", "edits": edits} if edits else {}
 
 
 def in_language(result: JobResult, language: str | None) -> JobResult:
@@ -130,7 +167,7 @@ def program_text(result: JobResult, texts: FileTexts, revision: int) -> ProgramT
     """Return the program files of a result, with the time of each line."""
     faults = list(texts.faults)
     if not texts.program and not faults:
-        faults = ["no program: a contour has no plan that passes its audit"]
+        faults = [f"no program: {_why_none(result)}"]
     places = program_places(result, {name: texts.files[name] for name in texts.program})
     said = {str(issue) for issue, _ in places.findings}
     return ProgramTextMessage(
@@ -173,8 +210,7 @@ def zipped(name: str, texts: FileTexts) -> File:
         There is no program.
     """
     if not texts.program:
-        why = "; ".join(texts.faults) or "a contour has no plan that passes its audit"
-        raise InputError(f"no program: {why}")
+        raise InputError("; ".join(texts.faults) or 'no program: the job has language = "none"')
     if len(texts.program) == 1:
         (only,) = texts.program
         return File(only.rsplit("/", 1)[-1], "text/plain", texts.files[only].encode())
@@ -221,10 +257,9 @@ def program_message(result: JobResult, revision: int) -> ProgramMessage:
     revision : int
         Revision of the job.
     """
-    missing = [cut.contour for cut in result.cuts if cut.plan is None]
     why = ""
-    if missing:
-        why = f"There is no program: no plan for {', '.join(missing)}."
+    if result.missing and not result.may_be_written:
+        why = f"There is no program: {_why_none(result)}."
     elif result.stuck is not None:
         why = f"There is no program: {result.stuck}."
     if not why:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from commands import run
-from kerfpath.errors import AuditFailed
+from kerfpath.errors import AuditFailed, InputError
 from kerfpath.job import audit_file, program_from_file, read_job, run_job, write_result
+from kerfpath.studio.program import exports_of, program_message
 
 JOB = """\
 [robot]
@@ -47,9 +48,11 @@ def circles():
     return "\n".join([*rows, ""])
 
 
-def job_of(folder, program="", sequence="", speeds=(3, 300, 3)):
+def job_of(folder, program="", sequence="", speeds=(3, 300, 3), off=None):
     (folder / "part.csv").write_text(circles())
     text = JOB.format(program=program, sequence=sequence)
+    if off is not None:
+        text = text.replace("[plan]", f"switched_off = {json.dumps(off)}\n[plan]")
     text += "".join(CONTOUR.format(name=n, speed=v) for n, v in zip("abc", speeds, strict=True))
     (folder / "job.toml").write_text(text)
     return read_job(folder / "job.toml")
@@ -87,6 +90,45 @@ def test_otherwise_none_is_written_and_the_key_is_named(tmp_path, sequence):
     assert any('incomplete = "accept"' in note and "for b;" in note for note in written.notes)
     with pytest.raises(AuditFailed, match=r'b has no plan; .* incomplete = "accept"'):
         program_from_file(tmp_path / "out" / "plan.json", job_file=job.path)
+
+
+def test_a_contour_that_is_switched_off_is_neither_planned_nor_cut(tmp_path):
+    job = job_of(tmp_path, off=["b"])
+    result = run_job(job)
+    assert result.passed
+    assert [cut.name for cut in result.cuts] == ["a", "c"]
+    written = write_result(result, tmp_path / "out")
+    assert "Not cut, as switched_off in [part] names it: b." in written.notes
+    assert audit_file(tmp_path / "out" / "cut.mod", job.path).passed
+
+
+@pytest.mark.parametrize(
+    ("off", "words"),
+    [
+        (["d"], r":10: part.switched_off: expected names of contours, got 'd'; "),
+        (["a", "b", "c"], r":10: part.switched_off: every contour is switched off"),
+    ],
+)
+def test_what_is_switched_off_is_a_contour_and_not_the_last_one(tmp_path, off, words):
+    job = job_of(tmp_path, off=off)
+    with pytest.raises(InputError, match=words):
+        job.tasks(job.read_part())
+
+
+def test_the_studio_says_how_to_get_a_program_of_the_rest(tmp_path):
+    def program(**changes):
+        result = run_job(job_of(tmp_path, **changes))
+        return exports_of(result, settled=True)[1], result
+
+    found, result = program()
+    assert (found.ready, found.why, found.remedy) == (False, "no path for b", "Without b")
+    assert [edit.path for edit in found.edits] == [["program", "incomplete"]]
+    assert program_message(result, 1).segments == []
+    found, result = program(program=ACCEPT)
+    assert found.ready
+    assert found.about.endswith("of a, c")
+    segments = program_message(result, 1).segments
+    assert {s.contour for s in segments if s.kind == "cut"} == {"a", "c"}
 
 
 def test_without_any_path_there_is_no_program(tmp_path):

@@ -150,15 +150,53 @@ def test_no_path_says_where_and_why_and_its_relaxations_are_buttons(page, studio
 
 
 @pytest.mark.slow
+def test_contours_are_switched_off_and_a_program_is_asked_for_without_them(page, studio, first):
+    """Also: the button that closes a sheet stays in it beside very many files of a program."""
+    off = first[0]["values"]["part"] | {"switched_off": ["old hole"]}
+    job = first[0] | {"values": first[0]["values"] | {"part": off}}
+    edits = [{"path": ["program", "incomplete"], "value": "accept"}]
+    (outcome,) = (each for each in first if each["type"] == "outcome")
+    lost = {"ready": False, "why": "no path for b", "remedy": "Without b", "edits": edits}
+    exports = [e | lost if e["name"] == "program" else e for e in outcome["exports"]]
+    studio.open(job, *first[1:], outcome | {"exports": exports})
+    ready(page)
+    name = first[0]["contours"][0]["name"]
+    page.get_by_role("checkbox", name=f"Cut {name}").click()
+    page.get_by_role("checkbox", name="Cut old hole").click()
+    until(page, lambda: len(sent(studio, "edits")) == 2)
+    path = ["part", "switched_off"]
+    asked = [message["edits"] for message in sent(studio, "edits")]
+    assert asked[0] == [{"path": path, "value": ["old hole", name]}]
+    assert asked[1] == [{"path": path, "value": None}]
+    page.locator("#export").click()
+    page.get_by_role("button", name="Without b").click()
+    until(page, lambda: len(sent(studio, "edits")) == 3)
+    assert sent(studio, "edits")[2]["edits"] == edits
+    page.locator("#open-program").click()
+    file = {"text": "", "lines": [], "begin": [], "end": []}
+    files = [file | {"name": f"cut_of_hole_{i}.pgx"} for i in range(40)]
+    text = {"type": "program_text", "language": "val3", "revision": 1, "files": files}
+    studio.say(text | {"findings": [], "notes": [], "faults": []})
+    page.get_by_text("cut_of_hole_39.pgx").wait_for(state="attached")
+    close = page.get_by_role("button", name="Close").bounding_box()
+    assert close["x"] + close["width"] <= page.viewport_size["width"]
+    assert serious(page) == []
+
+
+@pytest.mark.slow
 def test_a_fault_of_the_job_and_an_error_are_said(page, studio, first):
     studio.open(*first)
     ready(page)
     message = "expected a number above 0, got -1"
-    studio.say(
-        first[0]
-        | {"revision": 2, "faults": [{"key": ["contour", 2, "speed_m_min"], "message": message}]}
-    )
-    page.get_by_text(f"contour.2.speed_m_min: {message}").wait_for()
+    line = first[0]["text"].split("\n").index("[plan]") + 1
+    fault = {"key": ["contour", 2, "speed_m_min"], "line": line, "message": message}
+    studio.say(first[0] | {"revision": 2, "faults": [fault]})
+    page.get_by_text(f"Line {line}, contour.2.speed_m_min: {message}").wait_for()
+    assert page.locator(f"p:not(.unseen):has-text('{message}')").count() == 1, "it is said once"
+    page.get_by_role("button", name=f"Line {line}").click()
+    chosen = "(area) => area.value.slice(area.selectionStart, area.selectionEnd)"
+    assert page.locator("dialog textarea").evaluate(chosen) == "[plan]"
+    page.get_by_role("button", name="Close").click()
     assert page.locator("#speed-number").get_attribute("aria-invalid") == "true"
     studio.say(
         {"type": "error", "message": "the file has changed since it was read", "about": "save"}

@@ -33,6 +33,7 @@ from kerfpath.job.format.tables import (
 )
 from kerfpath.job.format.tables.plan import said_in_keys
 from kerfpath.job.format.tolerances import Tolerances
+from kerfpath.job.format.values import nearest
 from kerfpath.options import OptionConflict, PlanOptions
 from kerfpath.planner import coarse_places, external_course, layered_graph
 from kerfpath.post import ProgramOptions
@@ -84,6 +85,8 @@ class Job:
         The text of the file, with its comments.
     accepts_incomplete : bool
         Whether a program may lack contours that have no path.
+    switched_off : tuple of str
+        Names of contours that are not cut.
     """
 
     path: Path
@@ -102,6 +105,7 @@ class Job:
     source: Mapping[str, Any]
     text: str = ""
     accepts_incomplete: bool = False
+    switched_off: tuple[str, ...] = ()
 
     __repr__ = short_repr
 
@@ -167,13 +171,13 @@ class Job:
         )
 
     def tasks(self, part: Part) -> tuple[ContourSpec, ...]:
-        """Return the contours to cut, one for each loop of the part that is picked.
+        """Return the contours to cut, one for each loop that is picked and not switched off.
 
         Raises
         ------
         InputError
-            A loop does not exist or is picked twice, or an open line has a key that needs a
-            closed loop.
+            A loop does not exist or is picked twice, an open line has a key that needs a closed
+            loop, a name that is switched off is no contour, or every contour is switched off.
         """
         tasks, faults = list[ContourSpec](), list[InputError]()
         for number, table in enumerate(self.contours):
@@ -193,7 +197,15 @@ class Job:
                     f"{self.path}: contour {name!r} is picked twice; give one of the two another "
                     "name, or narrow [contour.pick_all]"
                 )
-        return tuple(tasks)
+        at = ("part", "switched_off")
+        for name in self.switched_off:
+            if name not in names:
+                said = f"expected names of contours, got {name!r}; {nearest(name, names)}"
+                raise refusal_at(self.path, at, said)
+        on = tuple(task for task in tasks if task.name not in self.switched_off)
+        if not on:
+            raise refusal_at(self.path, at, "every contour is switched off; switch one on")
+        return on
 
     def _require_open(self, task: ContourSpec, number: int) -> None:
         """Raise InputError if table `number` has a key that its open line cannot have."""
@@ -260,6 +272,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         source=source,
         text=text,
         accepts_incomplete=file.program.incomplete == "accept",
+        switched_off=file.part.switched_off,
     )
 
 

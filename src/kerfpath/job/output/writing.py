@@ -412,16 +412,19 @@ def order_note(part: PartPlan) -> str:
 
 def incomplete_note(outcome: JobResult) -> list[str]:
     """Return the note on contours that the program lacks, or that keep it from being written."""
+    off = ", ".join(outcome.job.switched_off)
+    said = [f"Not cut, as switched_off in [part] names it: {off}."] if off else []
     missing = ", ".join(outcome.missing)
     if not missing:
-        return []
+        return said
     if outcome.may_be_written:
-        return [f"The program does not cut {missing}: no path was found."]
+        return [*said, f"The program does not cut {missing}: no path was found."]
     if outcome.job.accepts_incomplete:
-        return []
+        return said
     return [
+        *said,
         f"No program is written, as there is no path for {missing}; for a program without, write "
-        'incomplete = "accept" in [program].'
+        'incomplete = "accept" in [program].',
     ]
 
 

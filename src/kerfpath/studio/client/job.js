@@ -41,6 +41,20 @@ export function faultOf(key) {
   return store.job?.faults.find((each) => each.key.join(".") === path)?.message ?? "";
 }
 
+/** @returns {string[]} the names of the contours that are not cut */
+export const switchedOff = () => valueOf("part.switched_off") ?? [];
+
+/**
+ * Switch a contour on or off.
+ * @param {string} name
+ * @param {boolean} on
+ */
+export function switchContour(name, on) {
+  const others = switchedOff().filter((each) => each !== name);
+  const off = on ? others : [...others, name];
+  setKeys(["part.switched_off", off.length ? off : null]);
+}
+
 /**
  * Set a key; null removes it. Edits with the same gesture are one step of undo.
  * @param {string} key

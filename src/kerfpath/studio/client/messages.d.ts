@@ -11,6 +11,8 @@ export interface ContourName {
 export interface Fault {
   /** The key that it concerns, as a path; possibly empty. */
   key: (string | number)[];
+  /** The line of the text, from 1 on; null if it concerns none. */
+  line: number | null;
   message: string;
 }
 
@@ -427,6 +429,10 @@ export interface Export {
   href: string;
   ready: boolean;
   why: string;
+  /** What `edits` do, in words. */
+  remedy: string;
+  /** Changes of the job that make it ready, as far as is known. */
+  edits: EditEntry[];
 }
 
 /** The shares of a program's time, s. */

@@ -181,6 +181,10 @@ class PartTable(Table):
         Literal["refuse", "accept"],
         key("what to do if something to cut may be left out of the drawing", '"accept"'),
     ] = "refuse"
+    switched_off: Annotated[
+        tuple[Text, ...],
+        key("names of contours that are not cut for now", '["slot"]', strict=False),
+    ] = ()
     placed_by: Annotated[
         Literal["origin", "centre"],
         key("the point of the part at xyz_mm: its origin, or the centre of its box", '"centre"'),

@@ -5,6 +5,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { connection, send, store } from "../app.js";
 import { isDark, switchTheme } from "../desk.js";
 import { dot, html, icon } from "../ui.js";
+import { openLine } from "./jobtext.js";
 import { openSheet } from "./sheet.js";
 
 /** @typedef {import("../scene/record.js").Extra} Extra */
@@ -101,7 +102,7 @@ function exports(extras) {
   const files = store.outcome?.exports ?? [];
   const none = "Files can be exported once every contour is planned.";
   return html`
-    ${files.map((each) => (each.ready ? link(each) : off(each.name, each.why)))}
+    ${files.map((each) => (each.ready ? link(each) : [off(each.name, each.why), remedy(each)]))}
     ${!files.length && off("Nothing yet", none)}
     ${extras.map(({ name, about, why, make }) =>
       why()
@@ -112,6 +113,14 @@ function exports(extras) {
 
 /** @type {(name: string, why: string | null) => unknown} */
 const off = (name, why) => html`<div class="off">${name}<small>${why}</small></div>`;
+
+/** @param {import("../messages.js").Export} file  a button that makes it ready */
+const remedy = ({ remedy: words, edits }) => {
+  const take = () => send({ type: "edits", edits });
+  return (
+    words && html`<button class="entry remedy" onClick=${take}>${icon("check")}${words}</button>`
+  );
+};
 
 /** @param {import("../messages.js").Export} file  a link to it */
 function link({ name, about, href: path }) {
@@ -158,9 +167,12 @@ export function notices() {
     </button>`;
   return html`
     ${store.broken && html`<${Lost} />`}
-    ${(store.job?.faults ?? []).map(({ key, message }) =>
-      notice("bad", `${key.length ? `${key.join(".")}: ` : ""}${message}`, undo),
-    )}
+    ${(store.job?.faults ?? []).map(({ key, line, message }) => {
+      const at =
+        line && html`<button class="link" onClick=${() => openLine(line)}>Line ${line}</button>`;
+      const words = `${key.length ? `${key.join(".")}: ` : ""}${message}`;
+      return notice("bad", at ? html`${at}, ${words}` : words, undo);
+    })}
     ${store.errors.map((error) => html`<${Notice} key=${error.message} error=${error} />`)}`;
 }
 
@@ -197,6 +209,6 @@ function Lost() {
   return notice("bad", `${what} ${when}`, again);
 }
 
-/** @type {(kind: "bad" | "", text: string, buttons: unknown) => unknown} */
+/** @type {(kind: "bad" | "", text: unknown, buttons: unknown) => unknown} */
 const notice = (kind, text, buttons) =>
   html`<div class=${`notice ${kind}`}>${icon("warning")}<p>${text}</p>${buttons}</div>`;

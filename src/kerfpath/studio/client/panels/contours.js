@@ -3,6 +3,7 @@
 import { store } from "../app.js";
 import { clock, fixed, millimetres, secondsOf } from "../format.js";
 import { dot, folded, html, icon } from "../ui.js";
+import { switchContour, switchedOff } from "../job.js";
 import { openSheet } from "./sheet.js";
 
 /** @typedef {import("../messages.js").ContourEntry} ContourShape */
@@ -42,6 +43,7 @@ export function contoursPanel() {
     </header>
     <div id="contours" class="list">
       ${scene?.contours.length ? scene.contours.map(row) : html`<p class="empty">${none}</p>`}
+      ${switchedOff().map(offRow)}
     </div>
     <div id="cycle">${cycle()}</div>`;
 }
@@ -51,8 +53,9 @@ function row({ name, s }) {
   const { mark, words } = standing(name);
   const seconds = secondsOf(store.plans.get(name) ?? []);
   return html`
+    <div class="switched" key=${name}>
+    ${onOff(name, true)}
     <button
-      key=${name}
       aria-current=${String(name === store.selected)}
       title=${`${name}: ${millimetres(s[s.length - 1], 0)}, ${words}`}
       onClick=${() => store.select(name)}
@@ -61,7 +64,28 @@ function row({ name, s }) {
       <span class="name">${name}</span>
       <span class="time">${seconds ? `${fixed(seconds, 1)} s` : ""}</span>
       ${(mark === "none" || mark === "warn") && html`<span class="more">${words}</span>`}
-    </button>`;
+    </button>
+    </div>`;
+}
+
+/** @param {string} name  of a contour that is switched off */
+const offRow = (name) => html`
+  <div class="switched off" key=${name}>
+    ${onOff(name, false)}<span class="name">${name}</span><span class="quiet">not cut</span>
+  </div>`;
+
+/**
+ * The box that switches a contour on or off; the last one stays on.
+ * @param {string} name
+ * @param {boolean} on
+ */
+function onOff(name, on) {
+  const last = on && store.scene?.contours.length === 1;
+  const title = last ? "The only contour that is cut" : on ? "Do not cut it" : "Cut it";
+  const change = (/** @type {any} */ { target }) => switchContour(name, target.checked);
+  return html`
+    <input type="checkbox" aria-label=${`Cut ${name}`} title=${title} checked=${on}
+      disabled=${!store.live || last} onChange=${change} />`;
 }
 
 /** The cycle time and the notes of the program. */

@@ -92,7 +92,7 @@ function Row({ field, ways }) {
           ${icon("reset")}
         </button>
       </span>
-      <p class="fault" id=${`${id}-fault`} hidden=${!fault}>${fault}</p>
+      <p class="unseen" id=${`${id}-fault`} hidden=${!fault}>${fault}</p>
     </div>`;
 }
 

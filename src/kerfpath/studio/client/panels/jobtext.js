@@ -4,7 +4,19 @@ import { useEffect, useRef, useState } from "preact/hooks";
 
 import { send, store } from "../app.js";
 import { html } from "../ui.js";
-import { closeSheet } from "./sheet.js";
+import { closeSheet, openSheet } from "./sheet.js";
+
+let line = 1; // that the sheet opens at
+
+/**
+ * Open the text of the job at one of its lines.
+ * @param {number} at  from 1 on
+ */
+export function openLine(at) {
+  line = at;
+  openSheet("text");
+  line = 1;
+}
 
 /** @type {import("./sheet.js").Sheet} */
 export const jobSheet = {
@@ -15,10 +27,15 @@ export const jobSheet = {
 function JobText() {
   const [text, type] = useState(store.job?.text ?? "");
   const area = useRef(/** @type {HTMLTextAreaElement | null} */ (null));
+  const [at] = useState(line);
   useEffect(() => {
-    area.current?.focus();
-    area.current?.setSelectionRange(0, 0);
-    area.current?.scrollTo(0, 0);
+    if (!area.current) return;
+    const lines = text.split("\n");
+    const begin = lines.slice(0, at - 1).join("\n").length + (at > 1 ? 1 : 0);
+    area.current.focus();
+    area.current.setSelectionRange(begin, at > 1 ? begin + lines[at - 1].length : begin);
+    const height = area.current.scrollHeight / lines.length;
+    area.current.scrollTo(0, Math.max(0, (at - 4) * height));
   }, []);
   const apply = () => {
     send({ type: "text", text });

@@ -158,7 +158,7 @@ function Amount({ id, label, unit, least, most, step, places, value, disabled, f
       </div>
       <${Slider} id=${id} ...${range} value=${now} disabled=${disabled}
         aria-describedby=${`${id}-fault`} onHold=${hold} onSet=${onSet} />
-      <p class="fault" id=${`${id}-fault`} hidden=${!fault}>${fault}</p>
+      <p class="unseen" id=${`${id}-fault`} hidden=${!fault}>${fault}</p>
     </div>`;
 }
 

@@ -3,6 +3,7 @@
 import { send, store } from "../app.js";
 import { byId, floatAt } from "../dom.js";
 import { counted, millimetres } from "../format.js";
+import { switchContour } from "../job.js";
 import { barred, cutLoops, described, leaving, uncut } from "../part.js";
 import { draw, html, icon } from "../ui.js";
 import { Loops, faceOf } from "./loops.js";
@@ -114,6 +115,11 @@ export class Picking {
       send({ type: "leave", index });
       this.close();
     };
+    const skip = () => {
+      switchContour(contour, false);
+      this.close();
+    };
+    const only = store.scene?.contours.length === 1;
     this.open(
       x,
       y,
@@ -121,6 +127,7 @@ export class Picking {
         <strong>${contour}</strong>
         <p>${millimetres(s[s.length - 1])} long, ${loop}</p>
         ${why && html`<p>${why}</p>`}
+        <button class="plain" disabled=${only} onClick=${skip}>Do not cut it for now</button>
         <button class="plain" disabled=${why !== ""} onClick=${leave}>
           ${icon("close")}${words} of the job
         </button>`,

@@ -329,8 +329,7 @@ export class SceneView {
     }
     if (this.ready) return null;
     if (job?.faults.length && !scene) {
-      const how = "Correct it under Job file, at the top of the page.";
-      return said("The job has an error", job.faults[0].message, how);
+      return said("The job has an error", "It is said above; correct it under Job file.");
     }
     const what = connection === "open" ? "Reading the cell" : "Waiting for the studio's server";
     const step = progress.label || "Robot, head and part appear here once they are read.";
