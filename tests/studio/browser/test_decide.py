@@ -167,7 +167,7 @@ def test_a_point_of_the_pareto_set_is_shown_and_taken(page, studio, first, messa
     page.keyboard.press("Enter")
     page.get_by_text("kerfpath pareto --pick").wait_for()  # it was held to what no job can say
     assert page.get_by_role("button", name="Take it").count() == 0
-    page.locator("#cost", has_text="99.00").wait_for()  # drawn with the next frame
+    page.locator("#cost", has_text="99.00").wait_for(state="attached")  # drawn with the next frame
     page.keyboard.press("ArrowLeft")
     page.keyboard.press("Enter")
     take = page.get_by_role("button", name="Take it")

@@ -128,7 +128,7 @@ WINDOWS = "() => studio.store.job.values.contour[0].gamma_windows"
 
 
 def cost(page):
-    return float(page.locator("#cost").inner_text())
+    return float(page.locator("#cost").text_content())
 
 
 def drag(page, slider, share):
@@ -207,7 +207,7 @@ def test_without_a_path_a_relaxation_makes_one(opened):
     before = page.evaluate(REVISION)
     remedy.click()
     until(page, lambda: page.evaluate(REVISION) > before)
-    page.locator("#cost").wait_for(timeout=240_000)
+    page.locator("#cost").wait_for(state="attached", timeout=240_000)
     assert cost(page) > 0
 
 

@@ -75,11 +75,12 @@ export const folded = (summary, texts) =>
   html`<details><summary>${summary}</summary>${texts.map((each) => html`<p>${each}</p>`)}</details>`;
 
 /** @typedef {{value: string, label: string}} Choice */
+/** @typedef {{value: string, label: Content}} Pictured */
 
 /**
  * A group of buttons, of which one is pressed.
  * @param {string} label
- * @param {Choice[]} choices
+ * @param {Pictured[]} choices
  * @param {string} value
  * @param {(value: string) => void} choose
  * @param {boolean} [disabled]

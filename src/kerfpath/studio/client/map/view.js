@@ -3,6 +3,7 @@
 import { player, send, store } from "../app.js";
 import { ARROWS, byId, onNextFrame } from "../dom.js";
 import { deg } from "../format.js";
+import { posturePicture } from "../posture.js";
 import { html, mount, redraw, segments } from "../ui.js";
 import { Bands, courseAt } from "./bands.js";
 import { Chart } from "./chart.js";
@@ -14,6 +15,9 @@ import { legend } from "./legend.js";
 import { Pins } from "./pins.js";
 
 /** @typedef {import("./hover.js").Cell} Cell */
+
+/** @param {string} name */
+const pictured = (name) => html`${posturePicture(name)}${name}`;
 
 export class MapView {
   /** @param {import("./hover.js").Haunt} haunt */
@@ -103,7 +107,7 @@ export class MapView {
   tabs() {
     const layers = this.grid?.layers ?? [];
     if (layers.length < 2) return null;
-    const choices = layers.map(({ name }, i) => ({ value: String(i), label: name }));
+    const choices = layers.map(({ name }, i) => ({ value: String(i), label: pictured(name) }));
     return segments("Posture", choices, String(this.layer), (layer) => this.show(Number(layer)));
   }
 

@@ -5,6 +5,7 @@ import { useRef } from "preact/hooks";
 import { send, store } from "../app.js";
 import { capital, fixed } from "../format.js";
 import { faultOf, setKey, valueOf } from "../job.js";
+import { posturePicture } from "../posture.js";
 import {
   Input,
   NUMBER,
@@ -113,7 +114,7 @@ function choice({ key, label, choices, default: usual }) {
     </select>`;
   return html`
     <div class="field row">
-      <span class="label">${label}</span>
+      <span class="label">${label}${posturePicture(now)}</span>
       ${usual === null ? list() : segments(label, named, now, set, off())}
     </div>`;
 }

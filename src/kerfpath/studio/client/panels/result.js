@@ -1,4 +1,4 @@
-/** The cost and proof of the chosen contour's plan, or the reason why there is none. */
+/** Times, margin and proof of the chosen contour's plan, or the reason why there is none. */
 
 import { store } from "../app.js";
 import { byId } from "../dom.js";
@@ -46,19 +46,55 @@ function figures(plans) {
   );
   const changed = store.comparable(plans[0].contour) ? change(cost, before) : "";
   const better = changed === "same" ? "" : cost > before ? "up" : "down";
+  const total = cycleTime();
+  const seconds = html`${fixed(secondsOf(plans), 2)}<small> s</small>`;
+  const { left, joint, limit } = margin(plans);
   return html`
     <div class="figures">
       <div>
-        <span class="label">Cost</span><b id="cost">${digits(cost, 4)}</b>
-        ${changed && html`<span class=${`delta ${better}`}>${changed}</span>`}
+        <span class="label">${total ? "Cycle time" : "Time of the cut"}</span>
+        <b>${total ? html`${fixed(total)}<small> s</small>` : seconds}</b>
+        ${total > 0 && html`<span class="label">this cut ${seconds}</span>`}
       </div>
       <div>
-        <span class="label">Time of the cut</span>
-        <b>${fixed(secondsOf(plans), 2)}<small> s</small></b>
+        <span class="label">Margin to the limits</span>
+        <b id="margin" class=${left < 0 ? "fault" : ""}>${fixed(100 * left, 0)}<small> %</small></b>
+        <span class="label">least: ${limit} of ${joint}</span>
       </div>
     </div>
-    <p class="proof">${proof(plans)}</p>
-    ${plans.flatMap(({ checks }) => checks ?? []).map(failure)}`;
+    ${plans.flatMap(({ checks }) => checks ?? []).map(failure)}
+    <details>
+      <summary>Details</summary>
+      <p>
+        Cost <span id="cost">${digits(cost, 4)}</span>
+        ${changed && html`<span class=${`delta ${better}`}>${changed}</span>`}
+      </p>
+      <p class="proof">${proof(plans)}</p>
+    </details>`;
+}
+
+/** The time of the program in s, or 0 if it is not known for the job as it is. */
+function cycleTime() {
+  const { program, outcome } = store;
+  const now = program && outcome?.revision === program.revision && !store.stale(program);
+  return now ? program.total : 0;
+}
+
+/**
+ * Return the least share that is left of a limit of speed or acceleration, and of which.
+ * @param {PlanMessage[]} plans
+ */
+function margin(plans) {
+  const names = store.scene?.robot.joints.map(({ name }) => name) ?? [];
+  const peaks = plans.flatMap(({ criteria }) =>
+    [
+      { limit: "speed", shares: criteria.peak_velocity },
+      { limit: "acceleration", shares: criteria.peak_acceleration },
+    ].flatMap(({ limit, shares }) =>
+      shares.map((share, j) => ({ left: 1 - share, limit, joint: names[j] ?? `joint ${j + 1}` })),
+    ),
+  );
+  return peaks.reduce((least, each) => (each.left < least.left ? each : least));
 }
 
 /** @param {PlanMessage[]} plans */
