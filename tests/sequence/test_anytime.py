@@ -42,6 +42,32 @@ def test_more_time_is_never_worse() -> None:
     assert short.at_least <= long.duration + 1e-9  # a bound of any search holds for all orders
 
 
+def test_very_many_cuts_have_an_order_near_its_bound() -> None:
+    """160 plates, of which each loop can be cut in two ways: 900 000 moves between them."""
+    apart, rules = nest(160, 0)
+    group = np.repeat(np.arange(len(apart)), 2)
+    between = np.repeat(np.repeat(apart, 2, axis=0), 2, axis=1)
+    turned = np.add.outer(np.arange(len(group)), np.arange(len(group))) % 2
+    between = between + 0.3 * turned
+    order = best_order(group, np.ones(len(group)), between, before=rules, seconds=0.1)
+    place = np.argsort(group[order.candidates])
+    assert sorted(group[order.candidates].tolist()) == list(range(len(apart)))
+    assert all(place[a] < place[b] for a, b in rules)
+    assert 0.9 * order.duration < order.at_least <= order.duration
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_bound_of_an_order_without_a_search_holds(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = 6
+    group = np.concatenate([np.arange(count), rng.integers(0, count, 3)])
+    between = rng.random((9, 9))
+    between[rng.random((9, 9)) < 0.1] = np.inf
+    found = [best_order(group, np.ones(9), between, seconds=s) for s in (1e-6, 10)]
+    assert found[1].optimal
+    assert found[0].at_least <= found[1].duration + 1e-9
+
+
 def test_rules_that_contradict_each_other_are_told_from_too_little_time() -> None:
     apart, _ = nest(1, 0)
     with pytest.raises(NoFeasiblePath, match="contradict") as refused:

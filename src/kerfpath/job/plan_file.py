@@ -11,6 +11,7 @@ import zlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from pathlib import Path
 from types import UnionType
 from typing import (
@@ -488,6 +489,7 @@ def _shown(value: object) -> str:
 UNIT = re.compile(r"_(m|rad|rad_s|rad_s2|s)$")
 
 
+@cache
 def _attributes(kind: Any) -> dict[str, str]:
     """Return the attribute for each key that an entry must have, `kind` its TypedDict."""
     hints = get_type_hints(kind, include_extras=True).items()

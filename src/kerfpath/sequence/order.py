@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import linear_sum_assignment
 
 from kerfpath.arrays import Array, Bools, Ints, floats, freeze, integers, short_repr
 from kerfpath.cell import Cell
@@ -40,22 +41,22 @@ def inner_first(contours: Sequence[Contour]) -> list[tuple[int, int]]:
     the drawing without their leads. A loop around a tube, whose axes have no common direction,
     contains nothing either.
     """
+    firsts = np.array([contour.points[0] for contour in contours]).reshape(-1, 3)
+    means = np.array([contour.axes.mean(axis=0) for contour in contours]).reshape(-1, 3)
     pairs = []
     for j, outer in enumerate(contours):
-        if not outer.closed:
-            continue
-        n = outer.axes.mean(axis=0)
-        if np.linalg.norm(n) < COMMON:
+        n = means[j]
+        if not outer.closed or np.linalg.norm(n) < COMMON:
             continue
         x = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
         plane = np.array([x / np.linalg.norm(x), np.cross(n, x) / np.linalg.norm(np.cross(n, x))]).T
         ring = outer.points @ plane
-        for i, inner in enumerate(contours):
-            faces = i != j and float(inner.axes.mean(axis=0) @ n) > 0
-            at = inner.points @ plane
-            # The first point is enough for most contours, which are far outside.
-            if faces and _inside(ring, at[:1])[0] and _inside(ring, at).all():
-                pairs.append((i, j))
+        # The first point is enough for most contours, which are far outside.
+        at = firsts @ plane
+        near = (means @ n > 0) & ((ring.min(axis=0) <= at) & (at <= ring.max(axis=0))).all(axis=1)
+        near[j] = False
+        found = np.flatnonzero(near)[_inside(ring, at[near])]
+        pairs += [(i, j) for i in found.tolist() if _inside(ring, contours[i].points @ plane).all()]
     return pairs
 
 
@@ -369,8 +370,11 @@ def _solve(
     for g, h in before:
         earlier[g, h] = True
     time = _times(group, own, move, enter, leave, earlier)
+    start = _nearest_first(group, time, earlier)
+    among = _short_legs(time, start)
+    is_whole = bool((among == np.isfinite(time)).all())
     model = cp_model.CpModel()
-    ways = np.argwhere(np.isfinite(time)).tolist()
+    ways = np.argwhere(among).tolist()
     taken = {(a, b): model.new_bool_var(f"{a} to {b}") for a, b in ways}
     without = [model.new_bool_var(f"without {i}") for i in range(C)]
     model.add_circuit(
@@ -392,7 +396,6 @@ def _solve(
         for g, h in waiting:
             model.add(place[g] < place[h])
     model.minimize(sum(round(time[ends] / TICK) * way for ends, way in taken.items()))
-    start = _nearest_first(group, time, earlier)
     if start is not None:
         steps = {0: 0} | {int(i) + 1: k for k, i in enumerate(start.tolist())}
         legs = set(pairwise([0, *(start + 1).tolist(), 0]))
@@ -409,9 +412,6 @@ def _solve(
     # Circuit cuts prove a plain tour about ten times faster; with places they only cost time.
     solver.parameters.linearization_level = 1 if waiting else 2
     status = solver.solve(model)
-    least = float(time[:, 0].min()) + sum(
-        float(time[:, 1:][:, group == h].min()) for h in range(G)
-    )  # each group is reached, and home is, in no less
     if status in (cp_model.OPTIMAL, cp_model.FEASIBLE):
         following = {a: b for (a, b), way in taken.items() if solver.boolean_value(way)}
         chosen, here = [], following[0]
@@ -419,13 +419,12 @@ def _solve(
             chosen.append(here - 1)
             here = following[here]
         order = np.array(chosen)
-        least = max(least, solver.best_objective_bound * TICK)
         if start is not None and _duration(start, time) < _duration(order, time):
             order = start
-    elif start is not None and status != cp_model.INFEASIBLE:
+    elif start is not None:
         order = start
     else:
-        proved = status == cp_model.INFEASIBLE
+        proved = is_whole and status == cp_model.INFEASIBLE
         why = (
             "its constraints (which contour may follow or must come before another) contradict "
             "each other"
@@ -434,7 +433,9 @@ def _solve(
             "seconds in [sequence]"
         )
         raise NoFeasiblePath(f"no order of cutting: {why}", proved=proved, node=-1)
-    duration = _duration(order, time)
+    duration, least = _duration(order, time), _least_around(group, time)
+    if is_whole and status in (cp_model.OPTIMAL, cp_model.FEASIBLE):
+        least = max(least, solver.best_objective_bound * TICK)
     return Order(candidates=order, duration=duration, at_least=min(least, duration))
 
 
@@ -442,6 +443,39 @@ def _duration(order: Ints, time: Array) -> float:
     """Return the time (s) of an order of candidates, from home and back."""
     around = np.concatenate([[0], order + 1, [0]])
     return float(time[around[:-1], around[1:]].sum())
+
+
+MOST_LEGS = 100_000
+"""Most moves that the solver chooses from: it takes some kilobytes for each, and time to build."""
+
+
+def _short_legs(time: Array, start: Ints | None) -> Bools:
+    """Return the allowed moves (C + 1, C + 1), of very many the shortest ones and those of `start`.
+
+    All to and from home are among them.
+    """
+    among = np.isfinite(time)
+    if among.sum() <= MOST_LEGS:
+        return among
+    from_each = MOST_LEGS // len(time)
+    longest = np.partition(time[:, 1:], from_each, axis=1)[:, from_each]
+    short = among & (time <= longest[:, None])
+    short[0], short[:, 0] = among[0], among[:, 0]
+    if start is not None:
+        around = np.concatenate([[0], start + 1, [0]])
+        short[around[:-1], around[1:]] = True
+    return short
+
+
+def _least_around(group: Ints, time: Array) -> float:
+    """Return a time (s) that no order beats: each group, and home, is reached once and left once.
+
+    Which follows which is assigned at least cost; other candidates may be left than were reached.
+    """
+    number = np.append(0, group + 1)
+    best = np.full((number.max() + 1,) * 2, np.inf)
+    np.minimum.at(best, (number[:, None], number), time)
+    return float(best[linear_sum_assignment(best)].sum())
 
 
 STARTS = 32

@@ -397,7 +397,8 @@ def order_note(part: PartPlan) -> str:
     proved = (
         "no order takes less"
         if order.optimal
-        else f"an order of {order.at_least:.1f} s is not ruled out"
+        else f"an order of {order.at_least:.1f} s is not ruled out (for a longer search, raise "
+        "seconds in [sequence])"
     )
     common = " and in those that at least half of the contours can have"
     if part.plans[0].robot.free.size:
