@@ -324,16 +324,9 @@ def part_of_strokes(
     if not chains:
         why = f"; {left_out[0]}" if left_out else ""
         raise InputError(f"holds nothing to cut: no line, arc, polyline, ellipse or spline{why}")
-    holes = iter(_are_holes([chain for _, chain in chains if chain.is_closed], gap / MM))
-    kinds: list[Kind] = []
-    for k, (style, chain) in enumerate(chains):
-        kind: Kind = "open"
-        if chain.is_closed:
-            kind = "inner" if next(holes) else "outer"
-            if (chain.area[2] > 0) != (kind == "outer"):
-                other_way = tuple(backwards(curve) for curve in chain.edges[::-1])
-                chains[k] = style, EdgeChain(edges=other_way)
-        kinds.append(kind)
+    told = _nested([chain for _, chain in chains], gap / MM)
+    kinds = [kind for kind, _ in told]
+    chains = [(style, chain) for (style, _), (_, chain) in zip(chains, told, strict=True)]
     if axis is not None:
         chains = [(style, _rotated_back(chain, R)) for style, chain in chains]
     loops: list[Loop] = []
@@ -349,6 +342,35 @@ def part_of_strokes(
         notes.append(note)
     notes += [*_coincident_notes(loops, gap / MM), *_open_end_notes(loops)]
     return part_without_faces(path, unit, loops, gap=gap, notes=notes, left_out=left_out)
+
+
+def chains_against(
+    strokes: Sequence[Stroke], axis: Array, *, gap: float
+) -> tuple[list[tuple[Kind, Chain]], list[str]]:
+    """Return the chains of strokes, as of one layer, and what was repaired; `gap` is in m.
+
+    They nest and run as seen against the tool axis (3,), see `part_of_strokes`.
+    """
+    R = _rotation_to_axis(axis)
+    flat = [tuple(turned(curve, R, UP) for curve in stroke) for stroke in strokes]
+    chains, repaired = _chained(flat, gap / MM, R)
+    told = _nested(chains, gap / MM)
+    return [(kind, _rotated_back(chain, R)) for kind, chain in told], repaired
+
+
+def _nested(chains: Sequence[Chain], gap: float) -> list[tuple[Kind, Chain]]:
+    """Return the kind of each chain, and the chain in the direction of that; `gap` is in mm."""
+    holes = iter(_are_holes([chain for chain in chains if chain.is_closed], gap))
+    told = list[tuple[Kind, Chain]]()
+    for chain in chains:
+        kind: Kind = "open"
+        if chain.is_closed:
+            kind = "inner" if next(holes) else "outer"
+            if (chain.area[2] > 0) != (kind == "outer"):
+                other_way = tuple(backwards(curve) for curve in chain.edges[::-1])
+                chain = EdgeChain(edges=other_way)
+        told.append((kind, chain))
+    return told
 
 
 def _rotation_to_axis(axis: Array) -> Array:

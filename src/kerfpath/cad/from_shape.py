@@ -9,24 +9,19 @@ from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
-from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
-from OCP.Geom import Geom_TrimmedCurve
-from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
-from OCP.GeomConvert import GeomConvert
-from OCP.gp import gp_Ax2, gp_Pnt, gp_Vec
+from OCP.GeomAbs import GeomAbs_SurfaceType
 from OCP.Standard import Standard_Failure
 from OCP.TopAbs import TopAbs_ShapeEnum
-from OCP.TopoDS import TopoDS, TopoDS_Edge
-from scipy.interpolate import BSpline
+from OCP.TopoDS import TopoDS
 
 from kerfpath.arrays import Array, Ints, freeze
 from kerfpath.cad.build import STEMS, SUNK, named_loops
 from kerfpath.cad.chains import part_of_strokes
-from kerfpath.cad.curves import Arc, Curve, Line, Spline
 from kerfpath.cad.left_out import LeftOut, counted, nothing_drawn
 from kerfpath.cad.loops import FaceLoop, bounds_of, loops_of
+from kerfpath.cad.on_faces import LaidLoop, curve_of, curves_on_faces
 from kerfpath.cad.part import Loop, Part
 from kerfpath.cad.rims import SkinLoop
 from kerfpath.cad.shape import (
@@ -160,7 +155,14 @@ def _part_of_faces(
         loop if around.border is None else replace(loop, countersink=borders[id(around.border)])
         for loop, around in named
     ]
-    left_out = tuple(sorted([*drawn.left_out, *unread], key=lambda each: not each.may_cut))
+    laid = curves_on_faces(
+        drawn.curves, [named.face for named in faces], _sheets(skins, len(faces)), gap
+    )
+    names_of = [bent_of.get(f) or piece_of[f] or names[f] for f in range(len(faces))]
+    loops += _laid_loops(laid.loops, names, names_of, gap)
+    left_out = tuple(
+        sorted([*drawn.left_out, *unread, *laid.left_out], key=lambda each: not each.may_cut)
+    )
     return Part(
         path=path,
         unit=drawn.unit,
@@ -173,6 +175,7 @@ def _part_of_faces(
             *unsure,
             *_doubts(skins, skin_names, names),
             *_blind_notes(loops),
+            *laid.notes,
         ),
         left_out=left_out,
         frames=drawn.frames,
@@ -200,6 +203,36 @@ def _triangles(mesh: Mesh, numbers: Sequence[int]) -> tuple[Array, Ints]:
     vertices, triangles, sizes = mesh
     face = np.repeat(np.array(numbers, dtype=np.int64), sizes)
     return vertices[triangles[face >= 0]].reshape(-1, 3, 3), face[face >= 0]
+
+
+def _sheets(skins: Sequence[Skin], count: int) -> list[int]:
+    """Return a number for each face, the same for those of a skin, also over sharp edges."""
+    sheet = list(range(count))
+    for skin in skins:  # bent ones come last
+        for f in skin.faces:
+            sheet[f] = min(skin.faces)
+    return sheet
+
+
+def _laid_loops(
+    found: Sequence[LaidLoop], names: Sequence[str], wide: Sequence[str], gap: float
+) -> list[Loop]:
+    """Return the loops drawn on faces, numbered for each face, or for the skin if on several."""
+    on: dict[str, list[LaidLoop]] = {}
+    for each in found:
+        first, *others = each.faces
+        on.setdefault(wide[first] if others else names[first], []).append(each)
+    return [
+        replace(loop, name=f"{face}/curve{number}")
+        for face, own in on.items()
+        for number, loop in enumerate(
+            named_loops(
+                [(each.kind, each.chain, "") for each in own],
+                face=face, surface="curves", gap=gap, layer="",
+            ),
+            start=1,
+        )
+    ]  # fmt: skip
 
 
 def _readable(
@@ -330,49 +363,9 @@ def _part_of_lines(path: Path, drawn: NamedShape, gap: float, axis: Array) -> Pa
     for edge in list_shapes(drawn.shape, TopAbs_ShapeEnum.TopAbs_EDGE):
         edges.Add(edge)
     numbers = range(1, edges.Extent() + 1)
-    strokes = [(_curve(TopoDS.Edge(edges.FindKey(number))),) for number in numbers]
+    strokes = [(curve_of(TopoDS.Edge(edges.FindKey(number))),) for number in numbers]
     part = part_of_strokes(
         path, drawn.unit, {WIRE_STYLE: strokes}, gap=gap, notes=drawn.notes,
         left_out=drawn.left_out, axis=axis,
     )  # fmt: skip
     return replace(part, frames=drawn.frames)
-
-
-def _curve(edge: TopoDS_Edge) -> Curve:
-    adaptor = BRepAdaptor_Curve(edge)
-    first, last = adaptor.FirstParameter(), adaptor.LastParameter()
-    kind = adaptor.GetType()
-    if kind == GeomAbs_CurveType.GeomAbs_Line:
-        return Line(_vector(adaptor.Value(first)), _vector(adaptor.Value(last)))
-    if kind == GeomAbs_CurveType.GeomAbs_Circle:
-        circle = adaptor.Circle()
-        return _arc(circle.Position(), circle.Radius(), circle.Radius(), first, last)
-    if kind == GeomAbs_CurveType.GeomAbs_Ellipse:
-        ellipse = adaptor.Ellipse()
-        radii = ellipse.MajorRadius(), ellipse.MinorRadius()
-        return _arc(ellipse.Position(), *radii, first, last)
-    trimmed = Geom_TrimmedCurve(BRep_Tool.Curve_s(edge, first, last), first, last)
-    spline = GeomConvert.CurveToBSplineCurve_s(trimmed)
-    poles = range(1, spline.NbPoles() + 1)
-    weights = np.array([spline.Weight(k) for k in poles])
-    points = np.array([_vector(spline.Pole(k)) for k in poles])
-    net = np.column_stack([points * weights[:, None], weights])
-    knots = [
-        spline.Knot(k)
-        for k in range(1, spline.NbKnots() + 1)
-        for _ in range(spline.Multiplicity(k))
-    ]
-    return Spline(
-        BSpline(np.array(knots), net, spline.Degree()),
-        spline.FirstParameter(),
-        spline.LastParameter(),
-    )
-
-
-def _arc(at: gp_Ax2, major: float, minor: float, first: float, last: float) -> Arc:
-    x, y = gp_Vec(at.XDirection()), gp_Vec(at.YDirection())
-    return Arc(_vector(at.Location()), major * _vector(x), minor * _vector(y), first, last)
-
-
-def _vector(at: gp_Pnt | gp_Vec) -> Array:
-    return np.array([at.X(), at.Y(), at.Z()])

@@ -18,8 +18,9 @@ ON_SURFACE = 1e-7
 """Distance (mm) from the surface at which they end."""
 ASKEW = 0.3
 """Least cosine between the direction and a normal of the surface."""
-HALVED = (32, 64, 128)
-"""Number of chords per smooth stretch from which the length is extrapolated, to 1e-9 of it."""
+CHORDS, LEAST = 128, 8
+"""Number of chords along an edge, and along each smooth stretch at least, from which the length is
+extrapolated: to 1e-9 of it for a circle."""
 
 
 class LaidEdge:
@@ -72,9 +73,9 @@ class LaidEdge:
 
     @cached_property
     def _spread(self) -> Array:
-        """Points (B, 129, 3) mm along each smooth stretch, evenly in the parameter."""
+        """Points (B, 4 n + 1, 3) mm along each smooth stretch, evenly in the parameter."""
         breaks = self.breaks()
-        part = np.linspace(0.0, 1.0, HALVED[-1] + 1)
+        part = np.linspace(0.0, 1.0, 4 * (max(LEAST, CHORDS // (len(breaks) - 1)) // 4) + 1)
         t = breaks[:-1, None] + np.diff(breaks)[:, None] * part
         t[:, -1] = breaks[1:]
         return self.evaluate(t.ravel())[0].reshape(*t.shape, 3)
@@ -91,7 +92,7 @@ class LaidEdge:
     @cached_property
     def length(self) -> float:
         """Arc length, mm: chords of halved steps, extrapolated (Romberg)."""
-        chords = [np.diff(self._spread[:, :: HALVED[-1] // n], axis=1) for n in HALVED]
+        chords = [np.diff(self._spread[:, ::every], axis=1) for every in (4, 2, 1)]
         a, b, c = (float(np.linalg.norm(each, axis=2).sum()) for each in chords)
         return (64 * c - 20 * b + a) / 45
 

@@ -380,7 +380,7 @@ class HealedSurface:
     """
 
     def __init__(self, edges: Sequence[OrientedEdge]) -> None:
-        self._surfaces = [_Untrimmed(edge) for edge in edges]
+        self._surfaces = [UntrimmedSurface(edge.face, edge.surface) for edge in edges]
         counts = [int(edge.length / STEP) + 2 for edge in edges]
         along = [
             edge.evaluate(np.linspace(edge.start, edge.end, count))
@@ -409,27 +409,35 @@ class HealedSurface:
         return found * MM, normals
 
 
-class _Untrimmed:
-    """The surface of an edge's face without its bounds."""
+class UntrimmedSurface:
+    """The surface of a face without its bounds.
 
-    def __init__(self, edge: OrientedEdge) -> None:
-        self._edge = edge
-        self._surface = ShapeAnalysis_Surface(BRep_Tool.Surface_s(edge.face))
+    Parameters
+    ----------
+    face : TopoDS_Face
+    adaptor : BRepAdaptor_Surface
+        Of that face.
+    """
+
+    def __init__(self, face: TopoDS_Face, adaptor: BRepAdaptor_Surface) -> None:
+        self._adaptor = adaptor
+        self._outward = -1.0 if face.Orientation() == REVERSED else 1.0
+        self._surface = ShapeAnalysis_Surface(BRep_Tool.Surface_s(face))
 
     def nearest(self, points: Array) -> tuple[Array, Array]:
         """Return the nearest points (K, 3) mm and the outward normals (K, 3) there."""
-        if self._edge.surface.GetType() == PLANE:
-            plane = self._edge.surface.Plane().Position()
+        if self._adaptor.GetType() == PLANE:
+            plane = self._adaptor.Plane().Position()
             normal = _vector(plane.XDirection().XYZ().Crossed(plane.YDirection().XYZ()))
             off = (points - _vector(plane.Location().XYZ())) @ normal
-            normals = np.tile(self._edge.outward * normal, (len(points), 1))
+            normals = np.tile(self._outward * normal, (len(points), 1))
             return points - off[:, None] * normal, normals
         on, normals = np.empty_like(points), np.empty_like(points)
         for k, point in enumerate(points.tolist()):
             uv = self._surface.ValueOfUV(gp_Pnt(*point), PRECISION)
             at, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
-            self._edge.surface.D1(uv.X(), uv.Y(), at, du, dv)
+            self._adaptor.D1(uv.X(), uv.Y(), at, du, dv)
             normal = _vector(du.Crossed(dv).XYZ())
             size = float(np.linalg.norm(normal))
-            on[k], normals[k] = _vector(at.XYZ()), normal * (self._edge.outward / (size or 1.0))
+            on[k], normals[k] = _vector(at.XYZ()), normal * (self._outward / (size or 1.0))
         return on, normals

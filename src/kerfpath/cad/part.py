@@ -116,7 +116,8 @@ class Loop:
     Parameters
     ----------
     name : str
-        Unique in the part: the face's name, then /outer or /hole1, /hole2, ... or /line1, ...
+        Unique in the part: the face's name, then /outer, /hole1, /sunk1, /line1, or /curve1 if it
+        is drawn on the face.
     face : str
         Name of the face or skin whose normal the tool axis opposes; in a DXF the layer.
     kind : "outer", "inner" or "open"
@@ -124,7 +125,7 @@ class Loop:
         drawn as an open line.
     surface : str
         Kind of surface: plane, cylinder, cone, sphere, torus, bspline, ...; skin for several faces,
-        points for a table or tool path, lines for lines in space.
+        points for a table or tool path, lines for lines in space, curves for those drawn on faces.
     length : float m
     bounding_box : (2, 3) m
         Least and greatest coordinates.

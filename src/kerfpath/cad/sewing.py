@@ -225,12 +225,9 @@ def sewn_shape(
     InputError
         Neither faces nor lines, or no face left after sewing.
     """
-    lines = len(list_shapes(shape, EDGE, avoid=FACE))
+    lines = list_shapes(shape, EDGE, avoid=FACE)
     if not (faces or lines):
         raise nothing_drawn(left_out)
-    if lines and faces:
-        lost = LeftOut(kind="curve", reason="it bounds no face", count=lines, may_cut=True)
-        left_out = [*left_out, lost]
     solids = list_shapes(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
     if not solids and len(faces) > 1:
         loose = len(faces)
@@ -242,7 +239,10 @@ def sewn_shape(
             left_out = [*left_out, vanished]
         if not faces:
             raise nothing_drawn(left_out)
-    return NamedShape(unit=unit, shape=shape, faces=faces, notes=notes, left_out=left_out)
+    return NamedShape(
+        unit=unit, shape=shape, faces=faces, notes=notes, left_out=left_out,
+        curves=[TopoDS.Edge(line) for line in lines] if faces else (),
+    )  # fmt: skip
 
 
 def _sewn(faces: Sequence[NamedFace], gap: float) -> tuple[TopoDS_Shape, list[NamedFace], str]:

@@ -25,7 +25,14 @@ from OCP.Standard import Standard_Failure
 from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape
+from OCP.TopoDS import (
+    TopoDS,
+    TopoDS_Compound,
+    TopoDS_Edge,
+    TopoDS_Face,
+    TopoDS_Iterator,
+    TopoDS_Shape,
+)
 
 from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.cad.left_out import LeftOut
@@ -70,6 +77,8 @@ class NamedShape:
     notes : sequence of str
     left_out : sequence of LeftOut
         What is in the file but not in the shape.
+    curves : sequence of TopoDS_Edge
+        Curves that bound no face, beside faces.
     frames : mapping of str to (4, 4) m
         T_part_frame of the named coordinate systems of the file.
     """
@@ -79,22 +88,25 @@ class NamedShape:
     faces: Sequence[NamedFace]
     notes: Sequence[str]
     left_out: Sequence[LeftOut] = ()
+    curves: Sequence[TopoDS_Edge] = ()
     frames: Mapping[str, Array] = field(default_factory=dict)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what is needed to rebuild the shape in another process."""
-        both, faces, builder = TopoDS_Compound(), TopoDS_Compound(), BRep_Builder()
-        builder.MakeCompound(faces)
-        for named in self.faces:
-            builder.Add(faces, named.face)
-        builder.MakeCompound(both)
-        builder.Add(both, self.shape)
-        builder.Add(both, faces)
+        own: list[TopoDS_Shape] = [named.face for named in self.faces]
         stream = BytesIO()
-        BinTools.Write_s(both, stream)
+        BinTools.Write_s(_compound(self.shape, _compound(*own), _compound(*self.curves)), stream)
         names = [(n.name, n.component, n.layer, n.colour) for n in self.faces]
         rest = tuple(self.notes), tuple(self.left_out), dict(self.frames)
         return _copy_with_names, (self.unit, stream.getvalue(), names, *rest)
+
+
+def _compound(*shapes: TopoDS_Shape) -> TopoDS_Compound:
+    compound, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(compound)
+    for shape in shapes:
+        builder.Add(compound, shape)
+    return compound
 
 
 def _copy_with_names(
@@ -105,9 +117,9 @@ def _copy_with_names(
     left_out: Sequence[LeftOut],
     frames: Mapping[str, Array],
 ) -> NamedShape:
-    both = TopoDS_Shape()
-    BinTools.Read_s(both, BytesIO(stream))
-    shape, faces = children(both)
+    every = TopoDS_Shape()
+    BinTools.Read_s(every, BytesIO(stream))
+    shape, faces, curves = children(every)
     named = [
         NamedFace(
             face=TopoDS.Face(face), name=name, component=component, layer=layer, colour=colour
@@ -115,8 +127,9 @@ def _copy_with_names(
         for face, (name, component, layer, colour) in zip(children(faces), names, strict=True)
     ]
     return NamedShape(
-        unit=unit, shape=shape, faces=named, notes=notes, left_out=left_out, frames=frames
-    )
+        unit=unit, shape=shape, faces=named, notes=notes, left_out=left_out,
+        curves=[TopoDS.Edge(curve) for curve in children(curves)], frames=frames,
+    )  # fmt: skip
 
 
 def children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
