@@ -237,6 +237,25 @@ def test_what_is_written_is_read(
 
 
 GOOD = "UNITS/MM\nRAPID\nGOTO/0,0,0,0,0,1\nGOTO/10,0,0\nGOTO/10,20,0\n"
+
+
+@pytest.mark.parametrize("up", [1, -1])
+def test_a_circle_turns_about_its_axis(tmp_path: Path, up: int) -> None:
+    """As Creo writes it: counter-clockwise about 0,0,1, clockwise about 0,0,-1."""
+    text = (
+        "UNITS/MM\nRAPID\nGOTO/10,-5,0,0,0,1\nGOTO/10,0,0\n"
+        f"CIRCLE/10,10,0,0,0,{up},10\nFEDRAT/9\nGOTO/20,10,0\nGOTO/25,10,0\n"
+    )
+    path = tmp_path / "a.ncl.cl"
+    path.write_text(text)
+    points = 1e3 * read(path).contour("cut1", closed=False).points
+    on = points[1:-1] - [10, 10, 0]
+    assert np.linalg.norm(on, axis=1) == pytest.approx(10, abs=1e-9)
+    turned = np.degrees(np.unwrap(np.arctan2(on[:, 1], on[:, 0])))
+    assert turned[-1] - turned[0] == pytest.approx(90 if up > 0 else -270, abs=1e-9)
+    assert points[-1] == pytest.approx([25, 10, 0])
+
+
 REFUSED = {
     "no unit": (GOOD.replace("UNITS/MM\n", ""), "states no length unit; give it with unit="),
     "unknown unit": (GOOD.replace("MM", "PARSECS"), "line 1: UNITS: expected one of MM"),
@@ -255,7 +274,13 @@ REFUSED = {
     "a word for a number": (GOOD + "GOTO/P1,2,3\n", "line 6: GOTO: expected a number, got 'P1'"),
     "an underscore": (GOOD + "GOTO/1_0,2,3\n", "line 6: GOTO: expected a number, got '1_0'"),
     "infinity": (GOOD + "GOTO/inf,2,3\n", "line 6: GOTO: expected a number, got 'INF'"),
-    "a circle": (GOOD + "CIRCLE/0,0,0,0,0,1,5,.01,.5,10,0\n", "line 6: 'CIRCLE/.*': a curve; have"),
+    "a circle of NX": (GOOD + "CIRCLE/0,0,0,0,0,1,5,.01,.5,10,0\n", "line 6: CIRCLE: expected 7"),
+    "a circle without an end": (GOOD + "CIRCLE/0,0,0,0,0,1,5\n", "ends after a CIRCLE"),
+    "a circle to a rapid move": (GOOD + "CIRCLE/0,0,0,0,0,1,5\nRAPID\n", "line 7: expected the G"),
+    "a circle from a rapid move": (GOOD + "RAPID\nCIRCLE/0,0,0,0,0,1,5\n", "line 7: CIRCLE: exp"),
+    "a circle beside its end": (
+        GOOD + "CIRCLE/10,25,0,0,0,1,5\nGOTO/10,31,0\n", "line 7: an arc that begins"
+    ),
     "an arc": (GOOD + "TLON,GOFWD/(CIRCLE/0,0,0,5),ON\n", "line 6: 'TLON,GOFWD/.*linear moves"),
     "another arc": (GOOD + "MOVARC/0,0,0,0,0,1,5,ANGLE,90\n", "line 6: 'MOVARC/.*linear moves"),
     "compensation": (GOOD + "CUTCOM/LEFT\n", "line 6: 'CUTCOM/LEFT': the controller would offset"),

@@ -135,12 +135,65 @@ def test_an_axis_where_the_program_says_none(tmp_path: Path) -> None:
         program(tmp_path, text)
 
 
+ARCS = {
+    "left, a quarter": ("G17\nG3 X20 Y10 J10", (10, 10, 0), (0, 0, 1), 90),
+    "right, a quarter": ("G2 X20 Y-10 J-10", (10, -10, 0), (0, 0, -1), 90),
+    "right, three quarters": ("G2 X20 Y10 J10", (10, 10, 0), (0, 0, -1), 270),
+    "a full circle": ("G3 I5", (15, 0, 0), (0, 0, 1), 360),
+    "left, by its radius": ("G3 X20 Y10 R10", (10, 10, 0), (0, 0, 1), 90),
+    "left, more than a half": ("G3 X20 Y10 CR=-10", (20, 0, 0), (0, 0, 1), 270),
+    "right, by its radius": ("G2 X20 Y10 R10", (20, 0, 0), (0, 0, -1), 90),
+    "a half by its radius": ("G3 X10 Y20 R10", (10, 10, 0), (0, 0, 1), 180),
+    "rising": ("G3 X20 Y10 Z3 J10", (10, 10, 0), (0, 0, 1), 90),
+    "in ZX, from Z to X": ("G18\nG3 X20 Z-10 K-10", (10, 0, -10), (0, 1, 0), 90),
+    "in YZ, from Y to Z": ("G19\nG2 Y10 Z-10 K-10", (10, 0, -10), (-1, 0, 0), 90),
+}
+"""The blocks from X10 Y0 Z0 on, and the centre, the normal and the turn (deg) of the arc."""
+
+
+@pytest.mark.parametrize("case", ARCS)
+def test_arcs_are_chords_within_a_micrometre(tmp_path: Path, case: str) -> None:
+    text, centre, normal, turn = ARCS[case]
+    text = f"G21 G90 G40 G49 G80 G64 P0.01\nG0 X10 Y0 Z0\n{text}\nM2\n"
+    part = program(tmp_path, text, name="cut.ngc", axis=(0.6, 0.64, -0.48))
+    points = 1e3 * part.contour("cut1", closed=False).points - centre
+    rise = points @ normal
+    flat = points - rise[:, None] * normal
+    radius = np.linalg.norm(flat[0])
+    assert np.linalg.norm(flat, axis=1) == pytest.approx(radius, abs=1e-9)
+    steps = np.arctan2(np.cross(flat[:-1], flat[1:]) @ normal, (flat[:-1] * flat[1:]).sum(axis=1))
+    assert steps == pytest.approx(np.radians(turn) / len(steps), abs=1e-9)
+    assert np.diff(rise) == pytest.approx((3 if case == "rising" else 0) / len(steps), abs=1e-9)
+    assert radius * (1 - np.cos(steps[0] / 2)) <= 1e-3
+
+
+def test_a_vector_of_iso_programs_is_the_tool_axis(tmp_path: Path) -> None:
+    """Under G43.5, missing ones of I, J and K are 0; a block without any keeps the vector."""
+    text = "G21\nG43.5 H1\nG0 X0 Y0 Z0 K1\nG1 X10\nX20 I3 K4\nG49\nM30\n"
+    contour = program(tmp_path, text).contour("cut1", closed=False)
+    assert contour.axes == pytest.approx(np.array([[0, 0, -1], [0, 0, -1], [-0.6, 0, -0.8]]))
+
+
 S = "G710\nTRAORI\nG0 X0 Y0 Z0 A3=0 B3=0 C3=1\nG1 X10\nY20\n"
 H = "BEGIN PGM A MM\nLN X0 Y0 Z0 TX0 TY0 TZ1 FMAX M128\nL X10 F9\nL Y20\n"
 REFUSED = {
     "no unit": (S.replace("G710\n", ""), "states no length unit; give it with unit="),
     "a late unit": (S + "G700\n", "line 6: G700 after moves in another unit"),
-    "an arc": (S + "G2 X20 I5\n", "line 6: 'G2': a curve; have the CAM system write linear"),
+    "an arc without its centre": (S + "G2 X20\n", "line 6: an arc without its centre"),
+    "an arc beside its end": (S + "G2 X20 Y20 I4\n", "line 6: an arc that begins 4 mm"),
+    "an arc from nowhere": ("G21\nG0 X0 Y0\nG2 X9 I4.5 Z0\n", "line 3: an arc from a place"),
+    "a centre across the plane": (S + "G2 X20 K5\n", "line 6: an arc: expected its centre"),
+    "two centres": (S + "G2 X20 I5 R5\n", "line 6: an arc: expected its centre"),
+    "a full circle by its radius": (S + "G2 X10 Y20 R5\n", "line 6: an arc of radius 5 between"),
+    "too small a radius": (S + "G2 X30 R5\n", "line 6: an arc of radius 5 between places 20 apart"),
+    "two kinds of moves": (S + "G2 G1 X20 I5\n", "line 6: G1 and G2 in one block"),
+    "absolute centres": (S + "G90.1\n", r"line 6: 'G90\.1': absolute centres of arcs"),
+    "an arc under G43.5": (
+        "G21\nG43.5\nG0 X0 Y0 Z0 I0 J0 K1\nG1 X9\nG2 X5 I-2\n", r"line 5: an arc under G43\.5"
+    ),
+    "a vector after G49": (
+        "G21\nG43.5\nG0 X0 Y0 Z0 I0 J0 K1\nG1 X9\nG49\nG0 X0 Y0 Z0 K1\n", "line 6: 'K': the word"
+    ),
     "another arc": (S + "CIP X20 I1=5\n", "line 6: 'CIP': a curve"),
     "increments": (S + "G91 X5\n", "line 6: 'G91': increments; write absolute"),
     "an increment": (S + "X=IC(5)\n", "line 6: X=: expected a number"),
@@ -168,7 +221,7 @@ REFUSED = {
     "a cycle called": (S + "M99\n", "line 6: M99: a program that is called is not read"),
     "another program that is called": (S + "PART_TWO(1)\n", "line 6: 'PART_TWO': the word is not"),
     "a loop": (S + "GOTOB A\n", "line 6: expected words such as X1.5 .*, got 'A'"),
-    "an unknown G": (S + "G43.4 H1\n", "line 6: 'G43.4': the word is not known"),
+    "an unknown G": (S + "G43.4 H1\n", "line 6: 'G43.4': rotary axes"),
     "a skipped block": (S + "/X5\n", "line 6: a block that the machine may skip"),
     "no words": (S + "X5 ?\n", r"line 6: expected words such as X1\.5 or A3=0\.5, got ' \?'"),
     "a number of two points": (S + "X1.5.2\n", "line 6: expected words"),

@@ -10,6 +10,7 @@ from kerfpath.arrays import Array
 from kerfpath.cad.part import Part
 from kerfpath.cad.toolpath import (
     UNKNOWN,
+    Arc,
     Move,
     ToolPath,
     Triple,
@@ -38,7 +39,7 @@ BEGINS = ("END-OF-PATH", "LOAD", "LOADTL", "TOOL PATH")
 ENDS = ("END", "FINI")
 REFUSED = {
     **dict.fromkeys(
-        ("ARCMOV", "CIRCLE", "GOFWD", "HELIX", "INDIRV", "MOVARC", "NURBS", "SPLINE", "TLON"),
+        ("ARCMOV", "GOFWD", "HELIX", "INDIRV", "MOVARC", "NURBS", "SPLINE", "TLON"),
         "a curve; have the CAM system write linear moves only",
     ),
     **dict.fromkeys(
@@ -73,6 +74,7 @@ def read_apt(
     reader = _Reader()
     for line, word, rest in _statements(lines_of(content)):
         reader.take(line, word, rest)
+    reader.require_whole()
     tool_path = ToolPath(
         moves=reader.moves, unit=reader.unit, notes=reader.notes, unused=reader.unused
     )
@@ -122,6 +124,7 @@ class _Reader:
         self._is_rapid = False
         self._operation = ""
         self._system: tuple[float, ...] = ()
+        self._arc: Arc | None = None
         self._end = 0
 
     def take(self, line: int, word: str, rest: str) -> None:
@@ -133,10 +136,14 @@ class _Reader:
             A statement that is not known, or that changes the path.
         """
         where, values = f"line {line}", [value.strip(BLANK) for value in upper(rest).split(",")]
+        if self._arc is not None and word != "GOTO" and word not in (*TEXTS, *HARMLESS):
+            raise InputError(f"{where}: expected the GOTO that ends a CIRCLE, got {word[:40]!r}")
         if word in ("GOTO", "FROM"):
             self._goto(where, line, word, values)
         elif word in TEXTS or (word in HARMLESS and "RAPID" not in values):
             self.unused.add(word)
+        elif word == "CIRCLE":
+            self._circle(where, _numbers(where, word, values, (7,)))
         elif word == "UNITS":
             self._units(where, values)
         elif word == "MULTAX" and values in ([""], ["ON"], ["OFF"]):
@@ -159,6 +166,7 @@ class _Reader:
 
     def _goto(self, where: str, line: int, word: str, values: Sequence[str]) -> None:
         numbers = _numbers(where, word, values, (3, 6))
+        arc, self._arc = self._arc, None
         if self._end:
             raise InputError(f"{where}: a move after the end of the path in line {self._end}")
         if len(numbers) == 6:
@@ -168,9 +176,22 @@ class _Reader:
         self.moves.append(
             Move(
                 line=line, kind="feed" if is_feed else "rapid", point=_triple(numbers),
-                axis=self._axis, operation=self._operation,
+                axis=self._axis, operation=self._operation, arc=arc,
             )
         )  # fmt: skip
+
+    def require_whole(self) -> None:
+        """Raise InputError if the file ends before a move does."""
+        if self._arc is not None:
+            raise InputError("ends after a CIRCLE, without the GOTO that ends its arc")
+
+    def _circle(self, where: str, numbers: Sequence[float]) -> None:
+        """Take the circle along which the next GOTO moves, counter-clockwise about its axis."""
+        if not self.moves or self.moves[-1].point is None or self._is_rapid:
+            raise InputError(f"{where}: CIRCLE: expected a GOTO at feed to its start before it")
+        i, j, k = numbers[3:6]
+        normal = unit_axis((i, j, k), where)
+        self._arc = Arc(_triple(numbers), normal)
 
     def _direction(self, where: str, numbers: Sequence[float]) -> Triple:
         axis = unit_axis(_triple(numbers), where)

@@ -1,16 +1,19 @@
-"""Read programs for 5-axis machines with the tool axis as a vector: Siemens, Heidenhain."""
+"""Read programs of machines with the tool axis as a vector: Siemens, ISO, Heidenhain."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from kerfpath.arrays import Array
 from kerfpath.cad.klartext import is_klartext, klartext_path
 from kerfpath.cad.part import Part
 from kerfpath.cad.toolpath import (
     UNKNOWN,
+    Arc,
     Tip,
     ToolPath,
     Triple,
@@ -24,7 +27,7 @@ from kerfpath.text import upper
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 WORD = re.compile(
-    rf"\s*(?:(?P<named>[A-Z]\d*)\s*=\s*(?P<value>{NUMBER})?"
+    rf"\s*(?:(?P<named>CR|[A-Z]\d*)\s*=\s*(?P<value>{NUMBER})?"
     rf"|(?P<keyword>[A-Z_][A-Z_][A-Z0-9_]*)\s*(?P<arguments>\([^)]*\))?"
     rf"|(?P<letter>[A-Z])\s*(?P<number>{NUMBER})"
     rf"|(?P<comment>\([^)]*\)))",
@@ -33,16 +36,20 @@ WORD = re.compile(
 TEXT = re.compile(r'MSG\s*\(.*\)|T\s*=\s*"[^"]*"')
 """Words with text: a message, the name of a tool."""
 HEADER = re.compile(r"%|[O:]\d+\s*$|\$PATH", re.ASCII)
-AXIS = ("A3", "B3", "C3")
+AXIS, CENTRE = ("A3", "B3", "C3"), ("I", "J", "K")
+PLANES = {17: 2, 18: 1, 19: 0}
+"""The axis that arcs turn about, by their plane."""
 UNITS = {20: "in", 21: "mm", 70: "in", 71: "mm", 700: "in", 710: "mm"}
 OFFSETS = (54, 55, 56, 57, 58, 59, 500, *range(505, 600))
 HARMLESS_G = (
-    *(9, 17, 18, 19, 40, 60, 61, 62, 64, 80, 90, 93, 94, 95, 96, 97),
+    *(9, 40, 43, 60, 61, 62, 64, 80, 90, 91.1, 93, 94, 95, 96, 97),
     *(601, 602, 603, 641, 642, 643, 644, 645),
 )
 REFUSED_G: dict[float, str] = {
-    **dict.fromkeys((2, 3, 5, 6), "a curve; have the CAM system write linear moves only"),
+    **dict.fromkeys((5, 6), "a curve; have the CAM system write linear moves only"),
     **dict.fromkeys((41, 42), "the controller would offset the path; write the path of the tip"),
+    43.4: "rotary axes, whose effect depends on the machine; write G43.5 and I J K, or APT",
+    90.1: "absolute centres of arcs; write them from the start of each arc, under G91.1",
     91: "increments; write absolute positions, under G90",
 }
 AWAY = ("G28", "G30", "G74", "G75")
@@ -59,6 +66,8 @@ REFUSED = {
                     "a curve; have the CAM system write linear moves only"),
     "ORIMKS": "tool axes in the machine, not in the part; write ORIWKS",
 }  # fmt: skip
+ROUNDED = 1e-3
+"""Share by which rounding may leave a radius too short for its chord."""
 ENDS = (2, 17, 30)
 TOOL_CHANGE = 6
 CALLS = (98, 99)
@@ -136,7 +145,7 @@ class _Block:
         InputError
             A repeated word.
         """
-        if len(name) > 1 and not name[1:].isdigit():
+        if len(name) > 1 and not name[1:].isdigit() and name != "CR":
             self.keywords[name] = value
         elif name in "GM":
             (self.g if name == "G" else self.m).append(finite(value, f"{self.where}: {name}"))
@@ -153,8 +162,10 @@ class _Program:
         self.tip = Tip()
         self.unit = ""
         self.unused: set[str] = set()
-        self._feed: bool | None = None
+        self._motion: int | None = None
+        self._plane = PLANES[17]
         self._is_oriented = False
+        self._by_ijk = False
         self._offset = 0.0
         self._end = 0
 
@@ -173,8 +184,12 @@ class _Program:
         for g in block.g:
             away |= self._g(block, g)
         place = {name: words.pop(name) for name in "XYZ" if name in words}
-        vector = [words.pop(name, 0.0) if name in words else None for name in AXIS]
+        arc = self._arc(block, place) if self._motion in (2, 3) else None
+        names = CENTRE if self._by_ijk else AXIS
+        vector = [words.pop(name, 0.0) if name in words else None for name in names]
         words.pop("N", None)
+        if 4 in block.g or 64 in block.g:
+            words.pop("P", None)  # a time, or a tolerance
         if unknown := [name for name in words if name.rstrip("0123456789") not in UNUSED]:
             raise InputError(f"{where}: {_word_refusal(unknown[0])}")
         self.unused |= {name.rstrip("0123456789") for name in words} | ({"M"} if block.m else set())
@@ -184,8 +199,8 @@ class _Program:
             raise InputError(f"{where}: G4 with X, Y or Z: expected G4 F")
         if away and (place or not any(keyword in MACHINE for keyword in block.keywords)):
             self._away(block)
-        elif place or any(value is not None for value in vector):
-            self._move(block, place, vector)
+        elif place or arc is not None or any(value is not None for value in vector):
+            self._move(block, place, vector, arc)
         if TOOL_CHANGE in block.m:
             self.tip.forget(line)
         if any(m in ENDS for m in block.m):
@@ -211,10 +226,16 @@ class _Program:
     def _g(self, block: _Block, g: float) -> bool:
         """Take one G word; return whether the positions are not in part coordinates."""
         where = block.where
-        if g in (0, 1):
-            if 1 - g in block.g:
-                raise InputError(f"{where}: G0 and G1 in one block")
-            self._feed = g == 1
+        if g in (0, 1, 2, 3):
+            motions = sorted({other for other in block.g if other in (0, 1, 2, 3)})
+            if len(motions) > 1:
+                raise InputError(f"{where}: G{motions[0]:g} and G{motions[1]:g} in one block")
+            self._motion = int(g)
+        elif g in PLANES:
+            self._plane = PLANES[int(g)]
+        elif g == 43.5 or (g == 49 and self._by_ijk):
+            self._by_ijk = self._is_oriented = g == 43.5
+            self.tip.forget(block.line)
         elif g in UNITS:
             if self.unit != UNITS[int(g)] and (self.unit or self.tip.has_places):
                 raise InputError(f"{where}: G{g:g} after moves in another unit, or without one")
@@ -225,21 +246,64 @@ class _Program:
             self._offset = g
         elif f"G{g:g}" in (*AWAY, *MACHINE):
             return True
-        elif g not in HARMLESS_G and g != 4:
+        elif g not in (*HARMLESS_G, 4, 49):
             raise InputError(f"{where}: 'G{g:g}': {REFUSED_G.get(g, UNKNOWN)}")
         return False
 
     def _away(self, block: _Block) -> None:
         machine = [f"G{g:g}" for g in block.g if f"G{g:g}" in MACHINE] + list(block.keywords)
-        if self._feed and machine:
+        if self._motion and machine:
             raise InputError(
                 f"{block.where}: {machine[0]} at feed: its position is in machine coordinates, not "
                 "in the part"
             )
         self.tip.go_away(block.line)
 
-    def _move(self, block: _Block, place: dict[str, float], vector: Sequence[float | None]) -> None:
-        if self._feed is None:
+    def _arc(
+        self, block: _Block, place: Mapping[str, float]
+    ) -> Callable[[Triple, Triple], Arc] | None:
+        """Take the words of an arc; return what makes it from its ends, None without any."""
+        where, words = block.where, block.words
+        offset = {name: words.pop(name) for name in CENTRE if name in words}
+        radii = [words.pop(name) for name in ("R", "CR") if name in words]
+        if not offset and not radii:
+            if place:
+                raise InputError(f"{where}: an arc without its centre (I, J, K) or radius (R, CR=)")
+            return None
+        if self._by_ijk:
+            raise InputError(f"{where}: an arc under G43.5; have the CAM system write linear moves")
+        if CENTRE[self._plane] in offset or (offset and radii) or len(radii) > 1:
+            raise InputError(
+                f"{where}: an arc: expected its centre from its start in its plane (I and J under "
+                "G17), or its radius"
+            )
+        normal = np.eye(3)[self._plane] * (1.0 if self._motion == 3 else -1.0)
+
+        def arc(before: Triple, after: Triple) -> Arc:
+            start, end = np.array(before), np.array(after)
+            centre = start + [offset.get(name, 0.0) for name in CENTRE]
+            if radii:
+                way = end - start
+                way[self._plane] = 0.0
+                half, radius = float(np.linalg.norm(way)) / 2, abs(radii[0])
+                if not 0 < half <= radius * (1 + ROUNDED):
+                    raise InputError(
+                        f"{where}: an arc of radius {radius:g} between places {2 * half:g} apart; "
+                        "give a full circle by its centre"
+                    )
+                aside = np.cross(normal, way) / (2 * half) * np.copysign(1.0, radii[0])
+                centre = start + way / 2 + np.sqrt(max(radius**2 - half**2, 0.0)) * aside
+            x, y, z = centre.tolist()
+            i, j, k = normal.tolist()
+            return Arc((x, y, z), (i, j, k))
+
+        return arc
+
+    def _move(
+        self, block: _Block, place: dict[str, float], vector: Sequence[float | None],
+        arc: Callable[[Triple, Triple], Arc] | None,
+    ) -> None:  # fmt: skip
+        if self._motion is None:
             raise InputError(f"{block.where}: a position before any G0 or G1")
         axis: Triple | None = None
         if any(value is not None for value in vector):
@@ -247,7 +311,7 @@ class _Program:
                 raise InputError(f"{block.where}: A3 B3 C3 without TRAORI, which they need")
             a, b, c = (value or 0.0 for value in vector)  # the controller takes missing ones as 0
             axis = unit_axis((a, b, c), block.where, any_length=True)
-        self.tip.go(block.line, feed=self._feed, place=place, axis=axis)
+        self.tip.go(block.line, feed=self._motion > 0, place=place, axis=axis, arc=arc)
 
 
 def _word_refusal(name: str) -> str:

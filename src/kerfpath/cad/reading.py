@@ -60,9 +60,10 @@ def read(
     ----------
     path : str, Path or shape
         .step, .stp, .iges, .igs, .dxf; a table: .csv, .tsv or .txt; a tool path: .apt, .aptsource,
-        .cl or .cls; a program of a machine: .h, .mpf, .nc, .spf or .tap. Or a shape of OCP in
-        memory, an object with one as `.wrapped` (build123d, CadQuery), or a list of these: faces,
-        or edges. A shape is copied and read in this process, where OCCT may crash if it is damaged.
+        .cl or .cls; a program of a machine: .cnc, .gcode, .h, .mpf, .nc, .ngc, .spf or .tap. Or a
+        shape of OCP in memory, an object with one as `.wrapped` (build123d, CadQuery), or a list of
+        these: faces, or edges. A shape is copied and read in this process, where OCCT may crash if
+        it is damaged.
     unit : str, optional
         Unit of the numbers in the file, instead of that in its header: um, mm, cm, dm, m, km, mil,
         in or ft. A shape has no unit: its numbers are in mm by default.

@@ -124,8 +124,8 @@ class Rims:
     def floors(self) -> list[int]:
         """Return the floors of counterbores and flat countersinks, which are no sheet themselves.
 
-        They have one hole, the same side of the sheet is all around and above them, and what lies
-        across is plain or such a floor, unlike that of a hollow that is formed.
+        They have one hole, one side of the sheet is all around and above them, and what lies across
+        is plain or such a floor, unlike that of a hollow that is formed.
         """
         around = {
             f: sheet for f, loops in enumerate(self._found) if (sheet := self._above(f, loops))
@@ -152,8 +152,7 @@ class Rims:
         deep = (np.vstack(rising).mean(axis=0) - hole.around.mean(axis=0)) @ outline.edges[
             0
         ].end_normals[outline.edges[0].start]
-        is_step = deep > DEEP and all(self._side[g] == self._side[f] for g in sheet)
-        return sheet if is_step else set()
+        return sheet if deep > DEEP and len({self._side[g] for g in sheet}) == 1 else set()
 
     # -------------------------------------------------------------------------
     # Countersinks.

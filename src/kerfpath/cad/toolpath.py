@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import codecs
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from kerfpath.cad.build import (
 from kerfpath.cad.left_out import counted
 from kerfpath.cad.part import Loop, Part
 from kerfpath.cad.units import LARGEST, MM, UNITS_MM
-from kerfpath.contour import angle_between
+from kerfpath.contour import angle_between, slerp
 from kerfpath.errors import InputError
 from kerfpath.text import number, text_lines, upper
 
@@ -33,6 +33,20 @@ ALONG = float(np.radians(1.0))
 """rad: a move closer to the tool axis than this cuts nothing new: an approach or retract."""
 UNIT_AXIS = 1e-2
 """Largest deviation of the length of an axis from one: rounded digits pass, angles do not."""
+
+
+ARC_CHORD = 1e-3
+"""Largest distance (mm) of the chords of an arc from it."""
+ARC_ENDS, ARC_SHARE = 0.01, 1e-3
+"""Difference of the distances of the ends of an arc from its centre, by rounding of digits: mm, and
+as a share of its radius."""
+
+
+class Arc(NamedTuple):
+    """An arc: its centre (3,), and the unit vector (3,) about which it runs counter-clockwise."""
+
+    centre: Triple
+    normal: Triple
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +66,8 @@ class Move:
         Unit vector from the tip towards the spindle; None if the file has none.
     operation : str
         Name of the operation in the file.
+    arc : Arc or None
+        The arc that a feed move runs along; it rises evenly if its ends differ in height.
     """
 
     line: int
@@ -59,6 +75,7 @@ class Move:
     point: Triple | None = None
     axis: Triple | None = None
     operation: str = ""
+    arc: Arc | None = None
 
     __repr__ = short_repr
 
@@ -83,14 +100,20 @@ class Tip:
         self._place: dict[str, float] = {}
         self._axis: Triple | None = None
 
-    def go(self, line: int, *, feed: bool, place: dict[str, float], axis: Triple | None) -> None:
+    def go(
+        self, line: int, *, feed: bool, place: dict[str, float], axis: Triple | None,
+        arc: Callable[[Triple, Triple], Arc] | None = None,
+    ) -> None:  # fmt: skip
         """Move to `place`, of which any of the coordinates "X", "Y" and "Z" may be missing.
+
+        `arc` returns the arc from the place before (3,) to this one (3,).
 
         Raises
         ------
         InputError
             A feed move with a coordinate that was never given.
         """
+        before = [self._place.get(name) for name in "XYZ"]
         self._place |= place
         self._axis = axis or self._axis
         unknown = [name for name in "XYZ" if name not in self._place]
@@ -101,7 +124,13 @@ class Tip:
             return
         point = self._place["X"], self._place["Y"], self._place["Z"]
         kind: Literal["feed", "rapid"] = "feed" if feed else "rapid"
-        self.moves.append(Move(line=line, kind=kind, point=point, axis=self._axis))
+        along = None
+        if arc is not None:
+            x, y, z = before
+            if x is None or y is None or z is None:
+                raise InputError(f"line {line}: an arc from a place that is not known")
+            along = arc((x, y, z), point)
+        self.moves.append(Move(line=line, kind=kind, point=point, axis=self._axis, arc=along))
 
     def go_away(self, line: int) -> None:
         """Move to a position that is not known in the part."""
@@ -271,7 +300,50 @@ def _arrays(run: Sequence[Move], mm: float, axis: Array | None) -> tuple[Array, 
             f"line {run[far[0]].line}: a point further than {LARGEST / 1e6:g} km from the "
             "origin; check the unit"
         )
-    return points, np.array(normals), np.array([move.line for move in run])
+    lines = np.array([move.line for move in run])
+    return _with_arcs(run, points, np.array(normals), lines, mm)
+
+
+def _with_arcs(
+    run: Sequence[Move], points: Array, normals: Array, lines: Array, mm: float
+) -> tuple[Array, Array, Array]:
+    """Return the points, normals and lines with those of chords along the arcs of a run."""
+    each = [(points[:1], normals[:1], lines[:1])]
+    if run[0].arc is not None:
+        raise InputError(f"line {run[0].line}: an arc from a place that is not known")
+    for k in range(1, len(run)):
+        arc, way, axes = run[k].arc, points[k : k + 1], normals[k : k + 1]
+        if arc is not None:
+            share, way = _chords_of(arc, points[k - 1], points[k], mm, run[k].line)
+            axes = slerp(normals[k - 1], normals[k], share[:, None])
+        each.append((way, axes, np.full(len(way), lines[k])))
+    found = [np.concatenate(one) for one in zip(*each, strict=True)]
+    return found[0], found[1], found[2]
+
+
+def _chords_of(arc: Arc, start: Array, end: Array, mm: float, line: int) -> tuple[Array, Array]:
+    """Return shares (K,) of an arc, and the points (K, 3) mm there, without its start."""
+    z, centre = np.array(arc.normal), np.array(arc.centre) * mm
+    flat = [p - centre - ((p - centre) @ z) * z for p in (start, end)]
+    radii = [float(np.linalg.norm(p)) for p in flat]
+    if not min(radii) > 0 or abs(radii[1] - radii[0]) > ARC_ENDS + ARC_SHARE * radii[0]:
+        raise InputError(
+            f"line {line}: an arc that begins {radii[0]:.6g} mm from its centre and ends "
+            f"{radii[1]:.6g} mm from it; check its centre, and whether it is absolute or from the "
+            "start"
+        )
+    x = flat[0] / radii[0]
+    y = np.cross(z, x)
+    turn = float(np.arctan2(flat[1] @ y, flat[1] @ x)) % (2 * np.pi)
+    if np.linalg.norm(flat[1] - flat[0]) <= REPEATED:
+        turn = 2 * np.pi
+    step = 2 * np.arccos(max(0.0, 1 - ARC_CHORD / max(radii)))
+    share = np.linspace(0, 1, int(np.ceil(turn / step)) + 1)[1:]
+    angle, radius = turn * share[:, None], radii[0] + share[:, None] * (radii[1] - radii[0])
+    rise = ((start - centre) @ z + share * ((end - start) @ z))[:, None]
+    points = centre + radius * (np.cos(angle) * x + np.sin(angle) * y) + rise * z
+    points[-1] = end
+    return share, points
 
 
 def _along(points: Array, normals: Array) -> Array:

@@ -38,9 +38,12 @@ SUFFIXES = {
     ".aptsource": "tool path",
     ".cl": "tool path",
     ".cls": "tool path",
+    ".cnc": "NC program",
+    ".gcode": "NC program",
     ".h": "NC program",
     ".mpf": "NC program",
     ".nc": "NC program",
+    ".ngc": "NC program",
     ".spf": "NC program",
     ".tap": "NC program",
 }
