@@ -35,6 +35,32 @@ def test_rows_are_the_contour(tmp_path: Path) -> None:
     np.testing.assert_array_equal(contour.axes, np.tile([0.0, 0.0, -1.0], (4, 1)))
 
 
+def turn(about: int, deg: float) -> np.ndarray:
+    """Return the rotation about x, y or z (0, 1, 2)."""
+    c, s = np.cos(np.radians(deg)), np.sin(np.radians(deg))
+    R = np.eye(3)
+    i, j = (about + 1) % 3, (about + 2) % 3
+    R[[i, j, i, j], [i, j, j, i]] = c, c, -s, s
+    return R
+
+
+@pytest.mark.parametrize("header", ["a_deg,b_deg,c_deg", "A [deg],B [deg],C [deg]", "w,p,r"])
+def test_angles_of_poses_are_those_of_their_controller(tmp_path: Path, header: str) -> None:
+    """KUKA turns about z, then the new y, then the new x; FANUC about fixed x, y and z."""
+    rng = np.random.default_rng(2)
+    angles = np.array([170.0, 10, 175]) + rng.uniform(-25, 25, (6, 3))
+    rows = [f"{5 * k},{k},0,{x},{y},{z}\n" for k, (x, y, z) in enumerate(angles.tolist())]
+    part = table(tmp_path, f"x_mm,y_mm,z_mm,{header}\n" + "".join(rows))
+    axes = part.contour("contour", closed=False).axes
+    for (one, two, three), axis in zip(angles.tolist(), axes, strict=True):
+        z, x = (one, three) if header[0] in "aA" else (three, one)
+        R = turn(2, z) @ turn(1, two) @ turn(0, x)
+        assert axis == pytest.approx(R[:, 2], abs=1e-12)
+    # An axis for all points is what is meant if it is given.
+    given = table(tmp_path, f"x_mm,y_mm,z_mm,{header}\n" + "".join(rows), axis=(0, 0, -1))
+    assert given.contour("contour", closed=False).axes[0].tolist() == [0, 0, -1]
+
+
 def line_of_points(x: float, count: int = 5) -> str:
     """Return rows of points 1 mm apart in y, at x mm."""
     return "".join(f"{x},{k},0,0,0,1\n" for k in range(count))

@@ -11,6 +11,7 @@ from itertools import groupby, pairwise
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, short_repr
 from kerfpath.cad.build import kind_of_points, loop_of, part_without_faces, trace_of_points
@@ -139,8 +140,20 @@ POSITION = ("x", "y", "z")
 NORMAL = ("nx", "ny", "nz")
 AXIS = ("axis_x", "axis_y", "axis_z")
 QUATERNION = ("qx", "qy", "qz", "qw")
+ANGLES = {("a", "b", "c"): "ZYX", ("w", "p", "r"): "xyz"}
+"""Angles (deg) of a pose, in the order of scipy: of KUKA, about z, y, x as turned, and of FANUC,
+about x, y, z as fixed."""
 NAME = "contour"
-KNOWN = (*POSITION, *NORMAL, *AXIS, *QUATERNION, NAME)
+KNOWN = (
+    *POSITION,
+    *NORMAL,
+    *AXIS,
+    *QUATERNION,
+    *(name for names in ANGLES for name in names),
+    NAME,
+)
+AXES: tuple[tuple[str, ...], ...] = (AXIS, NORMAL, QUATERNION, *ANGLES)
+"""Columns that give the tool axis, those that are used first first."""
 UNUSED = "-"
 """Name of a column that is not used."""
 UNIT = re.compile(r"[_\[( ]\s*([a-z]+)\s*[\])]?$")
@@ -148,8 +161,8 @@ UNIT = re.compile(r"[_\[( ]\s*([a-z]+)\s*[\])]?$")
 UNNAMED = {6: POSITION + NORMAL, 7: POSITION + QUATERNION}
 """Columns of a table without a header, by their number."""
 EXPECTED = (
-    "x y z, then nx ny nz (outward normal), axis_x axis_y axis_z (tool axis) or qx qy qz qw (pose, "
-    "its z the tool axis)"
+    "x y z, then nx ny nz (outward normal), axis_x axis_y axis_z (tool axis), or a pose, its z the "
+    "tool axis: qx qy qz qw, or in deg a b c (KUKA) or w p r (FANUC)"
 )
 JUMP, FAR = 5.0, 20.0
 """Multiples of the usual step: after an empty line a longer one begins another run; without one it
@@ -274,7 +287,7 @@ def _require_columns(columns: Sequence[str], has_axis: bool) -> None:
     for name in columns:
         if columns.count(name) > 1:
             raise InputError(f"the header names the column {name!r} twice")
-    has_axes = has_axis or any(set(axes) <= set(columns) for axes in (NORMAL, AXIS, QUATERNION))
+    has_axes = has_axis or any(set(axes) <= set(columns) for axes in AXES)
     if not (set(POSITION) <= set(columns) and has_axes):
         raise InputError(
             f"expected columns {EXPECTED}; got {' '.join(columns)}; map their names with columns, "
@@ -290,7 +303,8 @@ def _header(table: TableCells, has_axis: bool) -> tuple[tuple[str, ...], str]:
     for cell in table.rows[0]:
         name = lower(cell).strip("\"' ")
         parts = re.fullmatch(r"([xyz])\s*[_\[( ]\s*([a-z]+)\s*[\])]?", name)
-        columns.append(parts[1] if parts else name)
+        angle = re.fullmatch(r"([abcwpr])\s*[_\[( ]\s*(?:deg|°)\s*[\])]?", name)
+        columns.append(parts[1] if parts else angle[1] if angle else name)
         units += [parts[2]] if parts else []
     _require_columns(columns, has_axis)
     if len(set(units)) > 1 or (units and (len(units) != 3 or units[0] not in UNITS_MM)):
@@ -306,7 +320,8 @@ def _numbers(
 ) -> tuple[Array, Array]:
     """Return points (K, 3) mm and outward unit normals (K, 3), by `axis` if no columns have it."""
     at = {name: k for k, name in enumerate(columns)}
-    axes = next((a for a in (AXIS, NORMAL, QUATERNION) if set(a) <= set(at)), ())
+    given = [names for names in AXES if set(names) <= set(at)]
+    axes = next((names for names in given if axis is None or names not in ANGLES), ())
     wanted = [at[name] for name in (*POSITION, *axes)]
     values = np.array(
         [
@@ -323,6 +338,9 @@ def _numbers(
     if not axes:
         assert axis is not None
         return points, np.tile(-axis / np.linalg.norm(axis), (len(points), 1))
+    if axes in ANGLES:
+        poses = Rotation.from_euler(ANGLES[axes], directions, degrees=True)
+        return points, -poses.as_matrix()[:, :, 2]
     size = np.abs(directions).max(axis=1)
     if (zero := np.flatnonzero(size == 0)).size:
         raise InputError(f"line {table.lines[zero[0]]}: {' '.join(axes)} are all 0; no direction")
