@@ -25,6 +25,9 @@ _A = TypeVar("_A", bound=NDArray[Any])
 
 WHOLE = 2.0**53
 """From here on float64 does not represent every whole number."""
+POSE = "a pose is a rotation (3, 3) beside a translation (3, 1) in m, above the row 0 0 0 1"
+FAR = 100.0
+"""m: a cell is smaller; larger lengths are in another unit."""
 _ROTATION_TOLERANCE = 1e-6
 """How far R^T R may be from the identity: seven printed decimals pass, a typo fails."""
 
@@ -42,11 +45,12 @@ def floats(
     *,
     copy: bool = True,
     infinite: bool = False,
+    hint: str = "",
 ) -> Array:
     """Return `value` as a read-only float64 array of `shape` (None: any length), all finite.
 
     Without `copy` the result may be a view of `value`: for arrays that are not kept. With
-    `infinite`, infinity is accepted.
+    `infinite`, infinity is accepted. `hint` says what to give instead of another shape.
 
     Raises
     ------
@@ -54,7 +58,7 @@ def floats(
         Not numbers, another shape, NaN or infinity; the message names the first bad index.
     """
     array = np.asarray(_converted(value, name, np.float64), order="C")
-    _require_shape(array, name, shape)
+    _require_shape(array, name, shape, hint)
     array = array.copy() if copy else array.view()
     good = ~np.isnan(array) if infinite else np.isfinite(array)
     if not good.all():
@@ -141,7 +145,7 @@ def as_pose(value: ArrayLike, name: str) -> Array:
     InputError
         Another shape, a last row that is not (0, 0, 0, 1), or a matrix that is not a rotation.
     """
-    pose = floats(value, name, (4, 4))
+    pose = floats(value, name, (4, 4), hint=POSE)
     rotation = pose[:3, :3]
     if not np.array_equal(pose[3], (0.0, 0.0, 0.0, 1.0)):
         raise InputError(f"{name}: the last row must be 0 0 0 1, got {pose[3].tolist()}")
@@ -154,20 +158,59 @@ def as_pose(value: ArrayLike, name: str) -> Array:
     return pose
 
 
+def require_metres(size: float, name: str) -> None:
+    """Raise InputError for a length that is surely in another unit than m; it asks for the unit."""
+    if size > FAR:
+        raise InputError(
+            f"{name}: unit? lengths are in m, got {size:g} m; if that is in mm, divide by 1000, "
+            f"which gives {size / 1e3:g} m"
+        )
+
+
+def in_radians(value: float, name: str, expected: str) -> InputError:
+    """Return the error for an angle in rad that was surely meant in deg."""
+    return InputError(
+        f"{name}: expected {expected}, got {value:g} rad, which is {np.degrees(value):.4g} deg; "
+        f"unit? for {value:g} deg give np.radians({value:g})"
+    )
+
+
+def require_instance(value: object, kind: type, name: str, cure: str) -> None:
+    """Raise InputError, with what to do, unless `value` is an object of a class of kerfpath."""
+    if not isinstance(value, kind):
+        raise InputError(
+            f"{name}: expected a kerfpath.{kind.__name__}, got {_type_of(value)}; {cure}"
+        )
+
+
+def _type_of(value: object) -> str:
+    """Return the type of a value, and the value itself if it is a short text."""
+    if value is None:
+        return "None"
+    shape = f" of shape {value.shape}" if isinstance(value, np.ndarray) else ""
+    shown = f" {value!r}" if isinstance(value, str) and len(value) <= SHORT else ""
+    return f"{type(value).__name__}{shown}{shape}"
+
+
 def _converted(value: ArrayLike, name: str, dtype: type[np.float64]) -> Array:
+    if value is None:
+        raise InputError(f"{name}: expected an array of numbers, got None")
     try:
         return np.asarray(value, dtype=dtype)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name}: expected an array of numbers ({error})") from None
 
 
-def _require_shape(array: NDArray[Any], name: str, shape: tuple[int | None, ...]) -> None:
+def _require_shape(
+    array: NDArray[Any], name: str, shape: tuple[int | None, ...], hint: str = ""
+) -> None:
     fits = array.ndim == len(shape) and all(
         want is None or want == have for want, have in zip(shape, array.shape, strict=True)
     )
     if not fits:
         want = "(" + ", ".join("any" if s is None else str(s) for s in shape) + ")"
-        raise InputError(f"{name}: expected shape {want}, got {array.shape}")
+        cure = f"; {hint}" if hint else ""
+        raise InputError(f"{name}: expected shape {want}, got {array.shape}{cure}")
 
 
 # -----------------------------------------------------------------------------

@@ -9,14 +9,14 @@ from typing import Any, Literal, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath.arrays import Array, floats, require_keywords, short_repr
+from kerfpath.arrays import Array, floats, in_radians, require_keywords, short_repr
 from kerfpath.certificate import USUAL, Certify
 from kerfpath.comfort import Comfort
 from kerfpath.contour import FrameKind
 from kerfpath.effort import current_effort
 from kerfpath.errors import InputError, OptionConflict
 from kerfpath.limits import Limits
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, postures_named
 from kerfpath.search import Closure, Method, Metric, ObjectiveKind, rotation_limits
 from kerfpath.setting import Settings, check, documented, setting
 from kerfpath.tilt import Tilt
@@ -35,6 +35,8 @@ __all__ = [
     "with_keywords",
 ]
 
+MOST_TURNS = 10
+"""Most turns that the rotation of a hose may be limited to; more was meant in deg."""
 PlanMethod = Literal["continuous", Method]
 FeedKind = Literal["constant", "dip"]
 Interruptions = Literal["none", "fewest"]
@@ -47,7 +49,7 @@ class GraphKeywords(TypedDict, total=False):
     gamma_step: float
     frames: FrameKind
     tilt: Tilt | None
-    postures: Sequence[int] | None
+    postures: Sequence[int | str] | str | None
     comfort: Comfort | None
     gamma_windows: Sequence[GammaWindow]
 
@@ -188,8 +190,8 @@ class PlanOptions(Settings):
     )
     postures: tuple[int, ...] | None = setting(
         None,
-        "postures (configurations) that may be used, see `kerfpath.robots.postures_named`; "
-        "none: all; in a job words, where a part that is left out is free",
+        'postures (configurations) that may be used, by numbers or words: "front/up" are all '
+        "postures with these words, see `kerfpath.robots.postures_named`; none: all",
         takes=str,
         what="a posture in words",
         example='"front/up"',
@@ -306,12 +308,19 @@ class PlanOptions(Settings):
     def __post_init__(self) -> None:
         check(self)
         cast: dict[str, object] = {}
+        if self.gamma_step >= 1 and (2 * self.gamma_step) % 1 == 0:  # no part of a turn in rad
+            raise in_radians(self.gamma_step, "gamma_step", "the step of gamma in rad")
         if self.postures is not None:
-            cast["postures"] = tuple(int(posture) for posture in self.postures)
+            asked = (self.postures,) if isinstance(self.postures, str) else self.postures
+            cast["postures"] = tuple(mu if isinstance(mu, str) else int(mu) for mu in asked)
         if self.weights is not None:
             cast["weights"] = floats(self.weights, "weights", (None,))
         if self.rotation is not None:
-            cast["rotation"] = floats(self.rotation, "rotation", (None,), infinite=True)
+            each = "give the largest angle of every joint in rad, np.inf for no limit"
+            turns = floats(self.rotation, "rotation", (None,), infinite=True, hint=each)
+            if (finite := turns[np.isfinite(turns)]).size and finite.max() > MOST_TURNS * 2 * np.pi:
+                raise in_radians(float(finite.max()), "rotation", "angles in rad")
+            cast["rotation"] = turns
         cast["gamma_windows"] = tuple(self.gamma_windows)
         for window in self.gamma_windows:
             if not isinstance(window, GammaWindow):
@@ -325,6 +334,25 @@ class PlanOptions(Settings):
 
     __hash__ = None  # type: ignore[assignment]  # arrays have none
 
+    def on(self, robot: Robot) -> PlanOptions:
+        """Return the options with the numbers of postures that were given in words.
+
+        Raises
+        ------
+        InputError
+            No posture of the robot has these words.
+        """
+        if not any(isinstance(mu, str) for mu in self.postures or ()):
+            return self
+        try:
+            found = [
+                postures_named(mu, robot.kinematics) if isinstance(mu, str) else (mu,)
+                for mu in self.postures or ()
+            ]
+        except InputError as error:
+            raise InputError(f"postures: {error}") from None
+        return replace(self, postures=tuple(sorted({mu for each in found for mu in each})))
+
     def resolve(self, robot: Robot, dt: float) -> PlanOptions:
         """Return the options with weights and rotation limits filled in, for nodes `dt` s apart.
 
@@ -333,6 +361,7 @@ class PlanOptions(Settings):
         InputError
             Weights or a rotation limit that do not fit the robot's joints.
         """
+        self = self.on(robot)
         velocity, _ = robot.speed_limits()
         weights = 1 / (velocity * dt) if self.weights is None else self.weights
         rotation = self.rotation

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath.arrays import Array, as_pose, short_repr
+from kerfpath.arrays import Array, as_pose, require_instance, require_metres, short_repr
 from kerfpath.cell import Cell
 from kerfpath.robots import Robot
 
 __all__ = ["Setup"]
+
+ROBOT = 'make one with kerfpath.robot("abb_irb4600_60_205") or kerfpath.Robot.from_urdf("arm.urdf")'
+"""What to do where no robot was given."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,7 +48,12 @@ class Setup:
         Raises
         ------
         InputError
-            A tool or a placement that is no pose.
+            No robot, a tool or a placement that is no pose, or a cell of another type.
         """
+        require_instance(robot, Robot, "robot", ROBOT)
+        if cell is not None:
+            require_instance(cell, Cell, "cell", "kerfpath.cell.build_cell makes one")
         T_flange_tip, T_base_part = as_pose(tool, "tool"), as_pose(placement, "placement")
+        require_metres(float(np.abs(T_flange_tip[:3, 3]).max()), "tool")
+        require_metres(float(np.abs(T_base_part[:3, 3]).max()), "placement")
         return cls(robot=robot, tool=T_flange_tip, placement=T_base_part, cell=cell)

@@ -7,7 +7,7 @@ from dataclasses import MISSING, dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath.arrays import Array, freeze, not_negative
+from kerfpath.arrays import Array, freeze, in_radians, not_negative
 from kerfpath.errors import InputError
 from kerfpath.setting import Settings, documented, setting
 
@@ -70,7 +70,7 @@ class Tilt(Settings):
             value = not_negative(getattr(self, name), f"tilt {name}", unit=unit)
             object.__setattr__(self, name, value)
         if self.cone >= np.pi / 2:
-            raise InputError(f"tilt cone: expected less than pi/2 rad, got {self.cone:g} rad")
+            raise in_radians(self.cone, "tilt cone", "less than pi/2 rad")
         if not (isinstance(self.steps, int | np.integer) and self.steps >= 0):
             raise InputError(f"tilt steps: expected a whole number >= 0, got {self.steps!r}")
         object.__setattr__(self, "steps", int(self.steps))

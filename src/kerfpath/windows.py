@@ -8,7 +8,7 @@ from typing import TypedDict
 
 import numpy as np
 
-from kerfpath.arrays import Array, Bools, freeze, scalar, short_repr
+from kerfpath.arrays import Array, Bools, freeze, in_radians, scalar, short_repr
 from kerfpath.errors import InputError
 
 __all__ = [
@@ -78,10 +78,8 @@ class GammaWindow:
             )
         for name in ("low", "high"):
             if abs(getattr(self, name)) > 2 * np.pi:
-                raise InputError(
-                    f"gamma_windows {name}: expected an angle from -2 pi to 2 pi rad, got "
-                    f"{getattr(self, name):g} rad"
-                )
+                wanted = "an angle from -2 pi to 2 pi rad"
+                raise in_radians(getattr(self, name), f"gamma_windows {name}", wanted)
         turned = abs(self.high - self.low)
         if max(turned, self.width) > 2 * np.pi - LEAST_OUT:
             raise InputError(

@@ -18,6 +18,7 @@ from kerfpath.auditor.rounding import Rounding as Rounding
 from kerfpath.auditor.rounding import rounding_of as rounding_of
 from kerfpath.auditor.table import Check as Check
 from kerfpath.auditor.table import Issue as Issue
+from kerfpath.auditor.table import Issues as Issues
 from kerfpath.auditor.table import Level as Level
 from kerfpath.auditor.table import Unit as Unit
 from kerfpath.auditor.table import format_value as format_value

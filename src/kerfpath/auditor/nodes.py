@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kerfpath.arrays import Array, scalar
+from kerfpath.arrays import Array, require_instance, scalar
 from kerfpath.auditor.between import BetweenNodes, bound_between_nodes
 from kerfpath.auditor.certificate import bound_checks
 from kerfpath.auditor.chain import chain_of
@@ -17,7 +17,7 @@ from kerfpath.auditor.dynamics import LagrangeArm
 from kerfpath.auditor.margins import margins
 from kerfpath.auditor.motion import Interpolation, Motion, joint_increments, motion_of
 from kerfpath.auditor.rounding import MOST_ROUNDED, Rounding
-from kerfpath.auditor.table import Check, Issue, check_worst
+from kerfpath.auditor.table import Check, Issues, check_worst
 from kerfpath.auditor.transfer import retract_checks
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -251,8 +251,8 @@ def audit(
     axis_tolerance: float = np.pi / 180,
     parts: int = 8,
     cell: Cell | None = None,
-) -> list[Issue]:
-    """Return the issues of a plan; an empty list means that it passes.
+) -> Issues:
+    """Return the issues of a plan; an empty list means that it passes, and prints as passed.
 
     The arguments and exceptions are those of `checks`.
     """
@@ -265,7 +265,7 @@ def audit(
         parts=parts,
         cell=cell,
     )
-    return [check.issue() for check in table if not check.ok]
+    return Issues(check.issue() for check in table if not check.ok)
 
 
 def checks(
@@ -307,6 +307,9 @@ def checks(
         The reference has another length, the interpolation is unknown, a tolerance or `parts` is
         not positive, limits are not known, or the cell has other external axes.
     """
+    require_instance(plan, Plan, "plan", "kerfpath.read_plan_file(path).plans has those of a file")
+    if reference is not None:
+        require_instance(reference, Contour, "reference", "give the path before it was resampled")
     if interpolation not in ("linear", "joint"):
         raise InputError(f"interpolation: expected linear or joint, got {interpolation!r}")
     if not (isinstance(parts, int) and parts >= 1):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from kerfpath.arrays import Array, Ints, short_repr
+from kerfpath.arrays import Array, Ints, counted, short_repr
 
 Unit = Literal["m", "rad", "m^3", "s", "share", "count"]
 Level = Literal["error", "warning"]
@@ -75,6 +75,24 @@ class Issue:
 
     def __str__(self) -> str:
         return f"{self.level}: {self.message} [{self.code}]"
+
+
+class Issues(list[Issue]):
+    """The issues of an audit: a list, which is empty if nothing failed, and prints the verdict."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether no check failed that is more than a warning."""
+        return all(issue.level != "error" for issue in self)
+
+    def __repr__(self) -> str:
+        warned = f", with {counted(len(self), 'warning')}" if self else ""
+        lines = [f"audit passed{warned}" if self.passed else "audit FAILED", *map(str, self)]
+        return "\n  ".join(lines)
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
+        """Print the verdict in IPython, which would print the list otherwise."""
+        printer.text(repr(self))
 
 
 def check_worst(

@@ -83,8 +83,9 @@ class Contour:
         )
 
     def __post_init__(self) -> None:
-        points = floats(self.points, "points", (None, 3))
-        axes = unit(floats(self.axes, "axes", (len(points), 3)))
+        points = floats(self.points, "points", (None, 3), hint="give x, y, z in m of every node")
+        each = "give the tool axis of every node; if all are the same, np.tile(axis, (K, 1))"
+        axes = unit(floats(self.axes, "axes", (len(points), 3), hint=each))
         kind, share = self._labels(len(points))
         returns = self.closed and len(points) > 0
         if returns and np.linalg.norm(points[0] - points[-1]) > REPEATED_POINT:

@@ -630,9 +630,10 @@ def pareto(
         refine=False,
         certify=None,
     )
+    setup = Setup.of(robot, tool, placement, cell)
+    asked = asked.on(robot)
     found = criteria_named(criteria, robot, options=asked, cell=cell, home=home)
     workers = whole_number((os.cpu_count() or 1) if workers is None else workers, "workers")
-    setup = Setup.of(robot, tool, placement, cell)
     if graph is None:
         graph = graph_of_runs(contour, setup, asked, speed=speed)
     problem = ParetoProblem(

@@ -17,6 +17,8 @@ from kerfpath.arrays import (
     floats,
     freeze,
     not_negative,
+    require_instance,
+    require_metres,
     scalar,
     short_repr,
 )
@@ -199,9 +201,11 @@ def node_interval(contour: Contour, speed: float | None) -> float:
     Raises
     ------
     InputError
-        No speed, or a speed besides the contour's own times; a speed that is not positive; nodes
-        unevenly spaced.
+        No contour, or one larger than any cell; no speed, or a speed besides the contour's own
+        times; a speed that is not positive; nodes unevenly spaced.
     """
+    require_instance(contour, Contour, "contour", "make one with kerfpath.Contour(points, axes)")
+    require_metres(float(np.ptp(contour.points, axis=0).max()), f"contour {contour.name!r}")
     if contour.time is not None:
         if speed is not None:
             raise InputError(

@@ -217,8 +217,9 @@ def plan(
             Task frames that gamma is measured in.
         tilt : Tilt, optional
             Tolerance of the tool axis, which is then searched too; default: the nominal axis only.
-        postures : sequence of int, optional
-            The postures that may be used; default all. See `kerfpath.robots.postures_named`.
+        postures : sequence of int or str, optional
+            The postures that may be used, by numbers or words: ["front/up"] are all with these
+            words. Default: all. See `kerfpath.robots.postures_named`.
         method : {"continuous", "exact", "paper", "known"}
             "continuous" (the default): the best motion found over continuous gamma, by a value
             function between its samples, beam searches that keep the acceleration limits, and

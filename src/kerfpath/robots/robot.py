@@ -19,6 +19,7 @@ from kerfpath.arrays import (
     freeze,
     html_table,
     in_degrees,
+    in_radians,
     require_keywords,
     scalar,
     short_repr,
@@ -595,8 +596,16 @@ class Robot:
     def with_limits(
         self, *, couplings: Sequence[Coupling] | None = None, **given: Unpack[LimitKeywords]
     ) -> Robot:
-        """Return this robot with some of its limits replaced (rad, s, N m)."""
+        """Return this robot with some of its limits replaced (rad, s, N m).
+
+        Raises
+        ------
+        InputError
+            Limits of the wrong shape or sign, or velocities or accelerations in deg.
+        """
         changes: dict[str, Any] = {k: value for k, value in given.items() if value is not None}
+        for name in ("velocity", "acceleration"):
+            _require_radians(changes.get(name), name)
         if couplings is not None:
             changes["couplings"] = tuple(couplings)
         limits = replace(self.limits, **changes)
@@ -846,6 +855,20 @@ def robot(name: str, *, acceleration_ratio: str | None = None) -> Robot:
             "applied"
         )
     return found.with_acceleration_ratio(acceleration_ratio)
+
+
+IN_DEGREES = 51, 10_000
+"""Whole numbers between these for every joint are rates in deg: 51 rad/s are 2900 deg/s."""
+
+
+def _require_radians(rates: ArrayLike | None, name: str) -> None:
+    """Raise InputError for rates of joints that are surely in deg."""
+    if rates is None:
+        return
+    values = floats(rates, name, (None,))
+    whole = values == np.round(values)
+    if values.size and (whole & (values >= IN_DEGREES[0]) & (values <= IN_DEGREES[1])).all():
+        raise in_radians(float(values.min()), name, "the limits of the joints in rad and s")
 
 
 # -----------------------------------------------------------------------------
