@@ -286,7 +286,7 @@ def test_a_bad_link_mesh_is_refused_by_name(tmp_path, write, hulls, scale, messa
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("link.ply", "ply", "expected a mesh as .stl, .dae or .obj, got '.ply'"),
+        ("link.wrl", "vrml", "expected a mesh as .stl, .dae, .obj or .ply, got '.wrl'"),
         ("link.obj", "nothing", "the mesh cannot be read as .obj"),
         ("link.dae", "<COLLADA/>", "the mesh cannot be read as .dae"),
         ("link.dae", None, "cannot be read"),

@@ -179,6 +179,12 @@ def _read_file(
             from kerfpath.cad.nc import read_nc
 
             return read_nc(path, content, unit, gap, axis)
+        if kind == "mesh":
+            from kerfpath.cad.meshes import read_mesh
+
+            if axis is not None:
+                raise InputError("axis: expected a drawing of lines, got a mesh")
+            return read_mesh(path, unit, gap)
         require_extra("cad", f"reading {kind}")
         if kind == "DXF":
             from kerfpath.cad.dxf import read_dxf

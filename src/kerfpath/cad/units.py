@@ -46,6 +46,9 @@ SUFFIXES = {
     ".ngc": "NC program",
     ".spf": "NC program",
     ".tap": "NC program",
+    ".stl": "mesh",
+    ".obj": "mesh",
+    ".ply": "mesh",
 }
 """The kind of drawing by the suffix of its file, in lower case."""
 LEAST_SIZE, MOST_SIZE = 0.005, 20.0

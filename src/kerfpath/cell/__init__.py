@@ -18,6 +18,7 @@ from kerfpath.cell.mesh import Mesh as Mesh
 from kerfpath.cell.mesh import edges_of as edges_of
 from kerfpath.cell.mesh import mesh_of as mesh_of
 from kerfpath.cell.mesh import read_stl as read_stl
+from kerfpath.cell.mesh import read_surface as read_surface
 from kerfpath.cell.mesh import thicken as thicken
 from kerfpath.cell.mesh import weld as weld
 from kerfpath.cell.pairs import MAY_TOUCH as MAY_TOUCH

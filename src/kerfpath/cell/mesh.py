@@ -463,7 +463,7 @@ def close_surface(vertices: Array, triangles: Ints, scale: Array | float, name: 
 
 
 def read_surface(path: Path, name: str) -> tuple[Array, Ints]:
-    """Return vertices (V, 3) and triangles (F, 3) of an STL, COLLADA (.dae) or Wavefront file.
+    """Return vertices (V, 3) and triangles (F, 3) of an STL, COLLADA (.dae), OBJ or PLY file.
 
     Vertices are in the file's own unit; those of a COLLADA file, which states its unit, are in m.
     Like other readers of robot descriptions, this one ignores the up axis of a COLLADA file.
@@ -475,9 +475,9 @@ def read_surface(path: Path, name: str) -> tuple[Array, Ints]:
     """
     if path.suffix.lower() == ".stl":
         return _stl(_bytes(path), name)
-    if path.suffix.lower() in (".dae", ".obj"):
+    if path.suffix.lower() in (".dae", ".obj", ".ply"):
         return _load_with_coal(path, name)
-    raise InputError(f"{name}: expected a mesh as .stl, .dae or .obj, got {path.suffix!r}")
+    raise InputError(f"{name}: expected a mesh as .stl, .dae, .obj or .ply, got {path.suffix!r}")
 
 
 def _bytes(path: Path) -> bytes:

@@ -1,0 +1,136 @@
+"""Triangle meshes: loops around their open border, and around faces between sharp edges."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+
+from kerfpath.cad import Part, read
+from kerfpath.errors import InputError
+
+Triangles = np.ndarray
+"""Corners (F, 3, 3) mm."""
+
+
+def stl(path: Path, triangles: Triangles) -> Path:
+    rows = ["solid a"]
+    for corners in triangles:
+        rows += ["facet normal 0 0 0", "outer loop"]
+        rows += [f"vertex {x!r} {y!r} {z!r}" for x, y, z in corners.tolist()]
+        rows += ["endloop", "endfacet"]
+    path.write_text("\n".join([*rows, "endsolid a"]))
+    return path
+
+
+def ring(radius: float, count: int) -> np.ndarray:
+    angle = 2 * np.pi * np.arange(count) / count
+    return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def annulus(lift: float) -> Triangles:
+    """Return a plate with a hole, of a paraboloid's height over each vertex."""
+    flat = np.vstack([ring(50, 60), ring(35, 40), ring(20, 24)])
+    found = flat[Delaunay(flat).simplices]
+    found = found[np.linalg.norm(found.mean(axis=1), axis=1) > 20 * np.cos(np.pi / 24)]
+    return np.concatenate([found, lift * (found**2).sum(axis=2, keepdims=True)], axis=2)
+
+
+def box(x: float, y: float, z: float) -> Triangles:
+    """Return a closed box, its triangles counter-clockwise from outside."""
+    faces = []
+    for axis in range(3):
+        for end in (0, 1):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            square = np.zeros((4, 3))
+            square[:, axis] = end
+            square[:, u], square[:, v] = (0, 1, 1, 0), (0, 0, 1, 1)
+            square = square if end else square[::-1]
+            faces += [square[[0, 1, 2]], square[[0, 2, 3]]]
+    return np.array(faces) * [x, y, z]
+
+
+def turns(part: Part, name: str) -> float:
+    """Return the vector area of a loop along the outward normal, mm^2."""
+    contour = part.contour(name)
+    points = contour.points[:-1] * 1e3
+    area = np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0) / 2
+    return float(area @ -contour.axes.mean(axis=0) / np.linalg.norm(contour.axes.mean(axis=0)))
+
+
+@pytest.mark.parametrize("lift", [0.0, 0.002])
+def test_an_open_mesh_has_its_border_and_its_holes(tmp_path: Path, lift: float) -> None:
+    part = read(stl(tmp_path / "a.stl", annulus(lift)), unit="mm")
+    (outer, hole) = part.loops
+    assert (outer.name, outer.kind, outer.edges) == ("mesh/outer", "outer", 60)
+    assert (hole.name, hole.kind, hole.edges) == ("mesh/hole1", "inner", 24)
+    assert outer.length == pytest.approx(2e-3 * 50 * 60 * np.sin(np.pi / 60), rel=1e-6)
+    assert turns(part, outer.name) == pytest.approx(30 * 50**2 * np.sin(np.pi / 30), rel=1e-3)
+    assert turns(part, hole.name) == pytest.approx(-12 * 20**2 * np.sin(np.pi / 12), rel=1e-3)
+    for loop in (outer, hole):
+        contour = part.contour(loop.name)
+        x, y = 1e3 * contour.points[:, :2].T
+        expected = np.stack([2 * lift * x, 2 * lift * y, np.full(len(x), -1.0)], axis=1)
+        expected /= np.linalg.norm(expected, axis=1)[:, None]
+        # Triangles beside the border are on its inside only.
+        assert (contour.axes * expected).sum(axis=1).min() > np.cos(np.radians(2))
+
+
+def test_a_closed_mesh_has_the_faces_between_its_sharp_edges(tmp_path: Path) -> None:
+    part = read(stl(tmp_path / "box.STL", box(20, 30, 5)), unit="in")
+    assert part.faces == 6
+    sizes = sorted(round(loop.length / 0.0254, 6) for loop in part.pick(kind="outer"))
+    assert sizes == [50, 50, 70, 70, 100, 100]
+    for loop in part.loops:
+        contour = part.contour(loop.name)
+        middle = np.array([10, 15, 2.5]) * 0.0254
+        assert ((middle - contour.points) * contour.axes).sum(axis=1).min() > 0
+        assert turns(part, loop.name) > 0
+    assert part.mesh()[1].shape == (12, 3)
+
+
+def test_obj_and_ply_are_the_same(tmp_path: Path) -> None:
+    corners = box(20, 30, 5)[:10].reshape(-1, 3)
+    rows = [f"{x:g} {y:g} {z:g}" for x, y, z in corners]
+    faces = np.arange(30).reshape(-1, 3)
+    obj = tmp_path / "a.obj"
+    obj.write_text(
+        "".join(f"v {row}\n" for row in rows)
+        + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces.tolist())
+    )
+    ply = tmp_path / "a.ply"
+    ply.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 30\nproperty float x\nproperty float y\n"
+        "property float z\nelement face 10\nproperty list uchar int vertex_indices\nend_header\n"
+        + "\n".join([*rows, *(f"3 {a} {b} {c}" for a, b, c in faces.tolist())])
+        + "\n"
+    )
+    for path in (obj, ply):
+        part = read(path, unit="mm")
+        (border,) = [loop for loop in part.loops if loop.is_main]
+        assert (border.name, border.edges) == ("mesh/outer", 4)
+        assert border.length == pytest.approx(0.1, abs=1e-8)
+
+
+def test_what_is_no_cut_is_refused(tmp_path: Path) -> None:
+    angle = np.linspace(0, np.pi, 40)[:, None]
+    around = np.linspace(0, 2 * np.pi, 80)
+    grid = np.stack(
+        [
+            np.sin(angle) * np.cos(around),
+            np.sin(angle) * np.sin(around),
+            np.cos(angle) + 0 * around,
+        ],
+        axis=2,
+    )
+    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+    ball = 30 * np.concatenate([np.stack([a, b, c], 2), np.stack([a, c, d], 2)]).reshape(-1, 3, 3)
+    path = stl(tmp_path / "ball.stl", ball)
+    with pytest.raises(InputError, match="closed surface without sharp edges"):
+        read(path, unit="mm")
+    with pytest.raises(InputError, match="states no length unit"):
+        read(path)
+    with pytest.raises(InputError, match="axis: expected a drawing of lines, got a mesh"):
+        read(path, unit="mm", axis=(0, 0, -1))
