@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from kerfpath.cad.part import Part as Part
     from kerfpath.cad.reading import read as read
     from kerfpath.cad.reading import read_measured as read_measured
+    from kerfpath.cad.sides import Triangles as Triangles
     from kerfpath.cad.units import GAP as GAP
     from kerfpath.cad.units import SUFFIXES as SUFFIXES
     from kerfpath.cad.units import UNITS_MM as UNITS_MM
@@ -26,6 +27,7 @@ _HOME = {
     "Loop": "part",
     "Part": "part",
     "SUFFIXES": "units",
+    "Triangles": "sides",
     "UNITS_MM": "units",
     "departure_from": "departure",
     "read": "reading",

@@ -35,7 +35,7 @@ def show_check(checked: JobPreview) -> None:
                 }
                 for s in checked.starts
             ],
-            "notes": [_note(checked)],
+            "notes": [*checked.warnings, _note(checked)],
         }
     )
     out.print(f"robot {escape(job.robot.id)}, {job.robot.joints} joints; {job.part_file.name}")
@@ -51,6 +51,8 @@ def show_check(checked: JobPreview) -> None:
     columns = ["contour", "nodes", "poses at its start"]
     columns += [] if cell is None else ["clear", "clearance mm", "nearest"]
     table(columns, rows, numbers=columns[1:5], spare=["nodes"])
+    for warning in checked.warnings:
+        out.print(f"warning: {escape(warning)}")
     out.print(f"note: {escape(_note(checked))}")
 
 

@@ -25,7 +25,7 @@ from kerfpath.job.plan_file import (
     plan_text,
 )
 from kerfpath.job.programs import expected_of_cuts, program_of
-from kerfpath.job.run import JobResult
+from kerfpath.job.run import JobResult, sides_in_doubt
 from kerfpath.plans import Plan, joint_columns
 from kerfpath.post import (
     MANIFEST,
@@ -328,6 +328,8 @@ def program_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     refused, unsafe = "", False
     notes = [collision_note(outcome.cell, moves_too=bool(moves))]
     notes += [] if part is None else [order_note(part)]
+    contours = {cut.contour: cut.candidate.nodes for cut in outcome.cuts}
+    notes += sides_in_doubt(job, contours.items(), outcome.mesh)
     notes += closer_sampling(outcome) + short_pieces(outcome)
     faults = [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
     faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]

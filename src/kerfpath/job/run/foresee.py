@@ -23,6 +23,7 @@ from kerfpath.job.format import (
     places_of,
     refusal_at,
 )
+from kerfpath.job.run.doubts import sides_in_doubt
 from kerfpath.plans import has_room
 from kerfpath.post import issues_before_planning
 from kerfpath.sequence import best_order, distances_between
@@ -66,12 +67,13 @@ class ContourStart:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JobPreview:
-    """A job with its part, its cell if it has one, and the start of every contour."""
+    """A job with its part, its cell if it has one, the start of every contour, and warnings."""
 
     job: Job
     part: Part
     cell: Cell | None
     starts: tuple[ContourStart, ...]
+    warnings: tuple[str, ...] = ()
 
     __repr__ = short_repr
 
@@ -86,15 +88,17 @@ def check_job(job: Job, part: Part | None = None) -> JobPreview:
     """
     part = part or job.read_part()
     cell = cell_of_job(job, part)
-    starts = []
+    starts, contours = [], []
     for task in job.tasks(part):
         nodes = task.sample(task.candidates(part)[0])
+        contours.append((task.name, nodes))
         first = nodes.part(0, 1, job.options.frames)
         plain = replace(job.options, comfort=None, retract=None, floor=None)
         graph = job.graph(first, plain, external=places_of(job, first))
         q = graph.q[: graph.start[1]]
         starts.append(_start(task.name, len(nodes), q, cell))
-    return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts))
+    doubts = sides_in_doubt(job, contours, part.mesh())
+    return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts), warnings=tuple(doubts))
 
 
 def _start(name: str, nodes: int, q: np.ndarray, cell: Cell | None) -> ContourStart:
