@@ -201,7 +201,7 @@ def test_points_without_axes_take_the_one_that_is_said(tmp_path: Path) -> None:
 
 
 BAD: dict[str, tuple[Mapping[str, str] | Sequence[str], str]] = {
-    "no such name": ({"w": "a"}, "expected names of x y z .*got 'w'"),
+    "no such name": ({"v": "a"}, "expected names of x y z .*got 'v'"),
     "no such column": ({"x": "q"}, "line 1: expected one column 'q' for x, got x y z"),
     "too few": (["x", "y"], "expected columns x y z"),
     "an unknown one": (["x", "y", "z", "feed"], "got 'feed'"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath.arrays import Array, freeze
-from kerfpath.cad.curves import Points, Trace, vector_area
+from kerfpath.cad.curves import Arc, Points, Trace, vector_area
 from kerfpath.cad.left_out import LeftOut
 from kerfpath.cad.part import Kind, Loop, Part
 from kerfpath.cad.units import LARGEST, MM
@@ -163,11 +163,19 @@ def loop_of(
         shortest_edge=float(trace.lengths.min()) * MM,
         largest_gap=float(widest) * MM,
         closed=kind != "open" and float(widest) * MM <= gap,
-        diameter=diameter(trace.around * MM) if is_round else None,
+        diameter=_diameter_of(trace) if is_round else None,
         layer=layer,
         colour=colour,
         _trace=trace,
     )
+
+
+def _diameter_of(trace: Trace) -> float | None:
+    """Return the diameter (m) of a round loop, None for another."""
+    first = trace.curves[0]
+    if len(trace.curves) == 1 and isinstance(first, Arc) and first.radius is not None:
+        return 2 * first.radius * MM
+    return diameter(trace.around * MM)
 
 
 def named_loops(

@@ -366,6 +366,8 @@ UP = (0.0, 0.0, 1.0)
 """The normal of a flat drawing."""
 GAUSS = np.polynomial.legendre.leggauss(12)
 """Nodes and weights on (-1, 1); 12 per smooth stretch give the length of drawn curves to 1e-9."""
+ROUND = 1e-12
+"""Share by which the axes of a circle differ, and are not square to each other, at most."""
 LOOK = 64
 """Number of points per stretch of a spline from which its bounding box is taken."""
 
@@ -446,6 +448,10 @@ class Line(_Flat):
     def speed(self, t: Array) -> Array:
         return np.full(len(t), np.linalg.norm(self.q - self.p))
 
+    @cached_property
+    def length(self) -> float:
+        return float(np.linalg.norm(self.q - self.p)) * abs(self.end - self.start)
+
 
 @dataclass(frozen=True)
 class Arc(_Flat):
@@ -464,6 +470,18 @@ class Arc(_Flat):
         return np.asarray(
             self.centre + np.cos(t)[:, None] * self.major + np.sin(t)[:, None] * self.minor
         )
+
+    @cached_property
+    def radius(self) -> float | None:
+        """The radius (mm) of a circle; None for an ellipse."""
+        a, b = float(np.linalg.norm(self.major)), float(np.linalg.norm(self.minor))
+        is_round = abs(a - b) <= ROUND * a and abs(float(self.major @ self.minor)) <= ROUND * a * a
+        return a if is_round else None
+
+    @cached_property
+    def length(self) -> float:
+        turn = abs(self.end - self.start)
+        return super().length if self.radius is None else self.radius * turn
 
     def speed(self, t: Array) -> Array:
         d = np.cos(t)[:, None] * self.minor - np.sin(t)[:, None] * self.major
