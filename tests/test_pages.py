@@ -9,6 +9,7 @@ import tomllib
 import pytest
 
 from conftest import ROOT
+from kerfpath.job import foresee, prepare, read_job
 from kerfpath.job.format.tables import TABLES
 from kerfpath.post import languages
 
@@ -83,6 +84,22 @@ def script(page, folder):
         [sys.executable, "script.py"], cwd=folder, capture_output=True, text=True, check=True
     )
     return done.stdout
+
+
+def test_the_angles_of_controllers_become_those_of_a_job(tmp_path):
+    said = dict(line.split(" ", 1) for line in script("measuring.md", tmp_path).splitlines())
+    assert said["ABB"] == "[0.0, 0.0, 90.0]"
+    assert said["KUKA"] == "[180.0, 0.0, 90.0]"  # [C, B, A]
+    assert said["Staubli"] == "[180.0, 0.0, -90.0]"
+    assert said["UR"] == "[0.0, 0.0, 90.0002]"  # 1.5708 rad
+
+
+@pytest.mark.slow
+def test_the_whole_job_of_its_page_is_a_job_without_faults(tmp_path):
+    (text,) = blocks(ROOT / "docs" / "job-file.md", "toml")[:1]
+    shutil.copy(ROOT / "examples" / "parts" / "bracket.step", tmp_path)
+    (tmp_path / "whole.toml").write_text(text)
+    assert not foresee(prepare(read_job(tmp_path / "whole.toml")))
 
 
 @pytest.mark.slow
