@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from urllib.parse import quote
 
 import numpy as np
 
 from kerfpath.arrays import Array
+from kerfpath.cell import picture_of
 from kerfpath.robots import (
     FAMILIES,
     ExternalProduct,
@@ -58,6 +61,9 @@ def _list_of_robots(robots: Sequence[Robot]) -> str:
 def _about_robot(each: Robot) -> Iterator[str]:
     """Yield what is known of one robot."""
     yield f"({_anchor(each)})="
+    about = escape(f"{each.manufacturer} {each.model}, reach {each.reach:g} m")
+    drawn = f"data:image/svg+xml,{quote(picture_of(each).strip())}"
+    yield f'```{{raw}} html\n<img alt="{about}" width="260" src="{drawn}">\n```'
     lengths = ", ".join(f"{name} {1000 * value:g}" for name, value in each.geometry.items())
     yield (
         f"{code(each.id)}: {FAMILIES[each.kinematics].words}; payload {each.payload:g} kg, "

@@ -10,6 +10,9 @@ from kerfpath.cell.cell import Cell as Cell
 from kerfpath.cell.checker import CollisionChecker as CollisionChecker
 from kerfpath.cell.clearance_map import Clearances as Clearances
 from kerfpath.cell.clearance_map import clearances as clearances
+from kerfpath.cell.drawn import DrawnLink as DrawnLink
+from kerfpath.cell.drawn import colours_of as colours_of
+from kerfpath.cell.drawn import drawn_links as drawn_links
 from kerfpath.cell.glb import glb_of as glb_of
 from kerfpath.cell.links import allowed_pairs as allowed_pairs
 from kerfpath.cell.links import link_bodies as link_bodies
@@ -22,6 +25,7 @@ from kerfpath.cell.mesh import read_surface as read_surface
 from kerfpath.cell.mesh import thicken as thicken
 from kerfpath.cell.mesh import weld as weld
 from kerfpath.cell.pairs import MAY_TOUCH as MAY_TOUCH
+from kerfpath.cell.picture import picture_of as picture_of
 from kerfpath.cell.scene import Body as Body
 from kerfpath.cell.shapes import Capsule as Capsule
 from kerfpath.cell.shapes import Hull as Hull

@@ -214,6 +214,8 @@ class BodyEntry(Message):
     """An id for `/mesh/ID`, in coordinates of that frame."""
     approximate: bool
     """Whether the shape replaces one that is not known."""
+    colour: str = ""
+    """In CSS notation; "": that of its kind."""
 
 
 class ContourEntry(Message):

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.arrays import Array
-from kerfpath.cell import Body, CuttingHead, link_bodies, surface
+from kerfpath.cell import (
+    Body,
+    Capsule,
+    CuttingHead,
+    colours_of,
+    drawn_links,
+    link_bodies,
+    surface,
+)
+from kerfpath.errors import InputError
 from kerfpath.job import CutRequest, Job, PreparedJob
-from kerfpath.robots import ExternalAxis, carried, chain_of
+from kerfpath.robots import ExternalAxis, Robot, carried, chain_of
+from kerfpath.studio.entries import job_file
 from kerfpath.studio.messages import (
     BodyEntry,
     ContourEntry,
@@ -53,7 +64,7 @@ def scene_of(prepared: PreparedJob, revision: int) -> tuple[SceneMessage, Meshes
         bodies = _own_bodies(job)
     else:  # the part is drawn from the drawing below
         bodies = [body for body in prepared.cell.bodies if body.kind != "part"]
-    entries = [_body(body, meshes) for body in bodies]
+    entries = list(_entries(job.robot, bodies, meshes))
     vertices, triangles = prepared.part.mesh()
     if len(triangles):
         mesh = meshes.add(_placed(vertices, job.placement), triangles)
@@ -74,7 +85,7 @@ def scene_of_robot(job: Job, revision: int) -> tuple[SceneMessage, Meshes]:
         As for `scene_of`.
     """
     meshes = Meshes()
-    entries = [_body(body, meshes) for body in _own_bodies(job)]
+    entries = list(_entries(job.robot, _own_bodies(job), meshes))
     return _scene(job, revision, entries, []), meshes
 
 
@@ -117,17 +128,39 @@ def _own_bodies(job: Job) -> Sequence[Body]:
 
     They are only displayed: collisions with them are not checked.
     """
-    return [*link_bodies(job.robot), *CuttingHead().bodies(chain_of(job.robot), job.tool)]
+    robot = job.robot
+    if job.source["robot"].get("urdf") and not robot.bodies:
+        with suppress(InputError):  # without its meshes the arm is drawn as any other
+            robot = job_file(job).robot.resolve(job.path.parent, bodies=True)
+    return [*link_bodies(robot), *CuttingHead().bodies(chain_of(job.robot), job.tool)]
 
 
-def _body(body: Body, meshes: Meshes) -> BodyEntry:
-    return BodyEntry(
-        name=body.name,
-        kind=body.kind,
-        frame=body.frame,
-        mesh=meshes.add(*surface(body.shape)),
-        approximate=body.approximate,
-    )
+def _entries(robot: Robot, bodies: Sequence[Body], meshes: Meshes) -> Iterator[BodyEntry]:
+    """Yield bodies as they are drawn: castings and housings in place of capsules of links."""
+    colours = dict(zip(("casting", "housing"), colours_of(robot), strict=True))
+    capsules = [b for b in bodies if b.kind == "robot" and isinstance(b.shape, Capsule)]
+    for body in bodies:
+        if body not in capsules:
+            yield BodyEntry(
+                name=body.name,
+                kind=body.kind,
+                frame=body.frame,
+                mesh=meshes.add(*surface(body.shape)),
+                approximate=body.approximate,
+                colour=colours["casting"] if body.kind == "robot" else "",
+            )
+    shaped = {body.frame for body in bodies if body.kind == "robot" and body not in capsules}
+    before = len(robot.externals)
+    for link in drawn_links(robot) if capsules else ():
+        if before + link.frame not in shaped:
+            yield BodyEntry(
+                name=link.name,
+                kind="robot",
+                frame=before + link.frame,
+                mesh=meshes.add(link.vertices, link.triangles),
+                approximate=True,
+                colour=colours[link.tone],
+            )
 
 
 def _placed(points: Array, T: Array) -> Array:

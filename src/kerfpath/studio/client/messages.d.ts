@@ -158,6 +158,8 @@ export interface BodyEntry {
   mesh: string;
   /** Whether the shape replaces one that is not known. */
   approximate: boolean;
+  /** In CSS notation; "": that of its kind. */
+  colour: string;
 }
 
 /** A contour of the scene, as it is cut. */

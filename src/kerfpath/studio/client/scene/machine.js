@@ -91,6 +91,8 @@ export class Machine {
         side: kind === "part" ? 2 : 0,
       });
     }
+    /** @type {Map<string, MeshStandardMaterial>} by their own colour */
+    this.colours = new Map();
     this.edge = new LineBasicMaterial({ transparent: true, opacity: 0.55 });
     // The veil only writes the depth of the ghost, so that only its nearest link is visible.
     this.veil = new MeshBasicMaterial({ colorWrite: false, transparent: true });
@@ -105,6 +107,7 @@ export class Machine {
   paint() {
     for (const [kind, material] of Object.entries(this.materials))
       material.color.set(themeColour(COLOURS[/** @type {Kind} */ (kind)]));
+    for (const [colour, material] of this.colours) material.color.set(colour);
     this.edge.color.set(themeColour("--edge"));
     this.leftMaterial.color.set(themeColour("--part"));
     this.ghostMaterial.color.set(themeColour("--ghost"));
@@ -117,17 +120,14 @@ export class Machine {
    */
   async build(scene, layout) {
     const groups = Map.groupBy(scene.bodies, (body) =>
-      [body.frame, goesWith(body, scene.robot, layout), body.kind, body.approximate].join(" "),
+      [body.frame, goesWith(body, scene.robot, layout), body.kind, body.colour].join(" "),
     );
     const made = await Promise.all(
       [...groups.values()].map(async (bodies) => {
         const [body] = bodies;
-        const { frame, kind } = body;
-        // The edges of an approximate shape mean nothing.
-        const edged = !(body.approximate && kind === "robot");
+        const { frame, kind, colour } = body;
         const whole = merged(await Promise.all(bodies.map((each) => mesh(each.mesh))));
-        const drawn = creased(whole, edged ? undefined : Math.PI / 2);
-        return { ...drawn, edged, frame, kind, by: goesWith(body, scene.robot, layout) };
+        return { ...creased(whole), frame, kind, colour, by: goesWith(body, scene.robot, layout) };
       }),
     );
     this.clear();
@@ -146,13 +146,13 @@ export class Machine {
     }
     this.standing[0].add(this.left);
     this.triangles = 0;
-    for (const { faces, edges, edged, by, frame, kind } of made) {
+    for (const { faces, edges, by, frame, kind, colour } of made) {
       const parent = this[by][frame];
-      const body = new Mesh(faces, this.materials[kind]);
+      const body = new Mesh(faces, this.coloured(kind, colour));
       body.name = kind;
       parent.add(body);
       this.triangles += faces.getAttribute("position").count / 3;
-      if (edged && edges.length && edges.length / 6 < MOST_EDGES) {
+      if (edges.length && edges.length / 6 < MOST_EDGES) {
         const lines = new BufferGeometry();
         lines.setAttribute("position", new BufferAttribute(edges, 3));
         parent.add(new LineSegments(lines, this.edge));
@@ -169,6 +169,19 @@ export class Machine {
           this.ghostFrames[frame].add(part);
         }
     }
+  }
+
+  /**
+   * Return the material of a kind of bodies, or of those of a colour of their own.
+   * @param {Kind} kind
+   * @param {string} colour
+   */
+  coloured(kind, colour) {
+    if (!colour) return this.materials[kind];
+    const known = this.colours.get(colour) ?? this.materials[kind].clone();
+    this.colours.set(colour, known);
+    this.paint();
+    return known;
   }
 
   clear() {

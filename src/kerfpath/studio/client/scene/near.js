@@ -91,7 +91,10 @@ export class Near {
       each.geometry.dispose();
     }
     this.material.color.set(themeColour("--caution-line"));
-    const bodies = (store.scene?.bodies ?? []).filter(({ name }) => names.includes(name));
+    const bodies = (store.scene?.bodies ?? []).filter(({ name }) =>
+      // A link is drawn as one, however many shapes it is checked with.
+      names.some((each) => each === name || each.startsWith(`${name} `)),
+    );
     const made = await Promise.all(
       bodies.map(async (body) => creased(await mesh(body.mesh)).faces),
     );

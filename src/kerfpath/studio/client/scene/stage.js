@@ -41,6 +41,8 @@ export class Stage {
     this.sun = new DirectionalLight(0xffffff, 1.7);
     this.scene.add(this.sky, this.sun, this.camera);
     this.size = new Vector2();
+    /** @type {[string, Vector3[]] | null} what is looked at, and what is to stay whole */
+    this.looked = this.held = null;
     /** Called with each frame, while it can be copied. @type {() => void} */
     this.drawn = () => {};
     /** Draw once, before the next frame of the screen. */
@@ -54,6 +56,12 @@ export class Stage {
     canvas.addEventListener("webglcontextrestored", () => this.invalidate());
     this.look("fit", [new Vector3(-1, -1, 0), new Vector3(2, 1, 2)]);
     this.resize();
+  }
+
+  /** Keep what is looked at whole while the canvas changes its size, until a person moves it. */
+  hold() {
+    this.held = this.looked;
+    this.controls.addEventListener("start", () => (this.held = null));
   }
 
   draw() {
@@ -73,6 +81,7 @@ export class Stage {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    if (this.held) this.look(...this.held);
     this.draw(); // at once: a resized canvas is empty
   }
 
@@ -104,6 +113,8 @@ export class Stage {
    * @param {Vector3[]} points
    */
   look(name, points) {
+    this.looked = [name, points];
+    if (this.held && this.held[1] !== points) this.held = null;
     const box = new Box3().setFromPoints(points);
     const direction = (VIEWS[/** @type {keyof typeof VIEWS} */ (name)] ?? VIEWS.fit)
       .clone()
@@ -157,6 +168,7 @@ export class Stage {
     const zoom = { "+": 0.88, "=": 0.88, "-": 1 / 0.88 }[event.key];
     if (event.ctrlKey || event.metaKey || event.altKey || event.shiftKey || (!turn && !zoom))
       return;
+    this.held = null;
     const offset = this.camera.position.clone().sub(this.controls.target);
     if (turn) {
       offset.applyAxisAngle(this.camera.up, turn[0] * 0.12);

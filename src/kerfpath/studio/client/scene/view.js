@@ -141,7 +141,10 @@ export class SceneView {
     this.placing.apply();
     this.lay();
     this.show(player.moment);
-    if (first) this.look("fit");
+    if (first) {
+      this.look("fit");
+      this.stage.hold();
+    }
     redraw();
   }
 
