@@ -115,7 +115,10 @@ def test_a_damaged_surface_of_an_iges_file_is_one_face_less(tmp_path: Path) -> N
     path.write_text("\n".join(lines) + "\n", "ascii")
     part = read(path)
     assert part.faces == 7
-    assert all(each.may_cut for each in part.left_out)
+    # Curves that bounded it and lie on edges of its neighbours are drawn there already.
+    assert all(
+        each.may_cut != (each.reason == "it lies on edges of faces") for each in part.left_out
+    )
     lost = [each.count for each in part.left_out if each.reason == "no face could be made from it"]
     assert lost == [1]
     # Of the surface and what bounds it, which belong to nothing any more.

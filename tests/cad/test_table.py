@@ -61,6 +61,19 @@ def test_angles_of_poses_are_those_of_their_controller(tmp_path: Path, header: s
     assert given.contour("contour", closed=False).axes[0].tolist() == [0, 0, -1]
 
 
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("count", [30, 3000])
+def test_points_in_no_order_are_said(tmp_path: Path, count: int, closed: bool) -> None:
+    rng = np.random.default_rng(4)
+    angle = np.linspace(0, 2 * np.pi if closed else 4, count, endpoint=False)
+    rows = np.round(np.stack([60 * np.cos(angle), 40 * np.sin(angle), 9 * angle], axis=1), 6)
+    for is_sorted in (True, False):
+        order = np.arange(count) if is_sorted else rng.permutation(count)
+        text = "".join(f"{x},{y},{z},0,0,1\n" for x, y, z in rows[order].tolist())
+        part = table(tmp_path, "x_mm,y_mm,z_mm,nx,ny,nz\n" + text)
+        assert any("in no order" in note for note in part.notes) != is_sorted
+
+
 def line_of_points(x: float, count: int = 5) -> str:
     """Return rows of points 1 mm apart in y, at x mm."""
     return "".join(f"{x},{k},0,0,0,1\n" for k in range(count))

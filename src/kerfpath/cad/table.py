@@ -11,6 +11,8 @@ from itertools import groupby, pairwise
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse.csgraph import minimum_spanning_tree
+from scipy.spatial.distance import pdist, squareform
 from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, short_repr
@@ -167,6 +169,9 @@ EXPECTED = (
 JUMP, FAR = 5.0, 20.0
 """Multiples of the usual step: after an empty line a longer one begins another run; without one it
 is said that it is cut."""
+UNSORTED, JUDGED = 3.0, 400
+"""How much longer a line than the shortest tree that joins its points is said; of how many of
+them."""
 UNIT_QUATERNION = 1e-2
 """Largest deviation of a quaternion's length from one: rounded digits pass, other columns fail."""
 
@@ -209,6 +214,12 @@ def read_table(
         lines = np.array(table.lines)[chosen]
         trace, repaired = trace_of_points(points[chosen], normals[chosen], lines, gap / MM)
         notes += [f"contour {name!r}: {what}" for what in repaired]
+        if (times := _times_as_long(points[chosen])) > UNSORTED:
+            notes.append(
+                f"contour {name!r}: the line through its points as listed is {times:.0f} times as "
+                "long as the shortest that joins them all; if they are in no order, as probes "
+                "may write them, sort them along the cut"
+            )
         kind = kind_of_points(trace)
         loops.append(
             loop_of(name=name, face=name, kind=kind, trace=trace, surface="points", gap=gap)
@@ -383,6 +394,17 @@ def _steps(points: Array) -> Array:
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     usual = float(np.median(steps)) if len(steps) else 0.0
     return steps / usual if usual > 0 else np.zeros(len(steps))
+
+
+def _times_as_long(points: Array) -> float:
+    """Return the length of the line through points (K, 3) as a multiple of their shortest tree.
+
+    Points along a line keep their order if only some of them are taken.
+    """
+    some = np.unique(points[:: -(-len(points) // JUDGED)], axis=0, return_index=True)[1]
+    along = points[:: -(-len(points) // JUDGED)][np.sort(some)]
+    tree = float(minimum_spanning_tree(squareform(pdist(along))).sum())
+    return float(np.linalg.norm(np.diff(along, axis=0), axis=1).sum()) / tree if tree > 0 else 1.0
 
 
 def _notes_on_jumps(
