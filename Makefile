@@ -44,9 +44,10 @@ figures: .venv/run.stamp
 	$(BIN)/python examples/known_against_proposed.py
 	$(BIN)/python examples/techniques.py
 
-# The pages that the documentation shows, photographed in Chromium.
+# The pages that the documentation shows, photographed in Chromium, and the output of the lessons.
 screenshots: .venv/dev.stamp
 	$(BIN)/python examples/screenshots.py
+	$(BIN)/python docs/_ext/lessons.py pictures
 
 # One environment, filled in steps: what running needs, what developing adds, what benchmarks and the site add.
 .venv/tools.stamp: requirements/build.txt
