@@ -33,7 +33,7 @@ SPACING = 2.0
 """Least distance between nodes, mm."""
 TURNS = ((0, 0, 0), (180, 0, 0), (90, 0, 0), (-90, 0, 0), (0, 90, 0), (0, -90, 0))
 """Roll, pitch and yaw in deg of the ways to lay a part down; the first of the best is taken."""
-PLACE = (0.63, 0.0, 0.24)
+PLACE = (0.634, 0.0, 0.244)
 """x and y of the middle of the part and z of its lowest point, as shares of the robot's reach."""
 HEAD = """\
 # A first job for {drawing}, written by kerfpath. What is marked "guess" must be changed to what
