@@ -33,7 +33,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kerfpath.errors import KerfpathError
-from kerfpath.studio.document import Document
+from kerfpath.studio.document import Begin, Document
 from kerfpath.studio.hub import Page
 from kerfpath.studio.messages import (
     CandidateRequest,
@@ -203,6 +203,8 @@ KINDS = {
 """Media types of the page's files that are served, by suffix."""
 LONGEST = 12_000_000
 """Largest message in bytes: a job of the largest size, quoted as JSON."""
+LARGEST_PART = 300_000_000
+"""Largest size of a drawing that a page sends, bytes."""
 MOST_LOOKS = 8
 """Number of questions of a page that are answered at the same time; further ones wait."""
 MOST_SAID = 300
@@ -217,7 +219,12 @@ REPORT_POLICY = (
 
 
 def application(
-    document: Document, *, hosts: Iterable[str], token: str, ticket: str = ""
+    document: Document,
+    *,
+    hosts: Iterable[str],
+    token: str,
+    ticket: str = "",
+    begin: Begin | None = None,
 ) -> Starlette:
     """Return the application that serves one job.
 
@@ -231,8 +238,10 @@ def application(
         Token that requests must have.
     ticket : str, optional
         Opens the page once, instead of the token.
+    begin : callable, optional
+        What writes a first job for a part that a page opens.
     """
-    worker = _Worker(document)
+    worker = _Worker(document, begin)
 
     @asynccontextmanager
     async def at_work(app: Starlette) -> AsyncIterator[None]:
@@ -250,6 +259,8 @@ def application(
             Route("/client/{name:path}", _client),
             Route("/mesh/{name}", _mesh),
             Route("/kept/{number}", _kept),
+            Route("/robot/{name}.svg", _robot),
+            Route("/part/{name}", _part, methods=["POST"]),
             Route("/export/{name}", _export),
             Route("/report", _report),
             WebSocketRoute("/ws", _socket),
@@ -264,8 +275,8 @@ def application(
 class _Worker:
     """The session of a document; its import takes a second, in which the page already loads."""
 
-    def __init__(self, document: Document) -> None:
-        self._document = document
+    def __init__(self, document: Document, begin: Begin | None) -> None:
+        self._document, self._begin = document, begin
         self._session: Session | None = None
         self._lock = asyncio.Lock()
 
@@ -273,7 +284,7 @@ class _Worker:
         """Return the session once it is imported."""
         async with self._lock:
             if self._session is None:
-                self._session = await asyncio.to_thread(_session_of, self._document)
+                self._session = await asyncio.to_thread(_session_of, self._document, self._begin)
         return self._session
 
     async def work(self) -> None:
@@ -281,10 +292,10 @@ class _Worker:
         await (await self.session()).work()
 
 
-def _session_of(document: Document) -> Session:
+def _session_of(document: Document, begin: Begin | None) -> Session:
     from kerfpath.studio.session import Session
 
-    return Session(document)
+    return Session(document, begin)
 
 
 async def _session(app: Starlette) -> Session:
@@ -323,6 +334,39 @@ async def _mesh(request: Request) -> Response:
         return PlainTextResponse("there is no such mesh\n", status_code=404)
     kept = {"cache-control": "private, max-age=31536000, immutable"}
     return Response(data, media_type="application/octet-stream", headers=kept)
+
+
+async def _robot(request: Request) -> Response:
+    from kerfpath.cell import picture_of
+    from kerfpath.robots import robot, robot_ids
+
+    name = request.path_params["name"]
+    if name not in robot_ids():
+        return PlainTextResponse("there is no such robot\n", status_code=404)
+    picture = await asyncio.to_thread(lambda: picture_of(robot(name)))
+    kept = {"cache-control": "private, max-age=3600"}
+    return Response(picture, media_type="image/svg+xml", headers=kept)
+
+
+async def _part(request: Request) -> Response:
+    """Begin a new job with the drawing that a page sends."""
+    session, data = await _session(request.app), bytearray()
+    async for piece in request.stream():
+        data += piece
+        if len(data) > LARGEST_PART:
+            said = f"the drawing has more than {LARGEST_PART // 10**6} MB; put it beside the job"
+            return PlainTextResponse(said, status_code=413)
+    asked = request.query_params
+    try:
+        await session.begin(
+            request.path_params["name"],
+            bytes(data),
+            robot=asked.get("robot") or None,
+            unit=asked.get("unit") or None,
+        )
+    except KerfpathError as error:
+        return PlainTextResponse(str(error), status_code=409)
+    return PlainTextResponse("")
 
 
 async def _kept(request: Request) -> Response:

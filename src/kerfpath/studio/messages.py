@@ -148,6 +148,26 @@ class Variable(Message):
     """Whether it varies if the job has no range at all."""
 
 
+class RobotChoice(Message):
+    """A robot of the library; `/robot/ID.svg` is its picture."""
+
+    id: str
+    maker: str
+    model: str
+    joints: int
+    kinematics: str
+    reach: float | None
+    """m"""
+    payload: float | None
+    """kg"""
+    ratio: str | None
+    """The nearest ratio of acceleration to velocity, if its accelerations are not known."""
+    missing: str
+    """What a job must give, as it is not known."""
+    languages: list[str]
+    """Those of its controllers."""
+
+
 class OptionsMessage(Message):
     """The form of options of the job: which keys have a control, and what it must know of them."""
 
@@ -161,6 +181,14 @@ class OptionsMessage(Message):
     """The criteria of a Pareto set."""
     languages: list[str]
     """The languages of a program."""
+    robots: list[RobotChoice] = []
+    """The library."""
+    heads: list[str] = []
+    """The shipped heads."""
+    suffixes: list[str] = []
+    """Ends of the names of drawings that can be read, with their dots."""
+    units: list[str] = []
+    """Units of a drawing."""
 
 
 class JointEntry(Message):

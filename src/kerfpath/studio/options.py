@@ -13,18 +13,21 @@ from typing import Any, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
+from kerfpath.cad import SUFFIXES, UNITS_MM
 from kerfpath.front import CRITERIA
-from kerfpath.job import TABLES, VARIABLES, JobFile
+from kerfpath.job import TABLES, VARIABLES, JobFile, heads
 from kerfpath.options import PlanOptions
 from kerfpath.post import languages
 from kerfpath.report.layout import GOALS
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, robot_ids
+from kerfpath.robots import robot as library_robot
 from kerfpath.setting import settings
 from kerfpath.studio.messages import (
     Companion,
     OptionField,
     OptionGroup,
     OptionsMessage,
+    RobotChoice,
     Sampling,
     Variable,
 )
@@ -180,7 +183,34 @@ def options_message(robot: Robot | None, external: Sequence[str] = ()) -> Option
         variables=[_variable(key, label) for key, label in VARIABLES.items()],
         criteria=list(CRITERIA),
         languages=[*sorted(languages()), "none"],
+        robots=_library(),
+        heads=list(heads()),
+        suffixes=sorted(SUFFIXES),
+        units=sorted(UNITS_MM),
     )
+
+
+@cache
+def _library() -> list[RobotChoice]:
+    """Return the robots of the library, by maker."""
+    found = sorted(map(library_robot, robot_ids()), key=lambda r: (r.manufacturer, r.model))
+    return [
+        RobotChoice(
+            id=each.id,
+            maker=each.manufacturer,
+            model=each.model,
+            joints=each.joints,
+            kinematics=each.kinematics,
+            reach=each.reach,
+            payload=each.payload,
+            ratio=each.acceleration_ratio if each.acceleration is None else None,
+            missing=each.limits_missing,
+            languages=[
+                n for n, one in languages().items() if each.manufacturer in one.manufacturers
+            ],
+        )
+        for each in found
+    ]
 
 
 def _external(robot: Robot, names: Sequence[str]) -> Iterator[OptionField]:

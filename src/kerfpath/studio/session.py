@@ -7,9 +7,14 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from itertools import count
+from pathlib import Path
 from typing import NamedTuple, TypeVarTuple
 
+from kerfpath.cad import SUFFIXES, unit_question
+from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError, KerfpathError
+from kerfpath.files import write_whole
 from kerfpath.job import (
     FileTexts,
     Job,
@@ -22,7 +27,7 @@ from kerfpath.job import (
     with_loops,
     without_contour,
 )
-from kerfpath.studio.document import Change, Document, KeptJobs
+from kerfpath.studio.document import Begin, Change, Document, KeptJobs, with_values
 from kerfpath.studio.entries import faults_of, job_file, job_message
 from kerfpath.studio.hub import Hub, Page
 from kerfpath.studio.messages import (
@@ -245,6 +250,32 @@ class OutdatedFilter:
         return message.model_copy(update={"previous_cost": before})
 
 
+def _stored(folder: Path, name: str, data: bytes) -> tuple[Path, bool]:
+    """Return the file beside the job with a drawing's content, and whether it is new.
+
+    Raises
+    ------
+    InputError
+        Its name is not that of a drawing, or it cannot be written.
+    """
+    given = Path(name)
+    if given.name != name or not name.isprintable() or given.suffix.lower() not in SUFFIXES:
+        known = ", ".join(sorted(SUFFIXES))
+        raise InputError(f"part: expected a drawing ({known}), got {name!r:.80}")
+    for number in count(1):
+        own = name if number == 1 else f"{given.stem}-{number}{given.suffix}"
+        file = folder / own
+        if not file.exists():
+            break
+        if file.is_file() and file.read_bytes() == data:
+            return file, False
+    try:
+        write_whole({file: data})
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written ({error.strerror})") from None
+    return file, True
+
+
 # -----------------------------------------------------------------------------
 # A session: one job that is edited, planned and shown; all open pages see the same state.
 
@@ -258,10 +289,12 @@ class Session:
     ----------
     document : Document
         The job.
+    begin : callable, optional
+        What writes a first job for a part.
     """
 
-    def __init__(self, document: Document) -> None:
-        self.document = document
+    def __init__(self, document: Document, begin: Begin | None = None) -> None:
+        self.document, self._begin = document, begin
         self.hub = Hub()
         self.kept = KeptJobs()
         self._planning = Planning(self._from_thread, self._prepared_there, self._refused_there)
@@ -333,6 +366,42 @@ class Session:
         if self._files is None or self._files[0] is not planned.result:
             self._files = planned.result, await asyncio.to_thread(result_texts, planned.result)
         return self._files[1]
+
+    async def begin(self, name: str, data: bytes, *, robot: str | None, unit: str | None) -> None:
+        """Begin a new job with a drawing, as one step of undo; head and language stay.
+
+        The drawing is written beside the job; a file that is there keeps its content.
+
+        Raises
+        ------
+        InputError
+            It is no drawing that can be read, or its unit is unlikely and none is given.
+        """
+        if self._begin is None:
+            raise InputError("this studio cannot begin a job; start it with kerfpath studio")
+        write, path = self._begin, self.document.path
+
+        def text() -> str:
+            file, new = _stored(path.parent, name, data)
+            try:
+                part = read_drawing(file, unit)
+                question = unit_question(part.unit, part.bounding_box)
+                if unit is None and question:
+                    raise InputError(question)
+                return write(part, path, robot=robot, unit=unit)
+            except InputError:
+                if new:
+                    file.unlink()
+                raise
+
+        made = await asyncio.to_thread(text)
+        before = {} if self._job is None else self._job.source
+        kept = [
+            ((table, key), before[table][key])
+            for table, key in (("tool", "head"), ("program", "language"))
+            if key in before.get(table, {})
+        ]
+        self._replace(with_values(made, kept) if kept else made)
 
     async def script(self) -> File:
         """Return the job as a Python script.

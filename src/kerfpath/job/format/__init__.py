@@ -30,4 +30,5 @@ from kerfpath.job.format.tables import LayoutTable as LayoutTable
 from kerfpath.job.format.tables import ProgramTable as ProgramTable
 from kerfpath.job.format.tables import SequenceTable as SequenceTable
 from kerfpath.job.format.tolerances import Tolerances as Tolerances
+from kerfpath.job.format.values import heads as heads
 from kerfpath.job.format.values import pose as pose

@@ -5,6 +5,7 @@ import { followTheme, splitter } from "./desk.js";
 import { byId } from "./dom.js";
 import { MapView } from "./map/view.js";
 import { foot, notices, topBar } from "./panels/bar.js";
+import { cellSheet, followDrops } from "./panels/cell.js";
 import { comparePanel, followKept } from "./panels/compare.js";
 import { contoursPanel } from "./panels/contours.js";
 import { formPanel } from "./panels/form.js";
@@ -44,7 +45,9 @@ new Track();
 followKept(view);
 followFastest();
 followProgram();
+followDrops();
 prepareSheets({
+  cell: cellSheet,
   text: jobSheet,
   program: programSheet,
   loops: loopsSheet,

@@ -98,6 +98,25 @@ export interface Variable {
   varies: boolean;
 }
 
+/** A robot of the library; `/robot/ID.svg` is its picture. */
+export interface RobotChoice {
+  id: string;
+  maker: string;
+  model: string;
+  joints: number;
+  kinematics: string;
+  /** m */
+  reach: number | null;
+  /** kg */
+  payload: number | null;
+  /** The nearest ratio of acceleration to velocity, if its accelerations are not known. */
+  ratio: string | null;
+  /** What a job must give, as it is not known. */
+  missing: string;
+  /** Those of its controllers. */
+  languages: string[];
+}
+
 /** The form of options of the job: which keys have a control, and what it must know of them. */
 export interface OptionsMessage {
   type: "options";
@@ -110,6 +129,14 @@ export interface OptionsMessage {
   criteria: string[];
   /** The languages of a program. */
   languages: string[];
+  /** The library. */
+  robots: RobotChoice[];
+  /** The shipped heads. */
+  heads: string[];
+  /** Ends of the names of drawings that can be read, with their dots. */
+  suffixes: string[];
+  /** Units of a drawing. */
+  units: string[];
 }
 
 /** A joint of the robot, or an external axis. */

@@ -43,6 +43,7 @@ export function topBar(extras) {
       ${step("redo", live && job.redo, "Redo (Ctrl+Shift+Z)")}
     </div>
     <div class="grow" />
+    ${opener("cell", live, "keep", "Cell")}
     ${opener("layout", open && Boolean(scene?.contours.length), "move", "Layout")}
     ${opener("text", live, "file", "Job file")}
     ${opener("program", live, "file", "Program")}

@@ -6,7 +6,7 @@ import { store } from "../app.js";
 import { byId } from "../dom.js";
 import { draw, html, icon } from "../ui.js";
 
-/** @typedef {"text" | "program" | "loops" | "layout"} Name */
+/** @typedef {"cell" | "text" | "program" | "loops" | "layout"} Name */
 
 /**
  * What a sheet shows.
