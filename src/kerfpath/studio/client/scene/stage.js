@@ -36,6 +36,7 @@ export class Stage {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
     this.controls.addEventListener("change", () => this.invalidate());
+    this.controls.addEventListener("start", () => (this.held = null));
     this.sky = new HemisphereLight(0xffffff, 0x8d99a8, 1.9);
     this.sky.position.set(0, 0, 1);
     this.sun = new DirectionalLight(0xffffff, 1.7);
@@ -61,7 +62,6 @@ export class Stage {
   /** Keep what is looked at whole while the canvas changes its size, until a person moves it. */
   hold() {
     this.held = this.looked;
-    this.controls.addEventListener("start", () => (this.held = null));
   }
 
   draw() {

@@ -34,6 +34,8 @@ export class SceneView {
     this.ghosts = new Ghosts(this);
     this.placing = new Placing(this);
     this.built = "";
+    this.fitted = ""; // the robot that the view was fitted to
+    this.begun = false; // whether there has been a motion
     this.ready = false;
     this.follow = false;
     /** @type {import("../timeline.js").Timeline | null} whose kerf is drawn */
@@ -126,7 +128,7 @@ export class SceneView {
     const layout = store.job?.values?.layout ?? {};
     const key = JSON.stringify([scene.robot, scene.bodies, layout.standing, layout.move]);
     if (key === this.built) return this.placing.apply();
-    const first = this.built === "";
+    const first = this.fitted !== scene.robot.id; // another robot has another size
     this.built = key;
     try {
       this.ghosts.clear();
@@ -141,11 +143,18 @@ export class SceneView {
     this.placing.apply();
     this.lay();
     this.show(player.moment);
-    if (first) {
-      this.look("fit");
-      this.stage.hold();
-    }
+    if (first || this.stage.held) this.fit(scene.robot.id);
     redraw();
+  }
+
+  /**
+   * Fit the view to the cell, and keep it whole until a person moves it.
+   * @param {string} robot
+   */
+  fit(robot) {
+    this.fitted = robot;
+    this.look("fit");
+    this.stage.hold();
   }
 
   /** Draw the floor under the bodies of the cell. */
@@ -209,6 +218,10 @@ export class SceneView {
     if (this.follow && moment) {
       if (this.carried) this.stage.carry(at.clone().sub(this.carried));
       this.carried = at;
+    }
+    if (moment && !this.begun) {
+      this.begun = true;
+      if (this.stage.held) this.fit(scene.robot.id); // the arm is elsewhere than before
     }
     this.stage.invalidate();
   }
