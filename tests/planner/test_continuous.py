@@ -21,7 +21,7 @@ from kerfpath.cell import box_between, cell_of
 from kerfpath.contour import Contour
 from kerfpath.effort import changed_effort
 from kerfpath.options import PlanOptions
-from kerfpath.planner import feed_reduction, layered_graph, subsampled
+from kerfpath.planner import layered_graph, subsampled
 from kerfpath.planner.task import planning_task
 from kerfpath.plans import Proof
 from kerfpath.setup import Setup
@@ -308,8 +308,8 @@ def test_feed_and_pieces_go_on_from_it(task, arm, tool, placement):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.2, 0.4])
-def test_a_feed_reduction_is_no_slower_for_paths_between_the_samples(
-    monkeypatch, arm, tool, placement, speed
+def test_a_feed_reduction_between_the_samples_is_no_slower_than_from_the_grid(
+    arm, tool, placement, speed
 ):
     along = np.linspace(0, 0.16, 81)
     points = np.stack([np.minimum(along, 0.08), np.maximum(along - 0.08, 0), 0 * along], axis=1)
@@ -317,13 +317,13 @@ def test_a_feed_reduction_is_no_slower_for_paths_between_the_samples(
     corner = Contour(points, np.c_[lean, 0 * along, -np.ones(81)], name="corner")
     options = {"tool": tool, "placement": placement, "gamma_step": np.radians(5), "feed": "dip"}
     made = plan(corner, arm, speed=speed, **options)
-    monkeypatch.setattr(feed_reduction, "_between_the_samples", lambda task, finder: [])
-    without = plan(corner, arm, speed=speed, **options)
-    assert made.time[-1] <= without.time[-1]
+    grid = plan(corner, arm, speed=speed, method="exact", refine=True, **options)
+    # Both are local optima, whose times differ by 0.2 % at 0.2 m/s.
+    assert made.time[-1] <= grid.time[-1] * 1.003
     if speed == 0.4:
-        # Measured: 0.529 s instead of 0.563, of which 0.4 s are those of the speed asked for.
-        assert made.time[-1] < 0.95 * without.time[-1]
-        assert "slowed down from a path over continuous gamma" in made.proof.statement
+        # Measured: 0.529 s instead of 0.537, of which 0.4 s are those of the speed asked for.
+        assert made.time[-1] < 0.99 * grid.time[-1]
+        assert "slowed down from paths over continuous rotation" in made.proof.statement
 
 
 def test_a_refinement_stays_within_what_it_is_given(task):

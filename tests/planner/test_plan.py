@@ -255,7 +255,7 @@ def test_off_the_grid_the_feed_dips_less(corner, arm, tool, placement):
 @pytest.mark.parametrize("moved", [True, False])
 def test_a_dip_is_never_slower_than_on_the_grid(monkeypatch, corner, arm, tool, placement, moved):
     if not moved:  # off the grid nothing is gained
-        monkeypatch.setattr("kerfpath.refiner.reduce_excess", lambda plan: plan)
+        monkeypatch.setattr("kerfpath.refiner.reduce_excess", lambda plan, **_: plan)
         monkeypatch.setattr("kerfpath.refiner.refine", lambda plan: SimpleNamespace(plan=plan))
     options = {"tool": tool, "placement": placement, "gamma_step": STEP, "feed": "dip"}
     options["method"] = "exact"

@@ -84,6 +84,7 @@ from kerfpath.post import (
     unsafe_paths,
     unsafe_restarts,
 )
+from kerfpath.tolerances import SAME_POINT
 from kerfpath.transfer import End, TransferMove, back_off
 
 # -----------------------------------------------------------------------------
@@ -394,9 +395,15 @@ def _plan(job: Job, name: str, cut: ReadCut, s: Array, time: Array) -> Plan:
 
 
 def _rounding(cut: ReadCut, made: Plan, rules: Rules) -> Rounding:
-    """Return the rounding of joints and times of a cut by the digits of a language."""
+    """Return the rounding of joints and times of a cut by the digits of a language.
+
+    Where the text states speeds, a time is that of a stretch between two rounded points.
+    """
     jointed = all(move.T_part_tip is None for move in cut.moves)
-    time = np.where(np.isnan(cut.speed), 0.0, rules.speed_step / 2 / cut.speed)
+    length = np.linalg.norm(np.diff(cut.T_part_tip[:, :3, 3], axis=0), axis=1)
+    moved = 0.0 if jointed else 2 * np.sqrt(3.0) * rules.point_step
+    longer = moved / np.maximum(length, SAME_POINT)
+    time = np.where(np.isnan(cut.speed), 0.0, rules.speed_step / 2 / cut.speed + longer)
     return rounding_of(made, rules.point_step, rules.angle_step, time, jointed=jointed)
 
 

@@ -44,8 +44,9 @@ class CollisionFreeSearch:
             _require_same_cell(task, cell)
 
     @property
-    def _graph(self) -> LayeredGraph:
-        return self._task.graph  # built late: a course of external axes must be known first
+    def graph(self) -> LayeredGraph:
+        """The graph of the task, built late: a course of external axes must be known first."""
+        return self._task.graph
 
     @cached_property
     def _checker(self) -> CollisionChecker:
@@ -53,18 +54,18 @@ class CollisionFreeSearch:
         asked = self._task.settings.comfort
         band = Band() if asked is None or asked.clearance is None else asked.clearance
         return CollisionChecker(
-            self._cell, self._graph.q, comfort=band.width, comfort_cost=band.cost
+            self._cell, self.graph.q, comfort=band.width, comfort_cost=band.cost
         )
 
     @cached_property
     def _known(self) -> CheckedEdges:
         return CheckedEdges(
-            self._graph.q,
-            self._graph.start,
+            self.graph.q,
+            self.graph.start,
             price=self._checker.price,
             passable=self._checker.passable,
             blocked=self._checker.blocked,
-            around=_gamma_neighbours(self._graph),
+            around=_gamma_neighbours(self.graph),
         )
 
     @property
@@ -134,7 +135,7 @@ class CollisionFreeSearch:
         first, nodes = closed[0], len(self._known.start) - 1
         others = f" ({len(closed)} such nodes: {_ranges(closed)})" if len(closed) > 1 else ""
         rest = "" if settled == nodes else f"; nodes from {settled} on have not been checked"
-        counts = self._graph.counts(first)
+        counts = self.graph.counts(first)
         counts.pop(Reason(Loss.ADMITTED), None)
         counts[Reason(Loss.COLLISION, "at the node")] = int(
             np.diff(self._known.start[first : first + 2])[0]

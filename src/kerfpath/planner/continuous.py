@@ -12,6 +12,7 @@ from kerfpath.planner.attempt import Attempt, Strategy, first_plan
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.courses import can_explore
 from kerfpath.planner.exploration import Exploration
+from kerfpath.planner.feed_reduction import may_keep_speed, slowed_motion
 from kerfpath.planner.impossible import refuse_impossible
 from kerfpath.planner.on_grid import plan_on_grid
 from kerfpath.planner.quickest import clear_paths, wide
@@ -61,6 +62,22 @@ def best_motion_found(attempt: Attempt) -> Plan | None:
     return None if found is None else claimed(found, attempt.finder)
 
 
+def motion_with_reduced_feed(attempt: Attempt) -> Plan | None:
+    """Plan at a reduced feed where the limits need it, if the feed may be reduced.
+
+    Where hardly any time would be lost, a motion at the speed asked for throughout is tried first.
+    """
+    task, finder = attempt.task.whole(), attempt.finder
+    if task.settings.feed != "dip" or grid_reason(task) or _costs_at_samples(task):
+        return None
+    attempt.task = task
+    attempt.begin("feed reduction")
+    slowed = slowed_motion(task, finder)
+    if slowed is None or may_keep_speed(task, slowed):
+        return best_motion_found(attempt) or slowed
+    return slowed
+
+
 def better_motion(attempt: Attempt) -> Plan | None:
     """Explore all valleys, if this has not been done; return the plan if it is better.
 
@@ -104,6 +121,7 @@ def motion_from_finer_grid(attempt: Attempt) -> Plan | None:
 
 
 OVER_CONTINUOUS_GAMMA: tuple[Strategy, ...] = (
+    motion_with_reduced_feed,
     best_motion_found,
     motion_from_grid,
     motion_from_finer_grid,
@@ -132,12 +150,15 @@ def _from_grid(
     NoFeasiblePath
         There is none.
     """
-    comfort = task.settings.comfort
-    # The node costs of a slowed-down motion are known only on the grid.
-    priced = task.settings.feed == "dip" and comfort is not None and comfort.costs
-    refine = task.robot.family.free_rotation and not priced
+    refine = task.robot.family.free_rotation and not _costs_at_samples(task)
     made = plan_on_grid(task, finder, begin, refine=refine)
     return replace(made, proof=replace(made.proof, statement=f"{why}; {made.proof.statement}"))
+
+
+def _costs_at_samples(task: Task) -> bool:
+    """Return whether nodes of a motion with a reduced feed have costs, known only on the grid."""
+    comfort = task.settings.comfort
+    return task.settings.feed == "dip" and comfort is not None and comfort.costs
 
 
 def _from_more_samples(

@@ -1,47 +1,146 @@
-"""feed = "dip": paths to slow down, their least times, and where the feed is reduced."""
+"""feed = "dip": paths to slow down, their least times, and where the feed is reduced.
+
+A path is slowed down in three steps. Gamma moves so that the motion exceeds the limits little at
+the speed asked for; `retime` gives every interval the least time that the limits need; and at these
+times gamma moves to the least cost.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from kerfpath import refiner
+from kerfpath.effort import current_effort
 from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.impossible import motion_test
+from kerfpath.planner.quickest import alike, clear_paths
 from kerfpath.planner.refinements import plan_first_order
+from kerfpath.planner.starts import Bounds, refined_clear
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
+from kerfpath.refiner import Refinement
 from kerfpath.retime import feed, retime
-from kerfpath.search import BeamWidth, ContinuousSearch, SearchProblem, find_slowed
+from kerfpath.search import (
+    BeamWidth,
+    ContinuousPath,
+    SearchProblem,
+    edges_allowed,
+    find_slow_path,
+    find_slowed,
+)
 
 BEAM = BeamWidth(60, (1.1, 1.0))
 """BeamWidth of the search for a path over continuous gamma."""
-SLOWER = (1.0, 1.15, 1.4, 2.0)
-"""Node intervals at which (6) must hold everywhere, as multiples of the one asked for."""
-MOST_LOOKS = 20
-"""Most searches for a path whose samples are clear in the cell."""
+SLOWER = (1.0, 1.2, 1.5, 2.0, 3.0, 4.5, 7.0, 10.0, 20.0, 50.0)
+"""Node intervals at which a path is to keep all limits, as multiples of the one asked for."""
+PROGRAMS = 10
+"""Most convex programs that reduce the excess; sixty gained 0.1 % of the time on 728 nodes."""
+NEARLY = 1.02
+"""Time of a plan with a reduced feed, relative to that at the speed asked for, up to which a motion
+at that speed throughout is looked for."""
+
+
+# -----------------------------------------------------------------------------
+# Over continuous gamma.
+
+
+def slowed_motion(task: Task, finder: CollisionFreeSearch) -> Plan | None:
+    """Return the quickest motion found, at the speed asked for where the limits allow it.
+
+    The paths to slow down are those of beam searches: at the speed asked for without (6), and with
+    all limits at the highest constant speed of `SLOWER` that has one. Of equally quick motions it
+    is the cheapest. None if no path was found or none stays clear of the cell.
+    """
+    found = []
+    tried: list[Plan] = []
+    for path in _paths(task, finder):
+        made = task.plan_between(path, _claim(finder))
+        if not any(alike(made, other) for other in tried):
+            tried.append(made)
+            found.append(_slowed_between(task, finder, path, made))
+    clear = [plan for plan in found if plan is not None]
+    return min(clear, key=_time_and_cost) if clear else None
+
+
+def may_keep_speed(task: Task, made: Plan) -> bool:
+    """Return whether a motion at the speed asked for throughout is worth a search.
+
+    It is where a plan with a reduced feed takes hardly longer, unless it is proved that no motion
+    passes the place where its feed is lowest.
+    """
+    assert made.feed is not None
+    if made.time[-1] > NEARLY * task.times[-1]:
+        return False
+    test = motion_test(task) if made.feed.node >= 0 else None
+    return test is None or test.closed(task.problem.limits, task.dt, made.feed.node) is None
+
+
+def _claim(finder: CollisionFreeSearch) -> Proof:
+    said = "the quickest motion found, slowed down from paths over continuous rotation"
+    return Proof(optimal=False, statement=finder.claimed(said))
+
+
+def _paths(task: Task, finder: CollisionFreeSearch) -> Iterator[ContinuousPath]:
+    """Yield paths over continuous gamma that are worth slowing down; there may be none."""
+    without = task.problem.limits.without_acceleration()
+    yield from _first_path(task, finder, replace(task.problem, limits=without))
+    for times in SLOWER:
+        found = _first_path(task, finder, replace(task.problem, dt=times * task.dt))
+        if found:
+            yield from found
+            return
+
+
+def _first_path(
+    task: Task, finder: CollisionFreeSearch, problem: SearchProblem
+) -> list[ContinuousPath]:
+    """Return the best path over continuous gamma of a problem, if one is found."""
+    searched = clear_paths(task.with_problem(problem), finder, (BEAM,))
+    return [] if searched is None else searched[1][:1]
+
+
+def _slowed_between(
+    task: Task, finder: CollisionFreeSearch, path: ContinuousPath, made: Plan
+) -> Plan | None:
+    """Return the plan of a path slowed down; None if it is not clear, even close to the path."""
+
+    def refine(within: Bounds | None) -> Refinement:
+        moved = refiner.reduce_excess(made, within=within, most=PROGRAMS)
+        return refiner.refine(_with_least_times(task, moved), within=within)
+
+    found = refined_clear(finder, path, made, refine)
+    slowed = _with_least_times(task, made if found is None else found.plan)
+    if found is None and _broken(task, finder, slowed):
+        return None
+    return replace(slowed, proof=_claim(finder))
+
+
+# -----------------------------------------------------------------------------
+# On the grid of gamma.
 
 
 def plan_slowed(task: Task, finder: CollisionFreeSearch, *, refine: bool) -> Plan:
-    """Return a plan at the speed asked for where its path allows it, and slower elsewhere.
+    """Return a plan at the speed asked for where the paths of the grid allow it, slower elsewhere.
 
-    Two paths of the grid get the least times under all limits: the one that loses the least time
-    step by step, with lost time priced above all distances, and the best one without acceleration
-    limits, if there is one. With `refine`, gamma also moves off the grid from each of them so that
-    the limits are exceeded little, and each is refined. With the method "continuous", so are paths
-    over continuous gamma: the best one without acceleration limits, and the one that keeps all
-    limits at the least constant interval that has one. The plan is the quickest clear one, and of
-    equally quick ones the cheapest.
+    Two paths get the least times under all limits: the one that loses the least time step by step,
+    with lost time priced above all distances, and the best one without acceleration limits. Where
+    the velocities leave very many edges, the first is left out; if there is no other, the shortest
+    path at the highest constant speed under the velocities is slowed down. With `refine`, gamma
+    also moves off the grid. The plan is the quickest clear one, and of equally quick ones the
+    cheapest.
+
+    Raises
+    ------
+    NoFeasiblePath
+        A node has no pose, or no path joins the nodes at any speed.
     """
-    slowed, first = _least_lost(task, finder), plan_first_order(task, finder)
-    starts = [slowed]
-    if first is not None and not np.array_equal(first.q, slowed.q):
-        starts.append(first)
+    starts = list(_on_grid(task, finder))
     on_grid = min((_with_least_times(task, start) for start in starts), key=_time_and_cost)
     if not (refine and task.robot.family.free_rotation):
         return on_grid
-    if task.settings.method == "continuous":
-        starts += _between_the_samples(task, finder)
     why = "take longer"
     for made in sorted((_off_grid(task, start) for start in starts), key=_time_and_cost):
         if _time_and_cost(made) > _time_and_cost(on_grid):
@@ -54,44 +153,41 @@ def plan_slowed(task: Task, finder: CollisionFreeSearch, *, refine: bool) -> Pla
     return replace(on_grid, proof=replace(on_grid.proof, statement=claim))
 
 
+def _on_grid(task: Task, finder: CollisionFreeSearch) -> Iterator[Plan]:
+    """Yield the paths of the grid to slow down; there is at least one."""
+    few = edges_allowed(task.problem, task.dt) <= current_effort().exact_edges
+    slowed, first = _least_lost(task, finder) if few else None, plan_first_order(task, finder)
+    if slowed is not None:
+        yield slowed
+    if first is not None and (slowed is None or not np.array_equal(first.q, slowed.q)):
+        yield first
+    if slowed is None and first is None:
+        path = finder.find(find_slow_path, task.problem)
+        claim = finder.claimed("the shortest path at the highest constant speed under velocities")
+        proof = Proof(optimal=False, statement=claim)
+        yield task.plan(path.index, task.cost(path.index), proof)
+
+
+def _least_lost(task: Task, finder: CollisionFreeSearch) -> Plan:
+    found = finder.find(find_slowed, task.problem)
+    claim = finder.claimed(
+        "at constant speed the graph has no path; of all its paths this one loses the least time "
+        "step by step"
+    )
+    return task.plan(found.index, task.cost(found.index), Proof(optimal=False, statement=claim))
+
+
 def _off_grid(task: Task, start: Plan) -> Plan:
     """Return the faster of a path with reduced excess and its refinement, with the least times."""
-    moved = _with_reduced_excess(task, start)
+    claim = f"{start.proof.statement}; gamma moved off the grid to lose little time"
+    moved = replace(
+        refiner.reduce_excess(start, most=PROGRAMS), proof=Proof(optimal=False, statement=claim)
+    )
+    moved = _with_least_times(task, moved)
     return min(moved, _with_least_times(task, refiner.refine(moved).plan), key=_time_and_cost)
 
 
-def _between_the_samples(task: Task, finder: CollisionFreeSearch) -> list[Plan]:
-    """Return the paths over continuous gamma that are worth slowing down; there may be none.
-
-    Each has a constant interval: the one asked for, without (6), and the least of `SLOWER` with it.
-    """
-    free = replace(task.problem, limits=task.problem.limits.without_acceleration())
-    found = [_between(task, finder, free)]
-    for times in SLOWER:
-        slow = _between(task, finder, replace(task.problem, dt=times * task.dt))
-        if slow is not None:
-            found.append(slow)
-            break
-    return [path for path in found if path is not None]
-
-
-def _between(task: Task, finder: CollisionFreeSearch, problem: SearchProblem) -> Plan | None:
-    """Return the best path over continuous gamma of a problem; None if none is found."""
-    claim = "no motion was found at constant speed; slowed down from a path over continuous gamma"
-    for _ in range(MOST_LOOKS):
-        search = ContinuousSearch(finder.open_problem(problem), task.samples)
-        paths = list(search.paths(BEAM))
-        if not finder.learn([ends for path in paths for ends in (path.one, path.other)]):
-            proof = Proof(optimal=False, statement=finder.claimed(claim))
-            return task.plan_between(paths[0], proof) if paths else None
-    return None
-
-
-def _with_reduced_excess(task: Task, start: Plan) -> Plan:
-    """Return the plan moved off the grid so that it exceeds the limits little, with least times."""
-    claim = f"{start.proof.statement}; gamma moved off the grid to lose little time"
-    moved = replace(refiner.reduce_excess(start), proof=Proof(optimal=False, statement=claim))
-    return _with_least_times(task, moved)
+# -----------------------------------------------------------------------------
 
 
 def _time_and_cost(made: Plan) -> tuple[float, float]:
@@ -105,15 +201,6 @@ def _broken(task: Task, finder: CollisionFreeSearch, made: Plan) -> str:
     if comfort is not None and comfort.broken(task.robot, made.q, task.setup.tool):
         return "break a margin of comfort"
     return "" if finder.is_clear(made) else "not be clear"
-
-
-def _least_lost(task: Task, finder: CollisionFreeSearch) -> Plan:
-    found = finder.find(find_slowed, task.problem)
-    claim = finder.claimed(
-        "at constant speed the graph has no path; of all its paths this one loses the least time "
-        "step by step"
-    )
-    return task.plan(found.index, task.cost(found.index), Proof(optimal=False, statement=claim))
 
 
 def _with_least_times(task: Task, made: Plan) -> Plan:

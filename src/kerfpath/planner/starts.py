@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from kerfpath import refiner
+from kerfpath.arrays import Array
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.quickest import alike
@@ -131,16 +133,32 @@ class Starts:
 def _refine_path(
     task: Task, finder: CollisionFreeSearch, path: ContinuousPath, made: Plan
 ) -> Refinement | None:
-    """Return the refinement of a path; None if it does not keep the limits or is not clear.
+    """Return the refinement of a path; None if it does not keep the limits or is not clear."""
+    return refined_clear(
+        finder, path, made, lambda within: refiner.refine(made, first=FIRST_STEP, within=within)
+    )
+
+
+Bounds = tuple[Array, Array]
+"""Least and largest free variables of a refinement, (K, 1 + E) rad or m."""
+
+
+def refined_clear(
+    finder: CollisionFreeSearch,
+    path: ContinuousPath,
+    made: Plan,
+    refine: Callable[[Bounds | None], Refinement],
+) -> Refinement | None:
+    """Return what `refine` makes of the plan of a path; None if it is not done or not clear.
 
     In a cell, gamma stays between clear samples. Where the refined motion is not clear, gamma and
     external axes are kept closer to the path, and the refinement is repeated.
     """
     clear = finder.corridor(path.one, path.other)
     if clear is None:
-        found = refiner.refine(made, first=FIRST_STEP)
+        found = refine(None)
         return found if found.done else None
-    graph = task.graph
+    graph = finder.graph
     sample = graph.sample[path.one].astype(np.int64)
     below, above = graph.gamma_at(sample), graph.gamma_at(sample + (path.one != path.other))
     at = below + path.share * (above - below)
@@ -152,7 +170,7 @@ def _refine_path(
         for gamma, side in ((low, -1.0), (high, 1.0))
     )
     for _ in range(NARROWED):
-        found = refiner.refine(made, first=FIRST_STEP, within=(low, high))
+        found = refine((low, high))
         unclear = finder.unclear(found.plan)
         if not (found.done and unclear.any()):
             break

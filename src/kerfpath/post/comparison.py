@@ -274,7 +274,8 @@ class _Digits:
             by_joints=REACH * joints * angle,
             angle=ANGLE + angle,
             frame=FRAME + point + angle,
-            speed=1e-9 + 0.51 * speed,
+            # Two texts may round the same speed, halfway between two digits, to either of them.
+            speed=1e-9 + 1.02 / len(steps) * speed,
             lead=LEAD * len(steps),
             duration=LEAD * len(steps),
         )

@@ -144,11 +144,7 @@ def refine(
     if comfort is not None and comfort.prices_clearance:
         return _unrefined(plan, "the cost of clearance is known on the grid only")
     descent, start = _descent(asked, kept)
-    low, high = descent.low.copy(), descent.high.copy()
-    if within is not None:
-        low, high = np.maximum(low, within[0]), np.minimum(high, within[1])
-    descent = replace(descent, first=first, low=low, high=high)
-    descent = descent if most is None else replace(descent, most=most)
+    descent = replace(_ended_after(_bounded(descent, within), most), first=first)
     found, programs = _lowest(descent, start, least)
     if found.admitted and not _room_kept(asked, found):
         descent = _ends_held(descent, start)
@@ -220,12 +216,16 @@ def promise(plan: Plan) -> float:
     return start.cost * (1 + REPAIR * start.lost) if start.outside <= 0 else np.inf
 
 
-def reduce_excess(plan: Plan) -> Plan:
+def reduce_excess(
+    plan: Plan, *, within: tuple[Array, Array] | None = None, most: int | None = None
+) -> Plan:
     """Return the plan with gamma moved so that it exceeds the limits little, at little cost.
 
     The excess of every interval and every node over the limits has a price on top of the cost.
+    `within` and `most` are as in `refine`.
     """
     descent, start = _descent(plan)
+    descent = _ended_after(_bounded(descent, within), most)
     return _plan_with_motion(plan, descent.with_reduced_excess(start))
 
 
@@ -310,6 +310,19 @@ def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, Motio
         high=np.column_stack([high, np.broadcast_to(ends[1], x.shape)]),
     )
     return descent, descent.stand(np.column_stack([gamma, x]), q)
+
+
+def _bounded(descent: Descent, within: tuple[Array, Array] | None) -> Descent:
+    """Return the descent whose free variables stay within bounds, too."""
+    if within is None:
+        return descent
+    low, high = np.maximum(descent.low, within[0]), np.minimum(descent.high, within[1])
+    return replace(descent, low=low, high=high)
+
+
+def _ended_after(descent: Descent, most: int | None) -> Descent:
+    """Return the descent ended after at most so many programs, if a number is given."""
+    return descent if most is None else replace(descent, most=most)
 
 
 def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:
