@@ -16,6 +16,7 @@ NAMES = (
     "demo",
     "search",
     "invariance",
+    "feed_reduction",
     "scale",
     "retiming",
     "contours",
@@ -61,7 +62,7 @@ def main() -> None:
     )
     parser.add_argument("--date", default="", help="date that the written file bears")
     parser.add_argument("--note", default="", help="what else to say of the run, as its commit")
-    parts = parser.add_argument_group("parts of invariance")
+    parts = parser.add_argument_group("parts of invariance and feed_reduction")
     parts.add_argument("--tasks", type=int, help="number of tasks")
     parts.add_argument("--first", type=int, default=0, help="seed of the first one")
     parts.add_argument("--rows", type=Path, help="file to which the results of tasks are added")
@@ -95,6 +96,12 @@ def _run(name: str, given: argparse.Namespace) -> list[Report]:
         from benchmarks import invariance
 
         return [invariance.run(quick=quick, tasks=given.tasks, first=given.first, rows=given.rows)]
+    if name == "feed_reduction":
+        from benchmarks import feed_reduction
+
+        return [
+            feed_reduction.run(quick=quick, tasks=given.tasks, first=given.first, rows=given.rows)
+        ]
     if name == "kinematics":
         from benchmarks import _enclosures, _families, kinematics
 

@@ -268,14 +268,15 @@ class _Digits:
     def of(cls, rules: Sequence[Rules], joints: int) -> _Digits:
         """Return those of texts with the digits of `rules`; without any, of equal languages."""
         steps = [(r.point_step, r.angle_step, r.speed_step) for r in rules] or [(0.0, 0.0, 0.0)]
-        point, angle, speed = np.sum(steps, axis=0).tolist()
+        # Two texts are rounded, both with the digits of a single language: a number halfway between
+        # two digits may become either of them.
+        point, angle, speed = (np.sum(steps, axis=0) * 2 / len(steps)).tolist()
         return cls(
-            point=POINT + point,
+            point=POINT + np.sqrt(3.0) * point,
             by_joints=REACH * joints * angle,
             angle=ANGLE + angle,
             frame=FRAME + point + angle,
-            # Two texts may round the same speed, halfway between two digits, to either of them.
-            speed=1e-9 + 1.02 / len(steps) * speed,
+            speed=1e-9 + 0.51 * speed,
             lead=LEAD * len(steps),
             duration=LEAD * len(steps),
         )

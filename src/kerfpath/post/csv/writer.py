@@ -75,7 +75,7 @@ class Csv(Formatter):
     def files(self) -> dict[str, str]:
         """Return the one table."""
         program = self.program
-        self._ends = iter([number(end, 9) for _, end in timetable(program)])
+        self._ends = iter([number(end, 12) for _, end in timetable(program)])
         lines = [",".join(columns(program.robot))]
         for section in program.sections:
             lines += (f"{section.name},{row}" for row in self.lines(section))
