@@ -58,7 +58,8 @@ def run(
 ) -> Report:
     """Return the report of tasks from `first` on; rows already in a file are not made again."""
     count = tasks or (QUICK if quick else TASKS)
-    known = [json.loads(line) for line in rows.read_text().splitlines()] if _is(rows) else []
+    lines = [] if rows is None or not rows.exists() else rows.read_text().splitlines()
+    known = [json.loads(line) for line in lines]
     made = [row for row in known if first <= row["seed"] < first + count]
     for seed in sorted(set(range(first, first + count)) - {row["seed"] for row in made}):
         made.append(planned(seed))
@@ -66,10 +67,6 @@ def run(
             with rows.open("a") as file:
                 print(json.dumps(made[-1]), file=file)
     return _report(made)
-
-
-def _is(rows: Path | None) -> bool:
-    return rows is not None and rows.exists()
 
 
 def planned(seed: int) -> dict[str, Any]:

@@ -192,14 +192,14 @@ def test_a_part_out_of_reach_is_reported_without_a_program(folder):
 
 @pytest.mark.slow
 def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder, fastest):
-    (folder / "fast.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = 30", 1))
+    (folder / "fast.toml").write_text(SMALL.replace("speed_m_min = 3", "speed_m_min = 7", 1))
     result = run("plan", "fast.toml", cwd=folder)
     assert result.returncode == 1
     told = re.search(
         r"on this grid of the rotation a path exists up to ([\d.]+) m/min(?: with .*)?, refined up "
         r"to ([\d.]+) m/min, where the acceleration", result.stdout,
     )  # fmt: skip
-    assert 3 < float(told[1]) < float(told[2]) < 30
+    assert 3 < float(told[1]) < float(told[2]) < 7
     # As `speed` has it, and the limits of a robot cannot be raised.
     for shown, key in ((told[1], "on_grid_m_min"), (told[2], "fastest_m_min")):
         assert float(shown) <= fastest[key] == pytest.approx(float(shown), rel=1e-3)
@@ -209,6 +209,18 @@ def test_a_contour_that_is_too_fast_is_told_how_fast_it_could_be(folder, fastest
     assert data["fastest_speed_m_s"] * 60 == pytest.approx(float(told[2]), rel=1e-3)
     assert data["proved"]
     assert "a path exists up to" in (folder / "fast-plan" / "report.html").read_text()
+
+
+def test_a_contour_that_is_far_too_fast_is_given_a_speed_at_once(folder):
+    far = SMALL.replace("speed_m_min = 3", "speed_m_min = 30", 1)
+    (folder / "far-too-fast.toml").write_text(far)
+    result = run("plan", "far-too-fast.toml", cwd=folder)
+    assert result.returncode == 1
+    words = " ".join(result.stdout.split())
+    speed = re.search(r"a path exists at ([\d.]+) m/min; `kerfpath speed` finds the fastest", words)
+    slower = far.replace("speed_m_min = 30", f"speed_m_min = {speed[1]}", 1)
+    (folder / "slower.toml").write_text(slower)
+    assert run("plan", "slower.toml", cwd=folder).returncode == 0
 
 
 @pytest.mark.slow

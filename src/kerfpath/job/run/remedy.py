@@ -27,6 +27,9 @@ GIVE = (0.0, 2e-3, 1e-2, 3e-2)
 """Relative amounts by which a value is relaxed until a plan is found with it."""
 ANY_PLAN: Mapping[str, Any] = {"between_nodes": "reported", "certify": None, "restarts": 0}
 """Options of trials, whose plans need not be good."""
+FAR = 0.5
+"""Share of the speed asked for up to which that of a motion found is advice enough: the fastest one
+would take minutes, and limits cannot be raised that far."""
 Share = Literal["eta_velocity", "eta_acceleration"]
 """Keys of a job for the share of a limit that may be used."""
 
@@ -41,6 +44,8 @@ class Remedy:
         Whether all of it holds for method "exact" although the job asks for another one.
     speed : str or None
         Feasible speed below the requested one, m/min; None: the requested speed is feasible.
+    fastest : bool
+        Whether that is the fastest speed found on the grid, and not just one with a plan.
     binds : str
         The limit that binds at the higher of both speeds, and where; "" if that is not known.
     refined : str or None
@@ -57,6 +62,7 @@ class Remedy:
 
     other_method: bool
     speed: str | None = None
+    fastest: bool = True
     binds: str = ""
     refined: str | None = None
     shares: Mapping[str, str] = field(default_factory=dict)
@@ -75,6 +81,8 @@ class Remedy:
         how = ' with method = "exact"' if self.other_method else ""
         if self.speed is None:
             return f"{ON_THIS_GRID} a path exists at the speed asked for{how}"
+        if not self.fastest:
+            return f"a path exists at {self.speed} m/min{how}; `kerfpath speed` finds the fastest"
         said = f"{ON_THIS_GRID} a path exists up to {self.speed} m/min{how}"
         if self.refined is not None:
             said += f", refined up to {self.refined} m/min"
@@ -170,7 +178,8 @@ def find_remedy(
     """Return what makes a cut without a plan feasible, and its fastest speed; None if unknown.
 
     The graph must have poses at every node, and the cut a constant speed. `relaxation` is what
-    `NoFeasiblePath` states about a motion off the grid.
+    `NoFeasiblePath` states about a motion off the grid; where that is slower by far, its speed is
+    the advice.
     """
     trial = _Trial(job=job, request=request, candidate=candidate, graph=graph, cell=cell)
     continuous = job.options.method == "continuous"
@@ -178,6 +187,10 @@ def find_remedy(
     other = not continuous and job.options.method != "exact"
     if other and trial.opens(trial.on_grid, trial.asked):
         return Remedy(other_method=True), None
+    if continuous and relaxation is not None and relaxation.speed <= FAR:
+        slow = trial.speed(trial.on_grid, relaxation.speed * trial.asked)
+        if slow is not None:
+            return Remedy(other_method=False, speed=slow, fastest=False), None
     # With a time step, another speed has other nodes, about which nothing would be proved.
     ceiling = continuous and request.task.time_step is None
     try:

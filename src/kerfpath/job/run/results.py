@@ -106,10 +106,10 @@ class CutResult:
 
     @property
     def failure(self) -> str:
-        """Why there is no plan, and what would help; empty if there is one."""
+        """What would help, and why there is no plan; empty if there is one."""
         if self.broken is None:
             return ""
-        return f"{self.broken}; {self.remedy}" if self.remedy else str(self.broken)
+        return f"{self.remedy}; {self.broken}" if self.remedy else str(self.broken)
 
     @property
     def remedy(self) -> str:
