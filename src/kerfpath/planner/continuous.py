@@ -67,12 +67,12 @@ def motion_with_reduced_feed(attempt: Attempt) -> Plan | None:
 
     Where hardly any time would be lost, a motion at the speed asked for throughout is tried first.
     """
-    task, finder = attempt.task.whole(), attempt.finder
+    task = attempt.task
     if task.settings.feed != "dip" or grid_reason(task) or _costs_at_samples(task):
         return None
-    attempt.task = task
+    attempt.task = task = task.whole()
     attempt.begin("feed reduction")
-    slowed = slowed_motion(task, finder)
+    slowed = slowed_motion(task, attempt.finder)
     if slowed is None or may_keep_speed(task, slowed):
         return best_motion_found(attempt) or slowed
     return slowed
