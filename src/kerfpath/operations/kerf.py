@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypedDict, Unpack, get_args
+from typing import Literal, NamedTuple, TypedDict, Unpack, get_args
 
 import numpy as np
 
-from kerfpath.arrays import Array, Ints, floats, scalar, short_repr
+from kerfpath.arrays import Array, Bools, Ints, floats, scalar, short_repr
 from kerfpath.contour import CORNER, KINDS, Contour, angle_between, join, slerp, unit
 from kerfpath.errors import InputError
 from kerfpath.operations.surface import (
@@ -34,6 +34,19 @@ ALIKE = 1e-6
 CUT, MICRO_JOINT, OVERLAP, CORNER_ARC = (
     KINDS.index(word) for word in ("cut", "micro joint", "overlap", "corner")
 )
+
+
+class _Chain(NamedTuple):
+    """Offset points (M, 3) m and axes, the kind of the stretch from each, and its source node."""
+
+    points: Array
+    axes: Array
+    kind: Ints
+    source: Ints
+
+    def at(self, nodes: Ints | Bools | slice) -> _Chain:
+        """Return some of its nodes, in that order."""
+        return _Chain(self.points[nodes], self.axes[nodes], self.kind[nodes], self.source[nodes])
 
 
 def reverse(contour: Contour) -> Contour:
@@ -281,21 +294,21 @@ def offset(
         micro joints, loops or slow corners.
     """
     distance = scalar(distance, "offset distance", unit="m", above=0.0)
-    if contour.kind.any() or (contour.speed_share < 1).any():
+    if not is_plain(contour.kind) or (contour.speed_share < 1).any():
         raise InputError(
             f"offset: contour {contour.name!r} already has leads, micro joints, loops or slow "
             "corners; offset it before adding those"
         )
     contour = _with_middles(contour)
-    points, axes, kind, source = _move_nodes(contour, distance, side, sharp)
+    chain = _move_nodes(contour, distance, side, sharp)
     if contour.closed:
-        k = _amid_what_fits(contour, points, distance)
-        around = (np.arange(len(points) + 1) + k) % len(points)
-        points, axes, kind, source = points[around], axes[around], kind[around], source[around]
-    points, axes, kind = _without_loops(contour, points, axes, kind, source, distance, side)
-    apart = np.append(np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME_NODE, True)
-    points, axes, kind = points[apart], axes[apart], kind[apart]
-    if len(points) < (4 if contour.closed else 2):
+        k, count = _amid_what_fits(contour, chain.points, distance), len(chain.points)
+        chain = chain.at((np.arange(count + 1) + k) % count)
+    chain = _without_loops(contour, chain, distance, side)
+    apart = np.append(np.linalg.norm(np.diff(chain.points, axis=0), axis=1) > SAME_NODE, True)
+    chain = chain.at(apart)
+    points, count = chain.points, len(chain.points) - 1
+    if count < (3 if contour.closed else 1):
         raise _too_tight(contour, contour.points[0], distance, "is too small")
     middles = (points[:-1] + points[1:]) / 2
     gap = np.linalg.norm(middles - nearest(contour, middles)[0], axis=1)
@@ -305,11 +318,13 @@ def offset(
         )
     if contour.closed:
         k = int(np.argmin(np.linalg.norm(points[:-1] - contour.points[0], axis=1)))
-        k = _middle_of_arc(kind[:-1], k)
-        points, axes, kind = (np.roll(each[:-1], -k, axis=0) for each in (points, axes, kind))
+        k = _middle_of_arc(chain.kind[:-1], k)
+        chain = chain.at((np.arange(count) + k) % count)
     else:
-        kind[-1] = kind[-2]
-    return Contour(points, axes, closed=contour.closed, kind=kind, name=contour.name)
+        chain.kind[-1] = chain.kind[-2]
+    return Contour(
+        chain.points, chain.axes, closed=contour.closed, kind=chain.kind, name=contour.name
+    )
 
 
 def _middle_of_arc(kind: Ints, k: int) -> int:
@@ -338,6 +353,7 @@ def _with_middles(contour: Contour) -> Contour:
         np.insert(contour.points, amid + 1, middles, axis=0),
         np.insert(contour.axes, amid + 1, axes, axis=0),
         closed=contour.closed,
+        kind=np.insert(contour.kind, amid + 1, contour.kind[amid]),
         name=contour.name,
     )
 
@@ -352,10 +368,8 @@ def _ways_at(contour: Contour) -> tuple[Array, Array]:
     return np.vstack([ends[:1], along]), np.vstack([along, ends[1:]])
 
 
-def _move_nodes(
-    contour: Contour, distance: float, side: Side, sharp: bool
-) -> tuple[Array, Array, Ints, Ints]:
-    """Return the offset points, the axis, kind and source node of each; corners give several."""
+def _move_nodes(contour: Contour, distance: float, side: Side, sharp: bool) -> _Chain:
+    """Return the offset nodes; corners give several."""
     before, after = _ways_at(contour)
     across = [lateral(contour.axes, t, side) for t in (before, after)]
     turn = angle_between(*across)
@@ -373,9 +387,10 @@ def _move_nodes(
         points.append(contour.points[k] + distance * ways)
         axes.append(np.tile(contour.axes[k], (len(ways), 1)))
         is_corner = outer[k] and turn[k] > CORNER
-        kind += [CORNER_ARC if is_corner else CUT] * (len(ways) - 1) + [CUT]
+        own = int(contour.kind[k])
+        kind += [CORNER_ARC if is_corner else own] * (len(ways) - 1) + [own]
         source += [k] * len(ways)
-    return np.vstack(points), np.vstack(axes), np.array(kind), np.array(source)
+    return _Chain(np.vstack(points), np.vstack(axes), np.array(kind), np.array(source))
 
 
 def _amid_what_fits(contour: Contour, points: Array, distance: float) -> int:
@@ -391,33 +406,22 @@ def _amid_what_fits(contour: Contour, points: Array, distance: float) -> int:
     return int(tight[k] + runs[k] // 2) % len(points)
 
 
-def _without_loops(
-    contour: Contour,
-    points: Array,
-    axes: Array,
-    kind: Ints,
-    source: Ints,
-    distance: float,
-    side: Side,
-) -> tuple[Array, Array, Ints]:
+def _without_loops(contour: Contour, chain: _Chain, distance: float, side: Side) -> _Chain:
     """Return the chain without the loops at its crossings with itself."""
-    kept, kept_axes, kept_kind = [], [], []
+    points, axes, kind, source = chain
+    kept = list[_Chain]()
     first, place = 0, 0.0  # the next node to keep, and its place along the chain, in nodes
     far = min(LOOK * distance, contour.length / 2)
     for i, f, j, g in _crossings(points, axes, far):
         if i + f < place:
             continue
         _require_corner(contour, np.unique(source[i + 1 : j + 1]), distance, side)
-        part = np.array([[f]])
-        kept += [points[first : i + 1], points[[i]] + f * (points[[i + 1]] - points[[i]])]
-        kept_axes += [axes[first : i + 1], slerp(axes[[i]], axes[[i + 1]], part)]
-        kept_kind += [kind[first : i + 1], kind[[j]]]
+        crossing = points[[i]] + f * (points[[i + 1]] - points[[i]])
+        axis = slerp(axes[[i]], axes[[i + 1]], np.array([[f]]))
+        kept += [chain.at(slice(first, i + 1)), _Chain(crossing, axis, kind[[j]], source[[j]])]
         first, place = j + 1, j + g
-    return (
-        np.vstack([*kept, points[first:]]),
-        np.vstack([*kept_axes, axes[first:]]),
-        np.concatenate([*kept_kind, kind[first:]]),
-    )
+    kept.append(chain.at(slice(first, None)))
+    return _Chain(*(np.concatenate(each) for each in zip(*kept, strict=True)))
 
 
 def _crossings(points: Array, axes: Array, far: float) -> list[tuple[int, float, int, float]]:
