@@ -8,9 +8,8 @@ import pytest
 
 from commands import assert_refused, run
 from kerfpath.cad import read
-from kerfpath.cli.first_job import job_text
 from kerfpath.errors import InputError
-from kerfpath.job import check_job, foresee, prepare, read_job
+from kerfpath.job import check_job, foresee, job_text, prepare, read_job
 from kerfpath.robots import robot
 
 REST = """

@@ -7,7 +7,6 @@ import ezdxf
 import pytest
 
 from conftest import ROOT
-from kerfpath.cli.first_job import job_text
 from kerfpath.errors import InputError
 from kerfpath.job import read_job
 from kerfpath.robots import robot, robot_ids
@@ -31,7 +30,7 @@ language = "krl"
 def session(tmp_path):
     path = tmp_path / "job.toml"
     path.write_text(JOB)
-    made = Session(Document(path), job_text)
+    made = Session(Document(path))
     yield made
     made._answers.close()
     made._planning.close()

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.markup import escape
 
 from kerfpath.cad import SUFFIXES
-from kerfpath.cli.first_job import first_job, job_text
+from kerfpath.cli.first_job import first_job
 from kerfpath.cli.show import out
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
@@ -41,7 +41,7 @@ def open_studio(job: Path | None, *, host: str, port: int, browser: bool) -> Non
     def show(address: str) -> None:
         out.print(f"{escape(str(path))} at [bold]{escape(address)}[/] (stop with Ctrl-C)")
 
-    serve(path, host=host, port=port, browser=browser, show=show, begin=job_text)
+    serve(path, host=host, port=port, browser=browser, show=show)
 
 
 def _copy_of_demo() -> Path:

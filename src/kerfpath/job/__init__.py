@@ -11,6 +11,7 @@ from kerfpath.job.audit import Audit as Audit
 from kerfpath.job.audit import audit_file as audit_file
 from kerfpath.job.audit_report import AuditReport as AuditReport
 from kerfpath.job.audit_report import collision_note as collision_note
+from kerfpath.job.first_job import job_text as job_text
 from kerfpath.job.format import TABLES as TABLES
 from kerfpath.job.format import VARIABLES as VARIABLES
 from kerfpath.job.format import Candidate as Candidate

@@ -33,7 +33,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kerfpath.errors import KerfpathError
-from kerfpath.studio.document import Begin, Document
+from kerfpath.studio.document import Document
 from kerfpath.studio.hub import Page
 from kerfpath.studio.messages import (
     CandidateRequest,
@@ -219,12 +219,7 @@ REPORT_POLICY = (
 
 
 def application(
-    document: Document,
-    *,
-    hosts: Iterable[str],
-    token: str,
-    ticket: str = "",
-    begin: Begin | None = None,
+    document: Document, *, hosts: Iterable[str], token: str, ticket: str = ""
 ) -> Starlette:
     """Return the application that serves one job.
 
@@ -238,10 +233,8 @@ def application(
         Token that requests must have.
     ticket : str, optional
         Opens the page once, instead of the token.
-    begin : callable, optional
-        What writes a first job for a part that a page opens.
     """
-    worker = _Worker(document, begin)
+    worker = _Worker(document)
 
     @asynccontextmanager
     async def at_work(app: Starlette) -> AsyncIterator[None]:
@@ -275,8 +268,8 @@ def application(
 class _Worker:
     """The session of a document; its import takes a second, in which the page already loads."""
 
-    def __init__(self, document: Document, begin: Begin | None) -> None:
-        self._document, self._begin = document, begin
+    def __init__(self, document: Document) -> None:
+        self._document = document
         self._session: Session | None = None
         self._lock = asyncio.Lock()
 
@@ -284,7 +277,7 @@ class _Worker:
         """Return the session once it is imported."""
         async with self._lock:
             if self._session is None:
-                self._session = await asyncio.to_thread(_session_of, self._document, self._begin)
+                self._session = await asyncio.to_thread(_session_of, self._document)
         return self._session
 
     async def work(self) -> None:
@@ -292,10 +285,10 @@ class _Worker:
         await (await self.session()).work()
 
 
-def _session_of(document: Document, begin: Begin | None) -> Session:
+def _session_of(document: Document) -> Session:
     from kerfpath.studio.session import Session
 
-    return Session(document, begin)
+    return Session(document)
 
 
 async def _session(app: Starlette) -> Session:

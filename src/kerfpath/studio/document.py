@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from string import ascii_uppercase
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
-from kerfpath.cad import Part
 from kerfpath.errors import InputError
 from kerfpath.files import write_whole
 from kerfpath.studio.messages import (
@@ -37,15 +36,6 @@ MOST_BYTES = 50_000_000
 """Largest size of all these steps together; of larger jobs fewer steps can be undone."""
 DIGITS = 12
 """Significant digits of a written number: sliders send values like 0.30000000000000004."""
-
-
-class Begin(Protocol):
-    """What writes a first job for a part."""
-
-    def __call__(
-        self, part: Part, job: Path, *, robot: str | None = None, unit: str | None = None
-    ) -> str:
-        """Return the text of a job at a path, with a robot of the library if one is chosen."""
 
 
 class Document:

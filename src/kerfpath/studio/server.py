@@ -12,7 +12,7 @@ from threading import Thread
 
 from kerfpath.errors import InputError
 from kerfpath.isolated import stand_by
-from kerfpath.studio.document import Begin, Document
+from kerfpath.studio.document import Document
 
 HERE = ("127.0.0.1", "localhost", "::1")
 """Addresses that only this machine can reach."""
@@ -27,15 +27,7 @@ WITHOUT_PORT = 80
 """Default HTTP port, which URLs leave out."""
 
 
-def serve(
-    path: Path,
-    *,
-    host: str,
-    port: int,
-    browser: bool,
-    show: Callable[[str], None],
-    begin: Begin | None = None,
-) -> None:
+def serve(path: Path, *, host: str, port: int, browser: bool, show: Callable[[str], None]) -> None:
     """Serve one job until the process is stopped.
 
     Parameters
@@ -50,8 +42,6 @@ def serve(
         Whether to open a browser.
     show : callable
         Takes the URL once the server listens there.
-    begin : callable, optional
-        What writes a first job for a part that a page opens.
 
     Raises
     ------
@@ -74,16 +64,11 @@ def serve(
             # The port is open already: the browser starts and waits for the page. All users of the
             # machine may see the arguments of its process, so they have a ticket for one time.
             Thread(target=webbrowser.open, args=(address + ticket,), daemon=True).start()
-        _run(document, hosts, token, ticket, listener, begin)
+        _run(document, hosts, token, ticket, listener)
 
 
 def _run(
-    document: Document,
-    hosts: Sequence[str],
-    token: str,
-    ticket: str,
-    listener: socket.socket,
-    begin: Begin | None,
+    document: Document, hosts: Sequence[str], token: str, ticket: str, listener: socket.socket
 ) -> None:
     """Serve a document; this imports modules that take a second to load."""
     import uvicorn
@@ -99,7 +84,7 @@ def _run(
             yield
 
     config = uvicorn.Config(
-        application(document, hosts=hosts, token=token, ticket=ticket, begin=begin),
+        application(document, hosts=hosts, token=token, ticket=ticket),
         log_level="warning",
         lifespan="on",
         ws="websockets-sansio",

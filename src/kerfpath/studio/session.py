@@ -20,6 +20,7 @@ from kerfpath.job import (
     Job,
     JobResult,
     PreparedJob,
+    job_text,
     program_texts,
     python_script,
     read_job,
@@ -27,7 +28,7 @@ from kerfpath.job import (
     with_loops,
     without_contour,
 )
-from kerfpath.studio.document import Begin, Change, Document, KeptJobs, with_values
+from kerfpath.studio.document import Change, Document, KeptJobs, with_values
 from kerfpath.studio.entries import faults_of, job_file, job_message
 from kerfpath.studio.hub import Hub, Page
 from kerfpath.studio.messages import (
@@ -289,12 +290,10 @@ class Session:
     ----------
     document : Document
         The job.
-    begin : callable, optional
-        What writes a first job for a part.
     """
 
-    def __init__(self, document: Document, begin: Begin | None = None) -> None:
-        self.document, self._begin = document, begin
+    def __init__(self, document: Document) -> None:
+        self.document = document
         self.hub = Hub()
         self.kept = KeptJobs()
         self._planning = Planning(self._from_thread, self._prepared_there, self._refused_there)
@@ -377,9 +376,7 @@ class Session:
         InputError
             It is no drawing that can be read, or its unit is unlikely and none is given.
         """
-        if self._begin is None:
-            raise InputError("this studio cannot begin a job; start it with kerfpath studio")
-        write, path = self._begin, self.document.path
+        path = self.document.path
 
         def text() -> str:
             file, new = _stored(path.parent, name, data)
@@ -388,7 +385,7 @@ class Session:
                 question = unit_question(part.unit, part.bounding_box)
                 if unit is None and question:
                     raise InputError(question)
-                return write(part, path, robot=robot, unit=unit)
+                return job_text(part, path, robot=robot, unit=unit)
             except InputError:
                 if new:
                     file.unlink()
