@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import os
 import platform
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from statistics import median
 from time import perf_counter
-from typing import Literal
+from typing import Any, Literal
 
 from rich.console import Console
 from rich.markup import escape
@@ -24,6 +25,7 @@ __all__ = [
     "Sheet",
     "available_gigabytes",
     "in_turn",
+    "kept_rows",
     "machine",
     "markdown",
     "peak_megabytes",
@@ -125,6 +127,27 @@ def in_turn(
             if turn >= unmeasured:
                 seconds[name].append(perf_counter() - start)
     return seconds
+
+
+def kept_rows(
+    make: Callable[[int], dict[str, Any]], seeds: Iterable[int], file: Path | None
+) -> list[dict[str, Any]]:
+    """Return the rows of a benchmark that is run in parts: of a file, then what `make` makes.
+
+    The file has one JSON object a line. Seeds that it has are not made again; the others are added
+    to it, each once it is made.
+    """
+    made = list[dict[str, Any]]()
+    if file is not None and file.exists():
+        made = [json.loads(line) for line in file.read_text().splitlines()]
+    known = {row["seed"] for row in made}
+    for seed in seeds:
+        if seed not in known:
+            made.append(make(seed))
+            if file is not None:
+                with file.open("a") as rows:
+                    print(json.dumps(made[-1]), file=rows)
+    return made
 
 
 def peak_megabytes(call: Callable[[], object]) -> float:

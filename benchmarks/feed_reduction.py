@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
@@ -13,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._figures import Report, Sheet
+from benchmarks._figures import Report, Sheet, kept_rows
 from benchmarks._random_contours import ROBOTS, arm, contour, head
 from kerfpath import Contour, NoFeasiblePath, fastest_speed
 from kerfpath.errors import AuditFailed, InputError
@@ -56,17 +55,9 @@ xyz_mm = [{x:.3f}, {y:.3f}, {z:.3f}]
 def run(
     *, quick: bool, tasks: int | None = None, first: int = 0, rows: Path | None = None
 ) -> Report:
-    """Return the report of tasks from `first` on; rows already in a file are not made again."""
-    count = tasks or (QUICK if quick else TASKS)
-    lines = [] if rows is None or not rows.exists() else rows.read_text().splitlines()
-    known = [json.loads(line) for line in lines]
-    made = [row for row in known if first <= row["seed"] < first + count]
-    for seed in sorted(set(range(first, first + count)) - {row["seed"] for row in made}):
-        made.append(planned(seed))
-        if rows is not None:
-            with rows.open("a") as file:
-                print(json.dumps(made[-1]), file=file)
-    return _report(made)
+    """Plan so many tasks from a first one on; `rows` is a file as of `kept_rows`."""
+    count = tasks if tasks is not None else QUICK if quick else TASKS
+    return _report(kept_rows(planned, range(first, first + count), rows))
 
 
 def planned(seed: int) -> dict[str, Any]:

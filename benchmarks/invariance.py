@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -19,7 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks._certified import Task
-from benchmarks._figures import Report, Sheet
+from benchmarks._figures import Report, Sheet, kept_rows
 from benchmarks._random_contours import contour, head
 from kerfpath import Contour, NoFeasiblePath, PlanOptions, Robot, fastest_speed, robot
 from kerfpath.planner import node_interval
@@ -93,17 +92,7 @@ def run(
     are not planned again; the report is on all tasks of the file.
     """
     count = tasks if tasks is not None else QUICK if quick else TASKS
-    made = list[dict[str, Any]]()
-    if rows is not None and rows.exists():
-        made = [json.loads(line) for line in rows.read_text().splitlines()]
-    known = {row["seed"] for row in made}
-    for seed in range(first, first + count):
-        if seed not in known:
-            made.append(planned(seed))
-            if rows is not None:
-                with rows.open("a") as file:
-                    print(json.dumps(made[-1]), file=file)
-    return report(made)
+    return report(kept_rows(planned, range(first, first + count), rows))
 
 
 def planned(seed: int, forms: Sequence[str] = ()) -> dict[str, Any]:

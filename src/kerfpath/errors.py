@@ -57,17 +57,22 @@ class InputError(KerfpathError, ValueError):
     ----------
     message : str
     others : sequence of str
-        Messages about further faults found at the same time.
+        Messages about further faults found at the same time; the line says how many.
     parameter : str
         Name of the parameter that is wrong or missing; a job has a key for it.
     """
 
     def __init__(self, message: str, others: Sequence[str] = (), *, parameter: str = "") -> None:
-        self.others, self.parameter = tuple(others), parameter
-        line = printable(message)
-        if len(line) > LONGEST:
-            line = f"{line[:BEGINNING]} ... {line[BEGINNING + 5 - LONGEST :]}"
-        super().__init__(line)
+        self.message, self.others, self.parameter = _line(message), tuple(others), parameter
+        super().__init__(_line(f"{message} (and {len(others)} more)" if others else message))
+
+
+def _line(message: str) -> str:
+    """Return a message as one readable line, cut in the middle if it is long."""
+    line = printable(message)
+    if len(line) <= LONGEST:
+        return line
+    return f"{line[:BEGINNING]} ... {line[BEGINNING + 5 - LONGEST :]}"
 
 
 class OptionConflict(InputError):

@@ -56,5 +56,10 @@ def nearest(name: str, known: Sequence[str]) -> str:
         near = [plain[one] for one in get_close_matches(squeezed(name), plain, n=3, cutoff=0.4)]
     if not near:
         return "no id there is similar"
-    more = f" and {len(near) - MOST_NEAR} more" if len(near) > MOST_NEAR else ""
-    return f"nearest: {', '.join(near[:MOST_NEAR])}{more}"
+    return f"nearest: {listed(near, MOST_NEAR)}"
+
+
+def listed(names: Sequence[str], most: int) -> str:
+    """Return the first names in words for messages, and how many there are beyond `most`."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

@@ -36,6 +36,7 @@ from kerfpath.cad.shape import (
 from kerfpath.cad.skins import Skin, skins_of
 from kerfpath.cad.units import MM
 from kerfpath.errors import InputError
+from kerfpath.names import listed
 from kerfpath.progress import Progress
 
 MESHES = 3
@@ -276,9 +277,7 @@ def _blind_notes(loops: Sequence[Loop]) -> list[str]:
         if loop.is_main and loop.side == "outer" and loop.countersink
     ]
     return [
-        f"{', '.join(names[:MOST_LISTED])}"
-        + (f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else "")
-        + f": {words}"
+        f"{listed(names, MOST_LISTED)}: {words}"
         for names, words in (
             (
                 blind,

@@ -73,7 +73,7 @@ def motion_with_reduced_feed(attempt: Attempt) -> Plan | None:
     attempt.task = task = task.whole()
     attempt.begin("feed reduction")
     slowed = slowed_motion(task, attempt.finder)
-    if slowed is None or may_keep_speed(task, slowed):
+    if slowed is not None and may_keep_speed(task, slowed):
         return best_motion_found(attempt) or slowed
     return slowed
 

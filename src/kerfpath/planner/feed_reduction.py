@@ -108,8 +108,7 @@ def _slowed_between(
     """Return the plan of a path slowed down; None if it is not clear, even close to the path."""
 
     def refine(within: Bounds | None) -> Refinement:
-        moved = refiner.reduce_excess(made, within=within, most=PROGRAMS)
-        return refiner.refine(_with_least_times(task, moved), within=within)
+        return refiner.refine(_with_reduced_excess(task, made, within), within=within)
 
     found = refined_clear(finder, path, made, refine)
     slowed = _with_least_times(task, made if found is None else found.plan)
@@ -180,10 +179,8 @@ def _least_lost(task: Task, finder: CollisionFreeSearch) -> Plan:
 def _off_grid(task: Task, start: Plan) -> Plan:
     """Return the faster of a path with reduced excess and its refinement, with the least times."""
     claim = f"{start.proof.statement}; gamma moved off the grid to lose little time"
-    moved = replace(
-        refiner.reduce_excess(start, most=PROGRAMS), proof=Proof(optimal=False, statement=claim)
-    )
-    moved = _with_least_times(task, moved)
+    proof = Proof(optimal=False, statement=claim)
+    moved = replace(_with_reduced_excess(task, start), proof=proof)
     return min(moved, _with_least_times(task, refiner.refine(moved).plan), key=_time_and_cost)
 
 
@@ -201,6 +198,11 @@ def _broken(task: Task, finder: CollisionFreeSearch, made: Plan) -> str:
     if comfort is not None and comfort.broken(task.robot, made.q, task.setup.tool):
         return "break a margin of comfort"
     return "" if finder.is_clear(made) else "not be clear"
+
+
+def _with_reduced_excess(task: Task, start: Plan, within: Bounds | None = None) -> Plan:
+    """Return the plan with gamma moved to exceed the limits little, with the least times."""
+    return _with_least_times(task, refiner.reduce_excess(start, within=within, most=PROGRAMS))
 
 
 def _with_least_times(task: Task, made: Plan) -> Plan:

@@ -14,7 +14,7 @@ from kerfpath.errors import InputError
 from kerfpath.kernels.metric import wrap
 from kerfpath.losses import Loss, Reason
 from kerfpath.plans import Plan, Proof, has_room, on_turns, path_cost
-from kerfpath.refiner.descent import Descent, MotionState
+from kerfpath.refiner.descent import MOST_PROGRAMS, Descent, MotionState
 from kerfpath.refiner.joint_curves import JointCurves, room_at_ends
 from kerfpath.refiner.rates import KeptShares, RateLimits
 from kerfpath.refiner.sections import has_sections, lowest_in_sections
@@ -143,8 +143,8 @@ def refine(
     comfort = plan.settings.comfort
     if comfort is not None and comfort.prices_clearance:
         return _unrefined(plan, "the cost of clearance is known on the grid only")
-    descent, start = _descent(asked, kept)
-    descent = replace(_ended_after(_bounded(descent, within), most), first=first)
+    descent, start = _descent(asked, kept, within=within, most=most)
+    descent = replace(descent, first=first)
     found, programs = _lowest(descent, start, least)
     if found.admitted and not _room_kept(asked, found):
         descent = _ends_held(descent, start)
@@ -224,8 +224,7 @@ def reduce_excess(
     The excess of every interval and every node over the limits has a price on top of the cost.
     `within` and `most` are as in `refine`.
     """
-    descent, start = _descent(plan)
-    descent = _ended_after(_bounded(descent, within), most)
+    descent, start = _descent(plan, within=within, most=most)
     return _plan_with_motion(plan, descent.with_reduced_excess(start))
 
 
@@ -278,8 +277,14 @@ def _unrefined(plan: Plan, why: str) -> Refinement:
     )
 
 
-def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, MotionState]:
-    """Return the descent of a plan, and the motion that it starts from."""
+def _descent(
+    plan: Plan,
+    kept: KeptShares | None = None,
+    *,
+    within: tuple[Array, Array] | None = None,
+    most: int | None = None,
+) -> tuple[Descent, MotionState]:
+    """Return the descent of a plan, and the motion it starts from; `within` as in `refine`."""
     settings, comfort = plan.settings, plan.settings.comfort
     low, high = room_at_ends(plan)
     gamma, windows, q = plan.gamma, settings.gamma_windows, plan.unwrapped
@@ -291,6 +296,12 @@ def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, Motio
         gamma = np.full(len(gamma), np.nan) if inside is None else inside
         room = room_beside(windows, plan.contour.s, gamma)
         low, high = np.maximum(low, room[0]), np.minimum(high, room[1])
+    least, largest = (
+        np.column_stack([bound, np.broadcast_to(end, x.shape)])
+        for bound, end in ((low, ends[0]), (high, ends[1]))
+    )
+    if within is not None:
+        least, largest = np.maximum(least, within[0]), np.minimum(largest, within[1])
     descent = Descent(
         curves=JointCurves(plan.robot, plan.frames, plan.T_flange_tip, plan.posture),
         rates=RateLimits(
@@ -306,23 +317,11 @@ def _descent(plan: Plan, kept: KeptShares | None = None) -> tuple[Descent, Motio
         objective=settings.objective,
         node_cost=plan.node_cost,
         radius=FIRST_STEPS * settings.gamma_step,
-        low=np.column_stack([low, np.broadcast_to(ends[0], x.shape)]),
-        high=np.column_stack([high, np.broadcast_to(ends[1], x.shape)]),
+        low=least,
+        high=largest,
+        most=MOST_PROGRAMS if most is None else most,
     )
     return descent, descent.stand(np.column_stack([gamma, x]), q)
-
-
-def _bounded(descent: Descent, within: tuple[Array, Array] | None) -> Descent:
-    """Return the descent whose free variables stay within bounds, too."""
-    if within is None:
-        return descent
-    low, high = np.maximum(descent.low, within[0]), np.minimum(descent.high, within[1])
-    return replace(descent, low=low, high=high)
-
-
-def _ended_after(descent: Descent, most: int | None) -> Descent:
-    """Return the descent ended after at most so many programs, if a number is given."""
-    return descent if most is None else replace(descent, most=most)
 
 
 def _plan_with_motion(plan: Plan, found: MotionState) -> Plan:

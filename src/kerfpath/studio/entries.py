@@ -310,8 +310,7 @@ def job_message(
 def faults_of(error: InputError, text: str) -> list[Fault]:
     """Return the errors of a job once each, with line and key that the message names, if any."""
     lines = text.split("\n")
-    first = str(error).removesuffix(f" (and {len(error.others)} more)")
-    return [_fault(said, lines) for said in dict.fromkeys((first, *error.others))]
+    return [_fault(said, lines) for said in dict.fromkeys((error.message, *error.others))]
 
 
 def _fault(said: str, lines: list[str]) -> Fault:

@@ -274,5 +274,5 @@ def all_of(found: Sequence[InputError]) -> InputError:
     first, *rest = found
     if not rest:
         return first
-    others = [*first.others, *(line for one in rest for line in (str(one), *one.others))]
-    return InputError(f"{first} (and {len(others)} more)", others)
+    others = [*first.others, *(line for one in rest for line in (one.message, *one.others))]
+    return InputError(first.message, others)

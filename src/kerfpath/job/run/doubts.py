@@ -10,6 +10,7 @@ from kerfpath.arrays import Array, Ints
 from kerfpath.cad import Triangles
 from kerfpath.contour import Contour
 from kerfpath.job.format import Job
+from kerfpath.names import listed
 
 CLEAR, BESIDE = 2e-3, 1e-3
 """m: the beam is looked at from this distance before the tip on, in the middle and this far beside
@@ -18,6 +19,8 @@ MOST_NODES = 200
 """Most nodes of a contour that are looked at."""
 FROM_BELOW = 0.5
 """Least rise of the mean tool axis, a sine, at which a contour is cut from below."""
+MOST_LISTED = 3
+"""Most contours that a warning names."""
 
 
 def sides_in_doubt(
@@ -51,8 +54,9 @@ def sides_in_doubt(
     turned = any(axis.carries == "part" and axis.kind == "rotary" for axis in job.robot.externals)
     if below and not turned:
         said.append(
-            f"{_listed(below)}: the beam comes from below, in the robot base, through whatever the "
-            "part lies on; turn the part over (rpy_deg in [part]), or pick loops of its other side"
+            f"{listed(below, MOST_LISTED)}: the beam comes from below, in the robot base, through "
+            "whatever the part lies on; turn the part over (rpy_deg in [part]), or pick loops of "
+            "its other side"
         )
     return said
 
@@ -70,7 +74,3 @@ def _before_the_tip(part: Triangles, nodes: Contour) -> float:
         body = np.zeros(len(some), np.int64)
         met = np.maximum(met, part.first(origins * 1e3, -axes, body)[0])
     return float(met.min()) * 1e-3 + CLEAR
-
-
-def _listed(names: list[str]) -> str:
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

@@ -107,7 +107,6 @@ export class Machine {
   paint() {
     for (const [kind, material] of Object.entries(this.materials))
       material.color.set(themeColour(COLOURS[/** @type {Kind} */ (kind)]));
-    for (const [colour, material] of this.colours) material.color.set(colour);
     this.edge.color.set(themeColour("--edge"));
     this.leftMaterial.color.set(themeColour("--part"));
     this.ghostMaterial.color.set(themeColour("--ghost"));
@@ -178,10 +177,13 @@ export class Machine {
    */
   coloured(kind, colour) {
     if (!colour) return this.materials[kind];
-    const known = this.colours.get(colour) ?? this.materials[kind].clone();
-    this.colours.set(colour, known);
-    this.paint();
-    return known;
+    let own = this.colours.get(colour);
+    if (!own) {
+      own = this.materials[kind].clone();
+      own.color.set(colour);
+      this.colours.set(colour, own);
+    }
+    return own;
   }
 
   clear() {
