@@ -70,7 +70,7 @@ def test_each_job_has_its_row_with_what_came_of_it(done):
     assert [rows["fast"][key] for key in ("contours", "contours_passed")] == [2, 1]
     assert rows["fast"]["cutting_time_s"] is None
     reasons = {
-        "fast": "a: contour 'a': on this grid of the rotation no admissible edge",
+        "fast": "; contour 'a': on this grid of the rotation no admissible edge",
         "misspelt": "plan.gama_step_deg: expected a key of [plan]",
         "unknown": "'c'",
         "mute": "A6 = 360.0 deg cannot be expressed by Status and Turn",
@@ -79,6 +79,8 @@ def test_each_job_has_its_row_with_what_came_of_it(done):
     }
     assert all(said in rows[name]["reason"] for name, said in reasons.items())
     assert all("\n" not in rows[name]["reason"] for name in reasons)
+    # What would help comes first.
+    assert rows["fast"]["reason"].startswith("a: on this grid of the rotation a path exists up to ")
 
 
 @pytest.mark.slow
