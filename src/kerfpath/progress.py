@@ -7,7 +7,16 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Protocol
 
-__all__ = ["Progress", "may_stop", "no_progress", "stopped_by"]
+__all__ = [
+    "Progress",
+    "StopEarly",
+    "counted",
+    "may_stop",
+    "no_progress",
+    "shown_by",
+    "stopped_by",
+    "unstopped",
+]
 
 
 class Progress(Protocol):
@@ -30,6 +39,13 @@ def no_progress(what: str, done: int, total: int, /) -> None:
     """Take the state of a piece of work and show nothing: the default of `progress=`."""
 
 
+class StopEarly(Exception):  # not an error, so its name does not end in Error
+    """Raised by `may_stop` where the work is to end early, with the best result that it has.
+
+    Work that improves a result suppresses it and keeps that result; other work has none.
+    """
+
+
 def _go_on() -> None:
     """Stop nothing: the default."""
 
@@ -50,9 +66,59 @@ def may_stop() -> None:
 
 @contextmanager
 def stopped_by(check: Callable[[], None]) -> Iterator[None]:
-    """Make long calls in this thread call `check` now and then; it stops them by raising."""
-    token = _CHECK.set(check)
+    """Make long calls in this thread call `check` now and then; it stops them by raising.
+
+    A check that was set before is called as well, after it.
+    """
+    before = _CHECK.get()
+
+    def both() -> None:
+        check()
+        before()
+
+    token = _CHECK.set(both)
     try:
         yield
     finally:
         _CHECK.reset(token)
+
+
+@contextmanager
+def unstopped() -> Iterator[None]:
+    """Let the calls inside run to their end: they finish a result that has been found."""
+    token = _CHECK.set(_go_on)
+    try:
+        yield
+    finally:
+        _CHECK.reset(token)
+
+
+def _hide(done: int, total: int) -> None:
+    """Show nothing: the default."""
+
+
+_SHOW: ContextVar[Callable[[int, int], None]] = ContextVar("show", default=_hide)
+
+
+@contextmanager
+def shown_by(show: Callable[[int, int], None]) -> Iterator[None]:
+    """Show how far the long calls in this thread are: `show` takes the parts done and all parts."""
+    token = _SHOW.set(show)
+    try:
+        yield
+    finally:
+        _SHOW.reset(token)
+
+
+@contextmanager
+def counted(about: int) -> Iterator[None]:
+    """Count the places inside where the work may be stopped; there are `about` so many of them."""
+    show, done = _SHOW.get(), 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        show(min(done, about - 1), about)
+
+    with stopped_by(step):
+        yield

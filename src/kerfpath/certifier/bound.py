@@ -26,7 +26,7 @@ from kerfpath.certifier.stages import (
 from kerfpath.effort import current_effort
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.plans import Plan
-from kerfpath.progress import Progress, no_progress
+from kerfpath.progress import Progress, StopEarly, no_progress
 from kerfpath.search import METRIC_CODES
 
 TURNED = 3e-4
@@ -120,6 +120,8 @@ def certify(
     ------
     InputError
         A gap or a time that is not positive.
+    StopEarly
+        The work is stopped before any bound is proved, or before a certificate is whole.
     """
     gap = scalar(gap, "gap", above=0.0)
     until = np.inf
@@ -136,7 +138,11 @@ def certify(
         found = _certified(plan, best, gap, None, rounds, pairs)
         return replace(found, statement=f"{found.statement}; {NOT_KEPT}") if checkable else found
     certification = _Certification(plan, steps, gap, until, checkable, progress)
-    certification.run()
+    try:
+        certification.run()
+    except StopEarly:
+        if checkable or not certification.best:
+            raise
     stages = tuple(certification.stages) if checkable else None
     return _certified(
         plan, certification.best, gap, stages, certification.count, certification.pairs

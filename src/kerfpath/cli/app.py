@@ -169,6 +169,9 @@ def plan(
     every contour has a plan that passes its audit; with language = "none" there is no program.
     If the job has a cell, the motions along the contours are free of collisions.
 
+    Ctrl-C ends the searches: what is planned by then is audited and written. A second one stops at
+    once.
+
     Example: kerfpath plan door.toml --out door
     """
     from kerfpath.cli.plan_output import plan_job

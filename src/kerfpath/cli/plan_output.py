@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -23,6 +24,7 @@ from kerfpath.cli.show import (
     show_files,
     table,
 )
+from kerfpath.cli.stop import end_early, ended_early, exit_code
 from kerfpath.job import (
     AsRun,
     ContourSpeed,
@@ -130,8 +132,11 @@ def plan_job(
     prepared = prepare(job, part)
     compile_kernels(job.robot.kinematics)
     require_foreseen(prepared)
-    with progress_bars() as progress:
+    with progress_bars("", time_left=True) as progress, end_early():
         outcome = run_prepared(prepared, progress=progress)
+    if ended_early() and not outcome.cuts:
+        errors.print("kerfpath: stopped before anything was planned; nothing is written")
+        raise typer.Exit(exit_code(signal.SIGINT))
     finish_run(outcome, part, folder, strict=strict)
 
 
@@ -155,6 +160,7 @@ def finish_run(
     print_json(
         {
             "passed": outcome.passed,
+            "not_planned": list(outcome.not_planned),
             "drawing": drawing_entry(part),
             "contours": [_cut_entry(cut) for cut in outcome.cuts],
             "sequence": None if outcome.part is None else sequence_entry(outcome.part),
@@ -194,6 +200,9 @@ def finish_run(
             "to this plan; it was kept, as it was edited or kerfpath may not have written it: "
             "move it away"
         )
+    if ended_early():
+        errors.print("kerfpath: stopped; what was planned by then is written")
+        raise typer.Exit(exit_code(signal.SIGINT))
     if not outcome.passed:
         raise typer.Exit(1)
 

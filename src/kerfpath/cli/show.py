@@ -171,10 +171,17 @@ def write_text(path: Path, text: str, option: str) -> None:
 def progress_lines(unit: str) -> Iterator[Progress]:
     """Give a `Progress` that prints a line every few seconds, for output without a terminal."""
     state, begun, over = "", monotonic(), Event()
+    first: tuple[str, int, float] = "", 0, 0.0
 
     def take(what: str, done: int, total: int) -> None:
-        nonlocal state
+        nonlocal state, first
+        now = monotonic()
+        if what != first[0]:
+            first = what, done, now
         state = what + (f", {done} of {total} {unit}".rstrip() if total else "")
+        if done > first[1]:
+            left = (now - first[2]) * (total - done) / (done - first[1])
+            state += f", about {left:.0f} s left"
 
     def repeat() -> None:
         while not over.wait(LINE_SECONDS):
@@ -222,7 +229,7 @@ def progress_bars(unit: str = "nodes", *, time_left: bool = False) -> Iterator[P
                 return
             if what not in tasks:
                 tasks[what] = bars.add_task(what, total=total, measure="")
-            measure = f"{done}/{total} {unit}"
+            measure = f"{done}/{total} {unit}".rstrip()
             bars.update(tasks[what], completed=done, total=total, measure=measure)
 
         yield advance

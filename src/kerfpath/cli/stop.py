@@ -2,6 +2,8 @@
 
 SIGTERM and SIGHUP stop it in the same way, with codes 143 and 129.
 
+While contours are planned, the first Ctrl-C only ends the searches, see `end_early`.
+
 No exception is raised: inside foreign code (a solver, a CAD kernel, an import) it may be swallowed,
 turn into another exception or crash the interpreter, and so may an exit while threads of a solver
 run. Instead a thread waits for the signal and ends the process.
@@ -16,11 +18,12 @@ import socket
 import sys
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
-from threading import Thread, current_thread, main_thread
+from threading import Event, Thread, current_thread, main_thread
 from typing import Any
 
 from kerfpath.files import finish_writes, remove_scratch
 from kerfpath.isolated import end_processes
+from kerfpath.progress import StopEarly, stopped_by
 
 STOPS: dict[int, Any] = {
     signal.SIGINT: signal.default_int_handler,
@@ -31,9 +34,11 @@ STOPS: dict[int, Any] = {
 FILE_SECONDS = 5.0
 """Time in which a file that is being written may be finished, s."""
 
-_in_order = False
+_in_order = _may_end_early = False
 _received = 0
 """The number of the signal that is stopping the work in order."""
+_ending = Event()
+"""Set when the searches are to end early."""
 
 
 def exit_code(number: int) -> int:
@@ -67,6 +72,28 @@ def stoppable() -> Iterator[None]:
         sender.close()
         watch.join()
         receiver.close()
+
+
+@contextmanager
+def end_early() -> Iterator[None]:
+    """End the searches inside at the first Ctrl-C, with what they have found; another one exits."""
+    global _may_end_early
+    _may_end_early = True
+    try:
+        with stopped_by(_end_if_asked):
+            yield
+    finally:
+        _may_end_early = False
+
+
+def _end_if_asked() -> None:
+    if _ending.is_set():
+        raise StopEarly
+
+
+def ended_early() -> bool:
+    """Return whether Ctrl-C has ended the searches early."""
+    return _ending.is_set()
 
 
 @contextmanager
@@ -105,6 +132,10 @@ def _watch(receiver: socket.socket, heard: Collection[int]) -> None:
     count = 0
     while signals := receiver.recv(16):
         stops = [number for number in signals if number in heard]
+        if stops == [signal.SIGINT] and _may_end_early and not _ending.is_set():
+            _ending.set()
+            _print("kerfpath: stopping; what is planned is kept (Ctrl-C again: stop at once)")
+            continue
         count += len(stops)
         if count > (1 if _in_order else 0):
             finish_writes(FILE_SECONDS)

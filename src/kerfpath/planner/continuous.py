@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -18,9 +19,11 @@ from kerfpath.planner.on_grid import plan_on_grid
 from kerfpath.planner.quickest import clear_paths, wide
 from kerfpath.planner.refinements import refine_from_random_starts
 from kerfpath.planner.starts import Starts
+from kerfpath.planner.statements import STOPPED
 from kerfpath.planner.subsampled import subsampled
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
+from kerfpath.progress import StopEarly
 from kerfpath.refiner import Refinement
 from kerfpath.search import BeamWidth, ContinuousPath, ContinuousSearch
 
@@ -59,7 +62,12 @@ def best_motion_found(attempt: Attempt) -> Plan | None:
     attempt.begin("search")
     attempt.starts = Starts(attempt.task, attempt.finder)
     found = _clear_motion(attempt.task, attempt.starts, attempt.begin)
-    return None if found is None else claimed(found, attempt.finder)
+    if found is None:
+        return None
+    made = claimed(found, attempt.finder)
+    if attempt.starts.stopped:
+        made = replace(made, proof=made.proof.also(STOPPED))
+    return made
 
 
 def motion_with_reduced_feed(attempt: Attempt) -> Plan | None:
@@ -74,7 +82,8 @@ def motion_with_reduced_feed(attempt: Attempt) -> Plan | None:
     attempt.begin("feed reduction")
     slowed = slowed_motion(task, attempt.finder)
     if slowed is not None and may_keep_speed(task, slowed):
-        return best_motion_found(attempt) or slowed
+        with suppress(StopEarly):
+            return best_motion_found(attempt) or slowed
     return slowed
 
 
@@ -238,11 +247,16 @@ def _clear_motion(
     if starts.best is None and task.settings.feed == "constant":
         refuse_impossible(task, finder, paths)
     begin("refinement")
-    starts.refine(paths)
-    if thorough and explored and finder.is_free and can_explore(task):
-        _explore(task, starts, search)
-    elif thorough:
-        _search_wider(task, starts, search, paths)
+    try:
+        starts.refine(paths)
+        if thorough and explored and finder.is_free and can_explore(task):
+            _explore(task, starts, search)
+        elif thorough:
+            _search_wider(task, starts, search, paths)
+    except StopEarly:
+        if starts.best is None:
+            raise
+        starts.stopped = True
     return starts.best
 
 

@@ -19,8 +19,10 @@ from kerfpath.planner.impossible import motion_test
 from kerfpath.planner.quickest import alike, clear_paths
 from kerfpath.planner.refinements import plan_first_order
 from kerfpath.planner.starts import Bounds, refined_clear
+from kerfpath.planner.statements import STOPPED
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
+from kerfpath.progress import StopEarly, counted, unstopped
 from kerfpath.refiner import Refinement
 from kerfpath.retime import feed, retime
 from kerfpath.search import (
@@ -38,6 +40,8 @@ SLOWER = (1.0, 1.2, 1.5, 2.0, 3.0, 4.5, 7.0, 10.0, 20.0, 50.0)
 """Node intervals at which a path is to keep all limits, as multiples of the one asked for."""
 PROGRAMS = 10
 """Most convex programs that reduce the excess; sixty gained 0.1 % of the time on 728 nodes."""
+STEPS = 100
+"""Convex programs and beam searches that this usually takes, to estimate the time left."""
 NEARLY = 1.02
 """Time of a plan with a reduced feed, relative to that at the speed asked for, up to which a motion
 at that speed throughout is looked for."""
@@ -54,14 +58,26 @@ def slowed_motion(task: Task, finder: CollisionFreeSearch) -> Plan | None:
     all limits at the highest constant speed of `SLOWER` that has one. Of equally quick motions it
     is the cheapest. None if no path was found or none stays clear of the cell.
     """
-    found = []
+    clear: list[Plan] = []
     tried: list[Plan] = []
-    for path in _paths(task, finder):
-        made = task.plan_between(path, _claim(finder))
-        if not any(alike(made, other) for other in tried):
-            tried.append(made)
-            found.append(_slowed_between(task, finder, path, made))
-    clear = [plan for plan in found if plan is not None]
+    try:
+        with counted(STEPS):
+            for path in _paths(task, finder):
+                made = task.plan_between(path, _claim(finder))
+                if not any(alike(made, other) for other in tried):
+                    tried.append(made)
+                    slowed = _slowed_between(task, finder, path, made)
+                    clear += [] if slowed is None else [slowed]
+    except StopEarly:
+        if not clear:
+            with unstopped():
+                plans = (refiner.reduce_excess(made, most=0) for made in tried)
+                within = (plan for plan in plans if np.isfinite(plan.q).all())
+                slow = (_with_least_times(task, plan) for plan in within)
+                clear = [plan for plan in slow if not _broken(task, finder, plan)]
+        if not clear:
+            raise
+        clear = [replace(plan, proof=plan.proof.also(STOPPED)) for plan in clear]
     return min(clear, key=_time_and_cost) if clear else None
 
 
@@ -148,8 +164,8 @@ def plan_slowed(task: Task, finder: CollisionFreeSearch, *, refine: bool) -> Pla
         if not broken:
             return made
         why = broken
-    claim = f"{on_grid.proof.statement}; not refined: off the grid it would {why}"
-    return replace(on_grid, proof=replace(on_grid.proof, statement=claim))
+    proof = on_grid.proof.also(f"not refined: off the grid it would {why}")
+    return replace(on_grid, proof=proof)
 
 
 def _on_grid(task: Task, finder: CollisionFreeSearch) -> Iterator[Plan]:

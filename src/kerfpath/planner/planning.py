@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Unpack
@@ -35,7 +36,7 @@ from kerfpath.planner.starts import Starts
 from kerfpath.planner.statements import add_window_note, limits_named
 from kerfpath.planner.task import Task, planning_task
 from kerfpath.plans import Plan, Proof
-from kerfpath.progress import Progress, no_progress
+from kerfpath.progress import Progress, StopEarly, no_progress
 from kerfpath.robots import Robot
 from kerfpath.search import Course, Piece, find_interrupted
 from kerfpath.setup import Setup
@@ -163,9 +164,13 @@ def with_bound(
     if phase is not None:
         phase("certificate")
     finish_compiling()
-    found = certify(
-        made, gap=asked.gap, seconds=asked.seconds, checkable=asked.keep, progress=progress
-    )
+    try:
+        found = certify(
+            made, gap=asked.gap, seconds=asked.seconds, checkable=asked.keep, progress=progress
+        )
+    except StopEarly:
+        proof = made.proof.without_bound().also("stopped before a bound was proved")
+        return replace(made, settings=settings, proof=proof)
     proof = replace(
         found.plan.proof,
         statement=f"{made.proof.without_bound().statement}; {found.statement}",
@@ -296,8 +301,10 @@ def plan(
     made = with_bound(made, asked.certify, phase=phase)
     if asked.certify is None or made.proof.gap is None or made.proof.gap <= asked.certify.gap:
         return made
-    better = better_motion(attempt)
-    return made if better is None else with_bound(better, asked.certify, phase=phase)
+    with suppress(StopEarly):
+        better = better_motion(attempt)
+        made = made if better is None else with_bound(better, asked.certify, phase=phase)
+    return made
 
 
 def strategies(task: Task) -> tuple[Strategy, ...]:
@@ -418,8 +425,8 @@ def _off_grid(part: Task, finder: CollisionFreeSearch, made: Plan) -> Plan:
         found = clear_motion(part, finder)
     if found is None or found.cost_after >= refined.cost:
         return refined
-    claim = f"{made.proof.statement}; the best motion found over continuous rotation"
-    return replace(found.plan, proof=Proof(optimal=False, statement=claim))
+    claim = made.proof.also("the best motion found over continuous rotation")
+    return replace(found.plan, proof=Proof(optimal=False, statement=claim.statement))
 
 
 def _plan_piece(

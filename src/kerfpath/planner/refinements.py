@@ -49,8 +49,7 @@ def refine_plan(task: Task, finder: CollisionFreeSearch, made: Plan) -> Plan:
                 proved=False,
                 node=len(made.q) - 1,
             )
-        statement = f"{made.proof.statement}; {why}"
-        return replace(made, proof=replace(made.proof, statement=statement))
+        return replace(made, proof=made.proof.also(why))
     best = min(clear, key=lambda f: f.cost_after)
     how = "" if best is found[0] else " by way of the best path without acceleration limits"
     statement = (
@@ -132,8 +131,7 @@ def refine_from_random_starts(begun: Plan, finder: CollisionFreeSearch) -> Plan:
         again = refiner.refine(replace(best, gamma=best.gamma + change), first=size)
         if again.done and again.plan.cost < best.cost and finder.is_clear(again.plan):
             claim = f"refined again from a change of gamma at random: cost {again.plan.cost:.6g}"
-            statement = f"{begun.proof.statement}; {claim}"
-            best = replace(again.plan, proof=replace(begun.proof, statement=statement))
+            best = replace(again.plan, proof=begun.proof.also(claim))
     return best
 
 

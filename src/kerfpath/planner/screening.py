@@ -17,6 +17,7 @@ from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN, wrap
 from kerfpath.kernels.screening import Energy, energies, newton_steps
 from kerfpath.kernels.turns import JointLimits
+from kerfpath.progress import may_stop
 from kerfpath.refiner.joint_curves import JointCurves
 from kerfpath.robots import Robot
 from kerfpath.search import Course
@@ -172,6 +173,7 @@ class Screening:
         step = np.empty(gamma.shape)
         h = DERIVATIVE_STEP
         for _ in range(stage.iterations):
+            may_stop()
             at = np.flatnonzero(live)
             ahead = self._joints(gamma[at] + h, q[at], posture[at])
             behind = self._joints(gamma[at] - h, q[at], posture[at])

@@ -43,6 +43,7 @@ class Starts:
         self.found: list[Refinement] = []
         self.best: Refinement | None = None
         self.explored = False
+        self.stopped = False
 
     @property
     def all_found(self) -> list[Refinement]:

@@ -17,6 +17,8 @@ ON_THIS_GRID = "on this grid of the rotation"
 """Prefix of statements that hold on a grid."""
 FINER = "a finer gamma_step_deg or the refinement may do more"
 """Note that goes with such a statement."""
+STOPPED = "stopped before the search ended"
+"""Claim about the best motion found by then."""
 
 
 def at_most(value: float, digits: int = 4) -> str:

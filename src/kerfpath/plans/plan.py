@@ -175,6 +175,10 @@ class Proof:
             "below this plan, at any gamma, posture and turn"
         )
 
+    def also(self, claim: str) -> Proof:
+        """Return the proof with a claim added to its statement."""
+        return replace(self, statement=f"{self.statement}; {claim}")
+
     def without_bound(self) -> Proof:
         """Return the proof without bound, gap and certificate, which hold for this motion only."""
         rest = [part for part in self.statement.split("; ") if part != self.bound_claim]

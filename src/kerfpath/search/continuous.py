@@ -16,6 +16,7 @@ from kerfpath.kernels.continuous import Steps, Targets
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
 from kerfpath.kernels.metric import increments_between
 from kerfpath.limits import Limits
+from kerfpath.progress import may_stop
 from kerfpath.search.problem import SearchProblem, unroll
 
 WIDEST, WIDEST_STEPS, WIDEST_OF_ALL = 0.5, 6.0, 1.5
@@ -180,6 +181,7 @@ class ContinuousSearch:
 
     def _values(self, steps: Steps, cost: Array, last: Bools | None = None) -> Array:
         """Return the value function (N,) for vertex costs (N,) and allowed last vertices (m,)."""
+        may_stop()
         return values_to(self._targets, steps, cost, last)
 
     def _one_way(self) -> list[_Way]:
@@ -246,6 +248,7 @@ class ContinuousSearch:
 
     def _beam(self, way: _Way, wide: BeamWidth) -> ContinuousPath | None:
         """Return the best path of a beam search along a way; None if it does not reach the end."""
+        may_stop()
         targets = self._targets
         first = way.first[: wide.width]
         K = len(targets.start) - 1

@@ -13,7 +13,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, short_repr
 from kerfpath.cad import Departure
-from kerfpath.errors import AuditFailed, InputError
+from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.files import require_replaceable
 from kerfpath.job.audit_report import collision_note
 from kerfpath.job.format import Job, refusal_at
@@ -367,6 +367,9 @@ def plan_file_text(outcome: JobResult) -> str:
             )
         elif cut.broken is not None:
             entries.append(broken_entry(cut.name, cut.broken, cut.fastest))
+    for name in outcome.not_planned:
+        why = NoFeasiblePath("the run was stopped before it was planned", proved=False, node=-1)
+        entries.append(broken_entry(name, why, None))
     return plan_text(
         plan_document(
             job.robot, job.tool, job.placement, entries, job.source, outcome.cell, outcome.part
@@ -417,6 +420,9 @@ def incomplete_note(outcome: JobResult) -> list[str]:
     """Return the note on contours that the program lacks, or that keep it from being written."""
     off = ", ".join(outcome.job.switched_off)
     said = [f"Not cut, as switched_off in [part] names it: {off}."] if off else []
+    if outcome.not_planned:
+        left = ", ".join(outcome.not_planned)
+        return [*said, f"No program is written, as the run was stopped before {left} was planned."]
     missing = ", ".join(outcome.missing)
     if not missing:
         return said

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import TypeVar
 
@@ -26,7 +27,7 @@ from kerfpath.planner import (
     plan_in_pieces,
 )
 from kerfpath.plans import Plan
-from kerfpath.progress import Progress
+from kerfpath.progress import Progress, StopEarly, may_stop, shown_by, unstopped
 from kerfpath.refiner import refine
 
 _T = TypeVar("_T")
@@ -54,14 +55,21 @@ def cut_candidate(
     options = replace(request.options, certify=None)
     job, cell = replace(prepared.job, options=options), prepared.cell
     name, total, done = request.task.name, len(candidate.nodes), 0
+    phase = name
 
     def solved(count: int) -> None:
         nonlocal done
+        may_stop()
         done += count
         progress(name, done, total)
 
     def begin(what: str) -> None:
-        progress(f"{name}: {what}", 0, 0)
+        nonlocal phase
+        phase = f"{name}: {what}"
+        progress(phase, 0, 0)
+
+    def show(done: int, total: int) -> None:
+        progress(phase, done, total)
 
     progress(name, 0, total)
     run, asked = request.run, request.task.asked(prepared.job.options)
@@ -97,7 +105,8 @@ def cut_candidate(
 
     try:
         try:
-            plans: tuple[Plan, ...] = (planned(plan) if run is None else follow(run),)
+            with shown_by(show):
+                plans: tuple[Plan, ...] = (planned(plan) if run is None else follow(run),)
         except NoFeasiblePath:
             if job.options.interruptions == "none" or not np.diff(graph.start).all():
                 raise
@@ -105,7 +114,8 @@ def cut_candidate(
     except NoFeasiblePath as broken:
         return (replace(whole, broken=broken),)
     begin("audit")
-    return tuple(_audited(prepared, whole, made) for made in plans)
+    with unstopped():
+        return tuple(_audited(prepared, whole, made) for made in plans)
 
 
 def _whole(
@@ -153,7 +163,8 @@ def _cut_along_courses(
     graph = job.graph(nodes, external=course_of_plans(job, nodes, plans), progress=solved)
     whole = _whole(job, request, candidate, graph, cell, begin)
     begin("audit")
-    return tuple(_audited(prepared, whole, made) for made in plans)
+    with unstopped():
+        return tuple(_audited(prepared, whole, made) for made in plans)
 
 
 def _at_nodes(job: Job) -> PlanOptions:
@@ -223,16 +234,18 @@ def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutRes
     broken = cut.broken
     if broken is None:
         return cut
-    progress(f"{cut.request.task.name}: looking for a remedy", 0, 0)
-    if run is None and opens_without_windows(job, cut.request, cut.candidate, cell):
-        cut = replace(cut, advice=Remedy(other_method=False, without_windows=True))
-    if not (np.diff(graph.start).all() and plain and constant):
-        return cut
-    found = find_remedy(job, cut.request, cut.candidate, graph, cell, broken.relaxation)
-    if found is None:
-        return cut
-    free = cut.advice is not None
-    return replace(cut, advice=replace(found[0], without_windows=free), fastest=found[1])
+    with suppress(StopEarly):
+        progress(f"{cut.request.task.name}: looking for a remedy", 0, 0)
+        if run is None and opens_without_windows(job, cut.request, cut.candidate, cell):
+            cut = replace(cut, advice=Remedy(other_method=False, without_windows=True))
+        if not (np.diff(graph.start).all() and plain and constant):
+            return cut
+        found = find_remedy(job, cut.request, cut.candidate, graph, cell, broken.relaxation)
+        if found is not None:
+            free = cut.advice is not None
+            advice = replace(found[0], without_windows=free)
+            cut = replace(cut, advice=advice, fastest=found[1])
+    return cut
 
 
 def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
@@ -269,5 +282,5 @@ def _divided(made: Plan, path: Contour, parts: int) -> Plan:
     found = refine(made, nodes=divide_nodes(path, made.contour, parts))
     if found.done:
         return found.plan
-    statement = f"{made.proof.statement}; at {parts} parts of an interval {found.statement}"
-    return replace(made, proof=replace(made.proof, statement=statement))
+    claim = f"at {parts} parts of an interval {found.statement}"
+    return replace(made, proof=made.proof.also(claim))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 
@@ -19,7 +20,7 @@ from kerfpath.planner import (
     with_bound,
 )
 from kerfpath.plans import Plan
-from kerfpath.progress import Progress, no_progress
+from kerfpath.progress import Progress, StopEarly, may_stop, no_progress
 from kerfpath.sequence import common_postures, longest_search, order_candidates
 
 # -----------------------------------------------------------------------------
@@ -40,7 +41,8 @@ def order_cuts(
     ----------
     prepared : PreparedJob
     tried : sequence of sequences of tuples of CutResult
-        The result of each candidate of each contour: one cut, or its pieces.
+        The result of each candidate of each contour: one cut, or its pieces. Contours at the end
+        may lack: they are not planned, and there is no order.
     progress : callable
     """
     job = prepared.job
@@ -54,9 +56,11 @@ def order_cuts(
     complete = all(passed) or (
         job.accepts_incomplete and 0 < sum(map(bool, passed)) == len(passed) - len(missing)
     )
-    if job.sequence is None or not complete:
+    left = tuple(request.task.name for request in prepared.contours[len(tried) :])
+    if job.sequence is None or left or not complete:
         first = [(fine or each)[0] for fine, each in zip(passed, tried, strict=True)]
-        return replace(result, cuts=tuple(cut for cuts in first for cut in cuts))
+        every = tuple(cut for cuts in first for cut in cuts)
+        return replace(result, cuts=every, not_planned=left)
     units, owner, before = _units(passed, prepared.inner_first)
 
     longest = longest_search(job.sequence.seconds)
@@ -72,6 +76,10 @@ def order_cuts(
         else units[u][0].graph.postures_throughout.tolist()
         for u, (r, i) in enumerate(zip(requests, owner, strict=True))
     ]  # fmt: skip
+
+    def in_given_order(stuck: NoFeasiblePath) -> JobResult:
+        return replace(result, cuts=(*(unit[0] for unit in units), *missing), stuck=stuck)
+
     try:
         part = order_candidates(
             units,
@@ -95,8 +103,11 @@ def order_cuts(
             pierce_time=job.program.pierce_time,
             seconds=job.sequence.seconds,
         )
+    except StopEarly:
+        said = "stopped before an order was found"
+        return in_given_order(NoFeasiblePath(said, proved=False, node=-1))
     except NoFeasiblePath as stuck:
-        return replace(result, cuts=(*(unit[0] for unit in units), *missing), stuck=stuck)
+        return in_given_order(stuck)
     chosen = [units[unit][candidate] for unit, candidate in part.chosen]
     cuts = [_as_ordered(prepared, *each) for each in zip(chosen, part.plans, strict=True)]
     o = job.options
@@ -171,20 +182,26 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
     """Plan and audit every contour of a prepared job, in the order of its contours.
 
     Its contours replace those of the job: a touch-up has other paths in them, a plan picked from
-    a Pareto set has other options.
+    a Pareto set has other options. Where a check of `progress.stopped_by` raises `StopEarly`, the
+    result has the plans found by then, and names the contours that are not planned.
     """
-    tried = [
-        [
-            tuple(
-                advised(prepared, cut, progress)
-                for cut in cut_candidate(prepared, contour, candidate, progress)
+
+    def stoppable(what: str, done: int, total: int, /) -> None:
+        may_stop()
+        progress(what, done, total)
+
+    tried, count = list[list[tuple[CutResult, ...]]](), len(prepared.contours)
+    with suppress(StopEarly):
+        for contour in prepared.contours:
+            may_stop()
+            if count > 1:
+                progress("contours", len(tried), count)
+            found = [cut_candidate(prepared, contour, c, progress) for c in contour.candidates]
+            tried.append(
+                [tuple(advised(prepared, cut, progress) for cut in cuts) for cuts in found]
             )
-            for candidate in contour.candidates
-        ]
-        for contour in prepared.contours
-    ]
-    result = order_cuts(prepared, tried, progress)
-    cuts = tuple(certified(cut, progress) for cut in result.cuts)
+    result = order_cuts(prepared, tried, stoppable)
+    cuts = tuple(certified(cut, stoppable) for cut in result.cuts)
     return measured(prepared, result.with_cuts(cuts))
 
 

@@ -135,6 +135,8 @@ class JobResult:
         With [sequence]: why there is no order or no move.
     air : tuple of Check
         The audit of the moves.
+    not_planned : tuple of str
+        Names of the contours that have no cut, as the run was stopped before.
     """
 
     job: Job
@@ -144,6 +146,7 @@ class JobResult:
     part: PartPlan | None = None
     stuck: NoFeasiblePath | None = None
     air: tuple[Check, ...] = ()
+    not_planned: tuple[str, ...] = ()
 
     __repr__ = short_repr
 
@@ -151,7 +154,7 @@ class JobResult:
     def passed(self) -> bool:
         """True if every contour has a plan that passes its audit, and every move passes, too."""
         moves = self.stuck is None and all(check.ok for check in self.air)
-        return moves and all(cut.passed for cut in self.cuts)
+        return moves and not self.not_planned and all(cut.passed for cut in self.cuts)
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -165,7 +168,7 @@ class JobResult:
         Every contour and move has passed, or the job accepts a program without those that have no
         path, and all else has passed.
         """
-        if not (self.missing and self.job.accepts_incomplete):
+        if self.not_planned or not (self.missing and self.job.accepts_incomplete):
             return self.passed
         rest = tuple(cut for cut in self.cuts if cut.broken is None)
         return len(rest) > 0 and replace(self, cuts=rest).passed
