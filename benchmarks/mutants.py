@@ -14,7 +14,7 @@ __all__ = ["run"]
 
 ROOT = Path(__file__).parent.parent
 SECONDS = 20.0
-"""Time for each of 18 readers: those of plans and programs read fewer files in it, but as long."""
+"""Time for each of 19 readers: those of plans and programs read fewer files in it, but as long."""
 FIRST = 10_000_000
 """The first seed; a part begins where another ends."""
 HOW = """\

@@ -17,6 +17,7 @@ from OCP.gp import gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 
+import foreign
 from kerfpath.cad import read, read_measured
 from kerfpath.cell import Hull, link_bodies
 from kerfpath.cell.mesh import close_surface, read_surface
@@ -209,6 +210,14 @@ def tables(folder: Path) -> list[Whole]:
         (folder / name).write_text("".join(comma.join(map(str, row)) + "\n" for row in table))
     (folder / "ring.txt").write_text(ring())
     return _alone(list(folder.iterdir()))
+
+
+def paths(folder: Path) -> list[Whole]:
+    """Robot programs of others, as drawings; the data of one are in a file beside it."""
+    for name, text in foreign.TEXTS.items():
+        (folder / name).write_text(text)
+    mains = [path for path in folder.iterdir() if path.suffix != ".dat"]
+    return [*_alone(mains), Whole(folder / "trim.dat", folder / "trim.src")]
 
 
 def read_drawing(path: Path) -> None:
@@ -424,6 +433,7 @@ READERS: dict[str, Reader] = {
     "dxf": Reader(dxfs, read_drawing),
     "table": Reader(tables, read_drawing),
     "mesh": Reader(meshes, read_mesh),
+    "path": Reader(paths, read_drawing),
     "urdf": Reader(urdfs, read_robot),
     "job": Reader(jobs, read_a_job),
     "plan": Reader(plans, read_plan),

@@ -52,18 +52,20 @@ def read(
     outer_towards: ArrayLike | None = None,
     axis: ArrayLike | None = None,
     columns: Columns | None = None,
+    beam: str | Sequence[str] | None = None,
     progress: Progress = no_progress,
 ) -> Part:
-    """Return the part in a drawing (STEP, IGES, DXF, a table of points, a tool path) or a shape.
+    """Return the part in a drawing (STEP, IGES, DXF, a table, a mesh, a path) or a shape.
 
     Parameters
     ----------
     path : str, Path or shape
         .step, .stp, .iges, .igs, .dxf; a table: .csv, .tsv or .txt; a tool path: .apt, .aptsource,
-        .cl or .cls; a program of a machine: .cnc, .gcode, .h, .mpf, .nc, .ngc, .spf or .tap. Or a
-        shape of OCP in memory, an object with one as `.wrapped` (build123d, CadQuery), or a list of
-        these: faces, or edges. A shape is copied and read in this process, where OCCT may crash if
-        it is damaged.
+        .cl or .cls; a program of a machine: .cnc, .gcode, .h, .mpf, .nc, .ngc, .spf or .tap; a
+        program of a robot: .src (KUKA), .mod or .modx (ABB), .ls (FANUC) or .script (Universal
+        Robots); a mesh: .stl, .obj or .ply. Or a shape of OCP in memory, an object with one as
+        `.wrapped` (build123d, CadQuery), or a list of these: faces, or edges. A shape is copied and
+        read in this process, where OCCT may crash if it is damaged.
     unit : str, optional
         Unit of the numbers in the file, instead of that in its header: um, mm, cm, dm, m, km, mil,
         in or ft. A shape has no unit: its numbers are in mm by default.
@@ -79,6 +81,9 @@ def read(
     columns : mapping of str to str or sequence of str, optional
         For a table: the names in its header of x, y, z, nx, ...; or, without a header, the columns
         in their order, "-" for one that is not used.
+    beam : str or (str, str), optional
+        For a program of a robot: the output that is on while it cuts, as "$OUT[5]"; the statements
+        that switch the beam on and off; or the speed of its cuts, as "120 mm/s".
     progress : callable
         Called with the current step and the number of faces; see `kerfpath.progress`.
 
@@ -97,10 +102,13 @@ def read(
         outer_towards=_direction(outer_towards, "outer_towards"),
         axis=_direction(axis, "axis"),
         columns=columns,
+        beam=_beam(beam),
     )
     if not isinstance(path, str | PathLike):
         if columns is not None:
             raise InputError("shape: columns: expected a table, got a shape")
+        if beam is not None:
+            raise InputError("shape: beam: expected a program of a robot, got a shape")
         return _read_shape(path, options, progress)
     path = Path(path)
     content = content_of(path, _EXPECTED)
@@ -115,6 +123,8 @@ def read(
         raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
     if columns is not None and kind != "table":
         raise InputError(f"{path}: columns: expected a table, got a {kind} file")
+    if beam is not None and kind != "robot program":
+        raise InputError(f"{path}: beam: expected a program of a robot, got a {kind} file")
     part = _read_file(kind, path, content, options, progress)
     question = None if unit is not None else unit_question(part.unit, part.bounding_box)
     return part if question is None else replace(part, notes=(*part.notes, question))
@@ -129,8 +139,20 @@ class _ReadOptions:
     outer_towards: Direction | None
     axis: Direction | None
     columns: Columns | None
+    beam: str | tuple[str, str] | None
 
     __repr__ = short_repr
+
+
+def _beam(value: str | Sequence[str] | None) -> str | tuple[str, str] | None:
+    if value is None or (isinstance(value, str) and value.strip()):
+        return value
+    if not isinstance(value, str) and len(value) == 2 and all(each.strip() for each in value):
+        return value[0], value[1]
+    raise InputError(
+        f"beam: expected the name of an output, or the two statements that switch on and off, got "
+        f"{str(value)[:60]!r}"
+    )
 
 
 def _direction(value: ArrayLike | None, name: str) -> Direction | None:
@@ -179,6 +201,12 @@ def _read_file(
             from kerfpath.cad.nc import read_nc
 
             return read_nc(path, content, unit, gap, axis)
+        if kind == "robot program":
+            from kerfpath.cad.programs import read_program
+
+            if axis is not None:
+                raise InputError("axis: expected a drawing of lines, got a program of a robot")
+            return read_program(path, content, unit, gap, options.beam)
         if kind == "mesh":
             from kerfpath.cad.meshes import read_mesh
 

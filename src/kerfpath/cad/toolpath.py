@@ -55,8 +55,8 @@ class Move:
 
     Parameters
     ----------
-    line : int
-        Line in the file.
+    line : int or str
+        Line in the file, or line and file of another that belongs to it.
     kind : {"feed", "rapid", "away", "begin"}
         A feed move; a rapid move or a set position; a move to a position that is not in the file;
         or no move, but the begin of an operation, wherever the tool comes from.
@@ -70,7 +70,7 @@ class Move:
         The arc that a feed move runs along; it rises evenly if its ends differ in height.
     """
 
-    line: int
+    line: int | str
     kind: Literal["feed", "rapid", "away", "begin"]
     point: Triple | None = None
     axis: Triple | None = None
@@ -321,7 +321,9 @@ def _with_arcs(
     return found[0], found[1], found[2]
 
 
-def _chords_of(arc: Arc, start: Array, end: Array, mm: float, line: int) -> tuple[Array, Array]:
+def _chords_of(
+    arc: Arc, start: Array, end: Array, mm: float, line: int | str
+) -> tuple[Array, Array]:
     """Return shares (K,) of an arc, and the points (K, 3) mm there, without its start."""
     z, centre = np.array(arc.normal), np.array(arc.centre) * mm
     flat = [p - centre - ((p - centre) @ z) * z for p in (start, end)]

@@ -236,7 +236,8 @@ def speed(
 @app.command()
 def contours(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="STEP, IGES, DXF, or a table of points (CSV).")
+        Path,
+        typer.Argument(metavar="FILE", help="STEP, IGES, DXF, a mesh, points (CSV), or a path."),
     ],
     unit: Annotated[
         str | None,
@@ -259,6 +260,13 @@ def contours(
     columns: Annotated[
         str | None,
         typer.Option(help='Columns of a table: x,y,z,-,nx,... in order, or x=NAME,"y=A, B",...'),
+    ] = None,
+    beam: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Output of a robot program that is on while it cuts, as $OUT[5]; twice: the "
+            "statements that switch on and off; or the speed of its cuts, as '120 mm/s'."
+        ),
     ] = None,
     html: Annotated[
         Path | None,
@@ -286,6 +294,7 @@ def contours(
         outer_towards=outer_towards,
         axis=axis,
         columns=columns,
+        beam=beam,
     )
     list_contours(part, html, everything=everything)
 

@@ -28,6 +28,7 @@ def drawing_in(
     outer_towards: tuple[float, float, float] | None,
     axis: tuple[float, float, float] | None,
     columns: str | None,
+    beam: list[str] | None,
 ) -> Part:
     """Return the part in a file; `columns` is x,y,z,... or x=NAME,y=NAME,..., and `gap` is in m.
 
@@ -44,6 +45,7 @@ def drawing_in(
             outer_towards=outer_towards,
             axis=axis,
             columns=None if columns is None else _columns(columns),
+            beam=beam[0] if beam and len(beam) == 1 else beam or None,
             progress=progress,
         )
 

@@ -29,6 +29,8 @@ class Drawing:
         Tool axis for a drawing without one, part frame.
     columns : mapping or sequence of str, or None
         Meaning of the columns of a table of points, see `kerfpath.cad.read`.
+    beam : str or sequence of str, or None
+        How a program of a robot switches the beam, see `kerfpath.cad.read`.
     accept_left_out : bool
         Whether geometry that may have to be cut may be left out.
     """
@@ -39,6 +41,7 @@ class Drawing:
     outer_towards: Array | None = None
     axis: Array | None = None
     columns: Mapping[str, str] | Sequence[str] | None = None
+    beam: str | Sequence[str] | None = None
     accept_left_out: bool = False
 
     __repr__ = short_repr
@@ -58,4 +61,5 @@ class Drawing:
             outer_towards=self.outer_towards,
             axis=self.axis,
             columns=self.columns,
+            beam=self.beam,
         )

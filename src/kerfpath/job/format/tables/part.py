@@ -177,6 +177,14 @@ class PartTable(Table):
             '{ x = "Pos X", y = "Pos Y", z = "Pos Z" }',
         ),
     ] = None
+    beam: Annotated[
+        Text | list[Text] | None,
+        key(
+            "the output of a robot program that is on while it cuts, the two statements that "
+            "switch on and off, or the speed of its cuts",
+            '"$OUT[5]"',
+        ),
+    ] = None
     left_out: Annotated[
         Literal["refuse", "accept"],
         key("what to do if something to cut may be left out of the drawing", '"accept"'),
@@ -216,6 +224,7 @@ class PartTable(Table):
             outer_towards=_direction(self.outer_towards),
             axis=_direction(self.axis),
             columns=self.columns,
+            beam=self.beam,
             accept_left_out=self.left_out == "accept",
         )
 
