@@ -134,3 +134,92 @@ def test_what_is_no_cut_is_refused(tmp_path: Path) -> None:
         read(path)
     with pytest.raises(InputError, match="axis: expected a drawing of lines, got a mesh"):
         read(path, unit="mm", axis=(0, 0, -1))
+
+
+def tube(radius: float, length: float, around: int, along: int, taper: float = 0.0) -> Triangles:
+    """Return an open tube about z; its radius grows by `taper` for each mm of height."""
+    turn = 2 * np.pi * np.arange(around + 1) / around
+    z = np.linspace(0, length, along + 1)[:, None]
+    wide = radius + taper * z
+    grid = np.stack([wide * np.cos(turn), wide * np.sin(turn), z + 0 * turn], axis=2)
+    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
+    return np.concatenate([np.stack([a, b, c], 2), np.stack([a, c, d], 2)]).reshape(-1, 3, 3)
+
+
+@pytest.mark.parametrize("taper", [0.0, 0.2])
+@pytest.mark.parametrize("up", [1, -1])
+def test_a_section_of_a_tube_is_cut_at_right_angles_to_its_wall(
+    tmp_path: Path, taper: float, up: int
+) -> None:
+    path = stl(tmp_path / "a.stl", tube(20, 60, 90, 7, taper))
+    heights = [0.013, 0.031]
+    part = read(path, unit="mm", section=(0, 0, 3 * up), section_at=[up * z for z in heights])
+    assert [(loop.name, loop.kind) for loop in part.loops] == [
+        ("section1/outer", "outer"),
+        ("section2/outer", "outer"),
+    ]
+    for loop, z in zip(part.loops, heights, strict=True):
+        contour = part.contour(loop.name)
+        radius = 20e-3 + taper * z
+        assert np.ptp(contour.points[:, 2]) < 1e-12
+        assert contour.points[0, 2] == pytest.approx(z, abs=1e-12)
+        out = contour.points * [1, 1, 0] / np.linalg.norm(contour.points[:, :2], axis=1)[:, None]
+        # The tube has 90 sides: its chords leave the circle by 1 - cos(2 deg) of the radius.
+        assert np.abs(np.linalg.norm(contour.points[:, :2], axis=1) / radius - 1).max() < 6.1e-4
+        expected = -(out - [0, 0, taper]) / np.hypot(1, taper)
+        # Normals at the ends of the mesh have triangles on one side only.
+        assert (contour.axes * expected).sum(axis=1).min() > np.cos(np.radians(1))
+        # What is above the plane is on the left, seen from outside.
+        steps = np.diff(contour.points, axis=0)
+        left = np.cross(-contour.axes[:-1], steps)
+        assert (left[:, 2] * up).min() > 0
+
+
+def test_a_section_of_a_box_turns_at_its_edges_alone(tmp_path: Path) -> None:
+    path = stl(tmp_path / "a.stl", box(30, 40, 60))
+    part = read(path, unit="mm", section=(0, 0, 1), section_at=[0.02])
+    (loop,) = part.loops
+    assert loop.length == pytest.approx(0.14, abs=1e-12)
+    contour = part.contour(loop.name)
+    near = np.abs(contour.axes[:, :2]).min(axis=1) > 1e-9
+    corners = contour.points[near] * 1e3
+    found = {(round(x), round(y)) for x, y, _ in corners.tolist()}
+    assert found == {(0, 0), (30, 0), (30, 40), (0, 40)}
+    flat = contour.points[~near][:, :2] * 1e3
+    from_corner = np.linalg.norm(flat[:, None] - np.array(sorted(found))[None], axis=2).min(axis=1)
+    assert from_corner.min() == pytest.approx(1.0, abs=1e-9)
+    assert "crosses sharp edges at 4 places" in " ".join(part.notes)
+
+
+def test_a_plane_may_cut_a_hole_and_an_open_sheet(tmp_path: Path) -> None:
+    solid = np.concatenate([box(30, 30, 30), box(10, 10, 50)[:, ::-1] + [10, 10, -10]])
+    part = read(stl(tmp_path / "a.stl", solid), unit="mm", section=(0, 0, 1), section_at=[0.015])
+    assert [loop.kind for loop in part.loops] == ["outer", "inner"]
+    sheet = annulus(0.002)
+    part = read(stl(tmp_path / "b.stl", sheet), unit="mm", section=(1, 0, 0), section_at=[0.005])
+    assert [(loop.name, loop.kind) for loop in part.loops] == [
+        ("section1/line1", "open"),
+        ("section1/line2", "open"),
+    ]
+
+
+def test_planes_through_corners_and_bad_planes(tmp_path: Path) -> None:
+    path = stl(tmp_path / "a.stl", tube(20, 60, 90, 6))
+    part = read(path, unit="mm", section=(0, 0, 1), section_at=[0.02])  # through a ring of corners
+    assert part.loops[0].edges == 90
+    for options, message in (
+        ({"section": (0, 0, 1), "section_at": [0.061]}, "reaches from 0 to 60 mm along the normal"),
+        ({"section": (0, 0, 1), "section_at": [0.0]}, "expected a plane within the part"),
+        ({"section": (0, 0, 1)}, "section and section_at: expected both"),
+        ({"section_at": [0.02]}, "section and section_at: expected both"),
+        ({"section": (0, 0, 0), "section_at": [0.02]}, "a vector of length 0"),
+    ):
+        with pytest.raises(InputError, match=message):
+            read(path, unit="mm", **options)
+    (tmp_path / "a.csv").write_text("x,y,z,nx,ny,nz\n0,0,0,0,0,1\n")
+    with pytest.raises(InputError, match="section: expected a triangle mesh, got a table"):
+        read(tmp_path / "a.csv", section=(0, 0, 1), section_at=[0.0])
+    odd = tube(20, 60, 90, 6)
+    odd[3] = odd[3][::-1]
+    with pytest.raises(InputError, match="turned opposite ways; repair the mesh"):
+        read(stl(tmp_path / "b.stl", odd), unit="mm", section=(0, 0, 1), section_at=[0.005])

@@ -53,6 +53,8 @@ def read(
     axis: ArrayLike | None = None,
     columns: Columns | None = None,
     beam: str | Sequence[str] | None = None,
+    section: ArrayLike | None = None,
+    section_at: ArrayLike = (),
     progress: Progress = no_progress,
 ) -> Part:
     """Return the part in a drawing (STEP, IGES, DXF, a table, a mesh, a path) or a shape.
@@ -84,6 +86,10 @@ def read(
     beam : str or (str, str), optional
         For a program of a robot: the output that is on while it cuts, as "$OUT[5]"; the statements
         that switch the beam on and off; or the speed of its cuts, as "120 mm/s".
+    section : (3,), optional
+        For a mesh: the normal of parallel planes, whose loops are the contours.
+    section_at : (K,) m
+        Distance of each of these planes from the origin, along the normal.
     progress : callable
         Called with the current step and the number of faces; see `kerfpath.progress`.
 
@@ -103,10 +109,16 @@ def read(
         axis=_direction(axis, "axis"),
         columns=columns,
         beam=_beam(beam),
+        section=_direction(section, "section"),
+        heights=tuple(floats(section_at, "section_at", (None,)).tolist()),
     )
+    if (options.section is None) != (not options.heights):
+        raise InputError("section and section_at: expected both, or none of them")
     if not isinstance(path, str | PathLike):
         if columns is not None:
             raise InputError("shape: columns: expected a table, got a shape")
+        if options.section is not None:
+            raise InputError("shape: section: expected a triangle mesh, got a shape")
         if beam is not None:
             raise InputError("shape: beam: expected a program of a robot, got a shape")
         return _read_shape(path, options, progress)
@@ -123,6 +135,8 @@ def read(
         raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
     if columns is not None and kind != "table":
         raise InputError(f"{path}: columns: expected a table, got a {kind} file")
+    if options.section is not None and kind != "mesh":
+        raise InputError(f"{path}: section: expected a triangle mesh, got a {kind} file")
     if beam is not None and kind != "robot program":
         raise InputError(f"{path}: beam: expected a program of a robot, got a {kind} file")
     part = _read_file(kind, path, content, options, progress)
@@ -140,6 +154,8 @@ class _ReadOptions:
     axis: Direction | None
     columns: Columns | None
     beam: str | tuple[str, str] | None
+    section: Direction | None
+    heights: tuple[float, ...]
 
     __repr__ = short_repr
 
@@ -212,7 +228,8 @@ def _read_file(
 
             if axis is not None:
                 raise InputError("axis: expected a drawing of lines, got a mesh")
-            return read_mesh(path, unit, gap)
+            normal = None if options.section is None else np.array(options.section)
+            return read_mesh(path, unit, gap, normal, options.heights)
         require_extra("cad", f"reading {kind}")
         if kind == "DXF":
             from kerfpath.cad.dxf import read_dxf

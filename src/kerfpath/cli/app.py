@@ -268,6 +268,14 @@ def contours(
             "statements that switch on and off; or the speed of its cuts, as '120 mm/s'."
         ),
     ] = None,
+    section: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(help="Normal of planes that cut a mesh: their loops are the contours."),
+    ] = None,
+    section_mm: Annotated[
+        list[float] | None,
+        typer.Option(help="Distance of such a plane along its normal, mm; once for each."),
+    ] = None,
     html: Annotated[
         Path | None,
         typer.Option(help="HTML page to write: the part with its loops by name."),
@@ -295,6 +303,8 @@ def contours(
         axis=axis,
         columns=columns,
         beam=beam,
+        section=section,
+        section_at=[height / 1000 for height in section_mm or ()],
     )
     list_contours(part, html, everything=everything)
 

@@ -29,6 +29,8 @@ def drawing_in(
     axis: tuple[float, float, float] | None,
     columns: str | None,
     beam: list[str] | None,
+    section: tuple[float, float, float] | None,
+    section_at: list[float],
 ) -> Part:
     """Return the part in a file; `columns` is x,y,z,... or x=NAME,y=NAME,..., and `gap` is in m.
 
@@ -46,6 +48,8 @@ def drawing_in(
             axis=axis,
             columns=None if columns is None else _columns(columns),
             beam=beam[0] if beam and len(beam) == 1 else beam or None,
+            section=section,
+            section_at=section_at,
             progress=progress,
         )
 

@@ -31,6 +31,10 @@ class Drawing:
         Meaning of the columns of a table of points, see `kerfpath.cad.read`.
     beam : str or sequence of str, or None
         How a program of a robot switches the beam, see `kerfpath.cad.read`.
+    section : (3,) or None
+        Normal of the planes that cut a mesh, see `kerfpath.cad.read`.
+    section_at : tuple of float, m
+        Distance of each of them along the normal.
     accept_left_out : bool
         Whether geometry that may have to be cut may be left out.
     """
@@ -42,6 +46,8 @@ class Drawing:
     axis: Array | None = None
     columns: Mapping[str, str] | Sequence[str] | None = None
     beam: str | Sequence[str] | None = None
+    section: Array | None = None
+    section_at: tuple[float, ...] = ()
     accept_left_out: bool = False
 
     __repr__ = short_repr
@@ -62,4 +68,6 @@ class Drawing:
             axis=self.axis,
             columns=self.columns,
             beam=self.beam,
+            section=self.section,
+            section_at=self.section_at,
         )

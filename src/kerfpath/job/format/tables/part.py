@@ -185,6 +185,14 @@ class PartTable(Table):
             '"$OUT[5]"',
         ),
     ] = None
+    section: Annotated[
+        Three | None,
+        key("3 numbers, the normal of the planes that cut a mesh, in the part", "[0, 0, 1]"),
+    ] = None
+    section_mm: Annotated[
+        tuple[Number, ...],
+        key("distances of these planes along their normal, in mm", "[20, 40]", strict=False),
+    ] = ()
     left_out: Annotated[
         Literal["refuse", "accept"],
         key("what to do if something to cut may be left out of the drawing", '"accept"'),
@@ -213,6 +221,9 @@ class PartTable(Table):
     def _one_place(self) -> PartTable:
         if self.frame is not None and self.placed_by == "centre":
             raise fault("frame or placed_by", "both", "remove one", ("placed_by",))
+        if (self.section is None) != (not self.section_mm):
+            missing = "section_mm" if self.section else "section"
+            raise fault("section and section_mm", "one", f"add {missing}", (missing,))
         return self
 
     def drawing(self, folder: Path) -> Drawing:
@@ -225,6 +236,8 @@ class PartTable(Table):
             axis=_direction(self.axis),
             columns=self.columns,
             beam=self.beam,
+            section=_direction(self.section),
+            section_at=tuple(height / 1000 for height in self.section_mm),
             accept_left_out=self.left_out == "accept",
         )
 
