@@ -261,7 +261,7 @@ class PlanOptions(Settings):
     )
     least_piece: float | None = setting(
         None,
-        "least length of every such piece, along its nodes",
+        "least length of every such piece, along its nodes; default 10 mm",
         unit="mm",
         above=0,
         example="20",

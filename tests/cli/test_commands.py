@@ -404,7 +404,7 @@ def test_short_pieces_are_warned_of_and_a_job_may_ask_for_longer_ones(folder):
     assert "shortest of its" not in done.stdout
     done, _ = cut("least_piece_mm = 16.5")  # more than half of it
     assert done.returncode == 1
-    assert "no division into pieces of 0.0165 m or more keeps the limits" in done.stdout
+    assert "no division into pieces of 16.5 mm or more keeps the limits" in done.stdout
 
 
 def test_contours_lists_the_loops_by_name():

@@ -310,7 +310,7 @@ def test_the_pieces_of_an_interrupted_cut(corner, arm, tool, placement):
     assert min(float(np.ptp(p.contour.s)) for p in longer) >= shortest + 0.004 - 1e-9
     for p in longer:
         require_clean(p)
-    with pytest.raises(NoFeasiblePath, match=r"no division into pieces of 0.15 m or more"):
+    with pytest.raises(NoFeasiblePath, match=r"no division into pieces of 150 mm or more"):
         plan_in_pieces(corner, arm, least_piece=0.15, **options)
     with pytest.raises(InputError, match=r"least_piece: expected a number above 0 m"):
         plan_in_pieces(corner, arm, least_piece=0.0, **options)

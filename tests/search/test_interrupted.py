@@ -134,7 +134,7 @@ def test_a_least_length_moves_an_interruption_or_refuses():
     assert ends() == [0, 2]
     assert ends(s=s, least_piece=0.02) == [0, 2]
     with pytest.raises(
-        NoFeasiblePath, match=r"pieces of 0.025 m or more .* number of interruptions is 1"
+        NoFeasiblePath, match=r"pieces of 25 mm or more .* number of interruptions is 1"
     ) as e:
         ends(s=s, least_piece=0.025)
     assert (e.value.node, e.value.proved) == (2, True)

@@ -332,6 +332,10 @@ def require_nodes_alone(options: PlanOptions, what: str) -> None:
 # Contours that cannot be cut in one go: the fewest interruptions, and a plan for each piece.
 
 
+LEAST_PIECE = 0.01
+"""Least length of a piece, m, unless another is asked for."""
+
+
 class PieceKeywords(PlanKeywords, total=False):
     """The options that `plan_in_pieces` takes as keywords."""
 
@@ -355,8 +359,8 @@ def plan_in_pieces(
     """Return the plans of the pieces in which a contour is cut, with the fewest interruptions.
 
     At an interruption the beam goes off, the robot takes another pose at the same node, and the cut
-    goes on from there. On the graph it is proved that no plan has fewer interruptions, and that
-    none with as many costs less; the grid thus decides where the cut is interrupted. Each piece is
+    goes on from there. On the graph it is proved that no plan with pieces of the least length has
+    fewer interruptions, and that none with as many costs less; the grid thus decides where the cut is interrupted. Each piece is
     then planned on its own over continuous gamma (or refined, with the method "exact" and
     `refine`), and certified on its own: its bound holds for motions along that piece. The moves
     between pieces are not planned here and cost nothing.
@@ -369,7 +373,8 @@ def plan_in_pieces(
         costs in both.
     least_piece : float m, optional
         Least length of every piece, measured along the nodes; the number of interruptions is then
-        the least possible with this length. A cut in one go may be shorter.
+        the least possible with this length. A cut in one go may be shorter. Default: 10 mm, as a
+        contour in pieces of a millimetre is not a cut.
 
     Returns
     -------
@@ -401,7 +406,8 @@ def plan_in_pieces(
     begin = phase or (lambda what: None)
     begin("search for pieces")
     try:
-        search = partial(find_interrupted, s=contour.s, least_piece=asked.least_piece)
+        least = LEAST_PIECE if asked.least_piece is None else asked.least_piece
+        search = partial(find_interrupted, s=contour.s, least_piece=least)
         found = finder.find(search, task.problem)
     except NoFeasiblePath as broken:
         raise broken.with_message(

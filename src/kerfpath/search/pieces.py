@@ -153,8 +153,8 @@ def _long_enough(
     spans = fewest(reached, apart)
     if spans is None:
         raise NoFeasiblePath(
-            f"no division into pieces of {least_piece:g} m or more keeps the limits; with shorter "
-            f"pieces the least number of interruptions is {len(last) - 1}",
+            f"no division into pieces of {least_piece * 1e3:g} mm or more keeps the limits; with "
+            f"shorter pieces the least number of interruptions is {len(last) - 1}",
             proved=True,
             node=int(last[0]),
         )
