@@ -360,10 +360,10 @@ def plan_in_pieces(
 
     At an interruption the beam goes off, the robot takes another pose at the same node, and the cut
     goes on from there. On the graph it is proved that no plan with pieces of the least length has
-    fewer interruptions, and that none with as many costs less; the grid thus decides where the cut is interrupted. Each piece is
-    then planned on its own over continuous gamma (or refined, with the method "exact" and
-    `refine`), and certified on its own: its bound holds for motions along that piece. The moves
-    between pieces are not planned here and cost nothing.
+    fewer interruptions, and that none with as many costs less; the grid thus decides where the cut
+    is interrupted. Each piece is then planned on its own over continuous gamma (or refined, with
+    the method "exact" and `refine`), and certified on its own: its bound holds for motions along
+    that piece. The moves between pieces are not planned here and cost nothing.
 
     Parameters
     ----------
