@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
+from math import pi, tan
 from pathlib import Path
 from time import perf_counter
 
@@ -98,10 +99,13 @@ def write_tube(path: Path) -> None:
 
 
 def write_plate(path: Path) -> None:
-    """Write a sheet of 300 x 300 mm as DXF: nine round holes and its trim."""
+    """Write a sheet of 300 x 300 mm with round corners as DXF: nine round holes and its trim."""
     document = new("R2010", units=4)
     space = document.modelspace()
-    space.add_lwpolyline([(0, 0), (300, 0), (300, 300), (0, 300)], close=True)
+    ends = [(20, 0), (280, 0), (300, 20), (300, 280), (280, 300), (20, 300), (0, 280), (0, 20)]
+    quarter = tan(pi / 8)  # the bulge of an arc of 90 deg
+    trim = [(*end, quarter * (i % 2)) for i, end in enumerate(ends)]
+    space.add_lwpolyline(trim, format="xyb", close=True)
     for k in range(9):
         space.add_circle((60 + 90 * (k % 3), 60 + 90 * (k // 3)), 10 + 2 * (k % 4))
     document.saveas(path)

@@ -211,6 +211,16 @@ class Comfort:
         """Return the hard margins that any of joint vectors q (B, n) rad break."""
         return tuple(why for why, near in self.too_near(robot, q, tool).items() if near.any())
 
+    def bent(self, robot: Robot) -> list[int]:
+        """Return the joints that keep the margins of wrist and elbow, by number."""
+        return [joint for _, joint in self._bends(robot)]
+
+    def _bends(self, robot: Robot) -> list[tuple[str, int]]:
+        """Return wrist and elbow with the joint of each, where they have a margin."""
+        kept = (name for name, band in self.bands.items() if band.margin)
+        bends = _BENDS.get(robot.kinematics, {})
+        return [(name, bends[name][0]) for name in kept if name in bends]
+
     def narrowed(self, robot: Robot, q: Array) -> JointLimits:
         """Return joint limits narrowed so that the margins of limits, wrist and elbow are kept.
 
@@ -223,12 +233,12 @@ class Comfort:
             room, own = self.limits.margin, slice(robot.family.joints)
             lower[own] += room
             upper[own] -= room
-        for name, (joint, _) in _BENDS.get(robot.kinematics, {}).items():
-            band = self.bands.get(name, Band())
+        for name, joint in self._bends(robot):
             bend = _bend(name, robot, q)
             side = np.floor(bend / np.pi)
-            if band.margin and (side == side[0]).all():
-                ends = np.pi * (side[0] + np.arange(2)) + band.margin * np.array([1.0, -1.0])
+            if (side == side[0]).all():
+                margin = self.bands[name].margin
+                ends = np.pi * (side[0] + np.arange(2)) + margin * np.array([1.0, -1.0])
                 ends = q[0, joint] + robot.sign[joint] * (ends - bend[0])
                 lower[joint] = max(lower[joint], ends.min())
                 upper[joint] = min(upper[joint], ends.max())

@@ -48,6 +48,8 @@ class LayeredGraph:
     external : (K, X, E) rad or m, or None
         Values of the joints that a pose leaves free, at every node; each tilt has X variants.
         None: a pose leaves no joint free.
+    folded : (n,) bool, or None
+        Joints that count as endless though they have a range; None: none.
     kept : object
         What its vertices have been checked for (margins, floor, windows of gamma); None: nothing.
     """
@@ -63,6 +65,7 @@ class LayeredGraph:
     reason: NDArray[np.uint8]
     reasons: tuple[Reason, ...]
     external: Array | None = None
+    folded: Bools | None = None
     kept: object = None
 
     def __repr__(self) -> str:
@@ -130,6 +133,41 @@ class LayeredGraph:
         left_of_layer = np.bincount(layer[keep], minlength=len(sizes))
         start = np.concatenate([[0], np.cumsum(left_of_layer)])
         return replace(self._of(keep, start, slice(None)), reason=freeze(reason), reasons=reasons)
+
+    def fold(self, joints: Bools) -> LayeredGraph:
+        """Return the graph with the poses on one turn each of joints (n,), wrapped, which fold."""
+        if not (joints & ~self.is_folded).any():
+            return self
+        sizes = np.diff(self.start)
+        layer = np.repeat(np.arange(len(sizes)), sizes)
+        others = self.turn[:, ~joints]
+        pose = np.column_stack([layer, self.candidate, self.posture, others])
+        new = np.ones(len(pose), np.bool_)
+        order = np.lexsort(pose.T)
+        new[order[1:]] = (pose[order[1:]] != pose[order[:-1]]).any(axis=1)
+        start = np.concatenate([[0], np.cumsum(np.bincount(layer[new], minlength=len(sizes)))])
+        few = self._of(new, start, slice(None))
+        return replace(
+            few,
+            q=freeze(few.q - np.where(joints, 2 * np.pi * few.turn, 0.0)),
+            turn=freeze(np.where(joints, np.int8(0), few.turn)),
+            folded=freeze(self.is_folded | joints),
+        )
+
+    @property
+    def is_folded(self) -> Bools:
+        """Which joints (n,) are folded."""
+        return np.zeros(self.q.shape[1], np.bool_) if self.folded is None else self.folded
+
+    def in_postures(self, postures: Sequence[int]) -> LayeredGraph:
+        """Return the graph of some postures only; the others count as not wanted."""
+        unwanted = ~_wanted(postures, self.reason.shape[2])
+        keep, sizes = ~unwanted[self.posture], np.diff(self.start)
+        left = np.bincount(np.repeat(np.arange(len(sizes)), sizes)[keep], minlength=len(sizes))
+        start = np.concatenate([[0], np.cumsum(left)])
+        reason = self.reason.copy()
+        reason[:, :, unwanted] = self.reasons.index(Reason(Loss.UNWANTED))
+        return replace(self._of(keep, start, slice(None)), reason=freeze(reason))
 
     def part(self, first: int, last: int) -> LayeredGraph:
         """Return the graph of nodes `first` to `last`, both included."""

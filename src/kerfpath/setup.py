@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath.arrays import Array, as_pose, require_instance, require_metres, short_repr
+from kerfpath.arrays import Array, Bools, as_pose, require_instance, require_metres, short_repr
 from kerfpath.cell import Cell
 from kerfpath.robots import Robot
 
@@ -38,6 +38,11 @@ class Setup:
     cell: Cell | None = None
 
     __repr__ = short_repr
+
+    def folded(self, joints: Bools) -> Setup:
+        """Return the setup with some joints (n,) of its robot endless."""
+        cell = None if self.cell is None else self.cell.folded(joints)
+        return replace(self, robot=self.robot.folded(joints), cell=cell)
 
     @classmethod
     def of(

@@ -20,12 +20,17 @@ from kerfpath.sweep.store import Store
 # Paths of the grid, which turn as far as the comments say.
 SLIT = SLIT_JOB.replace("[plan]", '[plan]\nmethod = "exact"\ncertify = false')
 FAST = SLIT.replace("speed_m_min = 2", "speed_m_min = 900", 1)
+# Axis 6 has room beyond 360 deg only, which Status and Turn of KRL cannot say.
+RANGES = """[robot]
+lower_deg = [-180, -90, -180, -400, -125, 365]
+upper_deg = [180, 150, 75, 400, 120, 395]
+"""
 JOBS = {
     "good": SLIT,
     "fast": FAST,
     "misspelt": SLIT.replace("gamma_step", "gama_step"),
     "unknown": SLIT.replace('pick = "b"', 'pick = "c"'),
-    "mute": SLIT + '[program]\nlanguage = "krl"\n',  # whose Status and Turn say no 360 deg
+    "mute": SLIT.replace("[robot]\n", RANGES) + '[program]\nlanguage = "krl"\n',
     "foreign": SLIT + '[program]\nlanguage = "urscript"\n',
     "dry": SLIT + '[program]\nlanguage = "none"\n',
 }
@@ -73,7 +78,7 @@ def test_each_job_has_its_row_with_what_came_of_it(done):
         "fast": "; contour 'a': on this grid of the rotation no admissible edge",
         "misspelt": "plan.gama_step_deg: expected a key of [plan]",
         "unknown": "'c'",
-        "mute": "A6 = 360.0 deg cannot be expressed by Status and Turn",
+        "mute": " deg cannot be expressed by Status and Turn",
         "foreign": "program.language: ",
         "gone": "gone.toml: no such file",
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -213,6 +214,14 @@ class Cell:
         corners = floats(q, "q", (None, self.chain.joints))
         motions = self._sweep.clear(corners[:-1], corners[1:], self.required, self._scene.distances)
         return bool(motions.all())
+
+    def folded(self, joints: Bools) -> Cell:
+        """Return this cell, with the same bodies, with some joints (n,) endless."""
+        if not joints.any():
+            return self
+        other = copy(self)
+        object.__setattr__(other, "endless", freeze(self.endless | joints))
+        return other
 
     def increments(self, q0: Array, q1: Array) -> Array:
         """Return joint increments (B, n) rad from q0 to q1, endless joints the short way (13)."""

@@ -2,6 +2,7 @@
 
 from kerfpath.certifier.bound import Certified as Certified
 from kerfpath.certifier.bound import certify as certify
+from kerfpath.certifier.cells import foldable as foldable
 from kerfpath.certifier.infeasibility import MotionTest as MotionTest
 from kerfpath.certifier.infeasibility import closed_node as closed_node
 from kerfpath.certifier.stages import compile_bound as compile_bound

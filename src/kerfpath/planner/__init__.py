@@ -7,6 +7,7 @@ from kerfpath.planner.fastest import FastestSpeed as FastestSpeed
 from kerfpath.planner.fastest import fastest_speed as fastest_speed
 from kerfpath.planner.fastest import relaxations as relaxations
 from kerfpath.planner.fastest import require_rates_alone as require_rates_alone
+from kerfpath.planner.folding import folds as folds
 from kerfpath.planner.layers import ClearanceMap as ClearanceMap
 from kerfpath.planner.layers import clearance_map as clearance_map
 from kerfpath.planner.layers import layered_graph as layered_graph

@@ -51,6 +51,7 @@ def layered_graph(
     options: PlanOptions | None = None,
     nodes: ArrayLike | None = None,
     external: ArrayLike | None = None,
+    fold: Bools | None = None,
     progress: Callable[[int], None] | None = None,
     **keywords: Unpack[GraphKeywords],
 ) -> LayeredGraph:
@@ -64,6 +65,8 @@ def layered_graph(
         Only the layers of these nodes, which equal those of the whole graph; default: all.
     external : (K, E) or (K, X, E) rad or m, optional
         Values of the joints that a pose leaves free at every node, in X variants; default: a grid.
+    fold : (n,) bool, optional
+        Joints of which poses are on one turn only; default none. See `kerfpath.planner.folds`.
 
     Raises
     ------
@@ -72,6 +75,7 @@ def layered_graph(
     """
     asked = with_keywords(options, keywords, GraphKeywords)
     require_windows_fit(contour, robot, asked)
+    robot = robot if fold is None else robot.folded(fold)
     H, s = contour.frames(asked.frames), contour.s
     samples = None if asked.tilt is None else asked.tilt.samples()
     if samples is not None and samples.any():
@@ -94,7 +98,7 @@ def layered_graph(
     )
     if nodes is not None:
         asked = replace(asked, retract=None)  # its first and last layer need not be the ends
-    return within_margins(graph, robot, asked, T_flange_tip, s)
+    return within_margins(replace(graph, folded=fold), robot, asked, T_flange_tip, s)
 
 
 def course_of(external: ArrayLike, contour: Contour, robot: Robot) -> Array:

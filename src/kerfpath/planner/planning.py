@@ -11,6 +11,7 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kerfpath.arrays import Bools
 from kerfpath.cell import Cell
 from kerfpath.certificate import Certify
 from kerfpath.certifier import certify
@@ -29,6 +30,7 @@ from kerfpath.planner.continuous import (
     grid_reason,
 )
 from kerfpath.planner.external_motion import along_a_course, best_external_motion
+from kerfpath.planner.folding import all_within_ranges, unfolded, within_ranges
 from kerfpath.planner.on_grid import ON_GRID
 from kerfpath.planner.refinements import refine_plan
 from kerfpath.planner.screening import within
@@ -74,21 +76,25 @@ def best_motion(
         As `kerfpath.plan`.
     """
     options = replace(options, certify=None)
-    task = planning_task(contour, setup, options, speed=speed, graph=graph)
-    task = along_a_course(task, CollisionFreeSearch(task).clear)
-    finder, begin = CollisionFreeSearch(task), phase or (lambda what: None)
-    why = grid_reason(task)
-    begin("search")
-    found = None if why else clear_motion(task, finder, begin, explored=False)
-    if found is None:
-        raise NoFeasiblePath(
-            f"contour {contour.name!r}: no motion over continuous rotation"
-            f"{f': {why}' if why else ' was found'}",
-            proved=False,
-            node=-1,
-            counts={},
-        )
-    return claimed(found, finder)
+    begin = phase or (lambda what: None)
+
+    def planned(unfold: Bools) -> Plan:
+        task = planning_task(contour, setup, options, speed=speed, graph=graph, unfold=unfold)
+        task = along_a_course(task, CollisionFreeSearch(task).clear)
+        finder, why = CollisionFreeSearch(task), grid_reason(task)
+        begin("search")
+        found = None if why else clear_motion(task, finder, begin, explored=False)
+        if found is None:
+            raise NoFeasiblePath(
+                f"contour {contour.name!r}: no motion over continuous rotation"
+                f"{f': {why}' if why else ' was found'}",
+                proved=False,
+                node=-1,
+                counts={},
+            )
+        return claimed(found, finder)
+
+    return within_ranges(setup.robot, planned)
 
 
 def refined_motion(
@@ -279,31 +285,42 @@ def plan(
     require_nodes_alone(asked, "plan")
     if cell is None and asked.comfort is not None and asked.comfort.clearance is not None:
         raise InputError("comfort clearance: is measured in a cell; give cell=")
-    task = planning_task(
-        contour,
-        Setup.of(robot, tool, placement, cell),
-        asked,
-        speed=speed,
-        graph=graph,
-        external=external,
-        progress=progress,
-    )
-    attempt = Attempt(
-        task=task,
-        finder=CollisionFreeSearch(task),
-        begin=phase or (lambda what: None),
-        refine=asked.refine,
-    )
+    setup = Setup.of(robot, tool, placement, cell)
+    attempt: Attempt | None = None
+
+    def planned(unfold: Bools) -> Plan:
+        nonlocal attempt
+        task = planning_task(
+            contour,
+            setup,
+            asked,
+            speed=speed,
+            graph=graph,
+            external=external,
+            progress=progress,
+            unfold=unfold,
+        )
+        attempt = Attempt(
+            task=task,
+            finder=CollisionFreeSearch(task),
+            begin=phase or (lambda what: None),
+            refine=asked.refine,
+        )
+        return first_plan(attempt, strategies(task))
+
     try:
-        made = first_plan(attempt, strategies(task))
+        made = within_ranges(robot, planned)
     except NoFeasiblePath as broken:
         raise add_window_note(broken, asked) from None
     made = with_bound(made, asked.certify, phase=phase)
     if asked.certify is None or made.proof.gap is None or made.proof.gap <= asked.certify.gap:
         return made
+    assert attempt is not None, "the plan is of an attempt"
     with suppress(StopEarly):
         better = better_motion(attempt)
-        made = made if better is None else with_bound(better, asked.certify, phase=phase)
+        if better is not None:
+            better, beyond = unfolded(better, robot)
+            made = made if beyond.any() else with_bound(better, asked.certify, phase=phase)
     return made
 
 
@@ -393,34 +410,34 @@ def plan_in_pieces(
     """
     asked = with_keywords(options, keywords, PieceKeywords, interruptions="fewest")
     require_nodes_alone(asked, "plan_in_pieces")
-    task = planning_task(
-        contour,
-        Setup.of(robot, tool, placement, cell),
-        asked,
-        speed=speed,
-        graph=graph,
-        progress=progress,
-    )
-    task = along_a_course(task, CollisionFreeSearch(task).clear).whole()
-    finder = CollisionFreeSearch(task)
-    begin = phase or (lambda what: None)
-    begin("search for pieces")
-    try:
-        least = LEAST_PIECE if asked.least_piece is None else asked.least_piece
-        search = partial(find_interrupted, s=contour.s, least_piece=least)
-        found = finder.find(search, task.problem)
-    except NoFeasiblePath as broken:
-        raise broken.with_message(
-            f"contour {contour.name!r}: no number of interruptions helps: {broken}"
-        ) from None
-    plans = []
-    for number, piece in enumerate(found.pieces, 1):
-        part, made = _plan_piece(task, finder, piece, number, len(found.pieces))
-        if asked.refine or asked.method == "continuous":
-            begin(f"refinement of piece {number} of {len(found.pieces)}")
-            made = _off_grid(part, CollisionFreeSearch(part), made)
-        plans.append(with_bound(made, asked.certify, phase=begin))
-    return tuple(plans)
+    setup, begin = Setup.of(robot, tool, placement, cell), phase or (lambda what: None)
+
+    def planned(unfold: Bools) -> list[Plan]:
+        task = planning_task(
+            contour, setup, asked, speed=speed, graph=graph, progress=progress, unfold=unfold
+        )
+        task = along_a_course(task, CollisionFreeSearch(task).clear).whole()
+        finder = CollisionFreeSearch(task)
+        begin("search for pieces")
+        try:
+            least = LEAST_PIECE if asked.least_piece is None else asked.least_piece
+            search = partial(find_interrupted, s=contour.s, least_piece=least)
+            found = finder.find(search, task.problem)
+        except NoFeasiblePath as broken:
+            raise broken.with_message(
+                f"contour {contour.name!r}: no number of interruptions helps: {broken}"
+            ) from None
+        plans = []
+        for number, piece in enumerate(found.pieces, 1):
+            part, made = _plan_piece(task, finder, piece, number, len(found.pieces))
+            if asked.refine or asked.method == "continuous":
+                begin(f"refinement of piece {number} of {len(found.pieces)}")
+                made = _off_grid(part, CollisionFreeSearch(part), made)
+            plans.append(made)
+        return plans
+
+    plans = all_within_ranges(robot, planned)
+    return tuple(with_bound(made, asked.certify, phase=begin) for made in plans)
 
 
 def _off_grid(part: Task, finder: CollisionFreeSearch, made: Plan) -> Plan:

@@ -17,6 +17,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments, wrap
 from kerfpath.losses import Loss
 from kerfpath.options import PlanOptions
+from kerfpath.planner.folding import folds
 from kerfpath.planner.layers import (
     course_of,
     layered_graph,
@@ -259,10 +260,12 @@ def planning_task(
     graph: LayeredGraph | None = None,
     external: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
+    unfold: Bools | None = None,
 ) -> Task:
     """Return the task of a contour in a setup; other arguments and errors as in `kerfpath.plan`.
 
-    Nodes without a pose are found only when its graph is built.
+    Nodes without a pose are found only when its graph is built. All joints that may be are folded,
+    see `kerfpath.planner.folding`, except joints `unfold` (n,); None: none are.
     """
     robot = setup.robot
     dt = node_interval(contour, speed)
@@ -272,9 +275,15 @@ def planning_task(
     require_held(robot, options)
     require_windows_fit(contour, robot, options)
     x = None if external is None else course_of(external, contour, robot)[:, 0]
+    joints = np.zeros(robot.joints, np.bool_)
+    if unfold is not None:
+        joints = folds(robot, options, dt) & ~unfold
+    given = graph is not None
     if graph is not None:
         _require_fitting(graph, contour, robot, options)
         x = _course_in(graph)
+        graph = None if (graph.is_folded & ~joints).any() else graph.fold(joints)
+    setup = setup.folded(joints)
     return Task(
         contour=contour,
         setup=setup,
@@ -282,7 +291,7 @@ def planning_task(
         dt=dt,
         layers=partial(_layers, graph=graph, progress=progress),
         external=x,
-        placed=graph is not None or external is not None,
+        placed=given or external is not None,
     )
 
 

@@ -467,6 +467,12 @@ class Robot:
         first = Reason(Loss.ADMITTED), Reason(Loss.UNREACHABLE)
         return (*first, *self.bounds(), Reason(Loss.UNWANTED))
 
+    def folded(self, joints: Bools) -> Robot:
+        """Return this robot with some joints (n,) endless, each pose on one of their turns only."""
+        if not joints.any():
+            return self
+        return replace(self, limits=replace(self.limits, endless=self.endless | joints))
+
     def require_few_turns(self) -> None:
         """Require that the limits allow no more combinations of turns than the kernels can hold.
 

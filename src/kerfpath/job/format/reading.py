@@ -35,7 +35,7 @@ from kerfpath.job.format.tables.plan import said_in_keys
 from kerfpath.job.format.tolerances import Tolerances
 from kerfpath.job.format.values import nearest
 from kerfpath.options import OptionConflict, PlanOptions
-from kerfpath.planner import coarse_places, external_course, layered_graph
+from kerfpath.planner import coarse_places, external_course, folds, layered_graph
 from kerfpath.post import ProgramOptions
 from kerfpath.robots import Robot
 from kerfpath.setup import Setup
@@ -146,13 +146,15 @@ class Job:
         *,
         only: Ints | None = None,
         external: Array | None = None,
+        folded_at: float | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> LayeredGraph:
         """Return the layered graph of a contour's nodes, by these options or those of the job.
 
         With `only` (M,), the graph has the layers of these nodes only. External axes are at
         `external`, (K, E) or (K, X, E) rad or m; by default the continuous method takes the
-        course of `kerfpath.planner.external_course`.
+        course of `kerfpath.planner.external_course`. With `folded_at` it has one turn only of each
+        joint that a plan folds where nodes are so many seconds apart.
         """
         chosen = options or self.options
         if self.robot.free.size and external is None and chosen.method == "continuous":
@@ -167,6 +169,7 @@ class Job:
             options=chosen,
             nodes=only,
             external=external,
+            fold=None if folded_at is None else folds(self.robot, chosen, folded_at),
             progress=progress,
         )
 

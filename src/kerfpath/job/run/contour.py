@@ -35,22 +35,19 @@ GraphOf = Callable[[Job, Contour, Callable[[int], None]], LayeredGraph]
 """Returns the graph of a job's nodes, and calls its third argument with counts of solved nodes."""
 
 
-def _build(job: Job, nodes: Contour, solved: Callable[[int], None]) -> LayeredGraph:
-    return job.graph(nodes, progress=solved)
-
-
 def cut_candidate(
     prepared: PreparedJob,
     request: CutRequest,
     candidate: Candidate,
     progress: Progress,
     *,
-    graph_of: GraphOf = _build,
+    graph_of: GraphOf | None = None,
 ) -> tuple[CutResult, ...]:
     """Plan and audit a candidate; return one cut, or one for each piece if it is interrupted.
 
     Plans are not certified yet, because one candidate is chosen first, and a cut without a plan
-    has no advice yet, see `advised`. `graph_of` may return a graph that was kept.
+    has no advice yet, see `advised`. `graph_of` may return a graph that was kept; by default the
+    joints that a plan folds are folded in it.
     """
     options = replace(request.options, certify=None)
     job, cell = replace(prepared.job, options=options), prepared.cell
@@ -74,7 +71,12 @@ def cut_candidate(
     progress(name, 0, total)
     run, asked = request.run, request.task.asked(prepared.job.options)
     if not follows_courses(job.robot, asked):
-        graph = graph_of(job, candidate.nodes, solved)
+        folded_at = None if run is not None else candidate.dt
+        graph = (
+            job.graph(candidate.nodes, folded_at=folded_at, progress=solved)
+            if graph_of is None
+            else graph_of(job, candidate.nodes, solved)
+        )
     elif run is None:
         return _cut_along_courses(replace(prepared, job=job), request, candidate, solved, begin)
     else:
@@ -187,9 +189,9 @@ def course_of_plans(job: Job, nodes: Contour, plans: Sequence[Plan]) -> Array:
 
 
 def cut_in_posture(
-    prepared: PreparedJob, request: CutRequest, posture: int, *, quick: bool
+    prepared: PreparedJob, cut: CutResult, posture: int, *, quick: bool
 ) -> CutResult | None:
-    """Return a contour's first candidate cut in one posture; None where its audit fails.
+    """Return the candidate of a cut with a plan cut in one posture; None where its audit fails.
 
     If `quick`, it is given up where it would be planned on the grid.
 
@@ -198,9 +200,9 @@ def cut_in_posture(
     NoFeasiblePath
         It cannot be cut in this posture.
     """
-    candidate = request.candidates[0]
+    request, candidate = cut.request, cut.candidate
     job = replace(prepared.job, options=replace(request.options, postures=(posture,), certify=None))
-    graph = job.graph(candidate.nodes)
+    graph = job.graph(candidate.nodes) if job.robot.free.size else cut.graph.in_postures((posture,))
     if quick and job.options.method == "continuous":
         made = best_motion(
             candidate.nodes, job.setup_in(prepared.cell), _at_nodes(job), speed=candidate.speed,
@@ -212,8 +214,8 @@ def cut_in_posture(
             speed=candidate.speed, options=_at_nodes(job), cell=prepared.cell,
             graph=None if job.robot.free.size else graph,
         )  # fmt: skip
-    cut = _audited(prepared, CutResult(request=request, candidate=candidate, graph=graph), made)
-    return cut if cut.passed else None
+    other = _audited(prepared, CutResult(request=request, candidate=candidate, graph=graph), made)
+    return other if other.passed else None
 
 
 def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutResult:

@@ -85,7 +85,7 @@ def order_cuts(
             units,
             _plan,
             lambda unit, posture, quick: cut_in_posture(
-                prepared, requests[unit], posture, quick=quick
+                prepared, units[unit][0], posture, quick=quick
             ),
             others,
             common_postures(served, others),

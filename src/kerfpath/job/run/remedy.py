@@ -193,9 +193,12 @@ def find_remedy(
             return Remedy(other_method=False, speed=slow, fastest=False), None
     # With a time step, another speed has other nodes, about which nothing would be proved.
     ceiling = continuous and request.task.time_step is None
+    # Every speed found with folded joints is tried with all their turns by `trial`.
+    folded = replace(job, robot=job.robot.folded(graph.is_folded))
+    around = None if cell is None else cell.folded(graph.is_folded)
     try:
         fastest = fastest_along(
-            job, candidate.nodes, cell, refine=leaves_grid(job), graph=graph, ceiling=ceiling,
+            folded, candidate.nodes, around, refine=leaves_grid(job), graph=graph, ceiling=ceiling,
             explore=False,
         )  # fmt: skip
     except NoFeasiblePath:
@@ -241,7 +244,7 @@ def _shares(trial: _Trial, relaxation: Relaxation | None) -> tuple[dict[str, str
     options = trial.on_grid
     least = relaxations(
         trial.candidate.nodes,
-        trial.job.robot,
+        trial.job.robot.folded(trial.graph.is_folded),
         trial.graph,
         trial.asked,
         eta_v=options.eta_v,
