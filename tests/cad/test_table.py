@@ -74,6 +74,65 @@ def test_points_in_no_order_are_said(tmp_path: Path, count: int, closed: bool) -
         assert any("in no order" in note for note in part.notes) != is_sorted
 
 
+def probed(rows: np.ndarray) -> str:
+    return "x_mm,y_mm,z_mm,nx,ny,nz\n" + "".join(
+        f"{x},{y},{z},0,0,1\n" for x, y, z in rows.tolist()
+    )
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1), st.booleans(), st.integers(12, 300))
+def test_points_in_no_order_are_sorted_along_their_curve(
+    tmp_path_factory: pytest.TempPathFactory, seed: int, closed: bool, count: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    # Steps differ by less than a half from the mean: neighbours stay nearest.
+    steps = np.arange(count) + rng.uniform(-0.2, 0.2, count)
+    angle = steps / count * (2 * np.pi if closed else 4.0)
+    rows = np.stack([60 * np.cos(angle), 40 * np.sin(angle), 9 * np.sin(2 * angle)], axis=1)
+    rows = np.round(rows, 6)
+    mixed = rng.permutation(count)
+    folder = tmp_path_factory.mktemp("sort")
+    part = table(folder, probed(rows[mixed]), sort="closed" if closed else "open")
+    found = part.contour("contour", closed=closed).points * 1e3
+    assert part.loops[0].kind == ("outer" if closed else "open")
+    assert any("points sorted along the cut" in note for note in part.notes)
+    if closed:  # counter-clockwise, from the first point listed
+        expected = np.roll(rows, -int(mixed[0]), axis=0)
+    else:
+        place = np.argsort(mixed)
+        expected = rows if place[0] < place[-1] else rows[::-1]
+    np.testing.assert_allclose(found[:count], expected, atol=1e-9)
+
+
+def test_points_whose_order_is_not_clear_are_refused(tmp_path: Path) -> None:
+    t = np.arange(20.0)[:, None]
+    line = np.hstack([t, 0 * t, 0 * t])
+    ring = 10 * np.hstack([np.cos(t * np.pi / 10), np.sin(t * np.pi / 10), 0 * t])
+    near = np.vstack([line, [[19.5, 0.5, 0]], line[:4:-1] + np.array([0, 1.1, 0])])
+    for rows, sort, message in (
+        (np.vstack([line, [[10, 1, 0], [10, 2, 0], [10, 3, 0]]]), "open", "branch at 10, 0, 0 mm"),
+        (near, "open", "two stretches are as close as neighbours at"),
+        (line, "closed", "the ends of the curve, 0, 0, 0 mm and 19, 0, 0 mm, are 19 mm apart"),
+        (ring, "open", 'are 3.129 mm apart, as close as neighbours; write sort = "closed"'),
+        (
+            np.vstack([line, line + np.array([500, 0, 0])]),
+            "open",
+            r"a group of points at \d+, 0, 0 mm lies apart",
+        ),
+        (line[:3], "open", "expected at least 4 points apart, got 3"),
+    ):
+        text = probed(rows[np.random.default_rng(1).permutation(len(rows))])
+        with pytest.raises(InputError, match=message) as caught:
+            table(tmp_path, text, sort=sort)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match="sort: expected one of open, closed, got 'ring'"):
+        table(tmp_path, probed(line), sort="ring")
+    (tmp_path / "a.mpf").write_text("G71 G1 X0")
+    with pytest.raises(InputError, match="sort: expected a table, got a NC program file"):
+        read(tmp_path / "a.mpf", sort="open")
+
+
 def line_of_points(x: float, count: int = 5) -> str:
     """Return rows of points 1 mm apart in y, at x mm."""
     return "".join(f"{x},{k},0,0,0,1\n" for k in range(count))

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kerfpath.arrays import Array, floats, freeze, scalar, short_repr
+from kerfpath.arrays import Array, floats, freeze, require_one_of, scalar, short_repr
 from kerfpath.cad.part import Part
-from kerfpath.cad.table import TableCells, cells_of
+from kerfpath.cad.table import Ends, TableCells, cells_of
 from kerfpath.cad.units import GAP, MM, SUFFIXES, UNITS_MM, require_unit, unit_question
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
@@ -52,6 +52,7 @@ def read(
     outer_towards: ArrayLike | None = None,
     axis: ArrayLike | None = None,
     columns: Columns | None = None,
+    sort: Ends | None = None,
     beam: str | Sequence[str] | None = None,
     section: ArrayLike | None = None,
     section_at: ArrayLike = (),
@@ -83,6 +84,8 @@ def read(
     columns : mapping of str to str or sequence of str, optional
         For a table: the names in its header of x, y, z, nx, ...; or, without a header, the columns
         in their order, "-" for one that is not used.
+    sort : {"open", "closed"}, optional
+        For a table whose points are in no order: they are sorted along the curve that they lie on.
     beam : str or (str, str), optional
         For a program of a robot: the output that is on while it cuts, as "$OUT[5]"; the statements
         that switch the beam on and off; or the speed of its cuts, as "120 mm/s".
@@ -102,12 +105,15 @@ def read(
     """
     require_unit(unit)
     scalar(gap, "gap", unit="m", above=0.0)
+    if sort is not None:
+        require_one_of(sort, "sort", ("open", "closed"))
     options = _ReadOptions(
         unit=unit,
         gap=gap,
         outer_towards=_direction(outer_towards, "outer_towards"),
         axis=_direction(axis, "axis"),
         columns=columns,
+        sort=sort,
         beam=_beam(beam),
         section=_direction(section, "section"),
         heights=tuple(floats(section_at, "section_at", (None,)).tolist()),
@@ -115,8 +121,9 @@ def read(
     if (options.section is None) != (not options.heights):
         raise InputError("section and section_at: expected both, or none of them")
     if not isinstance(path, str | PathLike):
-        if columns is not None:
-            raise InputError("shape: columns: expected a table, got a shape")
+        for name, value in (("columns", columns), ("sort", sort)):
+            if value is not None:
+                raise InputError(f"shape: {name}: expected a table, got a shape")
         if options.section is not None:
             raise InputError("shape: section: expected a triangle mesh, got a shape")
         if beam is not None:
@@ -133,8 +140,9 @@ def read(
         raise InputError(f"{path}: the file is empty; expected {_EXPECTED}")
     if outer_towards is not None and kind not in ("STEP", "IGES"):
         raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
-    if columns is not None and kind != "table":
-        raise InputError(f"{path}: columns: expected a table, got a {kind} file")
+    for name, value in (("columns", columns), ("sort", sort)):
+        if value is not None and kind != "table":
+            raise InputError(f"{path}: {name}: expected a table, got a {kind} file")
     if options.section is not None and kind != "mesh":
         raise InputError(f"{path}: section: expected a triangle mesh, got a {kind} file")
     if beam is not None and kind != "robot program":
@@ -153,6 +161,7 @@ class _ReadOptions:
     outer_towards: Direction | None
     axis: Direction | None
     columns: Columns | None
+    sort: Ends | None
     beam: str | tuple[str, str] | None
     section: Direction | None
     heights: tuple[float, ...]
@@ -208,7 +217,9 @@ def _read_file(
         if kind == "table":
             from kerfpath.cad.table import read_table
 
-            return read_table(path, content, unit, gap, axis=axis, columns=options.columns)
+            return read_table(
+                path, content, unit, gap, axis=axis, columns=options.columns, sort=options.sort
+            )
         if kind == "tool path":
             from kerfpath.cad.apt import read_apt
 

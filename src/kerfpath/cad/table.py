@@ -9,14 +9,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
-from scipy.sparse.csgraph import minimum_spanning_tree
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import (
+    breadth_first_order,
+    connected_components,
+    minimum_spanning_tree,
+)
+from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist, squareform
 from scipy.spatial.transform import Rotation
 
-from kerfpath.arrays import Array, short_repr
+from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.cad.build import kind_of_points, loop_of, part_without_faces, trace_of_points
+from kerfpath.cad.curves import vector_area
 from kerfpath.cad.part import Part
 from kerfpath.cad.units import LARGEST, MM, UNITS_MM
 from kerfpath.errors import InputError
@@ -172,6 +180,16 @@ is said that it is cut."""
 UNSORTED, JUDGED = 3.0, 400
 """How much longer a line than the shortest tree that joins its points is said; of how many of
 them."""
+Ends = Literal["open", "closed"]
+"""Whether points in no order are sorted along an open or a closed curve."""
+MOST_SORTED = 100_000
+"""Most points that are sorted."""
+NEIGHBOURS = 12
+"""Nearest points among which the shortest tree is sought."""
+RING = 1.5
+"""Multiple of the longest step that the ends of points along a closed curve are apart at most."""
+CLEAR = 1.2
+"""Multiple of the steps beside a point within which no point of another stretch may be."""
 UNIT_QUATERNION = 1e-2
 """Largest deviation of a quaternion's length from one: rounded digits pass, other columns fail."""
 
@@ -184,10 +202,12 @@ def read_table(
     *,
     axis: Array | None = None,
     columns: Mapping[str, str] | Sequence[str] | None = None,
+    sort: Ends | None = None,
 ) -> Part:
     """Return the contours of a table of points, one per name in its column `contour`.
 
-    `axis` (3,) is the tool axis of tables without columns for it; `columns` is as in `cad.read`.
+    `axis` (3,) is the tool axis of tables without columns for it; `columns` and `sort` are as in
+    `cad.read`.
 
     Raises
     ------
@@ -212,13 +232,21 @@ def read_table(
         notes += _notes_on_jumps(table, points, runs)
     for name, chosen in runs:
         lines = np.array(table.lines)[chosen]
-        trace, repaired = trace_of_points(points[chosen], normals[chosen], lines, gap / MM)
+        along, out = points[chosen], normals[chosen]
+        if sort is not None:
+            try:
+                order = order_along(along, out, sort)
+            except InputError as error:
+                raise InputError(f"contour {name!r}: {error}") from None
+            along, out, lines = along[order], out[order], lines[order]
+            notes.append(f"contour {name!r}: points sorted along the cut, {sort}")
+        trace, repaired = trace_of_points(along, out, lines, gap / MM)
         notes += [f"contour {name!r}: {what}" for what in repaired]
-        if (times := _times_as_long(points[chosen])) > UNSORTED:
+        if sort is None and (times := _times_as_long(along)) > UNSORTED:
             notes.append(
                 f"contour {name!r}: the line through its points as listed is {times:.0f} times as "
                 "long as the shortest that joins them all; if they are in no order, as probes "
-                "may write them, sort them along the cut"
+                "may write them, give sort, open or closed (in [part] of a job, or --sort)"
             )
         kind = kind_of_points(trace)
         loops.append(
@@ -394,6 +422,83 @@ def _steps(points: Array) -> Array:
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     usual = float(np.median(steps)) if len(steps) else 0.0
     return steps / usual if usual > 0 else np.zeros(len(steps))
+
+
+def order_along(points: Array, normals: Array, ends: Ends) -> Ints:
+    """Return the order of points (K, 3) along the curve that they lie on, if it is clear.
+
+    The shortest tree that joins points which are close enough along a curve is the curve itself. An
+    open curve begins at the end that is listed first; a closed one at the first point, runs
+    counter-clockwise about the mean normal, and repeats its first point.
+
+    Raises
+    ------
+    InputError
+        Fewer than four points, a branch, two stretches as close as neighbours, ends that are close
+        (open) or far apart (closed).
+    """
+    kept = np.sort(np.unique(points, axis=0, return_index=True)[1])
+    count = len(kept)
+    if count < 4:
+        raise InputError(f"sort: expected at least 4 points apart, got {count}")
+    if count > MOST_SORTED:
+        raise InputError(f"sort: expected at most {MOST_SORTED} points, got {count}")
+    at = points[kept]
+    apart, other = map(np.asarray, cKDTree(at).query(at, k=min(NEIGHBOURS, count)))
+    one = np.repeat(np.arange(count), other.shape[1])
+    joined = csr_array((apart.ravel(), (one, other.ravel())), shape=(count, count))
+    tree = minimum_spanning_tree(joined)
+    tree = tree + tree.T
+    parts = connected_components(tree, directed=False)
+    if parts[0] > 1:
+        place = _at(at[np.flatnonzero(parts[1] == parts[1][-1])[0]])
+        raise InputError(f"sort: a group of points at {place} lies apart; name it as a contour")
+    degree = np.diff(tree.indptr)
+    if (bad := np.flatnonzero(degree > 2)).size:
+        raise InputError(
+            f"sort: the points branch at {_at(at[bad[0]])}, so their order is not clear; measure "
+            "more points there, or sort them"
+        )
+    tip = int(np.flatnonzero(degree == 1)[0])
+    order: Ints = np.asarray(
+        breadth_first_order(tree, tip, directed=False, return_predecessors=False), dtype=np.int64
+    )
+    line = at[order]
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    gap = float(np.linalg.norm(line[0] - line[-1]))
+    is_ring = gap <= RING * steps.max()
+    if is_ring != (ends == "closed"):
+        said = "close as neighbours" if is_ring else "far apart"
+        raise InputError(
+            f"sort: the ends of the curve, {_at(line[0])} and {_at(line[-1])}, are {gap:.4g} mm "
+            f'apart, as {said}; write sort = "{"closed" if is_ring else "open"}", or measure more '
+            "points between them"
+        )
+    around = np.concatenate([[gap if is_ring else 0.0], steps, [gap if is_ring else 0.0]])
+    reach = CLEAR * np.maximum(around[:-1], around[1:])
+    i, j = cKDTree(line).query_pairs(float(reach.max()), output_type="ndarray").T
+    between = np.abs(i - j)
+    if is_ring:
+        between = np.minimum(between, count - between)
+    close = np.linalg.norm(line[i] - line[j], axis=1) <= np.maximum(reach[i], reach[j])
+    if (bad := np.flatnonzero(close & (between > 2))).size:
+        raise InputError(
+            f"sort: two stretches are as close as neighbours at {_at(line[i[bad[0]]])}, so the "
+            "order of the points is not clear; measure more points there, or sort them"
+        )
+    order = np.asarray(kept[order], dtype=np.int64)
+    if is_ring:
+        order = np.roll(order, -int(np.argmin(order)))
+        if vector_area(points[order]) @ normals.mean(axis=0) < 0:
+            order = np.roll(order[::-1], 1)
+        order = np.append(order, order[0])
+    elif order[0] > order[-1]:
+        order = order[::-1]
+    return order
+
+
+def _at(point: Array) -> str:
+    return ", ".join(f"{x:.6g}" for x in point) + " mm"
 
 
 def _times_as_long(points: Array) -> float:

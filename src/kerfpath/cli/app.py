@@ -9,7 +9,7 @@ import sys
 from contextlib import suppress
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.markup import escape
@@ -261,6 +261,10 @@ def contours(
         str | None,
         typer.Option(help='Columns of a table: x,y,z,-,nx,... in order, or x=NAME,"y=A, B",...'),
     ] = None,
+    sort: Annotated[
+        Literal["open", "closed"] | None,
+        typer.Option(help="Sort the points of a table, which are in no order, along a curve."),
+    ] = None,
     beam: Annotated[
         list[str] | None,
         typer.Option(
@@ -302,6 +306,7 @@ def contours(
         outer_towards=outer_towards,
         axis=axis,
         columns=columns,
+        sort=sort,
         beam=beam,
         section=section,
         section_at=[height / 1000 for height in section_mm or ()],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from dataclasses import asdict
 from pathlib import Path
+from typing import Literal
 
 from rich.markup import escape
 
@@ -28,6 +29,7 @@ def drawing_in(
     outer_towards: tuple[float, float, float] | None,
     axis: tuple[float, float, float] | None,
     columns: str | None,
+    sort: Literal["open", "closed"] | None,
     beam: list[str] | None,
     section: tuple[float, float, float] | None,
     section_at: list[float],
@@ -47,6 +49,7 @@ def drawing_in(
             outer_towards=outer_towards,
             axis=axis,
             columns=None if columns is None else _columns(columns),
+            sort=sort,
             beam=beam[0] if beam and len(beam) == 1 else beam or None,
             section=section,
             section_at=section_at,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from kerfpath.arrays import Array, short_repr
 from kerfpath.cad import GAP, Part
@@ -29,6 +30,8 @@ class Drawing:
         Tool axis for a drawing without one, part frame.
     columns : mapping or sequence of str, or None
         Meaning of the columns of a table of points, see `kerfpath.cad.read`.
+    sort : "open", "closed" or None
+        Whether points of a table are sorted along a curve, see `kerfpath.cad.read`.
     beam : str or sequence of str, or None
         How a program of a robot switches the beam, see `kerfpath.cad.read`.
     section : (3,) or None
@@ -45,6 +48,7 @@ class Drawing:
     outer_towards: Array | None = None
     axis: Array | None = None
     columns: Mapping[str, str] | Sequence[str] | None = None
+    sort: Literal["open", "closed"] | None = None
     beam: str | Sequence[str] | None = None
     section: Array | None = None
     section_at: tuple[float, ...] = ()
@@ -67,6 +71,7 @@ class Drawing:
             outer_towards=self.outer_towards,
             axis=self.axis,
             columns=self.columns,
+            sort=self.sort,
             beam=self.beam,
             section=self.section,
             section_at=self.section_at,

@@ -177,6 +177,10 @@ class PartTable(Table):
             '{ x = "Pos X", y = "Pos Y", z = "Pos Z" }',
         ),
     ] = None
+    sort: Annotated[
+        Literal["open", "closed"] | None,
+        key("the curve along which points in no order are sorted", '"closed"'),
+    ] = None
     beam: Annotated[
         Text | list[Text] | None,
         key(
@@ -235,6 +239,7 @@ class PartTable(Table):
             outer_towards=_direction(self.outer_towards),
             axis=_direction(self.axis),
             columns=self.columns,
+            sort=self.sort,
             beam=self.beam,
             section=_direction(self.section),
             section_at=tuple(height / 1000 for height in self.section_mm),
