@@ -257,7 +257,7 @@ def test_a_circle_turns_about_its_axis(tmp_path: Path, up: int) -> None:
 
 
 REFUSED = {
-    "no unit": (GOOD.replace("UNITS/MM\n", ""), "states no length unit; give it with unit="),
+    "no unit": (GOOD.replace("UNITS/MM\n", ""), "states no length unit; give that"),
     "unknown unit": (GOOD.replace("MM", "PARSECS"), "line 1: UNITS: expected one of MM"),
     "two units": (GOOD + "UNITS/INCHES\n", "line 6: UNITS other than mm before"),
     "a late unit": (GOOD[9:] + "UNITS/MM\n", "line 5: UNITS after points without one"),

@@ -274,6 +274,14 @@ def test_a_fork_is_said_where_it_is(tmp_path: Path) -> None:
         part.contour("0/line1")
 
 
+def test_an_open_line_may_cross_itself(tmp_path: Path) -> None:
+    def draw(space: Modelspace) -> None:
+        space.add_lwpolyline([(0, 0), (100, 50), (100, 0), (0, 50)])
+
+    line = drawn(tmp_path, draw).contour("0/line1", closed=False)
+    assert line.length == pytest.approx(0.05 + 2 * np.hypot(0.1, 0.05))
+
+
 def test_a_loop_that_crosses_itself_is_refused_with_the_place(tmp_path: Path) -> None:
     part = drawn(tmp_path, lines((0, 0), (100, 50), (100, 0), (0, 50)))
     with pytest.raises(InputError, match=r"crosses or touches itself at \[50\.0, 25\.0, 0\.0\] mm"):
@@ -299,7 +307,7 @@ def test_insunits_is_taken_with_a_message(
 
 
 def test_no_unit_is_refused_unless_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no length unit \(\$INSUNITS is 0\).*unit="):
+    with pytest.raises(InputError, match=r"\$INSUNITS is 0: states no length unit.*--unit mm"):
         drawn(tmp_path, lambda space: space.add_circle((0, 0), 1), units=0)
     assert read(tmp_path / "drawing.dxf", unit="mm").loops[0].diameter == pytest.approx(2e-3)
 

@@ -177,7 +177,7 @@ def test_a_vector_of_iso_programs_is_the_tool_axis(tmp_path: Path) -> None:
 S = "G710\nTRAORI\nG0 X0 Y0 Z0 A3=0 B3=0 C3=1\nG1 X10\nY20\n"
 H = "BEGIN PGM A MM\nLN X0 Y0 Z0 TX0 TY0 TZ1 FMAX M128\nL X10 F9\nL Y20\n"
 REFUSED = {
-    "no unit": (S.replace("G710\n", ""), "states no length unit; give it with unit="),
+    "no unit": (S.replace("G710\n", ""), "states no length unit; give that"),
     "a late unit": (S + "G700\n", "line 6: G700 after moves in another unit"),
     "an arc without its centre": (S + "G2 X20\n", "line 6: an arc without its centre"),
     "an arc beside its end": (S + "G2 X20 Y20 I4\n", "line 6: an arc that begins 4 mm"),
@@ -228,7 +228,7 @@ REFUSED = {
     "X twice": (S + "X5 X6\n", "line 6: X twice in one block"),
     "two motions": (S + "G0 G1 X5\n", "line 6: G0 and G1 in one block"),
     "no motion": ("G710\nX5\n", "line 2: a position before any G0 or G1"),
-    "no Z": ("G710\nG1 X5 Y5\n", "line 2: a move at feed, but Z was not given before"),
+    "Z too late": ("G21\nG0 X0 Y0\nG1 X9\nZ5\n", "line 3: a move at feed, but Z was"),
     "a dwell with X": (S + "G4 X5\n", "line 6: G4 with X, Y or Z"),
     "a block after the end": (S + "M30\nX5\n", "line 7: a block after the end .* in line 6"),
     "Heidenhain, no unit": (H.replace(" MM", ""), "line 1: expected one BEGIN PGM NAME MM or INCH"),
@@ -277,3 +277,20 @@ def test_damaged_programs_are_read_or_refused(tmp_path: Path, source: str) -> No
             spoilt[place] = random.integers(0, 256)
         with contextlib.suppress(InputError):  # nothing else may come out
             program(tmp_path, bytes(spoilt[: int(random.integers(1, len(spoilt)))]))
+
+
+FLAT = "G21\nG0 X10 Y0\nM3\nG1 X110 F3000\nY60\nG3 X100 Y70 I-10 J0\nG1 X10 Y0\nM5\n"
+
+
+def test_a_program_without_z_is_flat(tmp_path: Path) -> None:
+    file = tmp_path / "sheet.nc"
+    file.write_text(FLAT)
+    with pytest.raises(InputError, match=r"no tool axis.*--axis 0 0 -1"):
+        read(file)
+    part = read(file, axis=(0, 0, -1))
+    assert "no move gives Z, which is taken as 0" in part.notes
+    arc = np.pi / 2 * 0.01
+    assert part.loops[0].length == pytest.approx(0.1 + 0.06 + arc + np.hypot(0.09, 0.07), abs=1e-6)
+    file.write_text(f"{FLAT}G0 Z5\n")
+    with pytest.raises(InputError, match="line 4: a move at feed, but Z was not given before"):
+        read(file, axis=(0, 0, -1))

@@ -515,7 +515,7 @@ def test_unknown_unit_is_refused_with_the_known_ones(tmp_path: Path) -> None:
 def test_file_without_a_unit_is_refused_unless_told(tmp_path: Path, text: str) -> None:
     path = tmp_path / "unitless.step"
     path.write_text(without_unit(text), "ascii")
-    with pytest.raises(InputError, match=r"no length unit.*unit="):
+    with pytest.raises(InputError, match=r"not known; give that of its numbers.*--unit mm"):
         read(path)
     assert read(path, unit="mm").bounding_box[1, 0] == pytest.approx(0.1)
 

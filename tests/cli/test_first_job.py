@@ -9,7 +9,7 @@ import pytest
 from commands import assert_refused, run
 from kerfpath.cad import read
 from kerfpath.errors import InputError
-from kerfpath.job import check_job, foresee, job_text, prepare, read_job
+from kerfpath.job import Drawing, check_job, foresee, job_text, prepare, read_job
 from kerfpath.robots import robot
 
 REST = """
@@ -96,6 +96,67 @@ def test_a_job_in_the_place_of_a_drawing_or_a_plan_is_told_so(tmp_path):
     assert_refused(run("audit", tmp_path / "plate.toml"), "kerfpath plan")
 
 
+def test_how_the_drawing_was_read_is_in_the_job(tmp_path):
+    table = tmp_path / "points.csv"
+    angle = np.linspace(0, 2 * np.pi, 41)
+    rows = np.c_[60 * np.cos(angle), 40 * np.sin(angle), 0 * angle]
+    table.write_text("East,North,Up\n" + "".join(f"{x:.6f},{y:.6f},{z}\n" for x, y, z in rows))
+    assert_refused(run("new", table.name, cwd=tmp_path), "--columns", "--axis 0 0 -1")
+    given = ["--columns", "x=East,y=North,z=Up", "--axis", "0", "0", "-1", "--unit", "mm"]
+    made = run("new", table.name, *given, "--gap-mm", "0.2", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    read_back = read_job(table.with_suffix(".toml")).drawing
+    assert (read_back.unit, read_back.gap) == ("mm", pytest.approx(2e-4))
+    assert read_back.columns == {"x": "East", "y": "North", "z": "Up"}
+    assert read_back.axis.tolist() == [0, 0, -1]
+
+
+def test_a_drawing_of_open_lines_gets_a_job_that_cuts_them(tmp_path):
+    drawing = ezdxf.new(units=4)
+    drawing.modelspace().add_line((0, 0), (200, 0))
+    drawing.saveas(tmp_path / "mark.dxf")
+    job = tmp_path / "mark.toml"
+    job.write_text(job_text(read(tmp_path / "mark.dxf"), job))
+    assert not foresee(prepare(read_job(job), read(tmp_path / "mark.dxf")))
+    drawing.modelspace().add_circle((100, 100), 20)
+    drawing.saveas(tmp_path / "both.dxf")
+    text = job_text(read(tmp_path / "both.dxf"), job)
+    assert "1 open line (0/line1) not in it" in text
+    assert text.count("[[contour]]") == 1
+
+
+def test_a_gap_that_may_be_a_slip_says_what_would_close_it(tmp_path):
+    drawing = ezdxf.new(units=4)
+    for ends in (((0, 0), (90, 0)), ((90, 0.3), (90, 60)), ((90, 60), (0, 0))):
+        drawing.modelspace().add_line(*ends)
+    drawing.saveas(tmp_path / "slip.dxf")
+    (note,) = [one for one in read(tmp_path / "slip.dxf").notes if one.startswith("open line")]
+    assert "set gap_mm = 0.31 in [part]" in note
+    assert read(tmp_path / "slip.dxf", gap=0.31e-3).loops[0].closed
+
+
+def test_bends_are_slowed_down(tmp_path):
+    flat, bent = drawn(tmp_path / "plate.dxf"), tmp_path / "bent.csv"
+    x = np.linspace(0, 1, 50)
+    rows = np.c_[100 * x, 0 * x, 0 * x, np.sin(x), 0 * x, np.cos(x)]
+    text = "".join(",".join(f"{v:.6f}" for v in row) + "\n" for row in rows)
+    bent.write_text(f"x_mm,y_mm,z_mm,nx,ny,nz\n{text}")
+    job = tmp_path / "job.toml"
+    assert "\n# feed = " in job_text(read(flat), job)
+    job.write_text(job_text(read(bent), job))
+    assert read_job(job).options.feed == "dip"
+
+
+def test_a_contour_out_of_reach_is_told_where_and_what_to_do(tmp_path):
+    drawing = drawn(tmp_path / "long.dxf", size=4000.0)
+    job = tmp_path / "long.toml"
+    job.write_text(job_text(read(drawing), job))
+    said = "".join(check_job(read_job(job)).warnings)
+    assert "0/outer: the robot has no pose at" in said
+    assert "unreachable" in said
+    assert "kerfpath layout long.toml --robots" in said
+
+
 # A unit that is surely wrong is asked for.
 
 
@@ -119,7 +180,7 @@ def test_a_part_of_unlikely_size_asks_for_its_unit(tmp_path, unit, size, asked, 
     assert checked.returncode == 2
     assert "part.file: unit?" in checked.stderr
     assert asked in checked.stderr
-    job.write_text(job_text(read(drawing, meant), job, unit=meant))
+    job.write_text(job_text(read(drawing, meant), job, drawing=Drawing(file=drawing, unit=meant)))
     assert run("check", job).returncode == 0
     assert not [note for note in read(drawing, part.unit).notes if "unit?" in note]  # confirmed
 

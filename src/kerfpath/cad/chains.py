@@ -283,6 +283,8 @@ MOST_NEAR = 5_000_000
 """Largest number of pairs of ends at different places that may be one."""
 MOST_REPORTED = 3
 """Number of open lines whose ends are reported, those with the nearest next end."""
+NEARLY = 1.0
+"""mm: an end that lies nearer to another may have been meant to meet it."""
 LARGER = 1.05
 """Of two loops in the same box, one with an area larger by this factor lies around the other."""
 Style = tuple[str, str]
@@ -704,8 +706,19 @@ class _OpenEnds:
                 breaks.append((0.0, f"ends {where}, where {crowd} curves meet"))
             else:
                 words = f"is open {where}: the next end is {away[1]:.3f} mm away"
+                if away[1] <= NEARLY:
+                    words += (
+                        f"; to close it, set gap_mm = {_above(away[1]):g} in [part] "
+                        "(--gap-mm) or mend the drawing"
+                    )
                 breaks.append((float(away[1]), words))
         return min(breaks)
+
+
+def _above(gap: float) -> float:
+    """Return a length of two digits above a gap, both in mm."""
+    digit = 10.0 ** (np.floor(np.log10(gap)) - 1)
+    return float((np.floor(gap / digit) + 1) * digit)
 
 
 def _are_holes(chains: Sequence[Chain], gap: float) -> list[bool]:

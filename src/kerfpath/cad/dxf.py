@@ -43,7 +43,7 @@ from kerfpath.cad.chains import Stroke, Style, part_of_strokes
 from kerfpath.cad.curves import Arc, Curve, Line, Spline
 from kerfpath.cad.left_out import LeftOut
 from kerfpath.cad.part import Part
-from kerfpath.cad.units import LARGEST, MM, UNITS_MM
+from kerfpath.cad.units import GIVE_AXIS, LARGEST, MM, NO_UNIT, UNITS_MM
 from kerfpath.errors import InputError, printable
 
 # -----------------------------------------------------------------------------
@@ -336,10 +336,7 @@ def read_dxf(
         ) from None
     declared = INSUNITS.get(insunits, "")
     if unit is None and not declared:
-        raise InputError(
-            f"states no length unit ($INSUNITS is {insunits}); "
-            f"give the unit of its numbers with unit= one of {', '.join(UNITS_MM)}"
-        )
+        raise InputError(f"$INSUNITS is {insunits}: {NO_UNIT}")
     notes = []
     if unit is None:
         notes.append(f"unit {declared} taken from $INSUNITS, which is only a hint: check it")
@@ -526,6 +523,6 @@ class _Sheet:
         if self.is_flat and box[1, 2] - box[0, 2] > FLAT:
             raise InputError(
                 f"a {kind} on layer {layer} leaves the drawing plane, z from {box[0, 2]:g} to "
-                f"{box[1, 2]:g} mm; expected a flat drawing: project it to one plane, or give the "
-                "tool axis with axis"
+                f"{box[1, 2]:g} mm; expected a flat drawing: project it to one plane, or "
+                f"{GIVE_AXIS}"
             )

@@ -19,7 +19,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 from kerfpath.cad.left_out import LOST, LeftOut, counted, kind_of
 from kerfpath.cad.sewing import sewn_shape
 from kerfpath.cad.shape import NamedFace, NamedShape, failures, list_shapes, occt, require_few_faces
-from kerfpath.cad.units import UNITS_MM
+from kerfpath.cad.units import GIVE_UNIT, UNITS_MM
 from kerfpath.errors import InputError, printable
 
 FLAGS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm"}
@@ -172,10 +172,7 @@ def _read(path: Path, unit: str | None, gap: float) -> NamedShape:
     flag = reader.IGESModel().GlobalSection().UnitFlag()
     header = FLAGS.get(flag, "")
     if unit is None and not header:
-        raise InputError(
-            f"the header's unit flag is {flag}, expected one of "
-            f"{', '.join(map(str, FLAGS))}; give the unit of the numbers with unit="
-        )
+        raise InputError(f"the header's unit flag is {flag}, which is not known; {GIVE_UNIT}")
     reader.TransferRoots()
     shape = reader.OneShape()
     if shape is not None:

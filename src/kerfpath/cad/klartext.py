@@ -46,7 +46,9 @@ def klartext_path(lines: Sequence[str]) -> ToolPath:
         text = re.sub(r"^[ \t]*[0-9]+\b", "", upper(line).partition(";")[0]).strip(" \t")
         if text:
             program.take(number, f"line {number}", text)
-    return ToolPath(moves=program.tip.moves, unit=program.unit, unused=program.unused)
+    return ToolPath(
+        moves=program.tip.moves, unit=program.unit, notes=program.tip.notes, unused=program.unused
+    )
 
 
 class _Program:

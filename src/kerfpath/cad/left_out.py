@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from kerfpath.cad.units import GIVE_AXIS
 from kerfpath.errors import InputError
 
 LOST = "no face could be made from it"
@@ -56,5 +57,5 @@ def nothing_drawn(left_out: Sequence[LeftOut]) -> InputError:
     why = f" ({'; '.join(map(str, left_out[:2]))})" if left_out else ""
     return InputError(
         f"the file holds no face{why}; export the part as a solid or a "
-        "surface, or give the tool axis with axis if it is drawn with lines"
+        f"surface, or, if it is drawn with lines, {GIVE_AXIS}"
     )

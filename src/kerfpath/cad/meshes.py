@@ -13,7 +13,7 @@ from kerfpath.arrays import Array, Bools, Ints, freeze
 from kerfpath.cad.build import REPEATED, kind_of_points, named_loops, part_without_faces
 from kerfpath.cad.curves import Points, Trace, label_connected, vector_area
 from kerfpath.cad.part import Kind, Loop, Part
-from kerfpath.cad.units import LARGEST, MM, UNITS_MM
+from kerfpath.cad.units import LARGEST, MM, NO_UNIT, UNITS_MM
 from kerfpath.cell import read_surface, weld
 from kerfpath.contour import angle_between, unit
 from kerfpath.errors import InputError
@@ -53,7 +53,7 @@ def read_mesh(
         that misses the mesh.
     """
     if length_unit is None:
-        raise InputError(f"states no length unit; give it with unit= one of {', '.join(UNITS_MM)}")
+        raise InputError(NO_UNIT)
     vertices, triangles = read_surface(path, path.name)
     if not 0 < len(triangles) <= MOST:
         raise InputError(f"expected 1 to {MOST} triangles, got {len(triangles)}; simplify the mesh")

@@ -103,7 +103,9 @@ def _siemens_path(lines: Sequence[str]) -> ToolPath:
         for name, value in _words(number, text):
             block.add(name, value)
         program.take(block)
-    return ToolPath(moves=program.tip.moves, unit=program.unit, unused=program.unused)
+    return ToolPath(
+        moves=program.tip.moves, unit=program.unit, notes=program.tip.notes, unused=program.unused
+    )
 
 
 def _words(line: int, text: str) -> Iterator[tuple[str, str]]:

@@ -373,8 +373,8 @@ class Part:
         Raises
         ------
         InputError
-            No such loop, a tolerance that is not positive, a loop that is not closed, or one that
-            crosses itself (the message has the place).
+            No such loop, a tolerance that is not positive, a loop that is not closed, or a closed
+            one that crosses itself (the message has the place).
         """
         loop = self.loop(name)
         chord = scalar(chord_tolerance, "chord_tolerance", unit="m", above=0.0)
@@ -390,6 +390,8 @@ class Part:
         except InputError as error:
             raise InputError(f"{self.path}: loop {name!r}: {error}") from None
         contour = Contour(points * MM, -normals, closed=loop.closed, name=name)
+        if not loop.closed:
+            return contour  # a line may cross itself: it separates nothing
         if (place := find_crossing(contour.points, min(2 * chord, TOUCH))) is not None:
             raise InputError(
                 f"{self.path}: loop {name!r} crosses or touches itself at "

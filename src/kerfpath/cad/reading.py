@@ -291,7 +291,9 @@ def _read_shape(shape: object, options: _ReadOptions, progress: Progress) -> Par
         with occt(), uncollected():
             drawn = shape_in_memory(shape, options.unit, options.gap)
             if not drawn.faces and options.axis is None:
-                raise InputError("it has edges but no face; give the tool axis with axis")
+                raise InputError(
+                    "it has edges but no face; give the tool axis, for example axis=(0, 0, -1)"
+                )
             return _part_of(Path("shape"), drawn, options, progress)
     except InputError as error:
         raise InputError(f"shape: {error}") from None

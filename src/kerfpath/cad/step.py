@@ -44,7 +44,7 @@ from kerfpath.cad.step_model import (
     require_drawable,
     step_frames,
 )
-from kerfpath.cad.units import UNITS_MM
+from kerfpath.cad.units import GIVE_UNIT, UNITS_MM
 from kerfpath.errors import InputError, printable
 
 # -----------------------------------------------------------------------------
@@ -241,8 +241,7 @@ def _read(path: Path, content: bytes, unit: str | None, gap: float) -> NamedShap
     header = _header_unit(reader)
     if unit is None and header not in UNITS_MM:
         raise InputError(
-            f"the header declares {header or 'no length unit'}, expected one of "
-            f"{', '.join(UNITS_MM)}; give the unit of the numbers with unit="
+            f"the header declares {header or 'no length unit'}, which is not known; {GIVE_UNIT}"
         )
     require_drawable(entities, UNITS_MM[unit or header])
     notes = [] if has_styles else ["colours and layers are damaged and not read"]

@@ -26,7 +26,7 @@ from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.cad.build import kind_of_points, loop_of, part_without_faces, trace_of_points
 from kerfpath.cad.curves import vector_area
 from kerfpath.cad.part import Part
-from kerfpath.cad.units import LARGEST, MM, UNITS_MM
+from kerfpath.cad.units import GIVE_AXIS, LARGEST, MM, NO_UNIT, UNITS_MM
 from kerfpath.errors import InputError
 from kerfpath.text import lower, number, text_lines
 
@@ -216,10 +216,7 @@ def read_table(
     """
     names, declared, table = _rows(cells_of(content, EXPECTED), columns, axis is not None)
     if not (unit or declared):
-        raise InputError(
-            f"states no length unit; give it with unit= one of {', '.join(UNITS_MM)}, "
-            "or in the header, as x_mm"
-        )
+        raise InputError(f"{NO_UNIT}, or x_mm in the header")
     notes = []
     if unit and declared and unit != declared:
         notes.append(f"unit {unit} as given; the header says {declared}")
@@ -329,8 +326,9 @@ def _require_columns(columns: Sequence[str], has_axis: bool) -> None:
     has_axes = has_axis or any(set(axes) <= set(columns) for axes in AXES)
     if not (set(POSITION) <= set(columns) and has_axes):
         raise InputError(
-            f"expected columns {EXPECTED}; got {' '.join(columns)}; map their names with columns, "
-            "and give the tool axis with axis if there is none"
+            f"expected columns {EXPECTED}; got {' '.join(columns)}; say which they are, columns = "
+            '{ x = "Pos X" } in [part] of a job or --columns "x=Pos X", and, if none is an axis, '
+            f"{GIVE_AXIS}"
         )
 
 

@@ -21,7 +21,7 @@ from kerfpath.cad.build import (
 )
 from kerfpath.cad.left_out import counted
 from kerfpath.cad.part import Loop, Part
-from kerfpath.cad.units import LARGEST, MM, UNITS_MM
+from kerfpath.cad.units import GIVE_AXIS, LARGEST, MM, NO_UNIT, UNITS_MM
 from kerfpath.contour import angle_between, slerp
 from kerfpath.errors import InputError
 from kerfpath.text import number, text_lines, upper
@@ -93,12 +93,16 @@ class ToolPath:
 
 
 class Tip:
-    """The tip of a tool, moved by the program of a machine; what a block leaves out is kept."""
+    """The tip of a tool, moved by the program of a machine; what a block leaves out is kept.
+
+    Z is 0 in a program that never gives it, as one for a flat sheet.
+    """
 
     def __init__(self) -> None:
         self.moves: list[Move] = []
         self._place: dict[str, float] = {}
         self._axis: Triple | None = None
+        self._level: list[int] | None = []
 
     def go(
         self, line: int, *, feed: bool, place: dict[str, float], axis: Triple | None,
@@ -113,8 +117,13 @@ class Tip:
         InputError
             A feed move with a coordinate that was never given.
         """
+        if "Z" in place:
+            self._leave_level()
         before = [self._place.get(name) for name in "XYZ"]
         self._place |= place
+        if self._level is not None and {"X", "Y"} <= self._place.keys():
+            self._level.append(len(self.moves))
+            self._place["Z"] = 0.0
         self._axis = axis or self._axis
         unknown = [name for name in "XYZ" if name not in self._place]
         if unknown and feed:
@@ -141,6 +150,21 @@ class Tip:
         """Forget the position, because earlier coordinates have another meaning from here on."""
         if self.moves:
             self.go_away(line)
+
+    def _leave_level(self) -> None:
+        """Take back that Z is 0: rapid moves without it end where nothing is known."""
+        for k in self._level or ():
+            if (move := self.moves[k]).kind == "feed":
+                raise InputError(f"line {move.line}: a move at feed, but Z was not given before")
+            self.moves[k] = Move(line=move.line, kind="away")
+        if self._level:
+            self._place.pop("Z", None)
+        self._level = None
+
+    @property
+    def notes(self) -> list[str]:
+        """What was assumed."""
+        return ["no move gives Z, which is taken as 0"] if self._level else []
 
     @property
     def has_places(self) -> bool:
@@ -219,7 +243,7 @@ def part_of_tool_path(
         contour (its line is named).
     """
     if not (unit or tool_path.unit):
-        raise InputError(f"states no length unit; give it with unit= one of {', '.join(UNITS_MM)}")
+        raise InputError(NO_UNIT)
     notes = list(tool_path.notes)
     if tool_path.unused:
         notes.append(f"words not used: {', '.join(sorted(tool_path.unused))}")
@@ -291,9 +315,7 @@ def _arrays(run: Sequence[Move], mm: float, axis: Array | None) -> tuple[Array, 
         elif axis is not None:
             normals.append(-axis / np.linalg.norm(axis))
         else:
-            raise InputError(
-                f"line {move.line}: no tool axis is known here; give it in the file, or with axis"
-            )
+            raise InputError(f"line {move.line}: no tool axis is known here; {GIVE_AXIS}")
     points = np.array([move.point for move in run]) * mm
     if (far := np.flatnonzero((np.abs(points) > LARGEST).any(axis=1))).size:
         raise InputError(
@@ -348,11 +370,14 @@ def _chords_of(
     return share, points
 
 
-def _along(points: Array, normals: Array) -> Array:
-    """Return for each move (K - 1,) whether it is along the tool axis, or has no length."""
+def _along(points: Array, normals: Array, ends: np.ufunc = np.maximum) -> Array:
+    """Return for each move (K - 1,) whether it is along the tool axis, or has no length.
+
+    By default it is along the axes of both its ends, with `np.minimum` along that of one of them.
+    """
     steps = np.diff(points, axis=0)
     length = np.linalg.norm(steps, axis=1)
-    aside = np.maximum(
+    aside = ends(
         np.linalg.norm(np.cross(steps, normals[:-1]), axis=1),
         np.linalg.norm(np.cross(steps, normals[1:]), axis=1),
     )
@@ -361,7 +386,7 @@ def _along(points: Array, normals: Array) -> Array:
 
 def _trimmed(points: Array, normals: Array) -> tuple[int, int]:
     """Return the first and last index of a cut without approach and retract."""
-    across = np.flatnonzero(np.logical_not(_along(points, normals)))
+    across = np.flatnonzero(np.logical_not(_along(points, normals, np.minimum)))
     return (int(across[0]), int(across[-1]) + 1) if across.size else (0, 0)
 
 

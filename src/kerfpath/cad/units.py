@@ -25,6 +25,15 @@ UNITS_MM = {
     "ft": 304.8,
 }
 """Length units by the name that users give, in mm."""
+GIVE_UNIT = (
+    f"give that of its numbers ({', '.join(UNITS_MM)}): "
+    'unit = "mm" in [part] of a job, or --unit mm'
+)
+"""What to do where a file states no length unit that is known."""
+NO_UNIT = f"states no length unit; {GIVE_UNIT}"
+"""What is said of a file without a unit."""
+GIVE_AXIS = "give the tool axis: axis = [0, 0, -1] in [part] of a job, or --axis 0 0 -1"
+"""What to do where a drawing of lines or points has no tool axis."""
 SUFFIXES = {
     ".step": "STEP",
     ".stp": "STEP",

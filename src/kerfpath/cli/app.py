@@ -46,6 +46,28 @@ Json = Annotated[
 Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; the command makes it if needed.")
 ]
+Unit = Annotated[
+    str | None,
+    typer.Option(help="Length unit, if the file has none or a wrong one: mm, cm, m, in."),
+]
+Gap = Annotated[
+    float, typer.Option(help="Largest gap between two curve ends that a loop bridges, mm.")
+]
+OuterTowards = Annotated[
+    tuple[float, float, float] | None,
+    typer.Option(
+        help="Direction that the outer sides of sheets face, in the part. Default: the side "
+        "that less of the part hides; for a flat sheet, the side that faces up."
+    ),
+]
+Axis = Annotated[
+    tuple[float, float, float] | None,
+    typer.Option(help="Tool axis for lines in space, and for points without one."),
+]
+Columns = Annotated[
+    str | None,
+    typer.Option(help='Columns of a table: x,y,z,-,nx,... in order, or x=NAME,"y=A, B",...'),
+]
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
 Strict = Annotated[
     bool, typer.Option("--strict", help="Refuse a program that would only give a warning.")
@@ -130,10 +152,11 @@ def new(
         str | None,
         typer.Option(metavar="ID", help="Robot of the library; default: a placeholder to change."),
     ] = None,
-    unit: Annotated[
-        str | None,
-        typer.Option(help="Length unit, if the file has none or a wrong one: mm, cm, m, in."),
-    ] = None,
+    unit: Unit = None,
+    gap_mm: Gap = 0.05,
+    outer_towards: OuterTowards = None,
+    axis: Axis = None,
+    columns: Columns = None,
     to: Annotated[
         Path | None,
         typer.Option("--out", metavar="JOB.toml", help="Job to write; default: PART.toml."),
@@ -142,14 +165,24 @@ def new(
 ) -> None:
     """Write a first job for a drawing, with comments; what is guessed in it is marked.
 
-    The job cuts the longest loops of the outer side at a guessed speed, with the beam from above
-    and the part in front of the robot. A file that exists already is never overwritten.
+    The job cuts the longest loops of the outer side, or the longest open lines if there are no
+    loops, at a guessed speed, with the beam from above and the part in front of the robot. A file
+    that exists already is never overwritten.
 
     Example: kerfpath new door.step --robot kuka_kr30_ha
     """
+    from kerfpath.cli.drawing_output import drawing_by
     from kerfpath.cli.first_job import write_new
 
-    write_new(drawing, to, robot=robot, unit=unit)
+    how = drawing_by(
+        drawing,
+        unit=unit,
+        gap=gap_mm / 1000,
+        outer_towards=outer_towards,
+        axis=axis,
+        columns=columns,
+    )
+    write_new(how, to, robot=robot)
 
 
 @app.command()
@@ -239,28 +272,11 @@ def contours(
         Path,
         typer.Argument(metavar="FILE", help="STEP, IGES, DXF, a mesh, points (CSV), or a path."),
     ],
-    unit: Annotated[
-        str | None,
-        typer.Option(help="Length unit, if the file has none or a wrong one: mm, cm, m, in."),
-    ] = None,
-    gap_mm: Annotated[
-        float, typer.Option(help="Largest gap between two curve ends that a loop bridges, mm.")
-    ] = 0.05,
-    outer_towards: Annotated[
-        tuple[float, float, float] | None,
-        typer.Option(
-            help="Direction that the outer sides of sheets face, in the part. Default: the side "
-            "that less of the part hides; for a flat sheet, the side that faces up."
-        ),
-    ] = None,
-    axis: Annotated[
-        tuple[float, float, float] | None,
-        typer.Option(help="Tool axis for lines in space, and for points without one."),
-    ] = None,
-    columns: Annotated[
-        str | None,
-        typer.Option(help='Columns of a table: x,y,z,-,nx,... in order, or x=NAME,"y=A, B",...'),
-    ] = None,
+    unit: Unit = None,
+    gap_mm: Gap = 0.05,
+    outer_towards: OuterTowards = None,
+    axis: Axis = None,
+    columns: Columns = None,
     sort: Annotated[
         Literal["open", "closed"] | None,
         typer.Option(help="Sort the points of a table, which are in no order, along a curve."),
@@ -297,9 +313,9 @@ def contours(
 
     Example: kerfpath contours door.step --html door.html
     """
-    from kerfpath.cli.drawing_output import drawing_in, list_contours
+    from kerfpath.cli.drawing_output import drawing_by, drawn, list_contours
 
-    part = drawing_in(
+    drawing = drawing_by(
         file,
         unit=unit,
         gap=gap_mm / 1000,
@@ -311,7 +327,7 @@ def contours(
         section=section,
         section_at=[height / 1000 for height in section_mm or ()],
     )
-    list_contours(part, html, everything=everything)
+    list_contours(drawn(drawing), html, everything=everything)
 
 
 @app.command()

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from rich.markup import escape
 
 from kerfpath.arrays import counted
 from kerfpath.cad import Loop, Part
-from kerfpath.cad import read as read_drawing
 from kerfpath.cli.show import busy, out, print_json, progress_bars, show_files, table
-from kerfpath.job import Job
+from kerfpath.job import Drawing, Job
 from kerfpath.post import write_program
 from kerfpath.report import DrawnLoop, render_drawing
 
@@ -21,7 +22,7 @@ from kerfpath.report import DrawnLoop, render_drawing
 # The one-line summary of a drawing, which every command that reads a drawing prints.
 
 
-def drawing_in(
+def drawing_by(
     file: Path,
     *,
     unit: str | None,
@@ -29,12 +30,28 @@ def drawing_in(
     outer_towards: tuple[float, float, float] | None,
     axis: tuple[float, float, float] | None,
     columns: str | None,
-    sort: Literal["open", "closed"] | None,
-    beam: list[str] | None,
-    section: tuple[float, float, float] | None,
-    section_at: list[float],
-) -> Part:
-    """Return the part in a file; `columns` is x,y,z,... or x=NAME,y=NAME,..., and `gap` is in m.
+    sort: Literal["open", "closed"] | None = None,
+    beam: list[str] | None = None,
+    section: tuple[float, float, float] | None = None,
+    section_at: Sequence[float] = (),
+) -> Drawing:
+    """Return a drawing by the options of a command; `columns` is x,y,z,... or x=NAME,y=NAME,..."""
+    return Drawing(
+        file=file,
+        unit=unit,
+        gap=gap,
+        outer_towards=None if outer_towards is None else np.array(outer_towards),
+        axis=None if axis is None else np.array(axis),
+        columns=None if columns is None else _columns(columns),
+        sort=sort,
+        beam=beam[0] if beam and len(beam) == 1 else beam or None,
+        section=None if section is None else np.array(section),
+        section_at=tuple(section_at),
+    )
+
+
+def drawn(drawing: Drawing) -> Part:
+    """Return the part in a drawing.
 
     Raises
     ------
@@ -42,19 +59,7 @@ def drawing_in(
         As `kerfpath.cad.read`.
     """
     with progress_bars("faces") as progress:
-        return read_drawing(
-            file,
-            unit=unit,
-            gap=gap,
-            outer_towards=outer_towards,
-            axis=axis,
-            columns=None if columns is None else _columns(columns),
-            sort=sort,
-            beam=beam[0] if beam and len(beam) == 1 else beam or None,
-            section=section,
-            section_at=section_at,
-            progress=progress,
-        )
+        return drawing.read(progress)
 
 
 def _columns(text: str) -> dict[str, str] | list[str]:

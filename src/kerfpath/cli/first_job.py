@@ -7,16 +7,14 @@ from pathlib import Path
 from rich.markup import escape
 
 from kerfpath.cad import read
-from kerfpath.cli.drawing_output import show_drawing
-from kerfpath.cli.show import busy, out, print_json
+from kerfpath.cli.drawing_output import drawn, show_drawing
+from kerfpath.cli.show import out, print_json
 from kerfpath.errors import InputError
 from kerfpath.files import write_whole
-from kerfpath.job import job_text
+from kerfpath.job import Drawing, job_text
 
 
-def write_new(
-    drawing: Path, job: Path | None, *, robot: str | None = None, unit: str | None = None
-) -> None:
+def write_new(drawing: Drawing, job: Path | None, *, robot: str | None = None) -> None:
     """Write a first job for a drawing, and print what it has and what to do next.
 
     Raises
@@ -24,17 +22,16 @@ def write_new(
     InputError
         There is a job already, or as `first_job`.
     """
-    job = job or drawing.with_suffix(".toml")
+    job = job or drawing.file.with_suffix(".toml")
     if job.exists():
         raise InputError(
             f"{job}: there is a file already, which is never overwritten; give another name with "
             "--out, or delete it"
         )
-    with busy(f"reading {drawing.name}"):
-        part = read(drawing, unit)
-    text = job_text(part, job, robot=robot, unit=unit)
+    part = drawn(drawing)
+    text = job_text(part, job, robot=robot, drawing=drawing)
     _write(job, text)
-    print_json({"job": str(job), "drawing": str(drawing), "text": text})
+    print_json({"job": str(job), "drawing": str(drawing.file), "text": text})
     show_drawing(part)
     out.print(f"wrote {escape(str(job))}; now change what is marked as a guess there, then:")
     out.print(f"  kerfpath check {escape(str(job))}", highlight=False)
@@ -47,7 +44,7 @@ def first_job(drawing: Path) -> Path:
     Raises
     ------
     InputError
-        The drawing cannot be read or has no closed loop; the job cannot be written.
+        The drawing cannot be read; the job cannot be written.
     """
     job = drawing.with_suffix(".toml")
     if not job.exists():

@@ -18,6 +18,7 @@ from kerfpath.job.format import Candidate as Candidate
 from kerfpath.job.format import ContourSpec as ContourSpec
 from kerfpath.job.format import ContourTable as ContourTable
 from kerfpath.job.format import CutRequest as CutRequest
+from kerfpath.job.format import Drawing as Drawing
 from kerfpath.job.format import Goal as Goal
 from kerfpath.job.format import Job as Job
 from kerfpath.job.format import JobFile as JobFile

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os.path import relpath
 from pathlib import Path
 
 import numpy as np
 
 from kerfpath.arrays import Array, counted
-from kerfpath.cad import Loop, Part
+from kerfpath.cad import GAP, Loop, Part
 from kerfpath.errors import InputError
-from kerfpath.job.format import pose
+from kerfpath.job.format import Drawing, pose
 from kerfpath.post import languages
 from kerfpath.robots import Robot
 from kerfpath.robots import robot as library_robot
@@ -27,6 +27,8 @@ NODES = 400
 """Most nodes of a loop; shorter loops are spaced by `SPACING`."""
 SPACING = 2.0
 """Least distance between nodes, mm."""
+BENT = np.radians(20.0)
+"""Least angle of the tool axis from its mean along a loop at which the loop passes bends."""
 TURNS = ((0, 0, 0), (180, 0, 0), (90, 0, 0), (-90, 0, 0), (0, 90, 0), (0, -90, 0))
 """Roll, pitch and yaw in deg of the ways to lay a part down; the first of the best is taken."""
 PLACE = (0.634, 0.0, 0.244)
@@ -45,14 +47,15 @@ head = "laser-head-45"      # guess: or xyz_mm and rpy_deg of the tip (TCP) in t
 
 [part]
 file = {name}
-{unit}xyz_mm = {xyz}   # guess: where the part's origin is in the robot base
+{reading}xyz_mm = {xyz}   # guess: where the part's origin is in the robot base
 rpy_deg = {rpy}              # guess: how the part is turned there; the beam comes from above
 
-# {count} of {total}, at a guessed speed; `kerfpath contours {drawing}` lists them all.
+# {cut} at a guessed speed; `kerfpath contours {drawing}` lists them all.
 """
 TAIL = """\
 [plan]
 gamma_step_deg = 2          # step of the free rotation about the beam
+{feed:<28}# slow down where the joints need it, as in bends
 
 # Without a [cell] nothing is checked for collisions. These lines check robot, head and part:
 # [cell]
@@ -63,8 +66,12 @@ language = "{language}"
 """
 
 
-def job_text(part: Part, job: Path, *, robot: str | None = None, unit: str | None = None) -> str:
-    """Return a job that cuts the longest closed loops of a part, placed in front of the robot.
+def job_text(
+    part: Part, job: Path, *, robot: str | None = None, drawing: Drawing | None = None
+) -> str:
+    """Return a job that cuts the longest loops of a part, placed in front of the robot.
+
+    The loops are closed ones, or open lines if there are no others.
 
     Parameters
     ----------
@@ -73,23 +80,27 @@ def job_text(part: Part, job: Path, *, robot: str | None = None, unit: str | Non
         Where the job will be; it names the drawing relative to its folder.
     robot : str, optional
         Robot of the library; default: a placeholder, which the job calls that.
-    unit : str, optional
-        Unit of the drawing, if it was read with another one than it states.
+    drawing : Drawing, optional
+        How the part was read, if not by default.
 
     Raises
     ------
     InputError
-        The part has no closed loop, or the robot is unknown.
+        Every loop has a gap, or the robot is unknown.
     """
+    lines = [loop for loop in part.loops if loop.kind == "open"]
     closed = [loop for loop in part.loops if loop.closed and loop.kind != "open"]
     main = [loop for loop in closed if not loop.skin and loop.side in ("outer", "")] or closed
+    main = main or lines
     if not main:
         raise InputError(
-            f"{part.path}: expected a closed loop, got none; write a job that picks its open lines"
+            f"{part.path}: every loop has a gap; `kerfpath contours {part.path}` shows how wide: "
+            "give --gap-mm above it"
         )
     chosen = sorted(main, key=lambda loop: loop.length)[-MOST_LOOPS:]
     used = library_robot(robot or PLACEHOLDER)
-    xyz, rpy = _place(part, chosen, used.reach or REACH)
+    axes = [part.contour(loop.name, closed=False).axes for loop in chosen]
+    xyz, rpy = _place(part, chosen, axes, used.reach or REACH)
     file = Path(relpath(part.path, job.parent)).as_posix()
     head = HEAD.format(
         drawing=part.path.name,
@@ -98,14 +109,22 @@ def job_text(part: Part, job: Path, *, robot: str | None = None, unit: str | Non
         chosen="" if robot else '   # guess, a placeholder: yours, see "kerfpath robots"',
         accelerations=_accelerations(used),
         name=json.dumps(file, ensure_ascii=False),
-        unit="" if unit is None else f'unit = "{unit}"\n',
+        reading="" if drawing is None else _reading(drawing),
         xyz=xyz,
         rpy=list(rpy),
-        count=len(chosen),
-        total=counted(len(part.loops), "loop"),
+        cut=_cut(part, chosen, lines if main is not lines else ()),
     )
     spoken = (name for name, each in languages().items() if used.manufacturer in each.manufacturers)
-    return head + "".join(map(_contour, chosen)) + TAIL.format(language=next(spoken, "csv"))
+    tail = TAIL.format(
+        feed=f'{"" if any(map(_is_bent, axes)) else "# "}feed = "dip"',
+        language=next(spoken, "csv"),
+    )
+    return head + "".join(map(_contour, chosen)) + tail
+
+
+def _is_bent(axes: Array) -> bool:
+    mean = axes.mean(axis=0)
+    return bool((axes @ mean).min() < np.cos(BENT) * np.linalg.norm(mean))
 
 
 def _accelerations(robot: Robot) -> str:
@@ -125,15 +144,50 @@ def _accelerations(robot: Robot) -> str:
     )
 
 
+def _reading(drawing: Drawing) -> str:
+    """Return the lines of [part] that say how a drawing was read."""
+    given: dict[str, object] = {
+        "unit": drawing.unit,
+        "gap_mm": None if drawing.gap == GAP else round(drawing.gap * 1e3, 9),
+        "outer_towards": drawing.outer_towards,
+        "axis": drawing.axis,
+        "columns": drawing.columns,
+    }
+    return "".join(f"{key} = {_toml(value)}\n" for key, value in given.items() if value is not None)
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, Mapping):
+        inside = ", ".join(f"{_toml(key)} = {_toml(own)}" for key, own in value.items())
+        return f"{{ {inside} }}"
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _cut(part: Part, chosen: Sequence[Loop], aside: Sequence[Loop]) -> str:
+    """Return the words on the loops of a job, and on the open lines that are not among them."""
+    words = f"{len(chosen)} of {counted(len(part.loops), 'loop')},"
+    if not aside:
+        return words
+    of = f"{counted(len(aside), 'open line')} ({aside[0].name}{', ...' if aside[1:] else ''})"
+    return (
+        f"{of} not in it: to mark or slit along one, pick it by name;\n# if it should be closed, "
+        f"set gap_mm in [part] above the gap that the notes name.\n# {words}"
+    )
+
+
 def _contour(loop: Loop) -> str:
     spacing = max(SPACING, round(loop.length * 1e3 / NODES, 1))
     name = json.dumps(loop.name, ensure_ascii=False)
     return f"[[contour]]\npick = {name}\nspeed_m_min = 3\nspacing_mm = {spacing:g}\n\n"
 
 
-def _place(part: Part, loops: Sequence[Loop], reach: float) -> tuple[list[float], tuple[int, ...]]:
+def _place(
+    part: Part, loops: Sequence[Loop], axes_of: Sequence[Array], reach: float
+) -> tuple[list[float], tuple[int, ...]]:
     """Return xyz in mm and rpy in deg with which the beam comes mainly from above."""
-    axes = np.vstack([part.contour(loop.name).axes.mean(axis=0) for loop in loops])
+    axes = np.vstack([each.mean(axis=0) for each in axes_of])
     weighed = (axes * np.array([[loop.length] for loop in loops])).sum(axis=0)
 
     def turned(rpy: tuple[int, ...]) -> Array:

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import NamedTuple, TypeVarTuple
 
 from kerfpath.cad import SUFFIXES, unit_question
-from kerfpath.cad import read as read_drawing
 from kerfpath.errors import InputError, KerfpathError
 from kerfpath.files import write_whole
 from kerfpath.job import (
+    Drawing,
     FileTexts,
     Job,
     JobResult,
@@ -381,11 +381,12 @@ class Session:
         def text() -> str:
             file, new = _stored(path.parent, name, data)
             try:
-                part = read_drawing(file, unit)
+                drawing = Drawing(file=file, unit=unit)
+                part = drawing.read()
                 question = unit_question(part.unit, part.bounding_box)
                 if unit is None and question:
                     raise InputError(question)
-                return job_text(part, path, robot=robot, unit=unit)
+                return job_text(part, path, robot=robot, drawing=drawing)
             except InputError:
                 if new:
                     file.unlink()

@@ -10,6 +10,7 @@ from typing import Literal
 from kerfpath.arrays import Array, short_repr
 from kerfpath.cad import GAP, Part
 from kerfpath.cad import read as read_drawing
+from kerfpath.progress import Progress, no_progress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,8 +57,10 @@ class Drawing:
 
     __repr__ = short_repr
 
-    def read(self) -> Part:
+    def read(self, progress: Progress = no_progress) -> Part:
         """Return the part in the drawing.
+
+        `progress` is called with the current step and the number of faces.
 
         Raises
         ------
@@ -75,4 +78,5 @@ class Drawing:
             beam=self.beam,
             section=self.section,
             section_at=self.section_at,
+            progress=progress,
         )

@@ -12,6 +12,7 @@ from kerfpath.cad import Part
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
+from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import (
     CutRequest,
     Job,
@@ -32,6 +33,10 @@ from kerfpath.tolerances import SAME_PLACE
 # -----------------------------------------------------------------------------
 # Check a job without planning it: its cell, and the poses at the start of its contours.
 
+PLACES = 25
+"""Most nodes of a contour at which poses are looked for."""
+CAUSES = 3
+"""Most causes that a warning names."""
 FAR = 0.05
 """Distance in m beyond the near-miss distance up to which clearances are measured."""
 
@@ -88,17 +93,38 @@ def check_job(job: Job, part: Part | None = None) -> JobPreview:
     """
     part = part or job.read_part()
     cell = cell_of_job(job, part)
-    starts, contours = [], []
+    plain = replace(job.options, comfort=None, retract=None, floor=None)
+    starts, contours, far = [], [], list[str]()
     for task in job.tasks(part):
         nodes = task.sample(task.candidates(part)[0])
         contours.append((task.name, nodes))
-        first = nodes.part(0, 1, job.options.frames)
-        plain = replace(job.options, comfort=None, retract=None, floor=None)
-        graph = job.graph(first, plain, external=places_of(job, first))
+        some = np.unique(np.linspace(0, len(nodes) - 1, PLACES).astype(np.int64))
+        graph = job.graph(nodes, plain, only=some, external=places_of(job, nodes))
         q = graph.q[: graph.start[1]]
         starts.append(_start(task.name, len(nodes), q, cell))
-    doubts = sides_in_doubt(job, contours, part.mesh())
-    return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts), warnings=tuple(doubts))
+        if not job.robot.free.size:  # external axes stand only at a few places here
+            far += _out_of_reach(job, task.name, nodes.points[some], graph)
+    doubts = (*far, *sides_in_doubt(job, contours, part.mesh()))
+    return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts), warnings=doubts)
+
+
+def _out_of_reach(job: Job, name: str, points: Array, graph: LayeredGraph) -> Iterator[str]:
+    """Yield a warning if no pose reaches some of the points (M, 3) m, one per layer of a graph."""
+    shut = np.flatnonzero(np.diff(graph.start) == 0)
+    if not shut.size:
+        return
+    codes, counts = np.unique(graph.reason[shut[0]], return_counts=True)
+    order = np.argsort(-counts)[:CAUSES]
+    why = ", ".join(
+        f"{counts[i] / counts.sum():.0%} {graph.reasons[codes[i]]}" for i in order.tolist()
+    )
+    place = (points[shut[0]] @ job.placement[:3, :3].T + job.placement[:3, 3]) * 1e3
+    yield (
+        f"{name}: the robot has no pose at {shut.size} of {len(points)} places that were looked "
+        f"at, the first at {' '.join(f'{v:.0f}' for v in place)} mm in the robot base (of all "
+        f"rotations and postures {why}); move or turn the part ([part]), with `kerfpath layout "
+        f"{job.path.name}`, or list robots that can with `kerfpath layout {job.path.name} --robots`"
+    )
 
 
 def _start(name: str, nodes: int, q: np.ndarray, cell: Cell | None) -> ContourStart:
