@@ -18,7 +18,7 @@ from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
-from kerfpath.planner import best_motion, layered_graph, plan, with_bound
+from kerfpath.planner import best_motion, folds, layered_graph, plan, with_bound
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot, posture_name
 from kerfpath.sequence.order import HOME, PATIENCE, MoveTimes, Order, best_order
@@ -402,8 +402,9 @@ def plan_part(
         for i, candidates in enumerate(groups):
             few = np.unique(np.linspace(0, len(candidates[0]) - 1, FEW).astype(int))
             graph = layered_graph(
-                candidates[0], robot, tool=tool, placement=placement, options=wanted, nodes=few
-            )
+                candidates[0], robot, tool=tool, placement=placement, options=wanted, nodes=few,
+                fold=folds(robot, wanted, 0.0),
+            )  # fmt: skip
             served[i] = graph.postures_throughout.tolist()
     common = common_postures(served, postures)
     found = order_candidates(tried, lambda made: made, in_posture, postures, common, **order)
@@ -416,6 +417,7 @@ def order_candidates(
     in_posture: Callable[[int, int, bool], T | None],
     postures: Sequence[Sequence[int] | None],
     common: Sequence[Sequence[int]],
+    settle: Callable[[T], T | None] = lambda made: made,
     progress: Callable[[int, int, int], None] = lambda contour, done, total: None,
     **order: Unpack[OrderKeywords],
 ) -> PartPlan:
@@ -434,6 +436,10 @@ def order_candidates(
         Postures that each contour may be cut in; None: all.
     common : sequence of sequences of int
         Postures that each contour is planned in before the order is sought, see `common_postures`.
+    settle : callable
+        Returns a quickly planned candidate that an order has chosen in its final form, which
+        replaces it, or None if it may not be used. Where one is not the same, an order is sought
+        again.
     progress : callable
         Called with the number of a contour, how many other postures of it are done, and how many
         there are.
@@ -461,10 +467,26 @@ def order_candidates(
             tried[i] += [] if one is None else [one]
         return [plan_of(one) for one in tried[i][made:]]
 
+    rough = list[T]()
     for i, offered in enumerate(common):
+        first = len(tried[i])
         add(i, offered, quick=True)
-    plans = [[plan_of(one) for one in each] for each in tried]
-    return order_plans(plans, more=lambda i: add(i, postures[i]), **order)
+        rough += tried[i][first:]
+    while True:
+        plans = [[plan_of(one) for one in each] for each in tried]
+        found = order_plans(plans, more=lambda i: add(i, postures[i]), **order)
+        chosen = [(i, c, tried[i][c]) for i, c in found.chosen]
+        new = [(i, c, one) for i, c, one in chosen if any(one is each for each in rough)]
+        rough = [one for one in rough if not any(one is each for _, _, each in new)]
+        same = True
+        for i, c, one in new:
+            settled = settle(one)
+            same &= settled is not None and np.array_equal(plan_of(settled).q, plan_of(one).q)
+            tried[i][c : c + 1] = [] if settled is None else [settled]
+        if same:  # on the turns that the order has chosen
+            made = zip(found.chosen, found.plans, strict=True)
+            last = (replace(plan_of(tried[i][c]), q=on.q, turn=on.turn) for (i, c), on in made)
+            return replace(found, plans=tuple(last))
 
 
 def order_plans(

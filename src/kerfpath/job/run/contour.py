@@ -193,7 +193,8 @@ def cut_in_posture(
 ) -> CutResult | None:
     """Return the candidate of a cut with a plan cut in one posture; None where its audit fails.
 
-    If `quick`, it is given up where it would be planned on the grid.
+    If `quick`, it is given up where it would be planned on the grid, and audited at its nodes only
+    until it is `settled`.
 
     Raises
     ------
@@ -214,8 +215,17 @@ def cut_in_posture(
             speed=candidate.speed, options=_at_nodes(job), cell=prepared.cell,
             graph=None if job.robot.free.size else graph,
         )  # fmt: skip
-    other = _audited(prepared, CutResult(request=request, candidate=candidate, graph=graph), made)
+    other = CutResult(request=request, candidate=candidate, graph=graph)
+    other = with_checks(prepared, other, made) if quick else _audited(prepared, other, made)
     return other if other.passed else None
+
+
+def settled(prepared: PreparedJob, cut: CutResult) -> CutResult | None:
+    """Return a cut that was planned quickly, audited between its nodes too; None if that fails."""
+    assert cut.plan is not None
+    whole = CutResult(request=cut.request, candidate=cut.candidate, graph=cut.graph)
+    done = _audited(prepared, whole, cut.plan)
+    return done if done.passed else None
 
 
 def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutResult:

@@ -25,6 +25,7 @@ from kerfpath.job.format import (
     refusal_at,
 )
 from kerfpath.job.run.doubts import sides_in_doubt
+from kerfpath.planner import folds
 from kerfpath.plans import has_room
 from kerfpath.post import issues_before_planning
 from kerfpath.sequence import best_order, distances_between
@@ -317,7 +318,7 @@ def _end_poses(job: Job, nodes: Contour) -> list[tuple[Array, Ints]]:
     ends = np.array([0, len(nodes) - 1])
     fine = min(job.options.gamma_step, FINE)
     options = replace(job.options, retract=None, gamma_step=fine)
-    graph = job.graph(nodes, options, only=ends, external=places_of(job, nodes))
+    graph = job.graph(nodes, options, only=ends, external=places_of(job, nodes), folded_at=0.0)
     cut = graph.start[1]
     posture = graph.posture.astype(np.int64)
     return [(graph.q[:cut], posture[:cut]), (graph.q[cut:], posture[cut:])]
@@ -325,4 +326,6 @@ def _end_poses(job: Job, nodes: Contour) -> list[tuple[Array, Ints]]:
 
 def _room(job: Job, q: Array, posture: Ints, retract: float) -> Bools:
     options = replace(job.options, retract=retract)
-    return has_room(options, job.robot, q, posture, job.tool)
+    # A folded joint has room on one of its turns.
+    robot = job.robot.folded(folds(job.robot, job.options, 0.0))
+    return has_room(options, robot, q, posture, job.tool)

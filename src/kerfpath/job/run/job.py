@@ -13,7 +13,7 @@ from kerfpath.auditor import bound_checks, transfer_checks, worst_of
 from kerfpath.cad import Part
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.format import Job, PreparedJob, prepare
-from kerfpath.job.run.contour import advised, cut_candidate, cut_in_posture, with_checks
+from kerfpath.job.run.contour import advised, cut_candidate, cut_in_posture, settled, with_checks
 from kerfpath.job.run.foresee import require_foreseen
 from kerfpath.job.run.results import CutResult, JobResult
 from kerfpath.planner import (
@@ -89,6 +89,7 @@ def order_cuts(
             ),
             others,
             common_postures(served, others),
+            settle=lambda cut: settled(prepared, cut),
             progress=lambda unit, done, total: progress(
                 f"{requests[unit].task.name}: other postures", done, total
             ),
