@@ -1,5 +1,7 @@
 """The fastest motion: what is reached a plan finds, and a refusal says what would open the way."""
 
+import re
+from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
 
@@ -254,3 +256,15 @@ def test_a_speed_that_is_enough_ends_the_search(arm, space, quickest_at_work):
         assert min(enough, fastest.speed) <= found.speed <= fastest.speed
     with pytest.raises(InputError, match=r"enough: expected .*, got 0"):
         fastest_speed(nodes, arm, refine=True, enough=0.0, **space)
+
+
+def test_the_phases_say_early_at_which_speed_there_is_a_motion(arm, space):
+    nodes, phases = drawn(0, nodes=41), []
+    fastest = fastest_speed(nodes, arm, refine=True, explore=False, **space)
+    with suppress(NoFeasiblePath):
+        plan(nodes, arm, speed=1.15 * fastest.speed, phase=phases.append, **space)
+    said = [float(found[1]) / 60 for p in phases if (found := re.search(r"([\d.]+) m/min", p))]
+    assert said
+    # A path that a refinement begins from: slower than asked for, but not by far.
+    assert 0.5 * fastest.speed < said[0] < 1.15 * fastest.speed
+    assert errors(plan(nodes, arm, speed=said[0], **space)) == []

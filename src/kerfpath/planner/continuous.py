@@ -8,13 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from kerfpath import refiner
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner.attempt import Attempt, Strategy, first_plan
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.courses import can_explore
 from kerfpath.planner.exploration import Exploration
 from kerfpath.planner.feed_reduction import may_keep_speed, slowed_motion
-from kerfpath.planner.impossible import refuse_impossible
+from kerfpath.planner.impossible import interval_of, refuse_impossible, speed_at
 from kerfpath.planner.on_grid import plan_on_grid
 from kerfpath.planner.quickest import clear_paths, wide
 from kerfpath.planner.refinements import refine_from_random_starts
@@ -240,13 +241,14 @@ def _clear_motion(
     task = task.whole()
     searched = clear_paths(task, finder, QUICK if starts.best is None else ())
     if searched is None:
+        begin(f"search on the grid{_about_speed(task, finder, [])}")
         return starts.best
     search, paths = searched
     if starts.best is not None and starts.above(search.value, ENOUGH):
         paths = [path for beam in QUICK for path in search.paths(beam)]
     if starts.best is None and task.settings.feed == "constant":
         refuse_impossible(task, finder, paths)
-    begin("refinement")
+    begin("refinement" if starts.best else f"refinement{_about_speed(task, finder, paths)}")
     try:
         starts.refine(paths)
         if thorough and explored and finder.is_free and can_explore(task):
@@ -258,6 +260,28 @@ def _clear_motion(
             raise
         starts.stopped = True
     return starts.best
+
+
+def _about_speed(task: Task, finder: CollisionFreeSearch, paths: list[ContinuousPath]) -> str:
+    """Return words on the speed at which the best path keeps the limits, if that is too slow.
+
+    It is one of `paths`, or else a path without (6); "" where the feed may be reduced.
+    """
+    if task.settings.feed != "constant" or task.contour.time is not None:
+        return ""
+    if not paths:
+        without = task.problem.limits.without_acceleration()
+        free = task.with_problem(replace(task.problem, limits=without))
+        searched = clear_paths(free, finder, QUICK[:1])
+        paths = [] if searched is None else searched[1]
+    claim = Proof(optimal=False, statement="")
+    plans = [refiner.reduce_excess(task.plan_between(path, claim), most=0) for path in paths]
+    dt = min((interval_of(task, plan) for plan in plans), default=np.inf)
+    return (
+        f", first estimate of a possible speed {speed_at(task, dt)}"
+        if task.dt < dt < np.inf
+        else ""
+    )
 
 
 def _explore(task: Task, starts: Starts, search: ContinuousSearch) -> None:

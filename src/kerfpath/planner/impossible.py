@@ -13,6 +13,7 @@ from kerfpath.effort import current_effort
 from kerfpath.errors import Closed, NoFeasiblePath, Relaxation
 from kerfpath.limits import rates_of
 from kerfpath.planner.collision_free import CollisionFreeSearch
+from kerfpath.planner.layers import longest_step
 from kerfpath.planner.quickest import QuickMotion, quickest_along
 from kerfpath.planner.statements import at_least, at_most
 from kerfpath.planner.task import Task
@@ -104,6 +105,28 @@ def can_be_slower(task: Task) -> bool:
     return not (asked.closure == "periodic" or priced or unknown)
 
 
+def limit_shares(task: Task, made: Plan) -> tuple[float, float]:
+    """Return the largest shares of the velocities and accelerations of a motion of a task."""
+    limits = task.problem.limits
+    v, a = rates_of(made.increments, np.full(len(task.contour) - 1, task.dt))
+    fast, sharp = (
+        float((np.abs(rates) / limit.usable).max(initial=0.0))
+        for rates, limit in ((v, limits.velocity), (a, limits.acceleration))
+    )
+    return fast, sharp
+
+
+def interval_of(task: Task, made: Plan) -> float:
+    """Return the interval, s, in which the joints of a plan keep (5) and (6); NaN out of reach."""
+    fast, sharp = limit_shares(task, made)
+    return float(task.dt * np.maximum(fast, np.sqrt(sharp)))
+
+
+def speed_at(task: Task, dt: float) -> str:
+    """Return the speed along the contour of a task with `dt` s between its nodes, in words."""
+    return f"{at_most(longest_step(task.contour) / dt * 60, 3)} m/min"
+
+
 def with_relaxation(broken: NoFeasiblePath, task: Task, quick: Plan) -> NoFeasiblePath:
     """Return an answer without a path, with the lower speed or higher limits that would suffice.
 
@@ -113,12 +136,7 @@ def with_relaxation(broken: NoFeasiblePath, task: Task, quick: Plan) -> NoFeasib
     """
     if task.settings.rotation is not None:
         return broken
-    limits = task.problem.limits
-    v, a = rates_of(quick.increments, np.full(len(task.contour) - 1, task.dt))
-    shares = (
-        float((np.abs(rates) / limit.usable).max(initial=0.0))
-        for rates, limit in ((v, limits.velocity), (a, limits.acceleration))
-    )
+    shares = limit_shares(task, quick)
     fast, sharp = (float(at_least(max(1.0, share * (1 + LIMIT_MARGIN)))) for share in shares)
     needed = Relaxation(speed=float(at_most(task.dt / quick.dt)), velocity=fast, acceleration=sharp)
     limits_said = " and ".join(

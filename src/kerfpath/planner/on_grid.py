@@ -8,7 +8,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner.attempt import Attempt, Strategy, first_plan
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.feed_reduction import plan_slowed
-from kerfpath.planner.impossible import at_any_gamma, can_be_slower, with_relaxation
+from kerfpath.planner.impossible import at_any_gamma, can_be_slower, speed_at, with_relaxation
 from kerfpath.planner.quickest import quick_motions, velocity_limited_motions
 from kerfpath.planner.refinements import plan_from_faster, plan_off_grid, refine_plan
 from kerfpath.planner.statements import ON_THIS_GRID, limits_named
@@ -20,6 +20,9 @@ from kerfpath.search import SearchProblem, find_shortest, velocity_allows
 HOPELESS = 4.0
 """If no path on the grid keeps the velocities in this multiple of the node interval, no motion is
 as quick as asked for, and the exact fastest path is not worth minutes."""
+NEAR = 1.25
+"""Multiple of the node interval up to which all valleys are explored for a quicker motion; that
+gains 20 % at most."""
 TOO_SLOW, NEARLY = 2.0, 1.15
 """Multiples of the node interval above which a proof that there is no motion is tried before the
 next search: for the fastest path on the grid, and for faster motions."""
@@ -122,9 +125,11 @@ def _from_quickest(
     judged, best = None, None
     begin("search for the quickest motion")
     hopeless = not velocity_allows(task.problem, HOPELESS * task.dt)
-    motions = velocity_limited_motions if hopeless else quick_motions
+    near = NEAR * task.dt
+    motions = (velocity_limited_motions if hopeless else quick_motions)(task, finder, explore=near)
     try:
-        for tried, best in enumerate(motions(task, finder)):
+        for tried, best in enumerate(motions):
+            begin(f"search for the quickest motion, {speed_at(task, best.dt)} so far")
             made = plan_from_faster(task, best, finder) if best.is_enough(task.dt) else None
             if made is not None:
                 return made

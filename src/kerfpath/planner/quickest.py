@@ -78,7 +78,7 @@ class QuickMotion:
 
 
 def quick_motions(
-    task: Task, finder: CollisionFreeSearch, *, explore: bool = True
+    task: Task, finder: CollisionFreeSearch, *, explore: float = np.inf
 ) -> Iterator[QuickMotion]:
     """Yield successively faster motions along the contour of a task, clear and within its margins.
 
@@ -86,7 +86,8 @@ def quick_motions(
     that path with gamma moved off the grid, or the same again. Beam searches over continuous gamma
     at the speed reached and above give the others, whatever they cost, until the speed no longer
     grows. The speed, closure and costs of the task do not matter: tasks that differ only in them
-    have the same motions, in the same order.
+    have the same motions, in the same order. At last all valleys are explored, if the motion found
+    by then has at most `explore` s between its nodes.
 
     Raises
     ------
@@ -115,7 +116,7 @@ def quick_motions(
                     best = faster
                     yield best
         without_gain = 0 if best.dt < (1 - GAIN) * before else without_gain + 1
-    if explore and can_explore(task):
+    if best.dt <= explore and can_explore(task):
         yield from _explored(task, finder, best)
 
 
@@ -164,7 +165,9 @@ def _quickened(
             yield best
 
 
-def velocity_limited_motions(task: Task, finder: CollisionFreeSearch) -> Iterator[QuickMotion]:
+def velocity_limited_motions(
+    task: Task, finder: CollisionFreeSearch, *, explore: float = np.inf
+) -> Iterator[QuickMotion]:
     """Yield motions of a task whose speed is much too high: the quickest if these take little time.
 
     If the velocities leave very many edges in the time that a path takes, they are the shortest
@@ -174,7 +177,7 @@ def velocity_limited_motions(task: Task, finder: CollisionFreeSearch) -> Iterato
     slow = _without_aim(task)
     path = finder.find(find_slow_path, slow.problem)
     if edges_allowed(slow.problem, path.dt) <= current_effort().exact_edges:
-        yield from quick_motions(task, finder)
+        yield from quick_motions(task, finder, explore=explore)
         return
     task, best = slow, _along(slow, path)
     yield best
