@@ -190,3 +190,15 @@ def test_a_part_of_likely_size_asks_nothing(tmp_path):
         part = read(drawn(tmp_path / "plate.dxf", unit, size))
         assert not [note for note in part.notes if "unit?" in note]
         assert np.ptp(part.bounding_box[:, 0]) > 0
+
+
+@pytest.mark.parametrize(("radius", "spacing"), [(60.0, "2"), (4.0, "1"), (1.0, "0.5")])
+def test_nodes_are_close_enough_for_small_radii(tmp_path, radius, spacing):
+    path = tmp_path / "slot.dxf"
+    drawing = ezdxf.new(units=4)
+    end = (radius + 20, 0, 0, 0, 1), (radius + 20, 2 * radius, 0, 0, 0)  # bulge 1: half a circle
+    ends = [(0, 2 * radius, 0, 0, 1), (0, 0, 0, 0, 0), *end]
+    drawing.modelspace().add_lwpolyline(ends, close=True)
+    drawing.saveas(path)
+    text = job_text(read(path), tmp_path / "slot.toml")
+    assert f"spacing_mm = {spacing}\n" in text

@@ -150,3 +150,26 @@ def test_backing_off_in_bulk_agrees_with_one_by_one(drawn):
                 assert not can
             else:
                 assert can
+
+
+def test_the_way_back_has_no_jump_where_the_wrist_would_flip(arm, tool):
+    """Against 400 small steps: from poses near a wrist singularity many ways lead through it."""
+    draw = np.random.default_rng(29)
+    q = draw.uniform([-1, -0.3, -0.8, 0, -0.02, -1], [1, 0.6, 0.3, 0, 0.02, 1], (120, 6))
+    q[::2, 5] = np.pi  # the way is in the plane of the arm, and leads exactly through it
+    T = arm.forward(q)
+    back = np.stack([arm.arm.follow(T, q, np.full(len(q), mu)) for mu in range(arm.postures)])
+    posture = np.nanargmin(np.abs(back - q).max(axis=2), axis=0)
+    np.testing.assert_allclose(back[posture, np.arange(len(q))], q, atol=1e-9)
+    wide = arm.with_limits(lower=np.full(6, -7.0), upper=np.full(6, 7.0))
+    can = can_back_off(wide, q, posture, tool, 0.2)
+    T, at, smooth, slow = T @ tool, q, np.ones(len(q), bool), np.ones(len(q), bool)
+    for _ in range(400):
+        T[:, :3, 3] -= 0.2 / 400 * T[:, :3, 2]
+        there = arm.arm.follow(T @ np.linalg.inv(tool), at, posture)
+        smooth &= np.abs(there - at).max(axis=1) < 2.0  # a wrist that flips turns by pi
+        slow &= np.abs(there - at).max(axis=1) < 1 / 40
+        at = there
+    assert 10 < slow.sum() <= smooth.sum() < len(q) - 5
+    assert not (can & ~smooth).any()
+    assert can[slow].all()  # else a joint may move by more than 1 rad in a tenth of the way

@@ -11,6 +11,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, counted
 from kerfpath.cad import GAP, Loop, Part
+from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job.format import Drawing, pose
 from kerfpath.post import languages
@@ -26,7 +27,12 @@ MOST_LOOPS = 8
 NODES = 400
 """Most nodes of a loop; shorter loops are spaced by `SPACING`."""
 SPACING = 2.0
-"""Least distance between nodes, mm."""
+"""Distance between nodes, mm, unless a curve needs less or a loop would have too many."""
+CLOSEST = 0.25
+"""Distance between nodes, mm, that is not halved again."""
+CHORD = 5e-5
+"""Largest distance of the drawn curve from the chords between nodes, m; half of what the audit
+allows by default."""
 BENT = np.radians(20.0)
 """Least angle of the tool axis from its mean along a loop at which the loop passes bends."""
 TURNS = ((0, 0, 0), (180, 0, 0), (90, 0, 0), (-90, 0, 0), (0, 90, 0), (0, -90, 0))
@@ -99,7 +105,8 @@ def job_text(
         )
     chosen = sorted(main, key=lambda loop: loop.length)[-MOST_LOOPS:]
     used = library_robot(robot or PLACEHOLDER)
-    axes = [part.contour(loop.name, closed=False).axes for loop in chosen]
+    dense = [part.contour(loop.name, closed=False) for loop in chosen]
+    axes = [contour.axes for contour in dense]
     xyz, rpy = _place(part, chosen, axes, used.reach or REACH)
     file = Path(relpath(part.path, job.parent)).as_posix()
     head = HEAD.format(
@@ -119,7 +126,10 @@ def job_text(
         feed=f'{"" if any(map(_is_bent, axes)) else "# "}feed = "dip"',
         language=next(spoken, "csv"),
     )
-    return head + "".join(map(_contour, chosen)) + tail
+    contours = (
+        _contour(loop, _spacing(part, along)) for loop, along in zip(chosen, dense, strict=True)
+    )
+    return head + "".join(contours) + tail
 
 
 def _is_bent(axes: Array) -> bool:
@@ -177,8 +187,18 @@ def _cut(part: Part, chosen: Sequence[Loop], aside: Sequence[Loop]) -> str:
     )
 
 
-def _contour(loop: Loop) -> str:
-    spacing = max(SPACING, round(loop.length * 1e3 / NODES, 1))
+def _spacing(part: Part, along: Contour) -> float:
+    """Return a distance between nodes, mm, whose chords are close to the curve."""
+    spacing = max(SPACING, round(along.length * 1e3 / NODES, 1))
+    while spacing > CLOSEST:
+        nodes = along.resample(spacing=spacing / 1e3)
+        if part.departure(along.name, nodes).chord_error <= CHORD:
+            break
+        spacing /= 2
+    return spacing
+
+
+def _contour(loop: Loop, spacing: float) -> str:
     name = json.dumps(loop.name, ensure_ascii=False)
     return f"[[contour]]\npick = {name}\nspeed_m_min = 3\nspacing_mm = {spacing:g}\n\n"
 

@@ -1048,13 +1048,19 @@ def _shift(by: Array) -> Array:
 # Check whether the tool can back off along its axis, as it does before and after a cut.
 
 
+RETRACT_PARTS = 10
+"""Number of parts in which the way back is followed."""
+JUMP = 1.0
+"""rad: largest movement of a joint in one part; a wrist that flips turns by half a turn."""
+
+
 def can_back_off(
     robot: Robot, q: Array, posture: Ints, tool: Array, retract: float, margin: float = 0.0
 ) -> Bools:
     """Return from which joint vectors (B,) the tool can back off within the joint limits.
 
-    The tool moves straight along its axis. The posture is kept, no joint moves more than half a
-    turn, and external axes do not move.
+    The tool moves straight along its axis. The posture is kept on the whole way, which no joint
+    passes in a jump, as it would at a singularity, and external axes do not move.
 
     Parameters
     ----------
@@ -1069,12 +1075,14 @@ def can_back_off(
         Distance kept from every joint limit in the backed-off pose.
     """
     arm, q = robot.arm, q[:, : robot.arm.joints]
-    T = arm.forward(q) @ tool
-    T[:, :3, 3] -= retract * T[:, :3, 2]
-    back = arm.follow(T @ np.linalg.inv(tool), q, posture)
+    T, back = arm.forward(q) @ tool, q
+    step, reached = retract / RETRACT_PARTS * T[:, :3, 2], np.ones(len(q), np.bool_)
+    for _ in range(RETRACT_PARTS):
+        T[:, :3, 3] -= step
+        there = arm.follow(T @ np.linalg.inv(tool), back, posture)
+        reached &= (np.abs(there - back) <= JUMP).all(axis=1)  # false out of reach, at NaN
+        back = np.where(reached[:, None], there, back)
     limits = robot.alone().joint_limits()
-    reached = np.asarray(np.isfinite(back).all(axis=1))
-    back = np.where(reached[:, None], back, q)
     room = np.minimum(back - limits.lower, limits.upper - back)
     sums = back @ limits.rows.T
     coupled = np.minimum(sums - limits.row_lower, limits.row_upper - sums)

@@ -192,3 +192,13 @@ def test_every_loop_that_does_not_exist_is_told(tmp_path):
     with pytest.raises(InputError) as found:
         prepare(read_job(path))
     assert len(found.value.others) == 1
+
+
+def test_a_fault_of_the_program_names_its_key_and_its_line(tmp_path):
+    program = '[program]\nlanguage = "inform"\ngas_lead_s = 0.1\n'
+    [fault] = said(job(tmp_path, [(0, "one", 0.5)], program))
+    assert "program.inform.gas_output: the gas is switched, but no output" in fault
+    own = f"{program}\n[program.inform]\nlaser_output = 2\n"
+    [fault] = said(job(tmp_path, [(0, "one", 0.5)], own))
+    lines = (tmp_path / "cut_holes.toml").read_text().splitlines()
+    assert f"cut_holes.toml:{lines.index('[program.inform]') + 1}: program.inform.gas" in fault

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -38,6 +39,8 @@ PLACES = 25
 """Most nodes of a contour at which poses are looked for."""
 CAUSES = 3
 """Most causes that a warning names."""
+KEY = re.compile(r"(?P<key>\w+) in \[(?P<table>program[\w.]*)\]")
+"""A key of the program in the words of a fault, and its table."""
 FAR = 0.05
 """Distance in m beyond the near-miss distance up to which clearances are measured."""
 
@@ -193,7 +196,9 @@ def _program_faults(prepared: PreparedJob) -> Iterator[InputError]:
             words += " by name in [program]"
         if words not in said:
             said.add(words)
-            yield refusal_at(job.path, ("program",), words)
+            key = KEY.search(words)
+            where = ("program",) if key is None else (*key["table"].split("."), key["key"])
+            yield refusal_at(job.path, where, words)
 
 
 def _floor_faults(prepared: PreparedJob) -> Iterator[InputError]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -25,6 +25,8 @@ from kerfpath.planner import (
 
 GIVE = (0.0, 2e-3, 1e-2, 3e-2)
 """Relative amounts by which a value is relaxed until a plan is found with it."""
+MUCH = (*GIVE, 0.1, 0.2, 0.4, 0.6)
+"""The same for a speed that is far below the one asked for, of a motion off the grid."""
 ANY_PLAN: Mapping[str, Any] = {"between_nodes": "reported", "certify": None, "restarts": 0}
 """Options of trials, whose plans need not be good."""
 FAR = 0.5
@@ -135,8 +137,14 @@ class _Trial:
             return False
         return True
 
-    def speed(self, options: PlanOptions, most: float, above: float = 0.0) -> str | None:
-        """Return a speed of `most` m/s or slightly less, in m/min, with a plan; None without one.
+    def speed(
+        self,
+        options: PlanOptions,
+        most: float,
+        above: float = 0.0,
+        give: Sequence[float] = GIVE,
+    ) -> str | None:
+        """Return a speed of `most` m/s or less by `give`, in m/min, with a plan; None without one.
 
         It is above `above` and below the requested speed, m/s.
         """
@@ -144,7 +152,7 @@ class _Trial:
         def fits(figure: str) -> bool:
             return above < float(figure) / 60 < self.asked
 
-        values = (at_most(min(most, self.asked) * 60 * (1 - give)) for give in GIVE)
+        values = (at_most(min(most, self.asked) * 60 * (1 - less)) for less in give)
         return _first(values, lambda v: fits(v) and self.opens(options, float(v) / 60))
 
     def share(self, options: PlanOptions, key: Share, least: float) -> str | None:
@@ -188,7 +196,7 @@ def find_remedy(
     if other and trial.opens(trial.on_grid, trial.asked):
         return Remedy(other_method=True), None
     if continuous and relaxation is not None and relaxation.speed <= FAR:
-        slow = trial.speed(trial.on_grid, relaxation.speed * trial.asked)
+        slow = trial.speed(trial.on_grid, relaxation.speed * trial.asked, give=MUCH)
         if slow is not None:
             return Remedy(other_method=False, speed=slow, fastest=False), None
     # With a time step, another speed has other nodes, about which nothing would be proved.
