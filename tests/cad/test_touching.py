@@ -175,7 +175,8 @@ def test_open_lines_say_where_they_hang_the_nearest_first(tmp_path: Path) -> Non
     part = drawn(tmp_path, draw)
     first, *others = hanging(part)
     assert first == (
-        "open line: 0/line6 is open at [200.0, 0.0, 0.0] mm: the next end is 0.300 mm away"
+        "open line: 0/line6 is open at [200.0, 0.0, 0.0] mm: the next end is 0.300 mm away; to "
+        "close it, set gap_mm = 0.3 in [part] (--gap-mm) or mend the drawing"
     )
     assert len(others) == 3
     assert others[-1] == "open lines: 3 more"
