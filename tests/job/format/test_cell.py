@@ -165,7 +165,7 @@ def test_the_fastest_speed_in_a_cell_is_clear_and_no_higher(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("key", ['feed = "dip"', 'interruptions = "fewest"'])
+@pytest.mark.parametrize("key", ['feed = "dip"', 'interruptions = "fewest"\nleast_piece_mm = 1'])
 def test_over_the_fastest_speed_a_cut_in_a_cell_dips_or_is_interrupted(folder, key):
     keys = ('method = "exact"', "refine = false", "certify = false", key)
     over = with_keys("[plan]", *keys).replace("spacing_mm = 1", "spacing_mm = 2")
