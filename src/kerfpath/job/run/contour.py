@@ -17,6 +17,7 @@ from kerfpath.front import Subproblem, follows_courses, graph_of_runs, plan_run
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.as_run import as_run, kept_between_nodes
 from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
+from kerfpath.job.run.reach import move_into_reach
 from kerfpath.job.run.remedy import Remedy, find_remedy, opens_without_windows
 from kerfpath.job.run.results import CutResult
 from kerfpath.options import PlanOptions
@@ -220,6 +221,17 @@ def cut_in_posture(
     return other if other.passed else None
 
 
+def moved_into_reach(prepared: PreparedJob, cuts: Sequence[CutResult]) -> dict[str, Remedy]:
+    """Return the advice to move the part, by contour, for cuts that have nodes without poses."""
+    far = {cut.contour: cut.request for cut in cuts if cut.lacks_poses and cut.advice is None}
+    if not far:
+        return {}
+    every = sorted(prepared.contours, key=lambda each: each.task.name not in far)
+    nodes = [(each.candidates[0].nodes, each.options) for each in every]
+    move = move_into_reach(prepared.job, nodes)
+    return dict.fromkeys(far, Remedy(other_method=False, move=move)) if move else {}
+
+
 def settled(prepared: PreparedJob, cut: CutResult) -> CutResult | None:
     """Return a cut that was planned quickly, audited between its nodes too; None if that fails."""
     assert cut.plan is not None
@@ -232,9 +244,10 @@ def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutRes
     """Return a cut without a plan with advice on what would make it feasible, if that is known.
 
     The advice is to leave out windows of gamma, and a speed or shares of the limits that are
-    enough. A lower speed helps if every node has poses. It need not help with periodic closure or
-    a limited rotation of endless axes; a reduced feed has tried it already; and with torque or
-    jerk limits it is not known. No speed is looked for in these cases.
+    enough; where nodes have no pose, see `moved_into_reach`. A lower speed helps if every node has
+    poses. It need not help with periodic closure or a limited rotation of endless axes; a reduced
+    feed has tried it already; and with torque or jerk limits it is not known. No speed is looked
+    for in these cases.
     """
     options, graph = replace(cut.request.options, certify=None), cut.graph
     job, cell, run = replace(prepared.job, options=options), prepared.cell, cut.request.run

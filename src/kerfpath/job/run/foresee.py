@@ -26,6 +26,7 @@ from kerfpath.job.format import (
     refusal_at,
 )
 from kerfpath.job.run.doubts import sides_in_doubt
+from kerfpath.job.run.reach import move_into_reach
 from kerfpath.planner import folds
 from kerfpath.plans import has_room
 from kerfpath.post import issues_before_planning
@@ -98,16 +99,19 @@ def check_job(job: Job, part: Part | None = None) -> JobPreview:
     part = part or job.read_part()
     cell = cell_of_job(job, part)
     plain = replace(job.options, comfort=None, retract=None, floor=None)
-    starts, contours, far = [], [], list[str]()
+    starts, contours, asked, far = [], [], [], list[str]()
     for task in job.tasks(part):
         nodes = task.sample(task.candidates(part)[0])
         contours.append((task.name, nodes))
+        asked.append((nodes, replace(task.asked(job.options), certify=None)))
         some = np.unique(np.linspace(0, len(nodes) - 1, PLACES).astype(np.int64))
         graph = job.graph(nodes, plain, only=some, external=places_of(job, nodes))
         q = graph.q[: graph.start[1]]
         starts.append(_start(task.name, len(nodes), q, cell))
         if not job.robot.free.size:  # external axes stand only at a few places here
             far += _out_of_reach(job, task.name, nodes.points[some], graph)
+    if far and (move := move_into_reach(job, asked)):
+        far.append(move)
     doubts = (*far, *sides_in_doubt(job, contours, part.mesh()))
     return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts), warnings=doubts)
 

@@ -13,7 +13,14 @@ from kerfpath.auditor import bound_checks, transfer_checks, worst_of
 from kerfpath.cad import Part
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.format import Job, PreparedJob, prepare
-from kerfpath.job.run.contour import advised, cut_candidate, cut_in_posture, settled, with_checks
+from kerfpath.job.run.contour import (
+    advised,
+    cut_candidate,
+    cut_in_posture,
+    moved_into_reach,
+    settled,
+    with_checks,
+)
 from kerfpath.job.run.foresee import require_foreseen
 from kerfpath.job.run.results import CutResult, JobResult
 from kerfpath.planner import (
@@ -203,6 +210,10 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
             )
     result = order_cuts(prepared, tried, stoppable)
     cuts = tuple(certified(cut, stoppable) for cut in result.cuts)
+    moves = moved_into_reach(prepared, cuts)
+    cuts = tuple(
+        replace(cut, advice=moves[cut.contour]) if cut.contour in moves else cut for cut in cuts
+    )
     return measured(prepared, result.with_cuts(cuts))
 
 

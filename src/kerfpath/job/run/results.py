@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.auditor import Check
 from kerfpath.cad import Departure, Part, departure_from
@@ -79,6 +81,11 @@ class CutResult:
     def picked(self) -> bool:
         """Whether the plan is one of a Pareto set, with another objective than the job."""
         return self.request.run is not None
+
+    @property
+    def lacks_poses(self) -> bool:
+        """Whether there is no plan, and some node of the contour has no pose."""
+        return self.broken is not None and not np.diff(self.graph.start).all()
 
     @property
     def passed(self) -> bool:

@@ -1,0 +1,78 @@
+"""Where a part may move so that the robot has poses all along its contours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import count, takewhile
+
+import numpy as np
+
+from kerfpath.arrays import Array
+from kerfpath.contour import Contour
+from kerfpath.job.format import Job
+from kerfpath.options import PlanOptions
+
+STEP, FARTHEST = 0.02, 3.0
+"""Step and largest length of the moves that are tried, m."""
+COARSE = np.radians(10.0)
+"""Least step of gamma, rad, with which places are looked at first."""
+PLACES = 12
+"""Nodes of each contour that are looked at first."""
+
+
+def move_into_reach(job: Job, contours: Sequence[tuple[Contour, PlanOptions]]) -> str:
+    """Return words on the shortest move of the part after which every node has poses; "" if none.
+
+    It leads towards axis 1 of the robot or away from it, up or down. It is tried at every node of
+    the contours, with all that their options ask of a pose; it is quickest if those without poses
+    come first. It says nothing about motions and collisions. None is known with external axes.
+    """
+    if job.robot.free.size:
+        return ""
+    for where, move in _moves(job, contours):
+        moved = replace(job, placement=_shifted(job.placement, move))
+        if all(_reaches(moved, *each, PLACES) for each in contours) and all(
+            _reaches(moved, *each) for each in contours
+        ):
+            by = " ".join(f"{v:g}" for v in move * 1e3 + 0.0)
+            return (
+                f"with the part moved {np.linalg.norm(move) * 1e3:.0f} mm {where} (by {by} mm in "
+                "the robot base, see xyz_mm in [part]) every node has poses"
+            )
+    return ""
+
+
+def _reaches(job: Job, nodes: Contour, options: PlanOptions, places: int = 0) -> bool:
+    """Return whether every node has poses; with `places`, only so many, at a coarse gamma."""
+    some = None
+    if places:
+        some = np.unique(np.linspace(0, len(nodes) - 1, places).astype(np.int64))
+        options = replace(options, gamma_step=max(COARSE, options.gamma_step))
+    return bool(np.diff(job.graph(nodes, options, only=some).start).all())
+
+
+def _moves(
+    job: Job, contours: Sequence[tuple[Contour, PlanOptions]]
+) -> Iterator[tuple[str, Array]]:
+    """Yield moves (3,) m in whole mm, the shortest first, and where they lead."""
+    middle = np.concatenate([nodes.points for nodes, _ in contours]).mean(axis=0)
+    x, y, _ = job.placement[:3, :3] @ middle + job.placement[:3, 3]
+    towards = -np.array([x, y, 0.0]) / max(np.hypot(x, y), STEP)
+    up = np.array([0.0, 0.0, 1.0])
+    ways = {
+        "towards the robot": towards,
+        "away from the robot": -towards,
+        "up": up,
+        "down": -up,
+    }
+    for far in takewhile(lambda far: far <= FARTHEST, (STEP * k for k in count(1))):
+        for where, way in ways.items():
+            if where != "towards the robot" or far < np.hypot(x, y):
+                yield where, np.round(far * way, 3)
+
+
+def _shifted(placement: Array, move: Array) -> Array:
+    T = placement.copy()
+    T[:3, 3] += move
+    return T
