@@ -57,9 +57,11 @@ def main() -> None:
         for issue in kerfpath.audit(dipped):
             assert issue.level == "warning", issue
             print(f"  {issue}")
+    # Around the corner only pieces of a millimetre are fast enough; the default is 10 mm or more.
     pieces = kerfpath.plan_in_pieces(
-        contour, robot, tool=tool, placement=placement, gamma_step=step, speed=0.15, method="exact"
-    )
+        contour, robot, tool=tool, placement=placement, gamma_step=step, speed=0.15,
+        method="exact", least_piece=1e-4,
+    )  # fmt: skip
     print(f"interrupted: {len(pieces)} pieces of {[len(p.q) for p in pieces]} nodes")
 
 

@@ -16,6 +16,11 @@ from kerfpath.job import foresee, prepare, read_job, run_prepared
 from studio.talk import write_job
 
 
+def _hears():
+    """Let a process hear Ctrl-C even if the tests run in the background, where it is ignored."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 @pytest.fixture
 def started(tmp_path):
     """Start the command, and return its process and the address that it prints."""
@@ -25,7 +30,7 @@ def started(tmp_path):
         command = [sys.executable, "-m", "kerfpath", "studio", *map(str, arguments)]
         process = subprocess.Popen(
             [*command, "--no-browser"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True, cwd=tmp_path,
+            text=True, cwd=tmp_path, preexec_fn=_hears,
         )  # fmt: skip
         processes.append(process)
         line = process.stdout.readline()
