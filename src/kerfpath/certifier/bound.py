@@ -120,8 +120,6 @@ def certify(
     ------
     InputError
         A gap or a time that is not positive.
-    StopEarly
-        The work is stopped before any bound is proved, or before a certificate is whole.
     """
     gap = scalar(gap, "gap", above=0.0)
     until = np.inf
@@ -140,7 +138,7 @@ def certify(
     certification = _Certification(plan, steps, gap, until, checkable, progress)
     try:
         certification.run()
-    except StopEarly:
+    except StopEarly:  # a certificate must be whole
         if checkable or not certification.best:
             raise
     stages = tuple(certification.stages) if checkable else None
