@@ -224,6 +224,11 @@ SHORT = 40
 """Most characters of a text, or of a collection whose items are shown."""
 
 
+def spread(count: int, most: int) -> Ints:
+    """Return at most so many of the numbers from 0 to count - 1, evenly spread, both ends."""
+    return np.unique(np.linspace(0, count - 1, most).astype(np.int64))
+
+
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun in singular or plural: "1 face", "2 faces"."""
     return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -86,6 +86,11 @@ class LayeredGraph:
         return np.asarray(self.reason.reshape(K, -1, len(self.gamma), P).min(axis=1))
 
     @property
+    def has_poses_throughout(self) -> bool:
+        """Whether every node has a pose."""
+        return bool(np.diff(self.start).all())
+
+    @property
     def postures_throughout(self) -> Ints:
         """Numbers of the postures that have a pose at every node."""
         return np.flatnonzero((self.reason == 0).any(axis=1).all(axis=0))

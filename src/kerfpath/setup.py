@@ -41,8 +41,11 @@ class Setup:
 
     def folded(self, joints: Bools) -> Setup:
         """Return the setup with some joints (n,) of its robot endless."""
-        cell = None if self.cell is None else self.cell.folded(joints)
-        return replace(self, robot=self.robot.folded(joints), cell=cell)
+        if not joints.any():
+            return self
+        robot = self.robot.folded(joints)
+        cell = None if self.cell is None else self.cell.with_endless(robot.endless)
+        return replace(self, robot=robot, cell=cell)
 
     @classmethod
     def of(

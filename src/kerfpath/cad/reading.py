@@ -121,13 +121,7 @@ def read(
     if (options.section is None) != (not options.heights):
         raise InputError("section and section_at: expected both, or none of them")
     if not isinstance(path, str | PathLike):
-        for name, value in (("columns", columns), ("sort", sort)):
-            if value is not None:
-                raise InputError(f"shape: {name}: expected a table, got a shape")
-        if options.section is not None:
-            raise InputError("shape: section: expected a triangle mesh, got a shape")
-        if beam is not None:
-            raise InputError("shape: beam: expected a program of a robot, got a shape")
+        _require_fit(options, "shape", "", "a shape")
         return _read_shape(path, options, progress)
     path = Path(path)
     content = content_of(path, _EXPECTED)
@@ -140,13 +134,7 @@ def read(
         raise InputError(f"{path}: the file is empty; expected {_EXPECTED}")
     if outer_towards is not None and kind not in ("STEP", "IGES"):
         raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
-    for name, value in (("columns", columns), ("sort", sort)):
-        if value is not None and kind != "table":
-            raise InputError(f"{path}: {name}: expected a table, got a {kind} file")
-    if options.section is not None and kind != "mesh":
-        raise InputError(f"{path}: section: expected a triangle mesh, got a {kind} file")
-    if beam is not None and kind != "robot program":
-        raise InputError(f"{path}: beam: expected a program of a robot, got a {kind} file")
+    _require_fit(options, path, kind, f"a {kind} file")
     part = _read_file(kind, path, content, options, progress)
     question = None if unit is not None else unit_question(part.unit, part.bounding_box)
     return part if question is None else replace(part, notes=(*part.notes, question))
@@ -167,6 +155,21 @@ class _ReadOptions:
     heights: tuple[float, ...]
 
     __repr__ = short_repr
+
+
+_OF_ONE_KIND = {
+    "columns": ("table", "a table"),
+    "sort": ("table", "a table"),
+    "section": ("mesh", "a triangle mesh"),
+    "beam": ("robot program", "a program of a robot"),
+}
+"""Options for files of one kind, and that kind in words."""
+
+
+def _require_fit(options: _ReadOptions, name: object, kind: str, got: str) -> None:
+    for option, (needed, expected) in _OF_ONE_KIND.items():
+        if getattr(options, option) is not None and kind != needed:
+            raise InputError(f"{name}: {option}: expected {expected}, got {got}")
 
 
 def _beam(value: str | Sequence[str] | None) -> str | tuple[str, str] | None:

@@ -215,12 +215,10 @@ class Cell:
         motions = self._sweep.clear(corners[:-1], corners[1:], self.required, self._scene.distances)
         return bool(motions.all())
 
-    def folded(self, joints: Bools) -> Cell:
-        """Return this cell, with the same bodies, with some joints (n,) endless."""
-        if not joints.any():
-            return self
+    def with_endless(self, endless: Bools) -> Cell:
+        """Return this cell with other joints (n,) endless; its bodies are not prepared again."""
         other = copy(self)
-        object.__setattr__(other, "endless", freeze(self.endless | joints))
+        object.__setattr__(other, "endless", bools(endless, "endless", self.endless.shape))
         return other
 
     def increments(self, q0: Array, q1: Array) -> Array:

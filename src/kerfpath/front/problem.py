@@ -345,12 +345,12 @@ def plan_run(
     if windowed:
         _require_ranges(asked, windowed)
         narrowed, graph = _narrowed(robot, graph, run.window, windowed, asked)
-        cell = cell and replace(cell, endless=narrowed.endless)
+        cell = cell and cell.with_endless(narrowed.endless)
     there = replace(setup, robot=narrowed, cell=cell)
     if run.begin:
         made = refined_motion(contour, there, asked, speed=speed, graph=graph, begin=run.begin)
     else:
-        empty = robot.externals and not np.diff(graph.start).all()
+        empty = robot.externals and not graph.has_poses_throughout
         made = best_motion(
             contour,
             there,

@@ -13,6 +13,10 @@ from kerfpath.planner.task import Task
 from kerfpath.plans import Plan
 
 
+def unheard(what: str) -> None:
+    """Do nothing with the name of a phase: nobody listens."""
+
+
 @dataclass(slots=True, kw_only=True, eq=False)
 class Attempt:
     """A task, what strategies need to plan it, and why none has found a plan so far.

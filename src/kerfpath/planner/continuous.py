@@ -10,7 +10,7 @@ import numpy as np
 
 from kerfpath import refiner
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.planner.attempt import Attempt, Strategy, first_plan
+from kerfpath.planner.attempt import Attempt, Strategy, first_plan, unheard
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.courses import can_explore
 from kerfpath.planner.exploration import Exploration
@@ -203,7 +203,7 @@ def _finer(task: Task) -> Task | None:
 def clear_motion(
     task: Task,
     finder: CollisionFreeSearch,
-    begin: Callable[[str], None] = lambda what: None,
+    begin: Callable[[str], None] = unheard,
     *,
     thorough: bool = True,
     explored: bool = True,
@@ -241,14 +241,17 @@ def _clear_motion(
     task = task.whole()
     searched = clear_paths(task, finder, QUICK if starts.best is None else ())
     if searched is None:
-        begin(f"search on the grid{_about_speed(task, finder, [])}")
+        _begin("search on the grid", begin, task, finder, [])
         return starts.best
     search, paths = searched
     if starts.best is not None and starts.above(search.value, ENOUGH):
         paths = [path for beam in QUICK for path in search.paths(beam)]
     if starts.best is None and task.settings.feed == "constant":
         refuse_impossible(task, finder, paths)
-    begin("refinement" if starts.best else f"refinement{_about_speed(task, finder, paths)}")
+    if starts.best is None:
+        _begin("refinement", begin, task, finder, paths)
+    else:
+        begin("refinement")
     try:
         starts.refine(paths)
         if thorough and explored and finder.is_free and can_explore(task):
@@ -262,13 +265,21 @@ def _clear_motion(
     return starts.best
 
 
-def _about_speed(task: Task, finder: CollisionFreeSearch, paths: list[ContinuousPath]) -> str:
-    """Return words on the speed at which the best path keeps the limits, if that is too slow.
+def _begin(
+    what: str,
+    begin: Callable[[str], None],
+    task: Task,
+    finder: CollisionFreeSearch,
+    paths: list[ContinuousPath],
+) -> None:
+    """Begin a phase; say at which speed the best path keeps the limits, if that is too slow.
 
-    It is one of `paths`, or else a path without (6); "" where the feed may be reduced.
+    It is one of `paths`, or else a path without (6). It is not known where the feed may be reduced,
+    and not looked for if nobody listens.
     """
-    if task.settings.feed != "constant" or task.contour.time is not None:
-        return ""
+    if begin is unheard or task.settings.feed != "constant" or task.contour.time is not None:
+        begin(what)
+        return
     if not paths:
         without = task.problem.limits.without_acceleration()
         free = task.with_problem(replace(task.problem, limits=without))
@@ -277,11 +288,9 @@ def _about_speed(task: Task, finder: CollisionFreeSearch, paths: list[Continuous
     claim = Proof(optimal=False, statement="")
     plans = [refiner.reduce_excess(task.plan_between(path, claim), most=0) for path in paths]
     dt = min((interval_of(task, plan) for plan in plans), default=np.inf)
-    return (
-        f", first estimate of a possible speed {speed_at(task, dt)}"
-        if task.dt < dt < np.inf
-        else ""
-    )
+    if task.dt < dt < np.inf:
+        what = f"{what}, first estimate of a possible speed {speed_at(task, dt)}"
+    begin(what)
 
 
 def _explore(task: Task, starts: Starts, search: ContinuousSearch) -> None:

@@ -18,7 +18,7 @@ from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.kernels.metric import increments, wrap
 from kerfpath.options import PlanOptions
-from kerfpath.planner.attempt import Attempt
+from kerfpath.planner.attempt import Attempt, unheard
 from kerfpath.planner.coarse import (
     Coarse,
     End,
@@ -240,7 +240,7 @@ def graph_over_courses(
         No plan is found, see `best_external_motion`.
     """
     task = planning_task(contour, setup, options, speed=speed)
-    plans = _plans(task, CollisionFreeSearch(task), lambda what: None)
+    plans = _plans(task, CollisionFreeSearch(task), unheard)
     ways: list[Array] = []
     for made in sorted(plans, key=lambda plan: plan.cost):
         if not any(np.allclose(made.course, other, atol=SAME_COURSE) for other in ways):
@@ -296,7 +296,7 @@ def faster_motions(
     while rung < len(RUNGS):
         at = replace(task, dt=best.dt / RUNGS[rung])
         try:
-            made = _along(courses(at, clear=finder.clear), at, finder, lambda what: None).best
+            made = _along(courses(at, clear=finder.clear), at, finder, unheard).best
         except NoFeasiblePath:
             made = None
         faster = best if made is None else faster_motion(task, finder, made, best)

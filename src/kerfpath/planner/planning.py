@@ -20,7 +20,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.options import KEEPS, PlanKeywords, PlanOptions, with_keywords
-from kerfpath.planner.attempt import Attempt, Strategy, first_plan
+from kerfpath.planner.attempt import Attempt, Strategy, first_plan, unheard
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.continuous import (
     OVER_CONTINUOUS_GAMMA,
@@ -76,7 +76,7 @@ def best_motion(
         As `kerfpath.plan`.
     """
     options = replace(options, certify=None)
-    begin = phase or (lambda what: None)
+    begin = phase or unheard
 
     def planned(unfold: Bools) -> Plan:
         task = planning_task(contour, setup, options, speed=speed, graph=graph, unfold=unfold)
@@ -303,7 +303,7 @@ def plan(
         attempt = Attempt(
             task=task,
             finder=CollisionFreeSearch(task),
-            begin=phase or (lambda what: None),
+            begin=phase or unheard,
             refine=asked.refine,
         )
         return first_plan(attempt, strategies(task))
@@ -410,7 +410,7 @@ def plan_in_pieces(
     """
     asked = with_keywords(options, keywords, PieceKeywords, interruptions="fewest")
     require_nodes_alone(asked, "plan_in_pieces")
-    setup, begin = Setup.of(robot, tool, placement, cell), phase or (lambda what: None)
+    setup, begin = Setup.of(robot, tool, placement, cell), phase or unheard
 
     def planned(unfold: Bools) -> list[Plan]:
         task = planning_task(

@@ -1075,11 +1075,12 @@ def can_back_off(
         Distance kept from every joint limit in the backed-off pose.
     """
     arm, q = robot.arm, q[:, : robot.arm.joints]
-    T, back = arm.forward(q) @ tool, q
-    step, reached = retract / RETRACT_PARTS * T[:, :3, 2], np.ones(len(q), np.bool_)
+    flange, back = arm.forward(q).copy(), q
+    step = retract / RETRACT_PARTS * (flange @ tool)[:, :3, 2]
+    reached = np.ones(len(q), np.bool_)
     for _ in range(RETRACT_PARTS):
-        T[:, :3, 3] -= step
-        there = arm.follow(T @ np.linalg.inv(tool), back, posture)
+        flange[:, :3, 3] -= step
+        there = arm.follow(flange, back, posture)
         reached &= (np.abs(there - back) <= JUMP).all(axis=1)  # false out of reach, at NaN
         back = np.where(reached[:, None], there, back)
     limits = robot.alone().joint_limits()

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from kerfpath.arrays import Array, Bools, Ints, floats, not_negative, scalar, short_repr
+from kerfpath.arrays import Array, Bools, Ints, floats, not_negative, scalar, short_repr, spread
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -400,7 +400,7 @@ def plan_part(
     served: list[Iterable[int]] = [()] * len(groups)
     if not robot.free.size:
         for i, candidates in enumerate(groups):
-            few = np.unique(np.linspace(0, len(candidates[0]) - 1, FEW).astype(int))
+            few = spread(len(candidates[0]), FEW)
             graph = layered_graph(
                 candidates[0], robot, tool=tool, placement=placement, options=wanted, nodes=few,
                 fold=folds(robot, wanted, 0.0),

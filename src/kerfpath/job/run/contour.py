@@ -111,14 +111,12 @@ def cut_candidate(
             with shown_by(show):
                 plans: tuple[Plan, ...] = (planned(plan) if run is None else follow(run),)
         except NoFeasiblePath:
-            if job.options.interruptions == "none" or not np.diff(graph.start).all():
+            if job.options.interruptions == "none" or not graph.has_poses_throughout:
                 raise
             plans = planned(plan_in_pieces)
     except NoFeasiblePath as broken:
         return (replace(whole, broken=broken),)
-    begin("audit")
-    with unstopped():
-        return tuple(_audited(prepared, whole, made) for made in plans)
+    return _all_audited(prepared, whole, plans, begin)
 
 
 def _whole(
@@ -165,9 +163,7 @@ def _cut_along_courses(
         return (replace(whole, broken=broken),)
     graph = job.graph(nodes, external=course_of_plans(job, nodes, plans), progress=solved)
     whole = _whole(job, request, candidate, graph, cell, begin)
-    begin("audit")
-    with unstopped():
-        return tuple(_audited(prepared, whole, made) for made in plans)
+    return _all_audited(prepared, whole, plans, begin)
 
 
 def _at_nodes(job: Job) -> PlanOptions:
@@ -263,7 +259,7 @@ def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutRes
         progress(f"{cut.request.task.name}: looking for a remedy", 0, 0)
         if run is None and opens_without_windows(job, cut.request, cut.candidate, cell):
             cut = replace(cut, advice=Remedy(other_method=False, without_windows=True))
-        if not (np.diff(graph.start).all() and plain and constant):
+        if not (graph.has_poses_throughout and plain and constant):
             return cut
         found = find_remedy(job, cut.request, cut.candidate, graph, cell, broken.relaxation)
         if found is not None:
@@ -271,6 +267,15 @@ def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutRes
             advice = replace(found[0], without_windows=free)
             cut = replace(cut, advice=advice, fastest=found[1])
     return cut
+
+
+def _all_audited(
+    prepared: PreparedJob, whole: CutResult, plans: Sequence[Plan], begin: Callable[[str], None]
+) -> tuple[CutResult, ...]:
+    """Return the cuts of the plans of a contour, even if the searches are to end early."""
+    begin("audit")
+    with unstopped():
+        return tuple(_audited(prepared, whole, made) for made in plans)
 
 
 def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:

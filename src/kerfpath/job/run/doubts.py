@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from kerfpath.arrays import Array, Ints
+from kerfpath.arrays import Array, Ints, spread
 from kerfpath.cad import Triangles
 from kerfpath.contour import Contour
 from kerfpath.job.format import Job
@@ -63,7 +63,7 @@ def sides_in_doubt(
 
 def _before_the_tip(part: Triangles, nodes: Contour) -> float:
     """Return how far before the tip the beam meets the part, m, at the nearest; inf if nowhere."""
-    some = np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), MOST_NODES)).astype(int))
+    some = spread(len(nodes), min(len(nodes), MOST_NODES))
     axes = nodes.axes[some]
     across = np.cross(axes, np.eye(3)[np.abs(axes).argmin(axis=1)])
     across /= np.linalg.norm(across, axis=1)[:, None]

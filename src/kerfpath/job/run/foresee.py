@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath.arrays import Array, Bools, Ints, short_repr
+from kerfpath.arrays import Array, Bools, Ints, short_repr, spread
 from kerfpath.cad import Part
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -103,8 +103,8 @@ def check_job(job: Job, part: Part | None = None) -> JobPreview:
     for task in job.tasks(part):
         nodes = task.sample(task.candidates(part)[0])
         contours.append((task.name, nodes))
-        asked.append((nodes, replace(task.asked(job.options), certify=None)))
-        some = np.unique(np.linspace(0, len(nodes) - 1, PLACES).astype(np.int64))
+        asked.append((nodes, task.asked(job.options)))
+        some = spread(len(nodes), PLACES)
         graph = job.graph(nodes, plain, only=some, external=places_of(job, nodes))
         q = graph.q[: graph.start[1]]
         starts.append(_start(task.name, len(nodes), q, cell))

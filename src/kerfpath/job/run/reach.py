@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import count, takewhile
 
 import numpy as np
 
-from kerfpath.arrays import Array
+from kerfpath.arrays import Array, spread
 from kerfpath.contour import Contour
 from kerfpath.job.format import Job
 from kerfpath.options import PlanOptions
@@ -47,9 +46,9 @@ def _reaches(job: Job, nodes: Contour, options: PlanOptions, places: int = 0) ->
     """Return whether every node has poses; with `places`, only so many, at a coarse gamma."""
     some = None
     if places:
-        some = np.unique(np.linspace(0, len(nodes) - 1, places).astype(np.int64))
+        some = spread(len(nodes), places)
         options = replace(options, gamma_step=max(COARSE, options.gamma_step))
-    return bool(np.diff(job.graph(nodes, options, only=some).start).all())
+    return job.graph(nodes, options, only=some).has_poses_throughout
 
 
 def _moves(
@@ -66,7 +65,7 @@ def _moves(
         "up": up,
         "down": -up,
     }
-    for far in takewhile(lambda far: far <= FARTHEST, (STEP * k for k in count(1))):
+    for far in STEP * np.arange(1, round(FARTHEST / STEP) + 1):
         for where, way in ways.items():
             if where != "towards the robot" or far < np.hypot(x, y):
                 yield where, np.round(far * way, 3)

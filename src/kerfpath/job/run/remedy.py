@@ -209,7 +209,7 @@ def find_remedy(
     ceiling = continuous and request.task.time_step is None
     # Every speed found with folded joints is tried with all their turns by `trial`.
     folded = replace(job, robot=job.robot.folded(graph.is_folded))
-    around = None if cell is None else cell.folded(graph.is_folded)
+    around = None if cell is None else cell.with_endless(folded.robot.endless)
     try:
         fastest = fastest_along(
             folded, candidate.nodes, around, refine=leaves_grid(job), graph=graph, ceiling=ceiling,

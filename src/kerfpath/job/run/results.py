@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.auditor import Check
 from kerfpath.cad import Departure, Part, departure_from
@@ -85,7 +83,7 @@ class CutResult:
     @property
     def lacks_poses(self) -> bool:
         """Whether there is no plan, and some node of the contour has no pose."""
-        return self.broken is not None and not np.diff(self.graph.start).all()
+        return self.broken is not None and not self.graph.has_poses_throughout
 
     @property
     def passed(self) -> bool:

@@ -434,7 +434,7 @@ class PlacementEvaluator(Evaluator):
     ) -> InfeasiblePlacement:
         """Return why and where a contour has no path."""
         status: Status = "speed"
-        if not np.diff(graph.start).all():
+        if not graph.has_poses_throughout:
             status = "unreachable"
         elif self.goal != "motion" or broken.lost_by(Loss.COLLISION):
             status = "collision"

@@ -298,7 +298,7 @@ class OffGridEvaluator(PlacementEvaluator):
             coarse = replace(options, gamma_step=STEP)
             course = self.courses.get(contour.nodes)
             graph = self.job.graph(contour.nodes, coarse, only=nodes, external=course)
-            if np.diff(graph.start).all():
+            if graph.has_poses_throughout:
                 return graph
         return self.graph(contour.nodes, nodes)
 
