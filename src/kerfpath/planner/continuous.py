@@ -42,7 +42,8 @@ BETTER = 1e-4
 COARSE_STEP = np.radians(1.5)
 """rad: step of gamma from which a search that finds nothing is repeated with half the step."""
 NEARLY = 0.95
-"""Share of the speed at which a motion must have been found for that."""
+"""Share of the speed at which a motion must have been found for that. A path that keeps the limits
+at more than this share of the speed, before it is refined, is not called too slow."""
 
 
 def plan_continuous(task: Task, finder: CollisionFreeSearch, begin: Callable[[str], None]) -> Plan:
@@ -288,7 +289,7 @@ def _begin(
     claim = Proof(optimal=False, statement="")
     plans = [refiner.reduce_excess(task.plan_between(path, claim), most=0) for path in paths]
     dt = min((interval_of(task, plan) for plan in plans), default=np.inf)
-    if task.dt < dt < np.inf:
+    if task.dt < NEARLY * dt < np.inf:
         what = f"{what}, first estimate of a possible speed {speed_at(task, dt)}"
     begin(what)
 
