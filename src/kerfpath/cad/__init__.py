@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from kerfpath.cad.departure import Departure as Departure
     from kerfpath.cad.departure import departure_from as departure_from
     from kerfpath.cad.left_out import LeftOut as LeftOut
+    from kerfpath.cad.machine import Machine as Machine
     from kerfpath.cad.part import Loop as Loop
     from kerfpath.cad.part import Part as Part
     from kerfpath.cad.reading import read as read
@@ -25,6 +26,7 @@ _HOME = {
     "GAP": "units",
     "LeftOut": "left_out",
     "Loop": "part",
+    "Machine": "machine",
     "Part": "part",
     "SUFFIXES": "units",
     "Triangles": "sides",

@@ -1,10 +1,11 @@
-"""Read moves of Heidenhain's plain-language programs: L and LN, with tool axis TX TY TZ."""
+"""Read moves of Heidenhain's programs: L and LN, with tool axis TX TY TZ or rotary axes."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 
+from kerfpath.cad.machine import GIVE_MACHINE, Machine
 from kerfpath.cad.toolpath import Tip, ToolPath, Triple, finite, unit_axis
 from kerfpath.errors import InputError
 from kerfpath.text import upper
@@ -32,16 +33,16 @@ def is_klartext(lines: Sequence[str]) -> bool:
     return BEGIN.match(upper(first)) is not None
 
 
-def klartext_path(lines: Sequence[str]) -> ToolPath:
+def klartext_path(lines: Sequence[str], machine: Machine | None) -> ToolPath:
     """Return the moves of a program.
 
     Raises
     ------
     InputError
-        A block that is not known, that changes the path, or that needs the kinematics of the
-        machine (its line is named).
+        A block that is not known, that changes the path, or that needs a machine that is not given
+        (its line is named).
     """
-    program = _Program()
+    program = _Program(machine)
     for number, line in enumerate(lines, start=1):
         text = re.sub(r"^[ \t]*[0-9]+\b", "", upper(line).partition(";")[0]).strip(" \t")
         if text:
@@ -54,11 +55,10 @@ def klartext_path(lines: Sequence[str]) -> ToolPath:
 class _Program:
     """The state of the program, which the next block is read with."""
 
-    def __init__(self) -> None:
-        self.tip = Tip()
+    def __init__(self, machine: Machine | None) -> None:
+        self.tip = Tip(machine)
         self.unit = ""
         self.unused: set[str] = set()
-        self._keeps_tip = False
         self._end = 0
 
     def take(self, line: int, where: str, text: str) -> None:
@@ -82,12 +82,15 @@ class _Program:
         elif text.startswith("END PGM") or text.removeprefix("STOP ") in ENDS:
             self._end = line
         elif NO_TCPM.match(text):
-            self._keeps_tip = False
-            self.tip.forget(line)
+            self._keep_tip(line, keeps=False)
         elif HARMLESS.match(text) and kind not in CHANGING:
-            if TCPM.match(text) and not self._keeps_tip:
-                self._keeps_tip = True
-                self.tip.forget(line)
+            if TCPM.match(text):
+                if "AXIS SPAT" in text:
+                    raise InputError(
+                        f"{where}: 'AXIS SPAT': A, B and C that are no rotary axes; write AXIS POS"
+                    )
+                self.tip.even = "PATHCTRL VECTOR" in text
+                self._keep_tip(line, keeps=True)
             elif kind == "TOOL":
                 self.tip.forget(line)
             self.unused.add(kind)
@@ -104,11 +107,8 @@ class _Program:
             if word.startswith("I") or found is None or word in ("RL", "RR"):
                 raise InputError(f"{where}: {word[:40]!r}: {_reason(word)}")
             name, text = found[1], found[2]
-            if name in ("A", "B", "C"):
-                raise InputError(
-                    f"{where}: {name}: the effect of a rotary axis depends on the kinematics of "
-                    "the machine; have the CAM system write LN with TX TY TZ, or APT"
-                )
+            if name in ("A", "B", "C") and self.tip.machine is None:
+                raise InputError(f"{where}: {name}: a rotary axis; {GIVE_MACHINE}")
             if name in ("M", "F"):
                 is_rapid |= (name, text) == ("F", "MAX")
                 extras.add(f"M{text}" if name == "M" else "F")
@@ -118,26 +118,31 @@ class _Program:
                 values[name] = finite(text.replace(",", "."), f"{where}: {name}")
         if changing := [each for each in CHANGING if each in extras]:
             raise InputError(f"{where}: {changing[0]!r}: {_reason(changing[0])}")
-        if "M128" in extras and not self._keeps_tip:
-            self._keeps_tip = True
-            self.tip.forget(line)
+        if "M128" in extras:
+            self._keep_tip(line, keeps=True)
         self.unused |= {each[0] for each in extras} | {n for n in NORMAL if n in values}
         self._go(line, where, values, extras, is_rapid)
         if "M129" in extras:
-            self._keeps_tip = False
-            self.tip.forget(line)
+            self._keep_tip(line, keeps=False)
         if any(each in extras for each in ENDS):
             self._end = line
+
+    def _keep_tip(self, line: int, *, keeps: bool) -> None:
+        """Switch the tool-centre-point control on or off."""
+        if self.tip.tcp is not keeps:
+            self.tip.tcp = keeps
+            self.tip.forget(line)
 
     def _go(
         self, line: int, where: str, values: dict[str, float], extras: set[str], is_rapid: bool
     ) -> None:
         place = {name: values[name] for name in "XYZ" if name in values}
+        angles = {name: values[name] for name in "ABC" if name in values}
         axis: Triple | None = None
         if any(name in values for name in AXIS):
             if missing := [name for name in AXIS if name not in values]:
                 raise InputError(f"{where}: TX, TY and TZ belong together; {missing[0]} is missing")
-            if not self._keeps_tip:
+            if not self.tip.tcp:
                 raise InputError(f"{where}: TX TY TZ without M128, which they need")
             axis = unit_axis((values["TX"], values["TY"], values["TZ"]), where)
         elif any(name in values for name in NORMAL):
@@ -147,9 +152,9 @@ class _Program:
                 raise InputError(
                     f"{where}: M91 at feed: its position is in machine coordinates, not in the part"
                 )
-            self.tip.go_away(line)
-        elif place or axis:
-            self.tip.go(line, feed=not is_rapid, place=place, axis=axis)
+            self.tip.go_away(line, angles)
+        elif place or axis or angles:
+            self.tip.go(line, feed=not is_rapid, place=place, axis=axis, angles=angles)
 
 
 def _reason(word: str) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from kerfpath.arrays import Array
 from kerfpath.cad.klartext import is_klartext, klartext_path
+from kerfpath.cad.machine import GIVE_MACHINE, Machine
 from kerfpath.cad.part import Part
 from kerfpath.cad.toolpath import (
     UNKNOWN,
@@ -48,7 +49,6 @@ HARMLESS_G = (
 REFUSED_G: dict[float, str] = {
     **dict.fromkeys((5, 6), "a curve; have the CAM system write linear moves only"),
     **dict.fromkeys((41, 42), "the controller would offset the path; write the path of the tip"),
-    43.4: "rotary axes, whose effect depends on the machine; write G43.5 and I J K, or APT",
     90.1: "absolute centres of arcs; write them from the start of each arc, under G91.1",
     91: "increments; write absolute positions, under G90",
 }
@@ -72,27 +72,33 @@ ENDS = (2, 17, 30)
 TOOL_CHANGE = 6
 CALLS = (98, 99)
 UNUSED = "DFHMST"
-ROTARY = re.compile("[ABC][0-9]*")
+ROTARY = "ABC"
+ORIENTATION = re.compile("[ABC][0-9]+")
+BY_VECTOR = {"ORIVECT": True, "ORIPLANE": True, "ORIAXES": False}
+"""Whether the tool axis turns evenly from block to block, or the rotary axes do."""
 
 
 def read_nc(
-    path: Path, content: bytes, unit: str | None, gap: float, axis: Array | None = None
-) -> Part:
+    path: Path, content: bytes, unit: str | None, gap: float, axis: Array | None = None,
+    machine: Machine | None = None,
+) -> Part:  # fmt: skip
     """Return the cuts of a program for a machine, one per run of feed moves.
 
     Raises
     ------
     InputError
-        A word that is not known, that changes the path, or that needs the kinematics of the machine
+        A word that is not known, that changes the path, or that needs a machine that is not given
         (its line is named), no unit, no tool axis, no cut.
     """
+    if axis is not None and machine is not None:
+        raise InputError("axis or machine: expected one of them, as a machine has its tool axis")
     lines = lines_of(content)
-    tool_path = klartext_path(lines) if is_klartext(lines) else _siemens_path(lines)
-    return part_of_tool_path(path, tool_path, unit, gap, axis)
+    path_of = klartext_path if is_klartext(lines) else _siemens_path
+    return part_of_tool_path(path, path_of(lines, machine), unit, gap, axis, machine)
 
 
-def _siemens_path(lines: Sequence[str]) -> ToolPath:
-    program = _Program()
+def _siemens_path(lines: Sequence[str], machine: Machine | None) -> ToolPath:
+    program = _Program(machine)
     for number, line in enumerate(lines, start=1):
         text = TEXT.sub("", upper(line)).partition(";")[0].strip(" \t")
         if not text or HEADER.match(text):
@@ -160,8 +166,8 @@ class _Block:
 class _Program:
     """The state of the program, which the next block is read with."""
 
-    def __init__(self) -> None:
-        self.tip = Tip()
+    def __init__(self, machine: Machine | None) -> None:
+        self.tip = Tip(machine)
         self.unit = ""
         self.unused: set[str] = set()
         self._motion: int | None = None
@@ -189,7 +195,10 @@ class _Program:
         arc = self._arc(block, place) if self._motion in (2, 3) else None
         names = CENTRE if self._by_ijk else AXIS
         vector = [words.pop(name, 0.0) if name in words else None for name in names]
+        angles = {name: words.pop(name) for name in ROTARY if name in words}
         words.pop("N", None)
+        if angles and self.tip.machine is None:
+            raise InputError(f"{where}: {next(iter(angles))}: a rotary axis; {GIVE_MACHINE}")
         if 4 in block.g or 64 in block.g:
             words.pop("P", None)  # a time, or a tolerance
         if unknown := [name for name in words if name.rstrip("0123456789") not in UNUSED]:
@@ -197,12 +206,12 @@ class _Program:
         self.unused |= {name.rstrip("0123456789") for name in words} | ({"M"} if block.m else set())
         if called := [m for m in block.m if m in CALLS]:
             raise InputError(f"{where}: M{called[0]:g}: a program that is called is not read")
-        if 4 in block.g and place:
+        if 4 in block.g and (place or angles):
             raise InputError(f"{where}: G4 with X, Y or Z: expected G4 F")
-        if away and (place or not any(keyword in MACHINE for keyword in block.keywords)):
-            self._away(block)
-        elif place or arc is not None or any(value is not None for value in vector):
-            self._move(block, place, vector, arc)
+        if away and (place or angles or not any(word in MACHINE for word in block.keywords)):
+            self._away(block, angles)
+        elif place or angles or arc is not None or any(value is not None for value in vector):
+            self._move(block, place, vector, arc, angles)
         if TOOL_CHANGE in block.m:
             self.tip.forget(line)
         if any(m in ENDS for m in block.m):
@@ -212,12 +221,13 @@ class _Program:
         """Take the keywords; return whether the positions are in machine coordinates."""
         for keyword, arguments in block.keywords.items():
             if keyword == "TRAORI":
-                self._is_oriented = True
+                self._is_oriented = self.tip.tcp = True
                 self.tip.forget(block.line)
             elif keyword == "TRAFOOF":
-                self._is_oriented = False
+                self._is_oriented = self.tip.tcp = False
                 self.tip.go_away(block.line)
             elif keyword in HARMLESS:
+                self.tip.even = BY_VECTOR.get(keyword, self.tip.even)
                 self.unused.add(keyword)
             elif keyword not in MACHINE and not (keyword == "CYCLE800" and arguments == "()"):
                 raise InputError(
@@ -235,8 +245,11 @@ class _Program:
             self._motion = int(g)
         elif g in PLANES:
             self._plane = PLANES[int(g)]
-        elif g == 43.5 or (g == 49 and self._by_ijk):
+        elif g in (43.4, 43.5) or (g == 49 and self.tip.tcp):
+            if g == 43.4 and self.tip.machine is None:
+                raise InputError(f"{where}: G43.4: rotary axes; {GIVE_MACHINE}")
             self._by_ijk = self._is_oriented = g == 43.5
+            self.tip.tcp = g != 49
             self.tip.forget(block.line)
         elif g in UNITS:
             if self.unit != UNITS[int(g)] and (self.unit or self.tip.has_places):
@@ -252,14 +265,14 @@ class _Program:
             raise InputError(f"{where}: 'G{g:g}': {REFUSED_G.get(g, UNKNOWN)}")
         return False
 
-    def _away(self, block: _Block) -> None:
+    def _away(self, block: _Block, angles: Mapping[str, float]) -> None:
         machine = [f"G{g:g}" for g in block.g if f"G{g:g}" in MACHINE] + list(block.keywords)
         if self._motion and machine:
             raise InputError(
                 f"{block.where}: {machine[0]} at feed: its position is in machine coordinates, not "
                 "in the part"
             )
-        self.tip.go_away(block.line)
+        self.tip.go_away(block.line, angles)
 
     def _arc(
         self, block: _Block, place: Mapping[str, float]
@@ -303,7 +316,7 @@ class _Program:
 
     def _move(
         self, block: _Block, place: dict[str, float], vector: Sequence[float | None],
-        arc: Callable[[Triple, Triple], Arc] | None,
+        arc: Callable[[Triple, Triple], Arc] | None, angles: Mapping[str, float],
     ) -> None:  # fmt: skip
         if self._motion is None:
             raise InputError(f"{block.where}: a position before any G0 or G1")
@@ -313,13 +326,15 @@ class _Program:
                 raise InputError(f"{block.where}: A3 B3 C3 without TRAORI, which they need")
             a, b, c = (value or 0.0 for value in vector)  # the controller takes missing ones as 0
             axis = unit_axis((a, b, c), block.where, any_length=True)
-        self.tip.go(block.line, feed=self._motion > 0, place=place, axis=axis, arc=arc)
+        self.tip.go(
+            block.line, feed=self._motion > 0, place=place, axis=axis, arc=arc, angles=angles
+        )
 
 
 def _word_refusal(name: str) -> str:
-    if ROTARY.fullmatch(name):
+    if ORIENTATION.fullmatch(name):
         return (
-            f"{name}: the effect of a rotary axis or angle depends on the kinematics of the "
-            "machine; have the CAM system write the tool axis as a vector (A3= B3= C3=), or APT"
+            f"{name}: the effect of this angle depends on the control; have the CAM system write "
+            "the tool axis as a vector (A3= B3= C3=), or APT"
         )
     return f"{name!r}: {UNKNOWN}"

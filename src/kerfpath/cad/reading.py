@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kerfpath.arrays import Array, floats, freeze, require_one_of, scalar, short_repr
+from kerfpath.cad.machine import Machine
 from kerfpath.cad.part import Part
 from kerfpath.cad.table import Ends, TableCells, cells_of
 from kerfpath.cad.units import GAP, MM, SUFFIXES, UNITS_MM, require_unit, unit_question
@@ -56,6 +57,7 @@ def read(
     beam: str | Sequence[str] | None = None,
     section: ArrayLike | None = None,
     section_at: ArrayLike = (),
+    machine: Machine | None = None,
     progress: Progress = no_progress,
 ) -> Part:
     """Return the part in a drawing (STEP, IGES, DXF, a table, a mesh, a path) or a shape.
@@ -93,6 +95,8 @@ def read(
         For a mesh: the normal of parallel planes, whose loops are the contours.
     section_at : (K,) m
         Distance of each of these planes from the origin, along the normal.
+    machine : Machine, optional
+        For a program of a machine: its rotary axes, where the program moves some.
     progress : callable
         Called with the current step and the number of faces; see `kerfpath.progress`.
 
@@ -117,6 +121,7 @@ def read(
         beam=_beam(beam),
         section=_direction(section, "section"),
         heights=tuple(floats(section_at, "section_at", (None,)).tolist()),
+        machine=machine,
     )
     if (options.section is None) != (not options.heights):
         raise InputError("section and section_at: expected both, or none of them")
@@ -153,6 +158,7 @@ class _ReadOptions:
     beam: str | tuple[str, str] | None
     section: Direction | None
     heights: tuple[float, ...]
+    machine: Machine | None
 
     __repr__ = short_repr
 
@@ -162,6 +168,7 @@ _OF_ONE_KIND = {
     "sort": ("table", "a table"),
     "section": ("mesh", "a triangle mesh"),
     "beam": ("robot program", "a program of a robot"),
+    "machine": ("NC program", "a program of a machine"),
 }
 """Options for files of one kind, and that kind in words."""
 
@@ -230,7 +237,7 @@ def _read_file(
         if kind == "NC program":
             from kerfpath.cad.nc import read_nc
 
-            return read_nc(path, content, unit, gap, axis)
+            return read_nc(path, content, unit, gap, axis, options.machine)
         if kind == "robot program":
             from kerfpath.cad.programs import read_program
 

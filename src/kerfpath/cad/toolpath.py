@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import codecs
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -20,6 +22,7 @@ from kerfpath.cad.build import (
     trace_of_points,
 )
 from kerfpath.cad.left_out import counted
+from kerfpath.cad.machine import GIVE_CENTRE, GIVE_PIVOT, GIVE_TCP, Machine
 from kerfpath.cad.part import Loop, Part
 from kerfpath.cad.units import GIVE_AXIS, LARGEST, MM, NO_UNIT, UNITS_MM
 from kerfpath.contour import angle_between, slerp
@@ -42,11 +45,38 @@ ARC_ENDS, ARC_SHARE = 0.01, 1e-3
 as a share of its radius."""
 
 
+AXIS_CHORD = float(np.radians(0.01))
+"""Largest angle (rad) between the tool axis while rotary axes move, and that turned evenly."""
+ROTARY_STEP = 5.0
+"""Largest step (deg) of a rotary axis between points."""
+MOST_ROTARY = 36_000.0
+"""Largest way (deg) of a rotary axis in one block; longer ones are typing errors."""
+
+
 class Arc(NamedTuple):
     """An arc: its centre (3,), and the unit vector (3,) about which it runs counter-clockwise."""
 
     centre: Triple
     normal: Triple
+
+
+class Rotary(NamedTuple):
+    """The rotary axes of a machine at the end of a move.
+
+    Parameters
+    ----------
+    angles : (3,) deg
+        A, B and C.
+    tcp : bool or None
+        Whether the point is that of the tip in the part, see `Machine`; None if neither the program
+        nor the machine says.
+    even : bool
+        Whether the tool axis turns evenly, not the rotary axes.
+    """
+
+    angles: Triple
+    tcp: bool | None
+    even: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +98,8 @@ class Move:
         Name of the operation in the file.
     arc : Arc or None
         The arc that a feed move runs along; it rises evenly if its ends differ in height.
+    rotary : Rotary or None
+        The rotary axes, instead of `axis`, in the program of a machine that has them.
     """
 
     line: int | str
@@ -76,6 +108,7 @@ class Move:
     axis: Triple | None = None
     operation: str = ""
     arc: Arc | None = None
+    rotary: Rotary | None = None
 
     __repr__ = short_repr
 
@@ -95,28 +128,45 @@ class ToolPath:
 class Tip:
     """The tip of a tool, moved by the program of a machine; what a block leaves out is kept.
 
-    Z is 0 in a program that never gives it, as one for a flat sheet.
+    Z is 0 in a program that never gives it, as one for a flat sheet. Rotary axes are at 0 until the
+    program gives them.
+
+    Parameters
+    ----------
+    machine : Machine or None
+        The machine of a program with rotary axes.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, machine: Machine | None = None) -> None:
         self.moves: list[Move] = []
+        self.machine = machine
+        self.tcp: bool | None = None
+        """What the program said last about tool-centre-point control."""
+        self.even = False
+        """Whether the control turns the tool axis evenly, not the rotary axes."""
         self._place: dict[str, float] = {}
         self._axis: Triple | None = None
         self._level: list[int] | None = []
+        self._angles = dict.fromkeys(machine.axes, 0.0) if machine else {}
+        self._assumed: dict[str, int] = {}
 
     def go(
         self, line: int, *, feed: bool, place: dict[str, float], axis: Triple | None,
         arc: Callable[[Triple, Triple], Arc] | None = None,
+        angles: Mapping[str, float] = MappingProxyType({}),
     ) -> None:  # fmt: skip
         """Move to `place`, of which any of the coordinates "X", "Y" and "Z" may be missing.
 
-        `arc` returns the arc from the place before (3,) to this one (3,).
+        `arc` returns the arc from the place before (3,) to this one (3,); `angles` (deg) has the
+        rotary axes that move, by their letters.
 
         Raises
         ------
         InputError
-            A feed move with a coordinate that was never given.
+            A feed move with a coordinate that was never given, a rotary axis that the machine does
+            not have, or a turn of one that depends on the machine.
         """
+        rotary = self._turned(line, angles, feed=feed, has_axis=axis is not None)
         if "Z" in place:
             self._leave_level()
         before = [self._place.get(name) for name in "XYZ"]
@@ -139,11 +189,60 @@ class Tip:
             if x is None or y is None or z is None:
                 raise InputError(f"line {line}: an arc from a place that is not known")
             along = arc((x, y, z), point)
-        self.moves.append(Move(line=line, kind=kind, point=point, axis=self._axis, arc=along))
+        self.moves.append(
+            Move(line=line, kind=kind, point=point, axis=self._axis, arc=along, rotary=rotary)
+        )
 
-    def go_away(self, line: int) -> None:
-        """Move to a position that is not known in the part."""
+    def _turned(
+        self, line: int, angles: Mapping[str, float], *, feed: bool, has_axis: bool
+    ) -> Rotary | None:
+        """Return the rotary axes after they have moved."""
+        if (machine := self.machine) is None:
+            return None
+        if has_axis:
+            raise InputError(
+                f"line {line}: machine: expected rotary axes, but the program has the tool axis as "
+                "a vector; remove machine"
+            )
+        for name, angle in angles.items():
+            if name not in machine.axes:
+                raise InputError(
+                    f"line {line}: {name}: machine has the rotary axes {', '.join(machine.axes)}; "
+                    "add it to head or table"
+                )
+            before = self._angles.get(name)
+            way = 0.0 if before is None else angle - before
+            if abs(way) > MOST_ROTARY:
+                raise InputError(
+                    f"line {line}: {name} turns by {way:g} deg in one block, more than "
+                    f"{MOST_ROTARY / 360:g} turns; correct it"
+                )
+            if before is not None and machine.rollover and abs(way) != 180:
+                angle = before + way - 360 * round(way / 360)
+            elif feed and machine.rollover is None and 180 < abs(way) < 360:
+                raise InputError(
+                    f"line {line}: {name} turns from {before:g} to {angle:g} deg at feed: say "
+                    f"whether by {way - np.copysign(360, way):g} deg, rollover = true in machine, "
+                    f"or by {way:g} deg, rollover = false"
+                )
+            self._angles[name] = angle
+            self._assumed.setdefault(name, 0)
+        if feed and (unknown := [name for name in machine.axes if name not in self._angles]):
+            raise InputError(
+                f"line {line}: a move at feed, but {unknown[0]} was not given after it moved to a "
+                "place in the machine"
+            )
+        for name in machine.axes if feed else ():
+            self._assumed.setdefault(name, line)
+        a, b, c = (self._angles.get(name, 0.0) for name in "ABC")
+        tcp = self.tcp if machine.tcp is None else machine.tcp
+        return Rotary((a, b, c), tcp, self.even)
+
+    def go_away(self, line: int, turned: Iterable[str] = ()) -> None:
+        """Move to a position that is not known in the part, with the rotary axes `turned`, too."""
         self._place, self._axis = {}, None
+        for name in turned:
+            self._angles.pop(name, None)
         self.moves.append(Move(line=line, kind="away"))
 
     def forget(self, line: int) -> None:
@@ -164,7 +263,14 @@ class Tip:
     @property
     def notes(self) -> list[str]:
         """What was assumed."""
-        return ["no move gives Z, which is taken as 0"] if self._level else []
+        notes = ["no move gives Z, which is taken as 0"] if self._level else []
+        if self.machine is not None:
+            notes += [
+                f"{name} is taken as 0 in line {line}, as no line before gives it"
+                for name, line in self._assumed.items()
+                if line
+            ]
+        return notes
 
     @property
     def has_places(self) -> bool:
@@ -221,8 +327,9 @@ def unit_axis(vector: Triple, where: str, *, any_length: bool = False) -> Triple
 
 
 def part_of_tool_path(
-    path: Path, tool_path: ToolPath, unit: str | None, gap: float, axis: Array | None
-) -> Part:
+    path: Path, tool_path: ToolPath, unit: str | None, gap: float, axis: Array | None,
+    machine: Machine | None = None,
+) -> Part:  # fmt: skip
     """Return the part whose loops are the cuts of a tool path: `cut1`, `cut2`, ...
 
     Parameters
@@ -235,6 +342,8 @@ def part_of_tool_path(
         Largest distance between the ends of a closed cut.
     axis : (3,) or None
         The tool axis, into the part, where the file has none.
+    machine : Machine or None
+        The machine whose rotary axes the moves have.
 
     Raises
     ------
@@ -251,11 +360,15 @@ def part_of_tool_path(
         notes.append(f"unit {unit} as given; the file says {tool_path.unit}")
     if axis is not None and all(move.axis for move in tool_path.moves if move.kind == "feed"):
         raise InputError("axis: expected a tool path without tool axes, but this one has them")
+    if machine is not None:
+        cuts = [move for move in tool_path.moves if move.kind == "feed"]
+        turned = [move.rotary.tcp for move in cuts if move.rotary is not None]
+        notes.append(machine.said(tcp=bool(turned and turned[-1])))
     loops: list[Loop] = []
     holes = 0
     for run in _runs(tool_path.moves):
         name = f"cut{len(loops) + 1}"
-        points, normals, lines = _arrays(run, UNITS_MM[unit or tool_path.unit], axis)
+        points, normals, lines = _arrays(run, UNITS_MM[unit or tool_path.unit], axis, machine)
         first, last = _trimmed(points, normals)
         if last - first < 1:
             holes += 1
@@ -263,7 +376,7 @@ def part_of_tool_path(
         notes += _left_out_of(name, points, normals, lines, first, last)
         inner = slice(first, last + 1)
         trace, repaired = trace_of_points(points[inner], normals[inner], lines[inner], gap / MM)
-        _require_across(points[inner], normals[inner], lines[inner])
+        _require_across(points[inner], normals[inner], lines[inner], turning=machine is not None)
         notes += [f"contour {name!r}: {what}" for what in repaired]
         if first == 0 and run[0].kind == "feed":
             notes.append(f"contour {name!r} begins in line {run[0].line}: no position before it")
@@ -306,53 +419,119 @@ def _runs(moves: Sequence[Move]) -> list[list[Move]]:
     return runs
 
 
-def _arrays(run: Sequence[Move], mm: float, axis: Array | None) -> tuple[Array, Array, Array]:
+def _arrays(
+    run: Sequence[Move], mm: float, axis: Array | None, machine: Machine | None
+) -> tuple[Array, Array, Array]:
     """Return points (K, 3) mm, unit normals (K, 3) and lines (K,) of a run."""
-    normals = []
-    for move in run:
-        if move.axis is not None:
-            normals.append(np.array(move.axis))
-        elif axis is not None:
-            normals.append(-axis / np.linalg.norm(axis))
-        else:
-            raise InputError(f"line {move.line}: no tool axis is known here; {GIVE_AXIS}")
-    points = np.array([move.point for move in run]) * mm
-    if (far := np.flatnonzero((np.abs(points) > LARGEST).any(axis=1))).size:
+    ends = np.array([move.point for move in run]) * mm
+    if (far := np.flatnonzero((np.abs(ends) > LARGEST).any(axis=1))).size:
         raise InputError(
             f"line {run[far[0]].line}: a point further than {LARGEST / 1e6:g} km from the "
             "origin; check the unit"
         )
-    lines = np.array([move.line for move in run])
-    return _with_arcs(run, points, np.array(normals), lines, mm)
-
-
-def _with_arcs(
-    run: Sequence[Move], points: Array, normals: Array, lines: Array, mm: float
-) -> tuple[Array, Array, Array]:
-    """Return the points, normals and lines with those of chords along the arcs of a run."""
-    each = [(points[:1], normals[:1], lines[:1])]
     if run[0].arc is not None:
         raise InputError(f"line {run[0].line}: an arc from a place that is not known")
-    for k in range(1, len(run)):
-        arc, way, axes = run[k].arc, points[k : k + 1], normals[k : k + 1]
-        if arc is not None:
-            share, way = _chords_of(arc, points[k - 1], points[k], mm, run[k].line)
-            axes = slerp(normals[k - 1], normals[k], share[:, None])
-        each.append((way, axes, np.full(len(way), lines[k])))
-    found = [np.concatenate(one) for one in zip(*each, strict=True)]
-    return found[0], found[1], found[2]
+    ways = [_way(run[k], ends[k - 1], ends[k], mm) for k in range(1, len(run))]
+    if machine is None:
+        each = _with_axes(run, ends, ways, axis)
+    else:
+        each = _with_rotary_axes(run, ends, ways, machine)
+    points, normals = (np.concatenate(one) for one in zip(*each, strict=True))
+    lines = np.array([move.line for move in run])
+    return points, normals, np.repeat(lines, [len(one) for one, _ in each])
 
 
-def _chords_of(
-    arc: Arc, start: Array, end: Array, mm: float, line: int | str
-) -> tuple[Array, Array]:
-    """Return shares (K,) of an arc, and the points (K, 3) mm there, without its start."""
+Placed = tuple[Array, Array]
+"""Points (K, 3) mm, and unit normals (K, 3) there."""
+
+
+class _Way(NamedTuple):
+    """Least number of chords along a move, and a function of shares (K,): points (K, 3) mm."""
+
+    steps: int
+    at: Callable[[Array], Array]
+
+
+def _with_axes(
+    run: Sequence[Move], ends: Array, ways: Sequence[_Way], axis: Array | None
+) -> list[Placed]:
+    """Return the points (K, 3) mm and normals (K, 3) of each move; the tool axis turns evenly."""
+    normals = np.empty_like(ends)
+    for k, move in enumerate(run):
+        if move.axis is not None:
+            normals[k] = move.axis
+        elif axis is not None:
+            normals[k] = -axis / np.linalg.norm(axis)
+        else:
+            raise InputError(f"line {move.line}: no tool axis is known here; {GIVE_AXIS}")
+    each = [(ends[:1], normals[:1])]
+    return each + [_even(way, *normals[k : k + 2]) for k, way in enumerate(ways)]
+
+
+def _even(way: _Way, before: Array, after: Array) -> Placed:
+    share = np.linspace(0, 1, way.steps + 1)[1:]
+    return way.at(share), slerp(before, after, share[:, None]) if way.steps > 1 else after[None]
+
+
+def _with_rotary_axes(
+    run: Sequence[Move], ends: Array, ways: Sequence[_Way], machine: Machine
+) -> list[Placed]:
+    """Return the points (K, 3) mm and normals (K, 3) of each move; all axes move evenly."""
+    rotary = [move.rotary for move in run if move.rotary is not None]
+    tcp = rotary[-1].tcp
+    if tcp is None and machine.head:
+        raise InputError(f"line {run[-1].line}: {GIVE_TCP}")
+    if not tcp and machine.head and machine.pivot is None:
+        raise InputError(f"line {run[-1].line}: {GIVE_PIVOT}")
+    in_part = partial(machine.in_part, tcp=bool(tcp))
+    each = [in_part(ends[:1], np.array([rotary[0].angles]))]
+    for way, move, before, after in zip(ways, run[1:], rotary, rotary[1:], strict=False):
+        start, turn = np.array(before.angles), np.subtract(after.angles, before.angles)
+        if tcp and after.even:
+            axes = in_part(np.zeros((2, 3)), np.array([before.angles, after.angles]))[1]
+            each.append(_even(way, *axes))
+            continue
+
+        def at(share: Array, way: _Way = way, start: Array = start, turn: Array = turn) -> Placed:
+            return in_part(way.at(share), start + share[:, None] * turn)
+
+        steps = max(way.steps, int(np.ceil(np.abs(turn).max() / ROTARY_STEP)))
+        sampled = _sampled(at, steps)
+        if len(sampled[0]) == 1 and turn.any() and machine.table and not tcp:
+            raise InputError(f"line {move.line}: {GIVE_CENTRE}")
+        each.append(sampled)
+    return each
+
+
+def _sampled(at: Callable[[Array], Placed], steps: int) -> Placed:
+    """Return points (K, 3) mm and normals (K, 3) along a move, without its start.
+
+    Straight lines between them leave it by at most `ARC_CHORD`, the axis by at most `AXIS_CHORD`.
+    The tip may stay in place: then only the end is returned.
+    """
+    while True:
+        points, axes = at(np.linspace(0, 1, 2 * steps + 1))
+        if np.ptp(points, axis=0).max() <= REPEATED:
+            return points[-1:], axes[-1:]
+        aside = np.linalg.norm(points[1::2] - (points[:-1:2] + points[2::2]) / 2, axis=1)
+        turned = angle_between(axes[1::2], axes[:-1:2] + axes[2::2])
+        excess = max(aside.max() / ARC_CHORD, turned.max() / AXIS_CHORD)
+        if excess <= 1:
+            return points[2::2], axes[2::2]
+        steps = int(np.ceil(steps * max(np.sqrt(excess), 1.02)))
+
+
+def _way(move: Move, start: Array, end: Array, mm: float) -> _Way:
+    """Return the way of a move as its program has it: a line, or an arc."""
+    arc = move.arc
+    if arc is None:
+        return _Way(1, lambda share: (1 - share[:, None]) * start + share[:, None] * end)
     z, centre = np.array(arc.normal), np.array(arc.centre) * mm
     flat = [p - centre - ((p - centre) @ z) * z for p in (start, end)]
     radii = [float(np.linalg.norm(p)) for p in flat]
     if not min(radii) > 0 or abs(radii[1] - radii[0]) > ARC_ENDS + ARC_SHARE * radii[0]:
         raise InputError(
-            f"line {line}: an arc that begins {radii[0]:.6g} mm from its centre and ends "
+            f"line {move.line}: an arc that begins {radii[0]:.6g} mm from its centre and ends "
             f"{radii[1]:.6g} mm from it; check its centre, and whether it is absolute or from the "
             "start"
         )
@@ -362,12 +541,14 @@ def _chords_of(
     if np.linalg.norm(flat[1] - flat[0]) <= REPEATED:
         turn = 2 * np.pi
     step = 2 * np.arccos(max(0.0, 1 - ARC_CHORD / max(radii)))
-    share = np.linspace(0, 1, int(np.ceil(turn / step)) + 1)[1:]
-    angle, radius = turn * share[:, None], radii[0] + share[:, None] * (radii[1] - radii[0])
-    rise = ((start - centre) @ z + share * ((end - start) @ z))[:, None]
-    points = centre + radius * (np.cos(angle) * x + np.sin(angle) * y) + rise * z
-    points[-1] = end
-    return share, points
+
+    def at(share: Array) -> Array:
+        angle, radius = turn * share[:, None], radii[0] + share[:, None] * (radii[1] - radii[0])
+        rise = ((start - centre) @ z + share * ((end - start) @ z))[:, None]
+        points = centre + radius * (np.cos(angle) * x + np.sin(angle) * y) + rise * z
+        return np.where(share[:, None] == 1, end, points)
+
+    return _Way(int(np.ceil(turn / step)), at)
 
 
 def _along(points: Array, normals: Array, ends: np.ufunc = np.maximum) -> Array:
@@ -408,9 +589,14 @@ def _left_out_of(
     return notes
 
 
-def _require_across(points: Array, normals: Array, lines: Array) -> None:
-    """Raise InputError if the tip moves along the tool axis within a cut."""
+def _require_across(points: Array, normals: Array, lines: Array, *, turning: bool) -> None:
+    """Raise InputError if the tip moves along the tool axis within a cut; if `turning`, steadily.
+
+    Where rotary axes turn at a corner, the tip may do so in passing.
+    """
     moved = np.linalg.norm(np.diff(points, axis=0), axis=1) > REPEATED
+    if turning:
+        moved &= (normals[1:] == normals[:-1]).all(axis=1)
     if (bad := np.flatnonzero(moved & _along(points, normals))).size:
         raise InputError(
             f"line {lines[bad[0] + 1]}: a move along the tool axis within a cut; if it is an "

@@ -68,6 +68,33 @@ Columns = Annotated[
     str | None,
     typer.Option(help='Columns of a table: x,y,z,-,nx,... in order, or x=NAME,"y=A, B",...'),
 ]
+Sort = Annotated[
+    Literal["open", "closed"] | None,
+    typer.Option(help="Sort the points of a table, which are in no order, along a curve."),
+]
+Beam = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Output of a robot program that is on while it cuts, as $OUT[5]; twice: the "
+        "statements that switch on and off; or the speed of its cuts, as '120 mm/s'."
+    ),
+]
+Section = Annotated[
+    tuple[float, float, float] | None,
+    typer.Option(help="Normal of planes that cut a mesh: their loops are the contours."),
+]
+SectionMm = Annotated[
+    list[float] | None,
+    typer.Option(help="Distance of such a plane along its normal, mm; once for each."),
+]
+Machine = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TABLE",
+        help="Rotary axes of the machine whose program it is, as machine of [part] in a job: "
+        "'{ head = \"CB\", tcp = true }'.",
+    ),
+]
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
 Strict = Annotated[
     bool, typer.Option("--strict", help="Refuse a program that would only give a warning.")
@@ -146,7 +173,8 @@ def demo(to: Out = None, as_json: Json = False) -> None:
 @app.command()
 def new(
     drawing: Annotated[
-        Path, typer.Argument(metavar="PART", help="STEP, IGES, DXF, or a table of points (CSV).")
+        Path,
+        typer.Argument(metavar="PART", help="STEP, IGES, DXF, a mesh, points (CSV), or a path."),
     ],
     robot: Annotated[
         str | None,
@@ -157,6 +185,11 @@ def new(
     outer_towards: OuterTowards = None,
     axis: Axis = None,
     columns: Columns = None,
+    sort: Sort = None,
+    beam: Beam = None,
+    section: Section = None,
+    section_mm: SectionMm = None,
+    machine: Machine = None,
     to: Annotated[
         Path | None,
         typer.Option("--out", metavar="JOB.toml", help="Job to write; default: PART.toml."),
@@ -181,6 +214,11 @@ def new(
         outer_towards=outer_towards,
         axis=axis,
         columns=columns,
+        sort=sort,
+        beam=beam,
+        section=section,
+        section_at=[height / 1000 for height in section_mm or ()],
+        machine=machine,
     )
     write_new(how, to, robot=robot)
 
@@ -277,25 +315,11 @@ def contours(
     outer_towards: OuterTowards = None,
     axis: Axis = None,
     columns: Columns = None,
-    sort: Annotated[
-        Literal["open", "closed"] | None,
-        typer.Option(help="Sort the points of a table, which are in no order, along a curve."),
-    ] = None,
-    beam: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Output of a robot program that is on while it cuts, as $OUT[5]; twice: the "
-            "statements that switch on and off; or the speed of its cuts, as '120 mm/s'."
-        ),
-    ] = None,
-    section: Annotated[
-        tuple[float, float, float] | None,
-        typer.Option(help="Normal of planes that cut a mesh: their loops are the contours."),
-    ] = None,
-    section_mm: Annotated[
-        list[float] | None,
-        typer.Option(help="Distance of such a plane along its normal, mm; once for each."),
-    ] = None,
+    sort: Sort = None,
+    beam: Beam = None,
+    section: Section = None,
+    section_mm: SectionMm = None,
+    machine: Machine = None,
     html: Annotated[
         Path | None,
         typer.Option(help="HTML page to write: the part with its loops by name."),
@@ -326,6 +350,7 @@ def contours(
         beam=beam,
         section=section,
         section_at=[height / 1000 for height in section_mm or ()],
+        machine=machine,
     )
     list_contours(drawn(drawing), html, everything=everything)
 

@@ -14,7 +14,7 @@ from rich.markup import escape
 from kerfpath.arrays import counted
 from kerfpath.cad import Loop, Part
 from kerfpath.cli.show import busy, out, print_json, progress_bars, show_files, table
-from kerfpath.job import Drawing, Job
+from kerfpath.job import Drawing, Job, machine_of
 from kerfpath.post import write_program
 from kerfpath.report import DrawnLoop, render_drawing
 
@@ -34,8 +34,12 @@ def drawing_by(
     beam: list[str] | None = None,
     section: tuple[float, float, float] | None = None,
     section_at: Sequence[float] = (),
+    machine: str | None = None,
 ) -> Drawing:
-    """Return a drawing by the options of a command; `columns` is x,y,z,... or x=NAME,y=NAME,..."""
+    """Return a drawing by the options of a command.
+
+    `columns` is x,y,z,... or x=NAME,y=NAME,...; `machine` is as in a job.
+    """
     return Drawing(
         file=file,
         unit=unit,
@@ -47,6 +51,7 @@ def drawing_by(
         beam=beam[0] if beam and len(beam) == 1 else beam or None,
         section=None if section is None else np.array(section),
         section_at=tuple(section_at),
+        machine=None if machine is None else machine_of(machine, "--machine"),
     )
 
 

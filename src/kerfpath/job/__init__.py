@@ -28,6 +28,7 @@ from kerfpath.job.format import ProgramTable as ProgramTable
 from kerfpath.job.format import all_of as all_of
 from kerfpath.job.format import cell_of_job as cell_of_job
 from kerfpath.job.format import heads as heads
+from kerfpath.job.format import machine_of as machine_of
 from kerfpath.job.format import places_of as places_of
 from kerfpath.job.format import pose as pose
 from kerfpath.job.format import prepare as prepare

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath.arrays import Array, counted
-from kerfpath.cad import GAP, Loop, Part
+from kerfpath.cad import GAP, Loop, Machine, Part
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job.format import Drawing, pose
@@ -162,8 +162,28 @@ def _reading(drawing: Drawing) -> str:
         "outer_towards": drawing.outer_towards,
         "axis": drawing.axis,
         "columns": drawing.columns,
+        "sort": drawing.sort,
+        "beam": drawing.beam,
+        "section": drawing.section,
+        "section_mm": np.round(np.multiply(drawing.section_at, 1e3), 9)
+        if drawing.section_at
+        else None,
+        "machine": None if drawing.machine is None else _machine(drawing.machine),
     }
     return "".join(f"{key} = {_toml(value)}\n" for key, value in given.items() if value is not None)
+
+
+def _machine(machine: Machine) -> dict[str, object]:
+    given = {
+        "head": machine.head or None,
+        "table": machine.table or None,
+        "tcp": machine.tcp,
+        "rollover": machine.rollover,
+        "reversed": machine.reversed or None,
+        "pivot_mm": None if machine.pivot is None else round(machine.pivot * 1e3, 9),
+        "centre_mm": np.round(np.multiply(machine.centre, 1e3), 9) if any(machine.centre) else None,
+    }
+    return {key: value for key, value in given.items() if value is not None}
 
 
 def _toml(value: object) -> str:

@@ -17,6 +17,7 @@ from kerfpath.job.format.prepared import divide_nodes as divide_nodes
 from kerfpath.job.format.prepared import prepare as prepare
 from kerfpath.job.format.reading import Job as Job
 from kerfpath.job.format.reading import home_of as home_of
+from kerfpath.job.format.reading import machine_of as machine_of
 from kerfpath.job.format.reading import places_of as places_of
 from kerfpath.job.format.reading import read_job as read_job
 from kerfpath.job.format.tables import TABLES as TABLES

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from kerfpath.arrays import Array, short_repr
-from kerfpath.cad import GAP, Part
+from kerfpath.cad import GAP, Machine, Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.progress import Progress, no_progress
 
@@ -39,6 +39,8 @@ class Drawing:
         Normal of the planes that cut a mesh, see `kerfpath.cad.read`.
     section_at : tuple of float, m
         Distance of each of them along the normal.
+    machine : Machine or None
+        The rotary axes of the machine whose program it is, see `kerfpath.cad.read`.
     accept_left_out : bool
         Whether geometry that may have to be cut may be left out.
     """
@@ -53,6 +55,7 @@ class Drawing:
     beam: str | Sequence[str] | None = None
     section: Array | None = None
     section_at: tuple[float, ...] = ()
+    machine: Machine | None = None
     accept_left_out: bool = False
 
     __repr__ = short_repr
@@ -78,5 +81,6 @@ class Drawing:
             beam=self.beam,
             section=self.section,
             section_at=self.section_at,
+            machine=self.machine,
             progress=progress,
         )

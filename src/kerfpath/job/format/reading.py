@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from kerfpath.arrays import Array, Ints, freeze, short_repr
-from kerfpath.cad import SUFFIXES, Part, unit_question
+from kerfpath.cad import SUFFIXES, Machine, Part, unit_question
 from kerfpath.cell import Cell
 from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour
@@ -29,9 +29,11 @@ from kerfpath.job.format.tables import (
     ExternalTable,
     JobFile,
     LayoutTable,
+    MachineTable,
     SequenceTable,
 )
 from kerfpath.job.format.tables.plan import said_in_keys
+from kerfpath.job.format.tables.table import Table
 from kerfpath.job.format.tolerances import Tolerances
 from kerfpath.job.format.values import nearest
 from kerfpath.options import OptionConflict, PlanOptions
@@ -394,6 +396,29 @@ def _require_text(path: Path, text: str, tables: Mapping[str, Any]) -> None:
             )
 
     look(tables, ())
+
+
+class _OnlyPart(Table):
+    class _OnlyMachine(Table):
+        machine: MachineTable
+
+    part: _OnlyMachine
+
+
+def machine_of(text: str, name: str) -> Machine:
+    """Return the machine in the value of a key `machine` of [part], such as { head = "CB" }.
+
+    Raises
+    ------
+    InputError
+        It is not valid; the message begins with `name`.
+    """
+    source = f"part.machine = {text}"
+    try:
+        file = _OnlyPart.model_validate(_tables(Path(name), source))
+    except ValidationError as error:
+        raise refusal(Path(name), source, error) from None
+    return file.part.machine.machine()
 
 
 def _tables(path: Path, text: str) -> dict[str, Any]:

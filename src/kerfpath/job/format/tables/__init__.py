@@ -18,6 +18,7 @@ from kerfpath.job.format.tables.job import LayoutTable as LayoutTable
 from kerfpath.job.format.tables.job import ProgramTable as ProgramTable
 from kerfpath.job.format.tables.job import SequenceTable as SequenceTable
 from kerfpath.job.format.tables.part import ContourTable as ContourTable
+from kerfpath.job.format.tables.part import MachineTable as MachineTable
 from kerfpath.job.format.tables.plan import PlanTable as PlanTable
 from kerfpath.job.format.tables.robot import ExternalTable as ExternalTable
 from kerfpath.job.format.tables.table import given as given

@@ -9,7 +9,8 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from kerfpath.arrays import Array, freeze
-from kerfpath.cad import GAP, UNITS_MM, Loop, Part
+from kerfpath.cad import GAP, UNITS_MM, Loop, Machine, Part
+from kerfpath.errors import InputError
 from kerfpath.job.format.drawing import Drawing
 from kerfpath.job.format.tables.table import Table, given, require_one
 from kerfpath.job.format.values import (
@@ -21,6 +22,7 @@ from kerfpath.job.format.values import (
     Three,
     existing,
     fault,
+    fault_in_words,
     key,
     one_of,
     pose,
@@ -146,6 +148,56 @@ class SmoothAxesTable(Table):
 # The [part] table: the CAD file, and where the part is.
 
 
+class MachineTable(Table):
+    """[part.machine]: the rotary axes of the machine whose program the drawing is."""
+
+    head: Annotated[
+        Text | None,
+        key("the axes that carry the tool, the one that carries the other first", '"CB"'),
+    ] = None
+    table: Annotated[
+        Text | None,
+        key("the axes that carry the part, the one that carries the other first", '"AC"'),
+    ] = None
+    tcp: Annotated[
+        bool | None,
+        key("whether the control keeps the tip at X, Y, Z while axes turn (true, false)", "true"),
+    ] = None
+    rollover: Annotated[
+        bool | None, key("whether axes take the shorter way to an angle (true or false)", "true")
+    ] = None
+    reversed: Annotated[Text | None, key("axes that count against ISO 841", '"A"')] = None
+    pivot_mm: Annotated[
+        NotNegative | None,
+        key("the distance of the tip from the axes of the head, in mm, without tcp", "150"),
+    ] = None
+    centre_mm: Annotated[
+        Three,
+        key("3 numbers, where the axes of the table meet, in mm, without tcp", "[0, 0, -30]"),
+    ] = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _is_machine(self) -> MachineTable:
+        try:
+            self.machine()
+        except InputError as error:
+            raise fault_in_words(str(error), ("head",)) from None
+        return self
+
+    def machine(self) -> Machine:
+        """Return the machine."""
+        x, y, z = np.divide(self.centre_mm, 1000).tolist()
+        return Machine(
+            head=self.head or "",
+            table=self.table or "",
+            tcp=self.tcp,
+            rollover=self.rollover,
+            reversed=self.reversed or "",
+            pivot=None if self.pivot_mm is None else self.pivot_mm / 1000,
+            centre=(x, y, z),
+        )
+
+
 class PartTable(Table):
     """[part]: the CAD file, and where the part is in the robot base."""
 
@@ -197,6 +249,7 @@ class PartTable(Table):
         tuple[Number, ...],
         key("distances of these planes along their normal, in mm", "[20, 40]", strict=False),
     ] = ()
+    machine: MachineTable | None = None
     left_out: Annotated[
         Literal["refuse", "accept"],
         key("what to do if something to cut may be left out of the drawing", '"accept"'),
@@ -243,6 +296,7 @@ class PartTable(Table):
             beam=self.beam,
             section=_direction(self.section),
             section_at=tuple(height / 1000 for height in self.section_mm),
+            machine=None if self.machine is None else self.machine.machine(),
             accept_left_out=self.left_out == "accept",
         )
 
