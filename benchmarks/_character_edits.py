@@ -97,6 +97,7 @@ LEXES = {
     "val3": Lexis(mark="//", said='logMsg("{}")'),
     "urscript": Lexis(mark=r"#|^\s*\$", said='textmsg("{}")',
                       extra=("set_payload(3.5)", "set_target_payload(3.5, [0, 0, 0.09])")),
+    "linuxcnc": Lexis(mark=r";|^#(?!\d)", caseless=True),
     "ros": Lexis(mark=r"(?:^|(?<=[ \t]))#"),
     "csv": Lexis(),
 }  # fmt: skip
@@ -371,11 +372,19 @@ OTHER_ENDS = "ends of lines"
 REMARK = {
     "rapid": "! {}", "krl": "; {}", "fanuc": "   1:  ! {} ;", "inform": "'{}", "val3": "// {}",
     "urscript": "# {}", "ros": "# {}",
+    "linuxcnc": "; {}",
 }  # fmt: skip
+
+
+def _is_configuration(lines: list[str], language: str) -> bool:
+    """Return whether a file is no program but INI or HAL, whose remarks are lines with #."""
+    return language == "linuxcnc" and lines[0].startswith("# ")
 
 
 def _body(lines: list[str], language: str) -> list[int]:
     """Return the numbers of lines before which a statement may stand."""
+    if _is_configuration(lines, language):
+        return []
     if language == "fanuc":
         first, last = lines.index("/MN") + 1, lines.index("/POS")
         return [k for k in range(first, last + 1) if ":  P[" not in lines[k]]
@@ -453,7 +462,7 @@ def _empty(lines: list[str], language: str, rng: np.random.Generator) -> Made:
 
 def _cases(lines: list[str], language: str, rng: np.random.Generator) -> Made:
     k = int(rng.integers(len(lines)))
-    if not LEXES[language].caseless or '"' in lines[k]:
+    if not LEXES[language].caseless or '"' in lines[k] or _is_configuration(lines, language):
         return None
     line = _random((str.upper, str.lower, str.swapcase), rng)(lines[k])
     return "case", k, _with(lines, k, line), line.strip()
@@ -483,7 +492,8 @@ def _digits(lines: list[str], language: str, rng: np.random.Generator) -> Made:
     k = int(rng.integers(len(lines)))
     alive = live(lines[k], language)
     ends = [m for m in re.finditer(r"(\.\d+?)0+(?![\w.])", lines[k]) if alive[m.start()]]
-    if not ends or language in ("fanuc", "inform", "ros"):
+    exact = language in ("fanuc", "inform", "ros") or _is_configuration(lines, language)
+    if not ends or exact:
         return None
     m = _random(ends, rng)
     line = lines[k][: m.start()] + m[1] + lines[k][m.end() :]

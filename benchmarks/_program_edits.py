@@ -90,6 +90,12 @@ WORDS = {
         idle=(r".*movej\(.*, (v=[\d.]+), t=.*",),  # the time counts
         held=(r"\s*(?:laser|gas)_ahead.*",),
     ),
+    "linuxcnc": Words(
+        remark=r"\s*(;.*)?|#(?!\d).*",
+        families=(*STATES, r"\bM6[2-5]\b", r"\bG(?:1|53 G1|61\.1)\b", r"\bP[01]\b"),
+        orderless=(r"M65 P\d",),
+        held=(r"  G6(?:1\.1|4 .*)",),
+    ),
     "ros": Words(remark=r"\s*(#.*)?", families=(*STATES, r"\b(?:laser|gas)\b"),
                  held=(r"- {positions.*",)),
     "csv": Words(remark=r"", families=(*STATES, r"\b(?:laser|gas)\b", r"\b(?:linear|joint)\b")),

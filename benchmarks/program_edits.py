@@ -93,6 +93,9 @@ external_pulses = [400.0, 2000.0]
 [program.urscript]
 laser_output = 0
 gas_output = 1
+[program.linuxcnc]
+laser_output = 0
+gas_output = 1
 """
 """A hole with a micro joint and an open slit, gas, pierce and lead times."""
 EXTERNAL = """\

@@ -129,7 +129,7 @@ def variants(name: str) -> dict[str, str]:
 
 # Jobs, planned.
 
-LANGUAGES = ("rapid", "krl", "fanuc", "val3", "inform", "urscript", "ros", "csv")
+LANGUAGES = ("rapid", "krl", "fanuc", "val3", "inform", "urscript", "ros", "csv", "linuxcnc")
 LASER = """\
 [program.krl]
 laser_output = 1

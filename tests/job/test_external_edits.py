@@ -11,7 +11,7 @@ from commands import run
 
 FAULTS, EDITS = 9, 6
 """One fault in so many beside those of external axes, and so many edits of the text, for each."""
-LANGUAGES = ("csv", "fanuc", "inform", "krl", "rapid", "ros")
+LANGUAGES = ("csv", "fanuc", "inform", "krl", "linuxcnc", "rapid", "ros")
 
 
 @pytest.fixture(scope="module")

@@ -83,6 +83,7 @@ def test_the_program_that_was_written_passes(folder, written):
         ("val3", "job/job.pjx"),
         ("ros", "job.yaml"),
         ("csv", "job.csv"),
+        ("linuxcnc", "job.ngc"),
     ],
 )
 def test_every_language_that_can_say_the_plan_passes_its_audit(folder, language, main):

@@ -9,7 +9,7 @@ from benchmarks import program_edits
 FAULTS, EDITS, CHARACTERS, HARMLESS = 6, 8, 60, 15
 """One fault in so many, and so many edits of the text, of its characters, and harmless ones, for
 each; the benchmark makes more."""
-LANGUAGES = ("csv", "fanuc", "inform", "krl", "rapid", "ros", "urscript", "val3")
+LANGUAGES = ("csv", "fanuc", "inform", "krl", "linuxcnc", "rapid", "ros", "urscript", "val3")
 RESETS = {
     "rapid": r"SetDO doGas,0;",
     "krl": r"\$OUT\[6\]=FALSE",
@@ -17,6 +17,7 @@ RESETS = {
     "inform": r"DOUT OT#\(6\) OFF",
     "val3": r"dioGas=false",
     "urscript": r"gas_set\(False\)",
+    "linuxcnc": r"M6[35] P1",
 }
 """What switches the gas off: at first, and wherever; a trajectory and a table have no such line."""
 TURNING = {

@@ -34,6 +34,8 @@ ARMS = {
     "urscript": ("ur_ur10e", (0.75, 0.1, 0.2)),
 }
 """A robot for each language that has outputs, and where a part lies that it reaches, m."""
+ASKING = {**ARMS, "linuxcnc": ("abb_irb4600_60_205", (1.05, -0.15, 0.61))}
+"""The same for each language that can ask partners and wait for them."""
 
 
 ZONE = 3e-4
@@ -92,6 +94,8 @@ class Case:
         A line without its number.
     timed : bool
         Whether it says times, which need limits of acceleration.
+    flying : bool
+        Whether it switches while the tip moves, though not ahead of a target.
     joint_step : float rad
         What digits leave of the joints of a target.
     posture_place, posture_reach : (3,) m, float rad
@@ -115,6 +119,7 @@ class Case:
     naming: str = r"\Z."
     bare: Callable = str
     timed: bool = False
+    flying: bool = False
     point: float = 1e-6
     joint_step: float = 2e-8
     posture_place: tuple[float, ...] = (0.55, 0.1, 0.9)
@@ -334,6 +339,22 @@ CASES = {
             comment=r"\s*#",
             naming=r"\s*(def )?\w+\(\):?",
             posture_place=(0.5, 0.2, 0.3),
+        ),
+        Case(
+            name="linuxcnc",
+            arm="abb_irb4600_60_205",
+            options={"laser_output": 0, "gas_output": 1},
+            build={"pierce_time": 0.3, "gas_lead": 0.2},
+            kinds="picmmcoo",
+            golden_files={
+                f"{CUT}{end}": f"golden_linuxcnc{end}" for end in (".ngc", ".ini", ".hal")
+            },
+            comment=r"\s*;|#",
+            naming=r"o<\w+> (sub|endsub|call)|MACHINE = \w+|HALFILE = \w+\.hal",
+            timed=True,
+            flying=True,
+            joint_step=1e-9,
+            windings=(-2, 0, 1),
         ),
         Case(
             name="csv",

@@ -204,6 +204,10 @@ EDITS = {
         ("e1_rail_mm", "e1_rail_deg", "e1_rail_mm"),
         (",20.000000000,0.000000000,", ",,0.000000000,", "expected a number with decimals"),
     ),
+    "linuxcnc": (
+        (" U20.00000000", "", "not expected here"),
+        ("JOINTS = 8", "JOINTS = 7", "expected 'JOINTS = 8'"),
+    ),
     "ros": (('"rail", "turn"', '"turn", "rail"', '"rail", "turn"'),),
 }
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from tests.post.cases import ARMS, refusal, renumbered
+from tests.post.cases import ASKING, refusal, renumbered
 from tests.post.test_handshakes import ASKED, program, settings
 
 from kerfpath import InputError
@@ -368,7 +368,7 @@ def test_answers_hold_for_one_contour():
     assert messages(flow, flow, late=off) == []
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", ASKING)
 @pytest.mark.parametrize("asked", [ASKED[:1], ASKED[2:], (ASKED[0], ASKED[2]), ASKED], ids=str)
 @pytest.mark.parametrize("contours", [("one",), ("one", "two")], ids=len)
 def test_all_handshakes_of_all_languages_end_safe_and_ask_again(name, asked, contours):
@@ -399,10 +399,11 @@ HANDSHAKE = {
     "val3": r"  (d[io]\w+=|while|disablePower|wait\(|endWhile)",
     "inform": r"DOUT|WAIT|\*WAIT|\*GO|JUMP|PAUSE",
     "urscript": r" +(set_standard_digital_out\([34], True|await_input\(\d)",
+    "linuxcnc": r"  (M64 P[34]|o<await_input> call|o<laser_with> call)",
 }
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", ASKING)
 def test_no_line_of_a_handshake_can_be_left_out_or_doubled(name):
     made, options = program(name, handshakes=ASKED), settings(name)
     files = post(made, name, options)

@@ -2,8 +2,9 @@
 
 import re
 
+import numpy as np
 import pytest
-from tests.post.cases import ARMS, refusal
+from tests.post.cases import ASKING, refusal
 
 from kerfpath import InputError, robot
 from kerfpath.post import (
@@ -20,6 +21,7 @@ from kerfpath.post import (
     post,
     preflight,
     read_program,
+    with_tips,
 )
 from programs import arc, codes, frames, hand_plan, with_steps
 
@@ -36,10 +38,12 @@ PORTS = {
 
 
 def program(name="rapid", contours=("one",), **options):
-    arm, place = ARMS[name]
+    arm, place = ASKING[name]
     tool, placement = frames()
     placement[:3, 3] = place
-    plans = [hand_plan(arc(each), robot(arm), tool, placement) for each in contours]
+    limits = {"acceleration": np.radians([500] * 6)} if name == "linuxcnc" else {}  # it says times
+    arm = robot(arm).with_limits(**limits)
+    plans = [hand_plan(arc(each), arm, tool, placement) for each in contours]
     return build_program(plans, gas_lead=0.2, pierce_time=0.1, lead_time=0.0, **options)
 
 
@@ -59,7 +63,7 @@ def test_partners_are_asked_before_the_way_down_and_released_after_the_way_back(
     assert len(made.steps) == len(program().steps) + 6
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", ASKING)
 def test_every_language_reads_its_handshakes_back(name):
     made, options = program(name, handshakes=ASKED), settings(name)
     files = post(made, name, options)
@@ -68,9 +72,9 @@ def test_every_language_reads_its_handshakes_back(name):
     found = [step.what for step in read.steps if isinstance(step, ReadHandshake)]
     assert found == [step for step in made.steps if isinstance(step, Request | Await)]
     without = post(program(name), name, options)
-    found = {
-        each.code for each in differences(read, read_program(without, name, made.robot, options))
-    }
+    other = read_program(without, name, made.robot, options)
+    frames = made.robot, made.T_flange_tip, made.T_base_part
+    found = {each.code for each in differences(*(with_tips(one, *frames) for one in (read, other)))}
     assert found == ({"handshakes"} if name == "inform" else {"handshakes", "switches"})
 
 
@@ -82,6 +86,7 @@ NEEDS = {
     "krl": ("$OUT[1]=$OUT[2] AND $OUT[3] AND $OUT[4]", " AND $OUT[{}]"),
     "fanuc": ("IF (DO[2] AND DO[3] AND DO[4]),DO[1]=(ON) ;", " AND DO[{}]"),
     "val3": ("dioLaser=dioGas and doShutter and doHeight", " and do{}"),
+    "linuxcnc": ("o<laser_with> call [18] [19] [20] [20]", " [{}]"),
     "urscript": (
         "laser_set(get_standard_digital_out(2) and get_standard_digital_out(3) and "
         "get_standard_digital_out(4))",
@@ -97,7 +102,7 @@ def test_the_laser_goes_on_only_with_gas_and_requests(name):
     files = post(made, name, options)
     line, needed = NEEDS[name]
     (file,) = [f for f, text in files.items() if line in text]
-    ports = ("Shutter", "Height") if name == "val3" else (3, 4)
+    ports = {"val3": ("Shutter", "Height"), "linuxcnc": (19, 20)}.get(name, (3, 4))
     edits = [line.replace(needed.format(port), "") for port in ports]
     edits += [line.replace(needed.format(ports[1]), needed.format(ports[0]))]
     edits += [line.replace("x4" if name == "rapid" else "4", "x1" if name == "rapid" else "1")]
@@ -125,6 +130,7 @@ EDITS = {
     "krl": [("$TIMER[20]=-4000", "$TIMER[20]=-9000"), ("$OUT[3]=TRUE", "$OUT[3]=FALSE")],
     "fanuc": [("$WAITTMOUT=400", "$WAITTMOUT=900"), ("DO[3]=ON", "DO[3]=OFF")],
     "val3": [("diReady==true,4.000", "diReady==true,9.000"), ("doShutter=true", "doShutter=false")],
+    "linuxcnc": [("[5] [4.000]", "[5] [9.000]"), ("  M64 P3", "  M65 P3")],
     "inform": [("IN#(5)=ON T=4.00", "IN#(5)=ON T=9.00"), ("OT#(3) ON", "OT#(3) OFF")],
     "urscript": [
         ("await_input(5, 4.000)", "await_input(5, 9.000)"),
@@ -138,7 +144,7 @@ ASK_AGAIN = ("krl", "val3", "inform")
 there."""
 
 
-@pytest.mark.parametrize(("name", "number"), [(name, k) for name in ARMS for k in (0, 1)])
+@pytest.mark.parametrize(("name", "number"), [(name, k) for name in ASKING for k in (0, 1)])
 def test_an_edited_handshake_is_found(name, number):
     made, options = program(name, handshakes=ASKED), settings(name)
     old, new = EDITS[name][number]
@@ -164,10 +170,11 @@ NO_ANSWER = {
     ),
     "inform": ("DOUT OT#(1) OFF\r\nDOUT OT#(2) OFF\r\nDOUT OT#(3)", "DOUT OT#(3)"),
     "urscript": ("    set_standard_digital_out(1, False)\n", ""),
+    "linuxcnc": ("  M65 P1\n  M65 P2\n", "  M65 P2\n"),
 }
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", ASKING)
 def test_without_an_answer_everything_is_switched_off_which_the_reader_requires(name):
     made, options = program(name, handshakes=ASKED), settings(name)
     files = post(made, name, options)
@@ -179,7 +186,7 @@ def test_without_an_answer_everything_is_switched_off_which_the_reader_requires(
             read_program(files | {file: files[file].replace(old, new)}, name, made.robot, options)
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", ASKING)
 def test_a_partner_needs_an_input_of_its_own(name):
     made = program(name, handshakes=ASKED)
     unnamed = settings(name, {"laser_output": 1, "gas_output": 2})
@@ -228,11 +235,12 @@ OFF = {
     "fanuc": (r"BG logic \(SETUP\) ;\r\n(.*?)/POS", r"IF \(!UO\[3\]\),DO\[(\d)\]=\(OFF\)"),
     "val3": (r'"stop".*?begin\n(.*?)end', r"(do?io?\w+|do\w+)=false"),
     "inform": (r"NAME CUT_ONE_OFF\r\n.*?NOP\r\n(.*?)END", r"DOUT OT#\((\d)\) OFF"),
+    "linuxcnc": (r"G93\n(.*?)\no<", r"M65 P(\d)"),
     "urscript": (r"first_contour = 1\n(.*?)\n  global", r"digital_output_to_value\((\d), 1\)"),
 }
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", ASKING)
 def test_what_runs_at_a_stop_switches_off_all_that_the_program_switches_on(name):
     files = post(program(name, handshakes=ASKED), name, settings(name))
     block, line = OFF[name]
@@ -283,7 +291,7 @@ def test_each_contour_is_a_program_that_can_be_started_alone(name):
             assert "///RCONF" in text
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", ASKING)
 def test_the_move_at_which_a_contour_may_be_begun_is_slow(name):
     """It goes nowhere if the robot comes from the contour before."""
     made = program(name, ("one", "two", "three"))

@@ -4,7 +4,7 @@ import re
 from functools import cache
 
 import pytest
-from tests.post.cases import ARMS, CASES, refusal, renumbered
+from tests.post.cases import ASKING, CASES, refusal, renumbered
 from tests.post.test_handshakes import ASKED, program, settings
 
 from kerfpath.post import language, post
@@ -43,19 +43,27 @@ FOREIGN = {
         "set_gravity([0, 0, 9.82])", "path_offset_enable()", "track_conveyor_linear(p[1,0,0], 500)",
         "set_standard_analog_out(0, 0.5)",
     ),
+    "linuxcnc": (
+        "G20", "G91", "G94", "G95", "G18", "G7", "G41 D1", "G43 H1", "G43.1 Z1", "G54", "G52 X1",
+        "G92 X1", "G10 L2 P9 X1", "#5381=1", "M50 P1", "M48", "M51 P0", "M52 P1", "G10 L1 P1 Z1",
+        "G28.1", "G61", "G64", "G64 P1", "M68 E0 Q1", "F100", "T1 M6",
+    ),
 }  # fmt: skip
 """Statements that leave another state, by language."""
 REMARKED = {
     "rapid": ("! {}",), "krl": ("; {}", ";FOLD {}"), "fanuc": ("//{}", "! {}"),
     "inform": ("'{}", "COMM {}"), "val3": ("// {}",), "urscript": ("# {}", "$ 1 # {}"),
+    "linuxcnc": ("; {}", "({})"),
 }  # fmt: skip
 MOTION = {
     "rapid": r"\s*(?:Move|Trigg)[A-Z]", "krl": r"\s*(?:PTP|LIN|CIRC) ", "fanuc": r"\s*\d+:[JLC] P",
     "inform": r"MOV[JLC]", "val3": r"\s*mov[ejlc]+\(", "urscript": r"\s*mov[ejlc]+\(",
+    "linuxcnc": r"\s*(?:G53 )?G1 ",
 }  # fmt: skip
 CALL = {
     "rapid": r"\s*IF nFirst", "krl": r"\s*IF first_contour", "fanuc": r"\s*\d+:  CALL",
     "inform": "CALL JOB:", "val3": r"\s*if nFirst", "urscript": r"\s*if first_contour",
+    "linuxcnc": r"o<(?:one|two)> call",
 }  # fmt: skip
 SWAPPED = {
     r"\Off": (r"\On",), "FALSE": ("TRUE",), "#BASE": ("#TCP",), "#VAR": ("#CONSTANT", "#JOINT"),
@@ -152,7 +160,7 @@ def passing(name, every=1):
     return tried, found
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", ASKING)
 def test_the_program_as_written_sets_every_state(name):
     made, files, chosen = case(name)
     assert refusal(files, name, made, chosen) == ""
@@ -160,7 +168,7 @@ def test_the_program_as_written_sets_every_state(name):
         assert any(_bare(name, row) == line for text in files.values() for row in text.split("\n"))
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", ASKING)
 def test_an_edit_of_an_inherited_state_is_refused(name):
     tried, found = passing(name, every=11)
     assert tried > 30
@@ -168,12 +176,12 @@ def test_an_edit_of_an_inherited_state_is_refused(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", ASKING)
 def test_every_edit_of_an_inherited_state_is_refused(name):
     assert passing(name)[1] == []
 
 
-@pytest.mark.parametrize("name", [n for n in ARMS if "override" in dict(CASES[n].settings)])
+@pytest.mark.parametrize("name", [n for n in ASKING if "override" in dict(CASES[n].settings)])
 def test_the_override_of_the_operator_is_kept_if_asked_for(name):
     made, _, chosen = case(name)
     kept = chosen.model_copy(update={"override": "operator"})

@@ -23,6 +23,7 @@ SWITCHED_OFF = {
     "inform": ("' ", r"DOUT OT#\(1\) OFF"),
     "val3": ("// ", r"dioLaser=false"),
     "urscript": ("# ", r"laser_set\(False\)"),
+    "linuxcnc": ("; ", r"M63 P0"),
     "csv": ("", r"laser off"),
     "ros": ("# ", r"set: laser, to: false"),
 }

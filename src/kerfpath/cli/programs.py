@@ -20,8 +20,8 @@ def post(
     language: Annotated[
         str | None,
         typer.Option(
-            help="Robot language: rapid, krl, fanuc, val3, inform, urscript, ros, csv, or your "
-            "own; default: that of the job."
+            help="Robot language: rapid, krl, fanuc, val3, inform, urscript, linuxcnc, ros, csv, "
+            "or your own; default: that of the job."
         ),
     ] = None,
     output: Annotated[

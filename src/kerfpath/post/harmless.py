@@ -37,7 +37,7 @@ class Harmless:
     where: Where = ""
 
 
-CASELESS = ("krl", "rapid")
+CASELESS = ("krl", "linuxcnc", "rapid")
 """Languages that do not distinguish capital and small letters."""
 _TEXT = r'"[^"\\]{0,80}"'
 _NUMBER = r"-?(?:\d+\.?\d*|\.\d+)"

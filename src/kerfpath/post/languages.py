@@ -628,6 +628,7 @@ SHIPPED = {
     "fanuc": "kerfpath.post.fanuc:FANUC",
     "inform": "kerfpath.post.inform:INFORM",
     "krl": "kerfpath.post.krl:KRL",
+    "linuxcnc": "kerfpath.post.linuxcnc:LINUXCNC",
     "rapid": "kerfpath.post.rapid:RAPID",
     "ros": "kerfpath.post.ros:ROS",
     "urscript": "kerfpath.post.urscript:URSCRIPT",

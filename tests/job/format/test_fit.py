@@ -69,6 +69,9 @@ lines_per_file = {lines}
 [program.urscript]
 laser_output = 0
 gas_output = 1
+[program.linuxcnc]
+laser_output = 0
+gas_output = 1
 """
 PULSES = "pulses_per_deg = [1341.4, 1341.4, 1000.0, 1000.0, 800.0, 500.0]"
 USUAL = {"lines": 5000, "decimals": 4, "unit": "cm/min", "pulses": PULSES}
@@ -116,7 +119,7 @@ TURNS = HEAD.format(
 ) + CONTOURS.format(slot=6, hole=4)
 """Its axes do not turn beyond what the positions of INFORM say."""
 OF = {
-    "whole": ("rapid", "krl", "val3", "ros", "csv"),
+    "whole": ("rapid", "krl", "val3", "ros", "csv", "linuxcnc"),
     "rods": ("fanuc",),
     "small": ("urscript",),
     "turns": ("inform", "rapid"),
@@ -202,6 +205,8 @@ def test_what_is_written_passes_its_audit_or_is_not_written(
 NOT_WRITTEN = {
     ("ros", 1): "a trajectory has no arcs",
     ("ros", 2): "a trajectory has no arcs",
+    ("linuxcnc", 1): "the joints have no arcs",
+    ("linuxcnc", 2): "the joints have no arcs",
     ("fanuc", 5): "5 % of it for digits.*eta_acceleration",  # three, and nodes 4 ms apart
 }
 """Refused in one line: what the language cannot say, or not with these digits."""

@@ -1,0 +1,27 @@
+"""G code of LinuxCNC, with a robot's joints as its axes."""
+
+from kerfpath.post.languages import Language
+from kerfpath.post.linuxcnc.controller import LinuxcncSettings as LinuxcncSettings
+from kerfpath.post.linuxcnc.controller import check, externals, inherited, rules, without_leads
+from kerfpath.post.linuxcnc.reader import read
+from kerfpath.post.linuxcnc.writer import Linuxcnc as Linuxcnc
+
+LINUXCNC = Language(
+    name="linuxcnc",
+    title="LinuxCNC",
+    manufacturers=(),
+    families=(),
+    suffix=".ngc",
+    settings=LinuxcncSettings,
+    rules=rules,
+    formatter=Linuxcnc,
+    check=check,
+    sayable=without_leads,
+    ahead=False,
+    zones=False,
+    assumed={"laser_output": 0},
+    externals=externals,
+    inherited=inherited,
+    read=read,
+)
+"""The language as registered."""

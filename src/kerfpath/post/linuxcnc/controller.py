@@ -1,0 +1,320 @@
+"""LinuxCNC with a robot's joints as its axes: settings, limits in INI and HAL, issues."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+
+from kerfpath.arrays import Array
+from kerfpath.post.arcs import check_times
+from kerfpath.post.build import arm_joints, to_controller_units
+from kerfpath.post.languages import (
+    Inherited,
+    LinesPerFile,
+    OverrideSetting,
+    PortSettings,
+    Rules,
+    handshakes,
+    setting,
+)
+from kerfpath.post.program import (
+    SIGNALS,
+    CircularMove,
+    LinearMove,
+    Program,
+    ProgramIssue,
+    switches_of,
+)
+from kerfpath.robots import Robot
+
+# -----------------------------------------------------------------------------
+# Settings of the controller, and rules of its programs.
+
+WORDS = "XYZABCUVW"
+"""The words of joints 1, 2, ... and then of external axes, in deg and mm."""
+DECIMALS = 8
+"""Decimals of deg and mm."""
+OFFSETS = range(5381, 5391)
+"""Parameters that hold the offsets and the rotation of the ninth coordinate system."""
+PORTS = 16
+"""Number of outputs, and of inputs; output n is read back at input `PORTS` + n."""
+
+Output = Annotated[int | None, setting("a digital output from 0 to 15", "0", ge=0, le=PORTS - 1)]
+Input = Annotated[int | None, setting("a digital input from 0 to 15", "0", ge=0, le=PORTS - 1)]
+
+
+class LinuxcncSettings(PortSettings, output=Output, input=Input):
+    """Inputs and outputs of the controller, the tolerance of its corners, and the override."""
+
+    lines_per_file: LinesPerFile = 1_000_000
+    tolerance_deg: Annotated[
+        float, setting("a number from 0.0001 to 1, in deg", "0.01", ge=1e-4, le=1)
+    ] = 0.01
+    override: OverrideSetting = "full"
+
+
+def inherited(settings: LinuxcncSettings) -> tuple[Inherited, ...]:
+    """Return the states that another program may have left."""
+    return (
+        Inherited(
+            state="units, plane, distance mode",
+            lines=("G21 G17 G90",),
+            why="words are mm or deg, and positions",
+        ),
+        Inherited(
+            state="cutter and tool compensation, lathe mode",
+            lines=("G40 G49 G8",),
+            why="words are positions of joints",
+        ),
+        Inherited(
+            state="offsets",
+            lines=(" ".join(f"#{number}=0" for number in OFFSETS), "G59.3", "G92.1"),
+            why="the ninth coordinate system is made that of the joints; the others stay",
+        ),
+        Inherited(
+            state="speed",
+            lines=(f"M50 P{int(settings.override == 'operator')}",),
+            why="M50 P0 ignores the feed override, which would slow the cut",
+        ),
+        Inherited(
+            state="feed mode",
+            lines=("G93",),
+            why="F is the inverse of the time of a move, per minute",
+        ),
+    )
+
+
+def rules(settings: LinuxcncSettings) -> Rules:
+    """Return the rules of programs: the digits of joints."""
+    step = 0.5 * 10.0**-DECIMALS
+    return Rules(slowest=1e-6, point_step=step * 1e-3, angle_step=float(np.radians(step)))
+
+
+def externals(robot: Robot, settings: LinuxcncSettings) -> Iterator[str]:
+    """Yield why a robot has more axes than LinuxCNC."""
+    if robot.joints > len(WORDS):
+        yield (
+            f"LinuxCNC has {len(WORDS)} axes, but {robot.id!r} has {robot.joints} joints with its "
+            "external axes; use another language"
+        )
+
+
+def in_words(robot: Robot, q: Array) -> Array:
+    """Return joints (K, n) rad and m as the words have them, in deg and mm."""
+    return np.hstack([np.degrees(arm_joints(robot, q)), to_controller_units(robot, q)])
+
+
+# -----------------------------------------------------------------------------
+# Times of joint moves: a trapezoid of speed from stop to stop.
+
+
+def cruise_time(took: float, ramp: float) -> float:
+    """Return the time (s) of a move at constant speed that takes `took` (s) from stop to stop.
+
+    Parameters
+    ----------
+    took : float s
+    ramp : float s^2
+        Largest way of a joint by its acceleration: the square of half the least time.
+    """
+    return float(took + np.sqrt(max(took**2 - 4 * ramp, 0.0))) / 2
+
+
+def time_from(cruise: float, ramp: float) -> float:
+    """Return the inverse of `cruise_time`, s."""
+    return cruise + ramp / cruise
+
+
+def ramp_of(robot: Robot, way: Array) -> float:
+    """Return the largest way of a joint (n,) by its acceleration, s^2."""
+    _, acceleration = robot.speed_limits()
+    return float((np.abs(way) / acceleration).max())
+
+
+STANDS = np.radians(1e-6)
+"""Way (rad or m) of all joints below which a move goes nowhere, as to where a contour begins."""
+
+
+def goes_nowhere(way: Array) -> bool:
+    """Return whether a way (n,) of the joints is none, but for digits."""
+    return bool(np.abs(way).max() < STANDS)
+
+
+def longest_way(robot: Robot) -> float:
+    """Return how long (s) joints take over their whole ranges at full speed: the slowest one.
+
+    The range of an endless joint is one turn.
+    """
+    limits, (velocity, _) = robot.joint_limits(), robot.speed_limits()
+    ranges = np.where(robot.endless, 2 * np.pi, limits.upper - limits.lower)
+    return float((ranges / velocity).max())
+
+
+# -----------------------------------------------------------------------------
+# The configuration of LinuxCNC: limits of the joints, and what they are connected to.
+
+ENDLESS = 1e9
+"""Limit (deg) of a joint that turns without end."""
+
+
+def ini_lines(name: str, robot: Robot, first: Array) -> Iterator[str]:
+    """Yield the INI file: the kinematics are trivial, so that axes are joints.
+
+    Parameters
+    ----------
+    name : str
+        Name of the program, and of the files.
+    robot : Robot
+    first : (n,) rad
+        Joints at which the robot stands when it is homed: those of the first target.
+    """
+    words = WORDS[: robot.joints]
+    limits, (velocity, acceleration) = robot.joint_limits(), robot.speed_limits()
+    lower = np.where(robot.endless, -np.radians(ENDLESS), limits.lower)
+    upper = np.where(robot.endless, np.radians(ENDLESS), limits.upper)
+    low, high, fast, sharp, home = in_words(
+        robot, np.array([lower, upper, velocity, acceleration, first])
+    )
+    most = [float(np.ceil(np.linalg.norm(each))) for each in (fast, sharp)]
+    yield from (
+        "[EMC]",
+        "VERSION = 1.1",
+        f"MACHINE = {name}",
+        "[DISPLAY]",
+        "DISPLAY = axis",
+        "PROGRAM_PREFIX = .",
+        "[RS274NGC]",
+        "PARAMETER_FILE = linuxcnc.var",
+        "[EMCMOT]",
+        "EMCMOT = motmod",
+        "COMM_TIMEOUT = 4.0",
+        "SERVO_PERIOD = 1000000",
+        "[TASK]",
+        "TASK = milltask",
+        "CYCLE_TIME = 0.001",
+        "[HAL]",
+        f"HALFILE = {name}.hal",
+        "HALUI = halui",
+        "[EMCIO]",
+        "EMCIO = io",
+        "CYCLE_TIME = 0.1",
+        "TOOL_TABLE = tool.tbl",
+        "[TRAJ]",
+        f"COORDINATES = {words}",
+        "LINEAR_UNITS = mm",
+        "ANGULAR_UNITS = degree",
+        f"MAX_LINEAR_VELOCITY = {most[0]:.0f}",
+        f"MAX_LINEAR_ACCELERATION = {most[1]:.0f}",
+        f"MAX_ANGULAR_VELOCITY = {most[0]:.0f}",
+        f"MAX_ANGULAR_ACCELERATION = {most[1]:.0f}",
+        "[KINS]",
+        f"KINEMATICS = trivkins coordinates={words}",
+        f"JOINTS = {robot.joints}",
+    )
+    for k, word in enumerate(words):
+        bounds = (
+            f"MIN_LIMIT = {low[k]:.6f}",
+            f"MAX_LIMIT = {high[k]:.6f}",
+            f"MAX_VELOCITY = {fast[k]:.6f}",
+            f"MAX_ACCELERATION = {sharp[k]:.6f}",
+        )
+        yield from (f"[AXIS_{word}]", *bounds)
+        yield from (
+            f"[JOINT_{k}]",
+            f"TYPE = {'ANGULAR' if word in 'ABC' else 'LINEAR'}",
+            *bounds,
+            f"HOME = {home[k]:.6f}",
+            f"HOME_OFFSET = {home[k]:.6f}",
+            "HOME_SEQUENCE = 0",
+            "HOME_SEARCH_VEL = 0",
+            "HOME_LATCH_VEL = 0",
+            "FERROR = 10",
+            "MIN_FERROR = 10",
+        )
+
+
+def hal_lines(robot: Robot, settings: LinuxcncSettings) -> Iterator[str]:
+    """Yield the HAL file: simulated joints, outputs that are gated and read back.
+
+    An output that the settings name is on only while a program runs.
+    """
+    named = {signal: getattr(settings, f"{signal}_output") for signal in SIGNALS}
+    named |= {p: port for (p, way), port in handshakes(settings).items() if way == "output"}
+    gates = {port: name for name, port in named.items() if port is not None}
+    yield from (
+        "loadrt [KINS]KINEMATICS",
+        "loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD "
+        f"num_joints=[KINS]JOINTS num_dio={2 * PORTS} num_aio=4",
+        f"loadrt and2 names={','.join(f'{name}-gate' for name in gates.values())}",
+        "addf motion-command-handler servo-thread",
+        "addf motion-controller servo-thread",
+        *(f"addf {name}-gate servo-thread" for name in gates.values()),
+    )
+    for k in range(robot.joints):
+        yield f"net joint-{k} joint.{k}.motor-pos-cmd => joint.{k}.motor-pos-fb"
+    for port in range(PORTS):
+        back = f"motion.digital-in-{PORTS + port:02d}"
+        gate = f" {gates[port]}-gate.in0" if port in gates else ""
+        yield f"net output-{port} motion.digital-out-{port:02d} => {back}{gate}"
+    yield from (
+        "net running halui.program.is-running => "
+        + " ".join(f"{name}-gate.in1" for name in gates.values()),
+        *(f"net {name} {name}-gate.out" for name in gates.values()),
+        "net enable iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in",
+        "net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared",
+        "net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed",
+    )
+
+
+# -----------------------------------------------------------------------------
+# What LinuxCNC cannot express, and where it will not keep the time.
+
+
+def without_leads(program: Program, settings: object = None) -> Program:
+    """Return the program without lead times: M62 acts as the next move begins."""
+
+    def late(move: LinearMove) -> LinearMove:
+        return replace(move, switches=tuple(replace(s, lead_time=0.0) for s in move.switches))
+
+    sections = tuple(
+        replace(
+            section,
+            steps=tuple(late(s) if switches_of(s) else s for s in section.steps),  # type: ignore[arg-type]
+        )
+        for section in program.sections
+    )
+    return replace(program, sections=sections)
+
+
+def check(program: Program, settings: LinuxcncSettings) -> Iterator[ProgramIssue]:
+    """Yield what the program cannot express, and where LinuxCNC will not keep its times."""
+    issues = [*check_times(program), *_check_shape(program)]
+    yield from issues
+    if any(issue.level == "error" for issue in issues):
+        return
+    yield from _check_leads(program)
+
+
+def _check_shape(program: Program) -> Iterator[ProgramIssue]:
+    """Check that there are no arcs, and that corners are rounded along the path alone."""
+    steps = [(section.name, step) for section in program.sections for step in section.moves]
+    for (name, move), (_, after) in zip(steps, [*steps[1:], ("", None)], strict=True):
+        if isinstance(move, CircularMove):
+            message = "the joints have no arcs; leave arcs_mm out of the job"
+            yield ProgramIssue("error", "arc", message, name)
+        if move.zone > 0 and not (isinstance(move, LinearMove) and isinstance(after, LinearMove)):
+            message = "a corner can only be rounded between linear moves; expected a stop"
+            yield ProgramIssue("error", "zone", message, name)
+
+
+def _check_leads(program: Program) -> Iterator[ProgramIssue]:
+    leads = [s.lead_time for move in program.moves for s in switches_of(move) if s.lead_time > 0]
+    if leads:
+        message = (
+            f"{len(leads)} switches are planned up to {max(leads) * 1e3:g} ms ahead, but LinuxCNC "
+            "switches as the tip arrives; measure the delay, and set no lead time"
+        )
+        yield ProgramIssue("warning", "lead-time", message, "program")
