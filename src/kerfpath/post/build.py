@@ -193,6 +193,23 @@ class AxisCount:
         angles = rows @ np.linalg.inv(self.matrix).T
         return freeze(np.asarray(robot.sign * angles, dtype=np.float64))
 
+    def bounds(self, robot: Robot, widest: ArrayLike) -> tuple[Array, Array]:
+        """Return the least and greatest joints (6,) rad at which no axis turns beyond a bound.
+
+        Endless joints have none. Of the axes that are bounded, each is that of one joint.
+
+        Parameters
+        ----------
+        widest : (6,) rad
+            Largest angle of each axis either way; inf for none.
+        """
+        bound = np.asarray(widest, dtype=np.float64)
+        free = np.isinf(bound) | robot.endless[:6]
+        ends = np.where(free, 0.0, np.stack([-bound, bound]))
+        joints = self.to_joints(robot, ends)
+        lower, upper = joints.min(axis=0), joints.max(axis=0)
+        return np.where(free, -np.inf, lower), np.where(free, np.inf, upper)
+
     def _shift(self, robot: Robot) -> Array:
         """Return the axes (6,) rad at which all joints of the robot are 0."""
         return np.asarray(self.shift - self.matrix @ offset_near(robot, self.counted_from))

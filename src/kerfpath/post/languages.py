@@ -678,6 +678,9 @@ class Language:
         reader. None: targets do not contain them.
     check : callable, optional
         (program, settings) -> the issues that only this language has.
+    bounds : callable, optional
+        (robot) -> the least and greatest joints (6,) rad that its targets can express; jobs plan
+        within them. None: it can express all.
     sayable : callable, optional
         (program, settings) -> the program as far as the language can express it; `check` warns of
         all that is left out. None: it can express all.
@@ -713,6 +716,7 @@ class Language:
     is_reserved: Callable[[str], bool] = _none_is_reserved
     posture: Callable[[Robot, Array, Any], list[tuple[int | str, ...]]] | None = None
     check: Callable[[Program, Any], Iterator[ProgramIssue]] | None = None
+    bounds: Callable[[Robot], tuple[Array, Array]] | None = None
     sayable: Callable[[Program, Any], Program] | None = None
     ahead: bool = True
     zones: bool = True

@@ -38,7 +38,7 @@ from kerfpath.job.format.tolerances import Tolerances
 from kerfpath.job.format.values import nearest
 from kerfpath.options import OptionConflict, PlanOptions
 from kerfpath.planner import coarse_places, external_course, folds, layered_graph
-from kerfpath.post import ProgramOptions
+from kerfpath.post import ProgramOptions, languages
 from kerfpath.robots import Robot
 from kerfpath.setup import Setup
 from kerfpath.text import NOT_TEXT, named
@@ -242,6 +242,7 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         raise refusal(path, text, error) from None
     described = file.cell is not None and file.cell.links != "capsules"
     robot = _loaded(path, file, file.robot.resolve(path.parent, bodies=described))
+    robot = _expressible(path, file, robot)
     if file.plan.rotation_deg is not None and not robot.endless.any():
         raise refusal_at(
             path,
@@ -331,6 +332,28 @@ def _loaded(path: Path, file: JobFile, robot: Robot) -> Robot:
             raise refusal_at(path, ("robot", "torque_nm"), said) from None
         said = f"{error}; give urdf with inertias in [robot], or remove mass_kg"
         raise refusal_at(path, ("tool", "mass_kg"), said) from None
+
+
+def _expressible(path: Path, file: JobFile, robot: Robot) -> Robot:
+    """Return the robot with the joints that targets in the language of the program can express."""
+    name = file.program.language
+    language = None if name == "none" else languages()[name]
+    if language is None or language.bounds is None or language.refusal(robot):
+        return robot
+    limits = robot.joint_limits()
+    lower, upper = limits.lower.copy(), limits.upper.copy()
+    least, most = language.bounds(robot)
+    arm = slice(robot.family.joints)
+    lower[arm], upper[arm] = np.maximum(lower[arm], least), np.minimum(upper[arm], most)
+    if (bad := np.flatnonzero(lower > upper)).size:
+        joint = int(bad[0])
+        ends = np.degrees([limits.lower[joint], limits.upper[joint]])
+        said = (
+            f"{language.title} can express no angle of joint {joint + 1} from {ends[0]:g} to "
+            f"{ends[1]:g} deg; change the limits in [robot], or take another language"
+        )
+        raise refusal_at(path, ("program", "language"), said)
+    return robot.with_limits(lower=lower, upper=upper)
 
 
 def _comfort(file: JobFile, robot: Robot) -> Comfort | None:

@@ -3,6 +3,7 @@
 from kerfpath.post.inform.controller import InformSettings as InformSettings
 from kerfpath.post.inform.controller import axes_from_joints as axes_from_joints
 from kerfpath.post.inform.controller import (
+    bounds,
     check,
     inherited,
     is_reserved,
@@ -30,6 +31,7 @@ INFORM = Language(
     is_reserved=is_reserved,
     posture=posture,
     check=check,
+    bounds=bounds,
     sayable=sayable,
     ahead=False,
     assumed={"laser_output": 1},

@@ -391,6 +391,17 @@ TURNING = {3: "R", 5: "T", 0: "S"}
 WHOLE_TURN_DEG = 360.0
 
 
+def bounds(robot: Robot) -> tuple[Array, Array]:
+    """Return the least and greatest joints (6,) rad that a position can express.
+
+    With external axes positions are in pulses, which can express all.
+    """
+    widest = np.full(6, np.inf)
+    if not robot.externals:
+        widest[list(TURNING)] = np.radians(WHOLE_TURN_DEG)
+    return COUNT.bounds(robot, widest)
+
+
 def sayable(program: Program, settings: InformSettings) -> Program:
     """Return the program with a stop at each switch, which depends on no other output."""
     sections = tuple(

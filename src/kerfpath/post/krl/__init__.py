@@ -2,7 +2,15 @@
 
 from kerfpath.post.krl.controller import KrlSettings as KrlSettings
 from kerfpath.post.krl.controller import axes_from_joints as axes_from_joints
-from kerfpath.post.krl.controller import check, inherited, is_reserved, missing, posture, rules
+from kerfpath.post.krl.controller import (
+    bounds,
+    check,
+    inherited,
+    is_reserved,
+    missing,
+    posture,
+    rules,
+)
 from kerfpath.post.krl.controller import joints_from_axes as joints_from_axes
 from kerfpath.post.krl.controller import status_and_turn as status_and_turn
 from kerfpath.post.krl.reader import read
@@ -22,6 +30,7 @@ KRL = Language(
     is_reserved=is_reserved,
     posture=posture,
     check=check,
+    bounds=bounds,
     assumed={"laser_output": 1},
     externals=missing,
     encodings=("utf-8-sig", "cp1252"),

@@ -313,6 +313,11 @@ HALF_TURN_DEG = 180.0 - 1e-3
 """An endless axis that should turn farther in one motion turns the other way."""
 
 
+def bounds(robot: Robot) -> tuple[Array, Array]:
+    """Return the least and greatest joints (6,) rad that Turn can express."""
+    return COUNT.bounds(robot, np.full(6, np.radians(TURN_DEG)))
+
+
 def check(program: Program, settings: KrlSettings) -> Iterator[ProgramIssue]:
     """Yield what KRL cannot express of a program, or a KUKA controller cannot do."""
     yield from _check_frames(program.robot)
