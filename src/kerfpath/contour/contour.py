@@ -168,6 +168,11 @@ class Contour:
         return sampling.corners(self.points, self.closed)
 
     @property
+    def bend_ends(self) -> Ints:
+        """Nodes at which the tool axis begins or ceases to turn, as at the ends of bends."""
+        return sampling.bend_ends(self._polyline, self.closed)
+
+    @property
     def feature_ends(self) -> Ints:
         """Nodes that sampling by `spacing` or `dt` keeps: ends, corners and changes of kind.
 
@@ -194,6 +199,7 @@ class Contour:
         dt: float | None = None,
         speed: ArrayLike | None = None,
         keep: ArrayLike = (),
+        bend_ends: bool = False,
     ) -> Contour:
         """Sample the contour again, uniformly in arc length or in time (Eq. 1).
 
@@ -219,6 +225,9 @@ class Contour:
             Speed along the path, constant or at each node; multiplied by `speed_share`.
         keep : (m,) int
             Further nodes of this contour to keep, with `spacing` or `dt`.
+        bend_ends : bool
+            Whether nodes at ends of bends are kept, too, unless a node that is kept is within an
+            eighth of the step; with `spacing` or `dt`.
 
         Raises
         ------
@@ -239,8 +248,9 @@ class Contour:
                 f"got {', '.join(ways) or 'none'}"
             )
         keep = integers(keep, "keep", (None,))
-        if len(keep) and spacing is None and dt is None:
-            raise InputError("keep: nodes are kept only with spacing= or dt=")
+        if (len(keep) or bend_ends) and spacing is None and dt is None:
+            what = "keep" if len(keep) else "bend_ends"
+            raise InputError(f"{what}: nodes are kept only with spacing= or dt=")
         ends = np.union1d(self.feature_ends, keep)
         if ends[0] < 0 or ends[-1] >= len(self):
             raise InputError(f"keep: expected nodes from 0 to {len(self) - 1}, got {keep.tolist()}")
@@ -250,9 +260,10 @@ class Contour:
             return self.at_nodes(np.linspace(self.s[0], self.s[-1], int(count)))
         if spacing is not None:
             step = scalar(spacing, "spacing", unit="m", above=0.0)
+            ends = sampling.apart(self.s, ends, self.bend_ends if bend_ends else ends[:0], step)
             return self.at_nodes(sampling.divide_evenly(self.s, ends, step, "mm", self.name))
         if dt is not None or speed is not None:
-            return self._in_time(dt, speed, ends)
+            return self._in_time(dt, speed, ends, self.bend_ends if bend_ends else ends[:0])
         position = np.inf if tolerance is None else scalar(tolerance, "tolerance", above=0.0)
         angle = (
             np.inf if axis_tolerance is None else scalar(axis_tolerance, "axis_tolerance", above=0)
@@ -353,11 +364,14 @@ class Contour:
             name=self.name,
         )
 
-    def _in_time(self, dt: float | None, speed: ArrayLike | None, ends: Ints) -> Contour:
+    def _in_time(
+        self, dt: float | None, speed: ArrayLike | None, ends: Ints, bends: Ints
+    ) -> Contour:
         if dt is None or speed is None:
             raise InputError("resample: sampling in time needs both dt= (s) and speed= (m/s)")
         step = scalar(dt, "dt", unit="s", above=0.0)
         v = positive(np.broadcast_to(np.asarray(speed), len(self)), "speed", (len(self),))
+        ends = sampling.apart(self.s, ends, bends, step * float(v.max()))
         s, time = sampling.sample_in_time(self.s, v * self.speed_share, step, ends, self.name)
         return self.at_nodes(s, freeze(time))
 

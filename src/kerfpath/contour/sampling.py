@@ -65,6 +65,15 @@ REPEATED_POINT = 1e-9
 """m; prevents a division by zero for a chord without length."""
 
 
+NEAR = 2.5e-4
+"""m: the tool axis at a node is compared with those this far before and behind it."""
+BEND = np.radians(0.5)
+"""rad: the axis at the end of a bend differs from the middle of these two by more than this; that
+is so for bends up to a radius of 14 mm."""
+APART = 0.125
+"""Share of the step: an end of a bend that is closer to another node that is kept is left out."""
+
+
 class Polyline(NamedTuple):
     """A path that is straight between its nodes, with an axis that turns evenly between them."""
 
@@ -93,6 +102,38 @@ def corners(points: Array, closed: bool) -> Ints:
     turn = angle_between(along, np.roll(along, 1, axis=0))
     turn[0] = turn[0] if closed else 0.0
     return np.flatnonzero(turn > CORNER)
+
+
+def bend_ends(line: Polyline, closed: bool) -> Ints:
+    """Return the nodes, in order, at which the tool axis begins or ceases to turn.
+
+    Of several within twice `NEAR`, the one at which it does so most counts.
+    """
+    start, end = line.s[0], line.s[-1]
+    before, behind = line.s - NEAR, line.s + NEAR
+    if closed:
+        before = np.where(before < start, before + (end - start), before)
+        behind = np.where(behind > end, behind - (end - start), behind)
+    evenly = slerp(line.at(before)[1], line.at(behind)[1], np.full((len(line.s), 1), 0.5))
+    off = angle_between(line.axes, evenly)
+    off[[0, -1]] = 0.0  # nodes in any case
+    found: list[int] = []
+    for k in np.argsort(-off, kind="stable")[: np.count_nonzero(off > BEND)].tolist():
+        if all(abs(line.s[k] - line.s[other]) > 2 * NEAR for other in found):
+            found.append(k)
+    return np.array(sorted(found), dtype=np.int64)
+
+
+def apart(at: Array, ends: Ints, more: Ints, step: float) -> Ints:
+    """Return the nodes `ends`, and those of `more` that are far enough from all others for a step.
+
+    The arguments are as of `divide_evenly`.
+    """
+    kept = ends.tolist()
+    for k in more.tolist():
+        if np.abs(at[kept] - at[k]).min() > APART * step:
+            kept.append(k)
+    return np.unique(np.array(kept, dtype=np.int64))
 
 
 def divide_evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str) -> Array:

@@ -171,6 +171,8 @@ class ContourSpec:
         Largest distance of the chords from the contour.
     axis_tolerance : float rad, optional
         Largest angle between the tool axis along a chord and the contour's, with `tolerance`.
+    bend_ends : bool
+        Whether nodes are at the ends of bends, too, with `spacing` or `time_step`.
     table : ContourTable
         The table in the file, with the operations on the loop before it is sampled.
     """
@@ -183,6 +185,7 @@ class ContourSpec:
     count: int | None = None
     tolerance: float | None = None
     axis_tolerance: float | None = None
+    bend_ends: bool = False
     table: ContourTable
 
     __repr__ = short_repr
@@ -259,13 +262,14 @@ class ContourSpec:
             self._require_few(contour, spacing, "spacing_mm")
             time_step = spacing / self.speed if slowed else None
         if time_step is not None:
-            timed = named.resample(dt=time_step, speed=self.speed)
+            timed = named.resample(dt=time_step, speed=self.speed, bend_ends=self.bend_ends)
             return timed if slowed else replace(timed, time=None)  # one speed: the plan's to say
         return named.resample(
             spacing=spacing,
             count=self.count,
             tolerance=self.tolerance,
             axis_tolerance=self.axis_tolerance,
+            bend_ends=self.bend_ends,
         )
 
     def finer(self, share: float) -> ContourSpec:
@@ -276,7 +280,8 @@ class ContourSpec:
         update = {key: value * share ** power[key] for key, value in given.items()}
         count = None if self.count is None else int(np.ceil((self.count - 1) / share)) + 1
         table = self.table.model_copy(update={**update, "count": count})
-        return replace(contour_request(table), pick=self.pick, name=self.name)
+        asked = contour_request(table)
+        return replace(asked, pick=self.pick, name=self.name, bend_ends=self.bend_ends)
 
     def asked(self, options: PlanOptions) -> PlanOptions:
         """Return the options of the job with the windows of gamma of this contour."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from kerfpath.cad import Part
 from kerfpath.cell import (
     Cell,
 )
-from kerfpath.contour import Contour
+from kerfpath.contour import Contour, angle_between
 from kerfpath.errors import InputError
 from kerfpath.front import Subproblem
 from kerfpath.job.format.cell import cell_of_job
@@ -34,6 +35,9 @@ MOST_TIMES = 8
 """Largest factor on the number of nodes that was asked for."""
 KEPT = 0.9
 """Share of a tolerance that finer sampling aims at, as the curvature varies along a contour."""
+BEND_STEP = np.radians(10.0)
+"""Largest turn (rad) of the tool axis between two nodes in a bend. The head turns about the beam on
+the way, too, so the axis does not turn quite evenly."""
 LEAST, MOST = 0.2, 0.9
 """Least and largest factor on the distance between nodes in one step."""
 
@@ -43,8 +47,9 @@ def closer_nodes(
 ) -> ContourSpec | None:
     """Return the task with its nodes close enough to keep the tolerances.
 
-    This is the task itself if its nodes are close enough. If the tool axis turns too fast for its
-    tolerance, only the tolerance of the path is kept; None if that is impossible, too.
+    This is the task itself if its nodes are close enough. Nodes at the ends of bends come before
+    nodes that are closer together. If the tool axis turns too fast for its tolerance, only the
+    tolerance of the path is kept; None if that is impossible, too.
 
     Parameters
     ----------
@@ -53,8 +58,16 @@ def closer_nodes(
         The paths to sample.
     tolerances : Tolerances
     """
-    found = _closer(task, paths, tolerances)
-    return found or _closer(task, paths, replace(tolerances, axis=np.inf))
+    if all(_excess(path, task.sample(path), tolerances) <= 1 for path in paths):
+        return task
+    at_bends = task
+    if task.sampled_by in ("spacing_mm", "time_step_ms"):
+        at_bends = replace(task, bend_ends=any(len(path.bend_ends) for path in paths))
+    return (
+        _closer(at_bends, paths, tolerances)
+        or _closer(task, paths, tolerances)
+        or _closer(task, paths, replace(tolerances, axis=np.inf))
+    )
 
 
 def chord_error(path: Contour, nodes: Contour) -> float:
@@ -68,7 +81,11 @@ def _closer(
     times = 1.0
     while times < MOST_TIMES:
         try:
-            excess = max(_excess(path, task.sample(path), tolerances) for path in paths)
+            nodes = [task.sample(path) for path in paths]
+            excess = max(map(_excess, paths, nodes, repeat(tolerances)))
+            if task.bend_ends:
+                step = max(float(angle_between(n.axes[1:], n.axes[:-1]).max()) for n in nodes)
+                excess = max(excess, (step / BEND_STEP) ** 2)
         except InputError:
             return None
         if excess <= 1:
@@ -325,10 +342,10 @@ def _within_tolerances(
         return task, ""
     key = task.sampled_by
     asked, used = (getattr(each.table, key) for each in (task, finer))
-    return finer, (
-        f"{key} = {used:.3g} is used in place of {asked:g}, so that the path between its nodes "
-        "keeps the tolerances of [audit]"
-    )
+    said = f"{key} = {used:.3g} is used in place of {asked:g}" if used != asked else ""
+    if finer.bend_ends:
+        said += f"{', with nodes' if said else 'nodes are'} at the ends of bends, too"
+    return finer, f"{said}, so that the path between its nodes keeps the tolerances of [audit]"
 
 
 def divide_nodes(path: Contour, nodes: Contour, parts: int) -> Contour:

@@ -332,7 +332,8 @@ def _nodes(task: ContourSpec, path: Contour, speed: str) -> Iterator[str]:
     if task.spacing is not None and slowed:
         step = f"{_mm(task.spacing)} / ({speed})"
     if step is not None:
-        yield f"nodes = path.resample(dt={step}, speed={speed})"
+        more = ", bend_ends=True" if task.bend_ends else ""
+        yield f"nodes = path.resample(dt={step}, speed={speed}{more})"
         if not slowed:
             yield "nodes = replace(nodes, time=None)"
         return
@@ -341,6 +342,7 @@ def _nodes(task: ContourSpec, path: Contour, speed: str) -> Iterator[str]:
         "count": None if task.count is None else str(task.count),
         "tolerance": None if task.tolerance is None else _mm(task.tolerance),
         "axis_tolerance": None if task.axis_tolerance is None else _angle(task.axis_tolerance),
+        "bend_ends": "True" if task.bend_ends else None,
     }
     said = ", ".join(f"{name}={value}" for name, value in asked.items() if value is not None)
     yield f"nodes = path.resample({said})"
