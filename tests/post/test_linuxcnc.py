@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.post.cases import CASES, CUT
 
-from kerfpath import InputError, robot
 from kerfpath.post import JointMove, build_program
 from kerfpath.post.linuxcnc.controller import cruise_time, time_from
 from kerfpath.transfer import least_time
@@ -174,15 +173,3 @@ def test_remarks_blanks_and_case_are_nobodys_business(program):
     ini = CASE.golden[f"{CUT}.ini"].replace("[KINS]", "# trivial\n\n  [KINS]")
     files = {**CASE.golden, f"{CUT}.ngc": text, f"{CUT}.ini": ini}
     assert CASE.deviations(program, files) == []
-
-
-def test_more_axes_than_nine_are_refused():
-    arm = robot("kuka_lbr_iiwa14_r820").with_limits(acceleration=np.full(7, 5.0))
-    for name in ("one", "two", "three"):
-        arm = arm.with_positioner(
-            [0, 0, 1], [1, 0, 0], name=name, lower=-1, upper=1, velocity=1.0, acceleration=1.0
-        )
-    (said,) = CASE.language.externals(arm, CASE.settings)
-    assert "LinuxCNC has 9 axes" in said
-    with pytest.raises(InputError, match="LinuxCNC has 9 axes"):
-        CASE.read({"a program": ""}, arm)

@@ -1,8 +1,8 @@
 """G code of LinuxCNC, with a robot's joints as its axes."""
 
-from kerfpath.post.languages import Language
+from kerfpath.post.languages import Language, no_settings_needed
 from kerfpath.post.linuxcnc.controller import LinuxcncSettings as LinuxcncSettings
-from kerfpath.post.linuxcnc.controller import check, externals, inherited, rules, without_leads
+from kerfpath.post.linuxcnc.controller import check, inherited, rules, without_leads
 from kerfpath.post.linuxcnc.reader import read
 from kerfpath.post.linuxcnc.writer import Linuxcnc as Linuxcnc
 
@@ -20,7 +20,7 @@ LINUXCNC = Language(
     ahead=False,
     zones=False,
     assumed={"laser_output": 0},
-    externals=externals,
+    externals=no_settings_needed,
     inherited=inherited,
     read=read,
 )

@@ -34,7 +34,7 @@ from kerfpath.robots import Robot
 # Settings of the controller, and rules of its programs.
 
 WORDS = "XYZABCUVW"
-"""The words of joints 1, 2, ... and then of external axes, in deg and mm."""
+"""The words of joints 1, 2, ... and then of external axes, in deg and mm: no robot has more."""
 DECIMALS = 8
 """Decimals of deg and mm."""
 OFFSETS = range(5381, 5391)
@@ -91,15 +91,6 @@ def rules(settings: LinuxcncSettings) -> Rules:
     """Return the rules of programs: the digits of joints."""
     step = 0.5 * 10.0**-DECIMALS
     return Rules(slowest=1e-6, point_step=step * 1e-3, angle_step=float(np.radians(step)))
-
-
-def externals(robot: Robot, settings: LinuxcncSettings) -> Iterator[str]:
-    """Yield why a robot has more axes than LinuxCNC."""
-    if robot.joints > len(WORDS):
-        yield (
-            f"LinuxCNC has {len(WORDS)} axes, but {robot.id!r} has {robot.joints} joints with its "
-            "external axes; use another language"
-        )
 
 
 def in_words(robot: Robot, q: Array) -> Array:
