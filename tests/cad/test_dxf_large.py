@@ -46,7 +46,7 @@ def test_loops_within_an_odd_number_of_others_are_holes(tmp_path: Path, seed: in
                 [(x, y), (x + side, y), (x + side, y + side), (x, y + side)], close=True
             )
 
-    part = drawn(tmp_path, draw)
+    part = drawn(tmp_path, draw, drawing_frame="cut")
     found = {tuple(np.round(loop.bounding_box[0, :2] * 1e3, 6)): loop.kind for loop in part.loops}
     for x, y, _, depth in tree:
         assert found[round(x, 6), round(y, 6)] == ("inner" if depth % 2 else "outer")

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from commands import assert_refused, run
+from kerfpath import cad
 from kerfpath.cad import Machine, Part, read
 from kerfpath.errors import InputError
 from kerfpath.job import read_job
@@ -342,6 +343,10 @@ def test_the_machine_of_a_job_is_in_its_part(tmp_path: Path) -> None:
     assert (machine.tcp, machine.rollover, machine.pivot) == (None, False, None)
     assert machine.centre == pytest.approx((0, 0, -0.03))
     assert run("contours", file, "--machine", given).returncode == 0
+    assert run("script", tmp_path / "tube.toml", "-o", tmp_path / "tube.py").returncode == 0
+    (call,) = [row for row in (tmp_path / "tube.py").read_text().splitlines() if "cad.read" in row]
+    again = eval(call.removeprefix("part = "), {"cad": cad, "HERE": tmp_path})
+    assert again.loops[0].length == read(file, machine=machine).loops[0].length
     (tmp_path / "points.csv").write_text("x_mm,y_mm,z_mm,nx,ny,nz\n0,0,0,0,0,1\n9,0,0,0,0,1\n")
     assert_refused(
         run("contours", tmp_path / "points.csv", "--machine", given),

@@ -41,6 +41,7 @@ from scipy.interpolate import BSpline
 from kerfpath.arrays import Array, freeze
 from kerfpath.cad.chains import Stroke, Style, part_of_strokes
 from kerfpath.cad.curves import Arc, Curve, Line, Spline
+from kerfpath.cad.drawing_frame import ASK, NAMED, Choice, drawing_frame, is_around_islands
 from kerfpath.cad.left_out import LeftOut
 from kerfpath.cad.part import Part
 from kerfpath.cad.units import GIVE_AXIS, LARGEST, MM, NO_UNIT, UNITS_MM
@@ -305,6 +306,8 @@ REQUIRED = {
     "ELLIPSE": ("center", "major_axis"),
 }
 """Attributes without which an entity is damaged, by its kind."""
+NAMES_FRAME = "a drawing frame by the name of its layer or block"
+"""Reason to leave out what is one."""
 NEVER_CUT = frozenset([
     "TEXT", "MTEXT", "ATTDEF", "ATTRIB", "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION",
     "LEADER", "MLEADER", "MULTILEADER", "TOLERANCE", "POINT", "VIEWPORT", "IMAGE", "WIPEOUT",
@@ -315,15 +318,19 @@ NEVER_CUT = frozenset([
 
 
 def read_dxf(
-    path: Path, content: bytes, unit: str | None, gap: float, axis: Array | None = None
-) -> Part:
+    path: Path, content: bytes, unit: str | None, gap: float, axis: Array | None = None,
+    frame: Choice | None = None,
+) -> Part:  # fmt: skip
     """Return the part in a DXF drawing; the tool axis is -z of its plane, or the given `axis`.
+
+    `frame` says what to do with a drawing frame; by default one that its names do not tell is left
+    out as what may have to be cut.
 
     Raises
     ------
     InputError
-        Not a DXF file, a damaged one, one without curves, curves that leave the plane, or no known
-        unit.
+        Not a DXF file, a damaged one, one without curves, curves that leave the plane, no known
+        unit, or no frame to leave out.
     """
     try:
         document, repairs, lost = document_of(content)
@@ -344,7 +351,7 @@ def read_dxf(
         notes.append(f"unit {unit} as given; $INSUNITS says {declared}")
     if repairs:
         notes.append(f"{len(repairs)} faults of the file repaired, the first: {repairs[0]}")
-    sheet = _Sheet(document, is_flat=axis is None)
+    sheet = _Sheet(document, is_flat=axis is None, cuts_frame=frame == "cut")
     scale = UNITS_MM[unit or declared]
     try:
         with np.errstate(all="ignore"):  # ezdxf divides by lengths that may be 0
@@ -355,10 +362,16 @@ def read_dxf(
     except DAMAGED as error:
         raise InputError(f"damaged ({_reason(error)}); repair it in CAD") from None
     sheet.left_out.update(lost)
-    part = part_of_strokes(
-        path, unit or declared, sheet.strokes, gap=gap, notes=notes, left_out=sheet.summed(),
-        axis=axis,
-    )  # fmt: skip
+
+    def drawn() -> Part:
+        return part_of_strokes(
+            path, unit or declared, sheet.strokes, gap=gap, notes=notes, left_out=sheet.summed(),
+            axis=axis,
+        )  # fmt: skip
+
+    part = drawn()
+    if frame != "cut" and sheet.leave_frame_out(part, is_asked=frame is None):
+        part = drawn()
     frames = {printable(str(ucs.dxf.name)): _frame(ucs, scale) for ucs in document.ucs}
     return replace(part, frames=frames)
 
@@ -391,10 +404,12 @@ class _Sheet:
 
     document: Drawing
     is_flat: bool = True
+    cuts_frame: bool = False
     strokes: dict[Style, list[Stroke]] = field(default_factory=dict)
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
     put_aside: Counter[tuple[str, str]] = field(default_factory=Counter)
     count: int = 0
+    texts: list[Array] = field(default_factory=list)
     layers: dict[str, str] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -418,6 +433,36 @@ class _Sheet:
             if not layout.is_modelspace:
                 for entity in layout:
                     self.put_aside[entity.dxftype(), f"on the sheet {layout.name}"] += 1
+
+    def leave_frame_out(self, part: Part, *, is_asked: bool) -> bool:
+        """Take the strokes of a drawing frame away; return whether there are any.
+
+        If it `is_asked` what to do, they may have been lines to cut, and a rectangle is only taken
+        if it has a title block or is around outlines.
+
+        Raises
+        ------
+        InputError
+            No rectangle is around the rest, and none was left out by its name.
+        """
+        has_islands = is_asked and is_around_islands(part.loops)
+        if is_asked and not self.texts and not has_islands:
+            return False
+        found = drawing_frame(self.strokes, self.texts)
+        if is_asked and not (found and (found.has_title or has_islands)):
+            return False
+        if found is None:
+            if any(NAMES_FRAME in reason for _, reason in self.put_aside):
+                return False
+            raise InputError("drawing_frame: no rectangle is around all else; remove drawing_frame")
+        what = "around all else" + (", with a title block" if found.has_title else "")
+        reason = f"a rectangle {what}: {ASK}" if is_asked else f"the drawing frame, {what}"
+        (self.left_out if is_asked else self.put_aside)["LINE", reason] += len(found.strokes)
+        for style, strokes in self.strokes.items():
+            self.strokes[style] = [
+                stroke for k, stroke in enumerate(strokes) if (style, k) not in found.strokes
+            ]
+        return True
 
     def add(
         self, entities: Iterable[DXFGraphic], T: Array, inside: Style = LOOSE, depth: int = 0
@@ -449,9 +494,16 @@ class _Sheet:
             if drawn.is_frozen() or (drawn.is_off() and not isinstance(entity, Insert)):
                 self.put_aside[kind, f"on hidden layer {look[0]}"] += 1
                 return
+        names = [look[0], *([str(entity.dxf.name)] if isinstance(entity, Insert) else [])]
+        if not self.cuts_frame and (named := [name for name in names if NAMED.search(name)]):
+            self.put_aside[kind, f"{NAMES_FRAME}, {printable(named[-1])}"] += 1
+            return
         if isinstance(entity, Insert):
+            self.texts += [T[:3, :3] @ [*each.dxf.insert] + T[:3, 3] for each in entity.attribs]
             self._insert(entity, T, look, depth)
             return
+        if kind in ("TEXT", "MTEXT"):
+            self.texts.append(T[:3, :3] @ [*entity.dxf.insert] + T[:3, 3])
         if missing := [name for name in REQUIRED.get(kind, ()) if not entity.dxf.hasattr(name)]:
             self.left_out[kind, f"its {missing[0]} is missing"] += 1  # ezdxf has a default for it
             return

@@ -9,7 +9,7 @@ from hashlib import sha256
 from os import PathLike
 from pathlib import Path
 from time import thread_time
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,6 +58,7 @@ def read(
     section: ArrayLike | None = None,
     section_at: ArrayLike = (),
     machine: Machine | None = None,
+    drawing_frame: Literal["leave_out", "cut"] | None = None,
     progress: Progress = no_progress,
 ) -> Part:
     """Return the part in a drawing (STEP, IGES, DXF, a table, a mesh, a path) or a shape.
@@ -97,6 +98,9 @@ def read(
         Distance of each of these planes from the origin, along the normal.
     machine : Machine, optional
         For a program of a machine: its rotary axes, where the program moves some.
+    drawing_frame : {"leave_out", "cut"}, optional
+        For a DXF: what to do with a rectangle around all else. By default it is left out if it
+        seems to be a drawing frame, and then said to be what may have to be cut.
     progress : callable
         Called with the current step and the number of faces; see `kerfpath.progress`.
 
@@ -111,6 +115,8 @@ def read(
     scalar(gap, "gap", unit="m", above=0.0)
     if sort is not None:
         require_one_of(sort, "sort", ("open", "closed"))
+    if drawing_frame is not None:
+        require_one_of(drawing_frame, "drawing_frame", ("leave_out", "cut"))
     options = _ReadOptions(
         unit=unit,
         gap=gap,
@@ -122,6 +128,7 @@ def read(
         section=_direction(section, "section"),
         heights=tuple(floats(section_at, "section_at", (None,)).tolist()),
         machine=machine,
+        drawing_frame=drawing_frame,
     )
     if (options.section is None) != (not options.heights):
         raise InputError("section and section_at: expected both, or none of them")
@@ -159,6 +166,7 @@ class _ReadOptions:
     section: Direction | None
     heights: tuple[float, ...]
     machine: Machine | None
+    drawing_frame: Literal["leave_out", "cut"] | None
 
     __repr__ = short_repr
 
@@ -169,6 +177,7 @@ _OF_ONE_KIND = {
     "section": ("mesh", "a triangle mesh"),
     "beam": ("robot program", "a program of a robot"),
     "machine": ("NC program", "a program of a machine"),
+    "drawing_frame": ("DXF", "a DXF drawing"),
 }
 """Options for files of one kind, and that kind in words."""
 
@@ -255,7 +264,7 @@ def _read_file(
         if kind == "DXF":
             from kerfpath.cad.dxf import read_dxf
 
-            return read_dxf(path, content, unit, gap, axis)
+            return read_dxf(path, content, unit, gap, axis, options.drawing_frame)
         return _translated(kind, path, content, options, progress)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None

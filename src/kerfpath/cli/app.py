@@ -95,6 +95,10 @@ Machine = Annotated[
         "'{ head = \"CB\", tcp = true }'.",
     ),
 ]
+DrawingFrame = Annotated[
+    Literal["leave_out", "cut"] | None,
+    typer.Option(help="What to do with a rectangle around all else in a DXF."),
+]
 JobArgument = Annotated[Path, typer.Argument(metavar="JOB.toml", help="The job file.")]
 Strict = Annotated[
     bool, typer.Option("--strict", help="Refuse a program that would only give a warning.")
@@ -190,6 +194,7 @@ def new(
     section: Section = None,
     section_mm: SectionMm = None,
     machine: Machine = None,
+    drawing_frame: DrawingFrame = None,
     to: Annotated[
         Path | None,
         typer.Option("--out", metavar="JOB.toml", help="Job to write; default: PART.toml."),
@@ -219,6 +224,7 @@ def new(
         section=section,
         section_at=[height / 1000 for height in section_mm or ()],
         machine=machine,
+        drawing_frame=drawing_frame,
     )
     write_new(how, to, robot=robot)
 
@@ -320,6 +326,7 @@ def contours(
     section: Section = None,
     section_mm: SectionMm = None,
     machine: Machine = None,
+    drawing_frame: DrawingFrame = None,
     html: Annotated[
         Path | None,
         typer.Option(help="HTML page to write: the part with its loops by name."),
@@ -351,6 +358,7 @@ def contours(
         section=section,
         section_at=[height / 1000 for height in section_mm or ()],
         machine=machine,
+        drawing_frame=drawing_frame,
     )
     list_contours(drawn(drawing), html, everything=everything)
 

@@ -35,6 +35,7 @@ def drawing_by(
     section: tuple[float, float, float] | None = None,
     section_at: Sequence[float] = (),
     machine: str | None = None,
+    drawing_frame: Literal["leave_out", "cut"] | None = None,
 ) -> Drawing:
     """Return a drawing by the options of a command.
 
@@ -52,6 +53,7 @@ def drawing_by(
         section=None if section is None else np.array(section),
         section_at=tuple(section_at),
         machine=None if machine is None else machine_of(machine, "--machine"),
+        drawing_frame=drawing_frame,
     )
 
 

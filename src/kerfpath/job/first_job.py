@@ -11,6 +11,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, counted
 from kerfpath.cad import GAP, Loop, Machine, Part
+from kerfpath.cad.drawing_frame import ASK
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job.format import Drawing, pose
@@ -116,7 +117,7 @@ def job_text(
         chosen="" if robot else '   # guess, a placeholder: yours, see "kerfpath robots"',
         accelerations=_accelerations(used),
         name=json.dumps(file, ensure_ascii=False),
-        reading="" if drawing is None else _reading(drawing),
+        reading=("" if drawing is None else _reading(drawing)) + _frame(part),
         xyz=xyz,
         rpy=list(rpy),
         cut=_cut(part, chosen, lines if main is not lines else ()),
@@ -168,9 +169,17 @@ def _reading(drawing: Drawing) -> str:
         "section_mm": np.round(np.multiply(drawing.section_at, 1e3), 9)
         if drawing.section_at
         else None,
+        "drawing_frame": drawing.drawing_frame,
         "machine": None if drawing.machine is None else _machine(drawing.machine),
     }
     return "".join(f"{key} = {_toml(value)}\n" for key, value in given.items() if value is not None)
+
+
+def _frame(part: Part) -> str:
+    """Return the line of [part] that leaves out what seems to be a drawing frame."""
+    if not any(ASK in one.reason for one in part.left_out):
+        return ""
+    return 'drawing_frame = "leave_out"   # guess: the rectangle around all else is not cut\n'
 
 
 def _machine(machine: Machine) -> dict[str, object]:

@@ -41,6 +41,8 @@ class Drawing:
         Distance of each of them along the normal.
     machine : Machine or None
         The rotary axes of the machine whose program it is, see `kerfpath.cad.read`.
+    drawing_frame : "leave_out", "cut" or None
+        What to do with a drawing frame in a DXF, see `kerfpath.cad.read`.
     accept_left_out : bool
         Whether geometry that may have to be cut may be left out.
     """
@@ -56,6 +58,7 @@ class Drawing:
     section: Array | None = None
     section_at: tuple[float, ...] = ()
     machine: Machine | None = None
+    drawing_frame: Literal["leave_out", "cut"] | None = None
     accept_left_out: bool = False
 
     __repr__ = short_repr
@@ -82,5 +85,6 @@ class Drawing:
             section=self.section,
             section_at=self.section_at,
             machine=self.machine,
+            drawing_frame=self.drawing_frame,
             progress=progress,
         )

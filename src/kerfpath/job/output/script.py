@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kerfpath.cad import Machine
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -437,7 +438,8 @@ def _value(value: object, name: str = "") -> str:
     if is_dataclass(value) and not isinstance(value, type):
         inner = {field.name: getattr(value, field.name) for field in fields(value)}
         given = {key: each for key, each in inner.items() if each is not None}
-        return f"{type(value).__name__}({_arguments(given)})"
+        module = "cad." if isinstance(value, Machine) else ""
+        return f"{module}{type(value).__name__}({_arguments(given)})"
     return "np.inf" if value == np.inf else repr(value)
 
 

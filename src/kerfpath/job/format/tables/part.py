@@ -250,6 +250,10 @@ class PartTable(Table):
         key("distances of these planes along their normal, in mm", "[20, 40]", strict=False),
     ] = ()
     machine: MachineTable | None = None
+    drawing_frame: Annotated[
+        Literal["leave_out", "cut"] | None,
+        key("what to do with a rectangle around all else in a DXF", '"leave_out"'),
+    ] = None
     left_out: Annotated[
         Literal["refuse", "accept"],
         key("what to do if something to cut may be left out of the drawing", '"accept"'),
@@ -297,6 +301,7 @@ class PartTable(Table):
             section=_direction(self.section),
             section_at=tuple(height / 1000 for height in self.section_mm),
             machine=None if self.machine is None else self.machine.machine(),
+            drawing_frame=self.drawing_frame,
             accept_left_out=self.left_out == "accept",
         )
 
