@@ -6,7 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+from OCP.TopoDS import TopoDS_Shape
 from scipy.spatial import Delaunay
+from tests.cad.sheets import PROFILES, sheet
+from tests.cad.test_part import write_step
 
 from kerfpath.cad import Part, read
 from kerfpath.errors import InputError
@@ -223,3 +229,74 @@ def test_planes_through_corners_and_bad_planes(tmp_path: Path) -> None:
     odd[3] = odd[3][::-1]
     with pytest.raises(InputError, match="turned opposite ways; repair the mesh"):
         read(stl(tmp_path / "b.stl", odd), unit="mm", section=(0, 0, 1), section_at=[0.005])
+
+
+# ----------------------------------------------------------------- sides of sheets in closed meshes
+
+
+def square_tube(holes: int, outer: float = 40.0, wall: float = 2.0) -> TopoDS_Shape:
+    """A square tube with sharp edges and round holes of 8 mm through its upper wall."""
+    shape = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), 200.0, outer, outer).Shape()
+    size = outer - 2 * wall
+    bore = BRepPrimAPI_MakeBox(gp_Pnt(-1, wall, wall), 202.0, size, size).Shape()
+    shape = BRepAlgoAPI_Cut(shape, bore).Shape()
+    for k in range(holes):
+        at = gp_Ax2(gp_Pnt(30 + 40 * k, outer / 2, outer / 2), gp_Dir(0, 0, 1))
+        shape = BRepAlgoAPI_Cut(shape, BRepPrimAPI_MakeCylinder(at, 4.0, outer).Shape()).Shape()
+    return shape
+
+
+SHEETS = {
+    "U profile": lambda: sheet(PROFILES["U"]),
+    "hat": lambda: sheet(PROFILES["hat"]),
+    "square tube": lambda: square_tube(4),
+    "plate with a hole": lambda: BRepAlgoAPI_Cut(
+        BRepPrimAPI_MakeBox(90.0, 60.0, 3.0).Shape(),
+        BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(30, 30, -1), gp_Dir(0, 0, 1)), 9.0, 9.0).Shape(),
+    ).Shape(),
+}
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_a_closed_mesh_of_a_sheet_has_the_sides_of_the_sheet(tmp_path: Path, name: str) -> None:
+    """Of a solid and of its mesh the same holes are on the outer side, and none twice."""
+    write_step(tmp_path / "a.step", SHEETS[name]())
+    solid = read(tmp_path / "a.step")
+    vertices, triangles = solid.mesh(2e-5)
+    part = read(stl(tmp_path / "a.stl", 1e3 * vertices[triangles]), unit="mm")
+    for side in ("outer", "inner"):
+        expected, found = (
+            sorted(loop.length for loop in each.loops if loop.is_main and loop.side == side)
+            for each in (solid, part)
+        )
+        assert found == pytest.approx(expected, rel=0.01)
+    assert {loop.side for loop in part.loops} == {"outer", "inner", "edge"}
+
+
+def test_the_end_of_a_square_tube_is_cut_at_right_angles_to_its_walls(tmp_path: Path) -> None:
+    """The axis turns within 1 mm of the edges, not along the walls."""
+    write_step(tmp_path / "tube.step", square_tube(0))
+    vertices, triangles = read(tmp_path / "tube.step").mesh()
+    part = read(stl(tmp_path / "tube.stl", 1e3 * vertices[triangles]), unit="mm")
+    ends = [loop for loop in part.loops if loop.is_main and loop.side == "outer"]
+    assert [round(1e3 * loop.length, 6) for loop in ends] == [160, 160]
+    for loop in ends:
+        nodes = part.contour(loop.name).resample(spacing=5e-4)
+        square = np.abs(nodes.axes).max(axis=1) > 1 - 1e-9
+        assert np.mean(square) > (40 - 2.5) / 40
+        inward = np.array([0, 0.02, 0.02]) - nodes.points * [0, 1, 1]
+        assert (inward * nodes.axes).sum(axis=1).min() > 0.019
+
+
+def test_the_outer_side_of_a_mesh_can_be_told(tmp_path: Path) -> None:
+    file = stl(tmp_path / "plate.stl", box(90, 60, 2))
+    for towards, z in (((0, 0, 1), 2), ((0, 0, -1), 0)):
+        part = read(file, unit="mm", outer_towards=towards)
+        (outer,) = part.pick(side="outer")
+        assert outer.bounding_box[:, 2] == pytest.approx(z * 1e-3)
+    (outer,) = read(file, unit="mm").pick(side="outer")
+    assert outer.bounding_box[:, 2] == pytest.approx(2e-3)
+    with pytest.raises(InputError, match="outer_towards: expected a closed mesh, got an open one"):
+        read(stl(tmp_path / "open.stl", annulus(0.0)), unit="mm", outer_towards=(0, 0, 1))
+    with pytest.raises(InputError, match="outer_towards: expected a closed mesh, got sections"):
+        read(file, unit="mm", outer_towards=(0, 0, 1), section=(1, 0, 0), section_at=[0.01])

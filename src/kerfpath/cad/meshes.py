@@ -12,7 +12,8 @@ import numpy as np
 from kerfpath.arrays import Array, Bools, Ints, freeze
 from kerfpath.cad.build import REPEATED, kind_of_points, named_loops, part_without_faces
 from kerfpath.cad.curves import Points, Trace, label_connected, vector_area
-from kerfpath.cad.part import Kind, Loop, Part
+from kerfpath.cad.part import Kind, Loop, Part, Side
+from kerfpath.cad.sides import Surfaces, sides_of
 from kerfpath.cad.units import LARGEST, MM, NO_UNIT, UNITS_MM
 from kerfpath.cell import read_surface, weld
 from kerfpath.contour import angle_between, unit
@@ -41,10 +42,12 @@ def read_mesh(
     gap: float,
     section: Array | None = None,
     heights: Sequence[float] = (),
+    outer_towards: Array | None = None,
 ) -> Part:
     """Return the loops of a triangle mesh: STL, OBJ or PLY.
 
-    `section` (3,) is the normal of planes at `heights` (m) along it; only their loops are read.
+    `section` (3,) is the normal of planes at `heights` (m) along it; only their loops are read. In
+    a closed mesh, `outer_towards` (3,) is the direction that the outer sides of sheets face.
 
     Raises
     ------
@@ -80,28 +83,36 @@ def read_mesh(
             f"{MOST_FACES} are read; smooth the mesh"
         )
     loops = []
-    body = np.zeros(len(corners), dtype=np.int64)
     notes: list[str] = []
+    mesh = _Mesh(points, corners, across, face, edges)
+    is_open = len(edges.free) > 0
+    if outer_towards is not None and (is_open or section is not None):
+        got = "an open one" if is_open else "sections"
+        raise InputError(f"outer_towards: expected a closed mesh, got {got}; remove it")
+    names = [WHOLE] * count if is_open else [f"face{k + 1}" for k in range(count)]
     if section is not None:
-        mesh = _Mesh(points, corners, across, face, edges)
         for k, height in enumerate(heights):
             named, said = _section(mesh, section, height / MM, f"section{k + 1}", gap)
             loops += named
             notes += said
-    is_open = len(edges.free) > 0
-    around = [(WHOLE, body, 0)] if is_open else []
-    if count > 1 or not is_open:
-        around += [(f"face{k + 1}", face, k) for k in range(count)]
-    for name, group, own in around if section is None else []:
-        found: list[tuple[Kind, Trace, str]] = []
-        beside = _normals(corners[group == own], across[group == own], len(points))
-        for ring in edges.rings(group, own):
-            normals = unit(beside[ring], "normals")
-            trace = Points(points=points[ring], normals=normals, is_closed=True)
-            found.append((kind_of_points(trace), trace, ""))
-        named = named_loops(found, face=name, surface="mesh", gap=gap, layer="")
-        skin = WHOLE if is_open and name != WHOLE else ""
-        loops += [replace(loop, skin=skin) for loop in named]
+    elif is_open:
+        loops = _loops(mesh, WHOLE, np.zeros_like(face), 0, gap)
+        for k in range(count if count > 1 else 0):
+            named = _loops(mesh, f"face{k + 1}", face, k, gap)
+            loops += [replace(loop, skin=WHOLE) for loop in named]
+    else:
+        sheet = _sheet(mesh, outer_towards)
+        notes = sheet.notes
+        for name, own in sheet.skins.items():
+            named = _skin_loops(mesh, name, sheet.skin[face], own, gap)
+            side = sheet.side[sheet.skin.tolist().index(own)]
+            loops += [replace(loop, side=side) for loop in named]
+        skin_of = {own: name for name, own in sheet.skins.items()}
+        for k, name in enumerate(names):
+            skin = skin_of.get(int(sheet.skin[k]), "")
+            named = _loops(mesh, name, face, k, gap)
+            loops += [replace(loop, skin=skin, side=sheet.side[k]) for loop in named]
+            names[k] = skin or name
     if not loops:
         raise InputError(
             "is a closed surface without sharp edges, so nothing bounds a cut; give a section, "
@@ -110,21 +121,115 @@ def read_mesh(
     part = part_without_faces(path, length_unit, loops, gap=gap, notes=notes)
     by_face = np.argsort(face, kind="stable")
     drawn = points, corners[by_face], np.bincount(face, minlength=count)
-    names = (WHOLE,) * count if is_open else tuple(f"face{k + 1}" for k in range(count))
     box = freeze(np.stack([points.min(axis=0), points.max(axis=0)]) * MM)
     return replace(
-        part, faces=count, bounding_box=box, _triangulate=lambda _: drawn, _face_names=names
+        part, faces=count, bounding_box=box, _triangulate=lambda _: drawn, _face_names=tuple(names)
     )
+
+
+def _loops(mesh: _Mesh, name: str, group: Ints, own: int, gap: float) -> list[Loop]:
+    """Return the loops around the triangles of a group; at a vertex it has one normal."""
+    inside = group == own
+    beside = _normals(mesh.corners[inside], mesh.across[inside], len(mesh.points))
+    found: list[tuple[Kind, Trace, str]] = []
+    for ring in mesh.edges.rings(group, own):
+        at = mesh.edges.tail[ring]
+        normals = unit(beside[at], "normals")
+        trace = Points(points=mesh.points[at], normals=normals, is_closed=True)
+        found.append((kind_of_points(trace), trace, ""))
+    return named_loops(found, face=name, surface="mesh", gap=gap, layer="")
+
+
+# -----------------------------------------------------------------------------
+# Closed meshes of sheets: their sides, and the loops around faces of one side.
+
+
+class _Sheet(NamedTuple):
+    """The faces of a closed mesh.
+
+    Parameters
+    ----------
+    skin : (F,) int
+        The same number for faces of one skin.
+    skins : mapping of str to int
+        Number of each skin of several faces, by its name.
+    side : sequence of str
+        Side of each face.
+    notes : list of str
+    """
+
+    skin: Ints
+    skins: dict[str, int]
+    side: list[Side]
+    notes: list[str]
+
+
+def _sheet(mesh: _Mesh, outer_towards: Array | None) -> _Sheet:
+    """Return the sides of the faces; neighbours on one side of a sheet are one skin."""
+    points, face, edges = mesh.points, mesh.face, mesh.edges
+    count = int(face.max()) + 1
+    borders: list[dict[int, float]] = [{} for _ in range(count)]
+    lengths = np.linalg.norm(points[edges.ends[:, 0]] - points[edges.ends[:, 1]], axis=1)
+    meets = face[edges.pairs]
+    for k in np.flatnonzero(meets[:, 0] != meets[:, 1]).tolist():
+        f, g = meets[k].tolist()
+        borders[f][g] = borders[g][f] = borders[f].get(g, 0.0) + float(lengths[k])
+    body = np.empty(count, dtype=np.int64)
+    body[face] = label_connected(edges.pairs, len(mesh.corners))
+    side, _, doubt = sides_of(
+        Surfaces(
+            corners=points[mesh.corners],
+            face=face,
+            body=body,
+            borders=borders,
+            smooth=[{} for _ in range(count)],
+            around=np.array([sum(each.values()) for each in borders]),
+        ),
+        outer_towards,
+    )
+    alike = [
+        (f, g)
+        for f, beside in enumerate(borders)
+        for g in beside
+        if f < g and side[f] == side[g] and side[f] in ("outer", "inner")
+    ]
+    skin = label_connected(np.array(alike, dtype=np.int64).reshape(-1, 2), count)
+    several = [k for k in dict.fromkeys(skin.tolist()) if (skin == k).sum() > 1]
+    skins = {f"skin{number}": k for number, k in enumerate(several, start=1)}
+    notes = [
+        f"face{f + 1}: the outer side of its sheet is not certain: {why}; check it, and set "
+        "outer_towards if it is the other side"
+        for f, why in enumerate(doubt)
+        if why and f == skin.tolist().index(skin[f])
+    ]
+    return _Sheet(skin, skins, side, notes)
+
+
+def _skin_loops(mesh: _Mesh, name: str, group: Ints, own: int, gap: float) -> list[Loop]:
+    """Return the loops around the faces of a skin; at its sharp edges the axis turns nearby."""
+    found: list[tuple[Kind, Trace, str]] = []
+    for ring in mesh.edges.rings(group, own):
+        smooth = _smooth(mesh, ring // 3)
+        each, corner = np.arange(len(ring)), ring % 3
+        start = mesh.points[mesh.edges.tail[ring]]
+        points, normals, _ = _turning(
+            start, np.roll(start, -1, axis=0), smooth[each, corner], smooth[each, (corner + 1) % 3],
+            is_closed=True,
+        )  # fmt: skip
+        trace = Points(points=points, normals=unit(normals, "normals"), is_closed=True)
+        found.append((kind_of_points(trace), trace, ""))
+    return named_loops(found, face=name, surface="mesh", gap=gap, layer="")
 
 
 class _Edges:
     """The half-edges of triangles (F, 3), each with the triangle on its left."""
 
     def __init__(self, corners: Ints) -> None:
-        self._tail = corners.ravel()
+        self.tail = corners.ravel()
+        """Vertex that each begins at."""
         self._head = np.roll(corners, -1, axis=1).ravel()
         self._of = np.repeat(np.arange(len(corners)), 3)
-        ends = list(zip(self._tail.tolist(), self._head.tolist(), strict=True))
+        ends = list(zip(self.tail.tolist(), self._head.tolist(), strict=True))
         key = {pair: k for k, pair in enumerate(ends)}
         self._twin = np.array([key.get((b, a), -1) for a, b in ends], dtype=np.int64)
         self.free = np.flatnonzero(self._twin < 0)
@@ -132,26 +237,27 @@ class _Edges:
         one = np.flatnonzero(self._twin > np.arange(len(self._twin)))
         self.pairs = np.stack([self._of[one], self._of[self._twin[one]]], axis=1)
         """Pairs (P, 2) of triangles that share an edge."""
+        self.ends = np.stack([self.tail[one], self._head[one]], axis=1)
+        """Vertices (P, 2) at the ends of these edges."""
 
     def rings(self, group: Ints, own: int) -> Iterator[Ints]:
-        """Yield the vertices of each closed loop around the triangles of a group, on its left."""
+        """Yield the half-edges of each closed loop around the triangles of a group, on its left."""
         ours = group[self._of] == own
         border = ours & ((self._twin < 0) | (group[self._of[self._twin]] != own))
         following: dict[int, list[int]] = {}
         for k in np.flatnonzero(border).tolist():
-            following.setdefault(int(self._tail[k]), []).append(int(self._head[k]))
+            following.setdefault(int(self.tail[k]), []).append(k)
         while following:
             start = at = next(iter(following))
-            ring = [start]
+            ring = []
             while at in following:
-                heads = following[at]
-                here = heads.pop()
-                if not heads:
+                out = following[at]
+                ring.append(k := out.pop())
+                if not out:
                     del following[at]
-                at = here
+                at = int(self._head[k])
                 if at == start:
                     break
-                ring.append(at)
             if at == start and len(ring) > 2:
                 yield np.array(ring)
 
@@ -270,11 +376,21 @@ def _line(
         one, other = smooth[np.arange(len(k)), here], smooth[np.arange(len(k)), (here + 1) % 3]
         ends.append((at, unit((1 - share) * one + share * other, "normals")))
     (start, from_normal), (end, to_normal) = ends
+    return _turning(start, end, from_normal, to_normal, is_closed=is_closed)
+
+
+def _turning(
+    start: Array, end: Array, from_normal: Array, to_normal: Array, *, is_closed: bool
+) -> tuple[Array, Array, int]:
+    """Return points and normals (K, 3) along segments, and how often sharp edges are crossed.
+
+    The segments (N, 3) mm follow each other; at a sharp edge the normals of two of them differ.
+    """
     turns = angle_between(to_normal, np.roll(from_normal, -1, axis=0)) > SHARP
     if not is_closed:
         turns[-1] = False
     points, normals = [], []
-    for n in range(len(k)):
+    for n in range(len(start)):
         step = end[n] - start[n]
         length = float(np.linalg.norm(step))
         near = min(AT_CORNER, length / 3) / length if length > REPEATED else 0.0

@@ -144,7 +144,7 @@ def read(
         raise InputError(f"{path}: expected {_EXPECTED} by its suffix, got {path.suffix!r}{cure}")
     if not content.strip():
         raise InputError(f"{path}: the file is empty; expected {_EXPECTED}")
-    if outer_towards is not None and kind not in ("STEP", "IGES"):
+    if outer_towards is not None and kind not in ("STEP", "IGES", "mesh"):
         raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
     _require_fit(options, path, kind, f"a {kind} file")
     part = _read_file(kind, path, content, options, progress)
@@ -259,7 +259,8 @@ def _read_file(
             if axis is not None:
                 raise InputError("axis: expected a drawing of lines, got a mesh")
             normal = None if options.section is None else np.array(options.section)
-            return read_mesh(path, unit, gap, normal, options.heights)
+            towards = None if options.outer_towards is None else np.array(options.outer_towards)
+            return read_mesh(path, unit, gap, normal, options.heights, towards)
         require_extra("cad", f"reading {kind}")
         if kind == "DXF":
             from kerfpath.cad.dxf import read_dxf
