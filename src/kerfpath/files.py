@@ -134,6 +134,23 @@ def require_replaceable(path: Path) -> None:
         raise OSError(errno.EACCES, "it is read-only", str(path))
 
 
+def require_writable(path: Path) -> None:
+    """Require that a file can be written, before any work is done for it.
+
+    Raises
+    ------
+    OSError
+        Its folder does not exist or cannot be written to, or as `require_replaceable`.
+    """
+    folder = path.absolute().parent
+    if not folder.is_dir():
+        code = errno.ENOTDIR if folder.exists() else errno.ENOENT
+        raise OSError(code, os.strerror(code), str(path))
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OSError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+    require_replaceable(path)
+
+
 def _write_new(path: Path, content: bytes, *, like: Path) -> None:
     """Write a new file to the disk, with the permissions of another file if that exists."""
     with path.open("xb") as file:

@@ -491,7 +491,10 @@ def test_help_teaches():
             ["'karel' is not known", "rapid"],
         ),
         (("post", "small-plan/plan.json", "-o", "no/such/folder/x.mod"), ["cannot write"]),
-        (("post", "small-plan/plan.json", "-o", "/dev/null"), ["/dev/null: it is a device"]),
+        (
+            ("post", "small-plan/plan.json", "-o", "/dev/null"),
+            ["/dev/null: cannot write (it is a device"],
+        ),
         (("contours", "none.step"), ["none.step"]),
         (("contours", "small.toml"), ["small.toml"]),
         (("contours", "b_pillar.step", "--unit", "ell"), ["ell"]),

@@ -5,7 +5,9 @@ import json
 import ezdxf
 import numpy as np
 import pytest
+from tests.cad.test_meshes import box, stl
 
+import foreign
 from commands import assert_refused, run
 from kerfpath.cad import read
 from kerfpath.errors import InputError
@@ -202,3 +204,32 @@ def test_nodes_are_close_enough_for_small_radii(tmp_path, radius, spacing):
     drawing.saveas(path)
     text = job_text(read(path), tmp_path / "slot.toml")
     assert f"spacing_mm = {spacing}\n" in text
+
+
+HANDED_ON = {
+    "sort": ["points.csv", "--sort", "closed"],
+    "section": ["box.stl", "--unit", "mm", "--section", "0", "0", "1", "--section-mm", "20"],
+    "beam": ["cut.script", "--beam", "digital_out[2]"],
+    "drawing_frame": ["framed.dxf", "--drawing-frame", "cut"],
+}
+
+
+@pytest.mark.parametrize("key", HANDED_ON)
+def test_what_a_drawing_needs_is_handed_on_to_its_job(tmp_path, key):
+    angle = np.random.default_rng(1).permutation(np.linspace(0, 2 * np.pi, 60, endpoint=False))
+    rows = "".join(f"{60 * np.cos(a):.6f},{40 * np.sin(a):.6f},0,0,0,1\n" for a in angle)
+    (tmp_path / "points.csv").write_text(f"x_mm,y_mm,z_mm,nx,ny,nz\n{rows}")
+    (tmp_path / "cut.script").write_text(foreign.TEXTS["trim.script"])
+    stl(tmp_path / "box.stl", box(90, 60, 40))
+    framed = ezdxf.new(units=4)
+    framed.modelspace().add_lwpolyline([(0, 0), (180, 0), (180, 90), (0, 90)], close=True)
+    framed.modelspace().add_lwpolyline([(20, 20), (160, 20), (160, 70), (20, 70)], close=True)
+    framed.modelspace().add_circle((90, 45), 10)
+    framed.saveas(tmp_path / "framed.dxf")
+    name, *given = HANDED_ON[key]
+    made = run("new", name, *given, "--out", "first.toml", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert f"\n{key} = " in (tmp_path / "first.toml").read_text()
+    job = read_job(tmp_path / "first.toml")
+    listed = json.loads(run("contours", name, *given, "--json", cwd=tmp_path).stdout)
+    assert [loop.name for loop in job.read_part().loops] == [one["name"] for one in listed["loops"]]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from commands import assert_refused, run
 from jobs import DEMO, SMALL
 
 KERFPATH = str(Path(sys.executable).parent / "kerfpath")
@@ -99,3 +100,24 @@ def test_little_memory_is_one_line_or_enough(megabytes, job, tmp_path):
         assert done.returncode == 2, done.stderr
         assert done.stderr.startswith("kerfpath: error: ")
         assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        (("contours", "none.step", "--html"), "--html"),
+        (("script", "none.toml", "-o"), "-o"),
+        (("post", "none.json", "-o"), "-o"),
+    ],
+)
+def test_a_place_that_cannot_be_written_is_refused_before_any_work(tmp_path, command, option):
+    """Before its input is read, which is not there."""
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "folder.html").mkdir()
+    refused = run(*command, "no/such/page.html", cwd=tmp_path)
+    assert_refused(refused, "no/such/page.html: cannot write (No such file", f"another {option}")
+    refused = run(*command, "file/page.html", cwd=tmp_path)
+    assert_refused(refused, "file/page.html: cannot write (Not a directory)", option)
+    if option == "--html":
+        refused = run(*command, "folder.html", cwd=tmp_path)
+        assert_refused(refused, "folder.html: cannot write (it is a folder, not a file)")

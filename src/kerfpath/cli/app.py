@@ -15,7 +15,15 @@ import typer
 from rich.markup import escape
 
 from kerfpath import __version__
-from kerfpath.cli.show import busy, compile_kernels, errors, out, progress_bars, quiet
+from kerfpath.cli.show import (
+    busy,
+    compile_kernels,
+    errors,
+    out,
+    progress_bars,
+    quiet,
+    require_output,
+)
 from kerfpath.cli.streams import flush
 from kerfpath.errors import AuditFailed, InputError, KerfpathError, NoFeasiblePath
 from kerfpath.text import NOT_TEXT, named
@@ -346,6 +354,8 @@ def contours(
     """
     from kerfpath.cli.drawing_output import drawing_by, drawn, list_contours
 
+    if html is not None:
+        require_output(html, "--html")
     drawing = drawing_by(
         file,
         unit=unit,

@@ -20,6 +20,7 @@ from kerfpath.cli.show import (
     out,
     print_json,
     progress_bars,
+    require_output,
     show_files,
     table,
     write_text,
@@ -64,6 +65,10 @@ def write_post(
     it. Otherwise a program of one file is written as `output`, and one of several files into the
     folder `output`.
     """
+    if output is not None and not output.is_dir() and (output.suffix or output.exists()):
+        require_output(output, "-o")
+    elif output is not None:
+        require_folder(output)
     if language is None:
         source = read_plan_file(plan_file).job if job is None else read_job(job).source
         language = program_language(source, job or plan_file)
@@ -302,6 +307,8 @@ def write_script(path: Path, output: Path | None) -> None:
     InputError
         The job cannot be prepared or written as a script, or the file cannot be written.
     """
+    if output is not None:
+        require_output(output, "-o")
     job = read_job(path)
     folder = None if output is None else output.absolute().parent
     text = python_script(prepare(job, drawing_of(job)), folder)

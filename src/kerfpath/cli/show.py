@@ -25,7 +25,7 @@ from rich.text import Text
 
 from kerfpath.cli.stop import stop_in_order
 from kerfpath.errors import InputError, printable
-from kerfpath.files import write_whole
+from kerfpath.files import require_writable, write_whole
 from kerfpath.progress import Progress, no_progress
 
 _PIPED = 200
@@ -148,6 +148,22 @@ def show_files(written: Iterable[Path], removed: Iterable[Path] = (), *, of: str
         out.print(f"removed {escape(str(path))}, of {of}")
     for path in written:
         out.print(f"wrote {escape(str(path))}")
+
+
+def require_output(path: Path, option: str) -> None:
+    """Require that the file that an option of the command names can be written.
+
+    Raises
+    ------
+    InputError
+        It cannot; the message names the option.
+    """
+    try:
+        require_writable(path)
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot write ({error.strerror}); choose another {option}"
+        ) from None
 
 
 def write_text(path: Path, text: str, option: str) -> None:
