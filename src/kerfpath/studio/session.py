@@ -261,8 +261,10 @@ def _stored(folder: Path, name: str, data: bytes) -> tuple[Path, bool]:
     """
     given = Path(name)
     if given.name != name or not name.isprintable() or given.suffix.lower() not in SUFFIXES:
-        known = ", ".join(sorted(SUFFIXES))
-        raise InputError(f"part: expected a drawing ({known}), got {name!r:.80}")
+        raise InputError(
+            f"expected a drawing, such as .step, .iges, .dxf or .stl, got {name!r:.80}; export the "
+            "part as one"
+        )
     for number in count(1):
         own = name if number == 1 else f"{given.stem}-{number}{given.suffix}"
         file = folder / own
@@ -387,10 +389,10 @@ class Session:
                 if unit is None and question:
                     raise InputError(question)
                 return job_text(part, path, robot=robot, drawing=drawing)
-            except InputError:
+            except InputError as error:
                 if new:
                     file.unlink()
-                raise
+                raise InputError(str(error).replace(str(file), file.name)) from None
 
         made = await asyncio.to_thread(text)
         before = {} if self._job is None else self._job.source

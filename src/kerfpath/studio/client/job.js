@@ -16,12 +16,12 @@ function pathOf(key) {
 }
 
 /**
- * Return the value of a key, or null.
+ * Return the value of a key, or null; while the job has a fault, that of the job before.
  * @param {string} key
  */
 export function valueOf(key) {
   /** @type {any} */
-  let found = store.job?.values;
+  let found = store.valid?.values;
   for (const part of pathOf(key)) found = found?.[part];
   return found ?? null;
 }
@@ -30,7 +30,7 @@ export function valueOf(key) {
  * Whether a key is in the text of the job.
  * @param {string} key
  */
-export const isGiven = (key) => store.job?.given.includes(pathOf(key).join(".")) ?? false;
+export const isGiven = (key) => store.valid?.given.includes(pathOf(key).join(".")) ?? false;
 
 /**
  * Return what is wrong with a key, or "".

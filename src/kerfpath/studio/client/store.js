@@ -38,6 +38,8 @@ export class Store extends Messages {
     this.connection = "connecting";
     /** @type {number | null} time of the next try, ms */
     this.retryAt = null;
+    /** @type {import("./messages.js").JobMessage | null} the newest job without a fault */
+    this.valid = null;
     this.met = false; // whether the connection has ever been open
     this.broken = false; // whether it has been lost since it was last open
     /** @type {import("./messages.js").ProgressMessage} */
@@ -185,6 +187,10 @@ export class Store extends Messages {
   /** @param {ServerMessage} message */
   take(message) {
     switch (message.type) {
+      case "job":
+        this.job = message;
+        if (message.values) this.valid = message;
+        break;
       case "scene":
         this.scene = message;
         this.shades.clear(); // robot or cell may have changed

@@ -30,12 +30,16 @@ export function followDrops() {
   });
 }
 
+let turn = Promise.resolve(); // files are read one after the other
+
 /**
  * Begin a new job with a drawing.
- * @param {File | null | undefined} file
+ * @param {File} file
  */
-async function begin(file) {
-  if (!file || part.reading) return;
+const begin = (file) => (turn = turn.then(() => read(file)));
+
+/** @param {File} file */
+async function read(file) {
   Object.assign(part, { reading: file.name, why: "", file });
   redraw();
   const query = new URLSearchParams({ robot: valueOf("robot.model") ?? "", unit: part.unit });
@@ -55,23 +59,39 @@ const body = () => html`
     ${drawing()}${robot()}${headAndLanguage()}${home()}${fixtures()}
   </div>`;
 
+/**
+ * A button that opens a file of this machine.
+ * @param {string} words
+ * @param {string[]} suffixes
+ * @param {(file: File) => void} take
+ */
+function opener(words, suffixes, take) {
+  const pick = (/** @type {any} */ { target }) => {
+    if (target.files.length) take(target.files[0]);
+    target.value = ""; // the same file may be opened again
+  };
+  return html`
+    <label class="plain">
+      ${icon("file")}${words}
+      <input type="file" class="unseen" accept=${suffixes.join(",")}
+        disabled=${!store.live} onChange=${pick} />
+    </label>`;
+}
+
 function drawing() {
   const { suffixes = [], units = [] } = store.options ?? {};
-  const pick = (/** @type {any} */ { target }) => {
-    begin(target.files[0]);
-    target.value = "";
+  const measure = (/** @type {any} */ { target }) => {
+    part.unit = target.value;
+    if (part.why && part.file) begin(part.file);
   };
-  const measure = (/** @type {any} */ { target }) => (part.unit = target.value);
   const choices = [{ value: "", label: "as the file says" }, ...units.map(worded)];
   return html`
     <section class="card">
-      <h3>Part</h3>
-      <p>${valueOf("part.file") ?? "none"}</p>
-      <p class="field row">
-        <span>Open</span>
-        <input type="file" accept=${suffixes.join(",")} aria-label="Drawing of the part"
-          disabled=${!store.live || part.reading !== ""} onChange=${pick} />
-      </p>
+      <header>
+        <h3>Part</h3><span class="grow" />
+        ${opener("Open a drawing", suffixes, begin)}
+      </header>
+      <p class="file">${valueOf("part.file") ?? "none"}</p>
       <p class="field row">
         <span>Unit</span>
         <select aria-label="Unit of the drawing" value=${part.unit} onChange=${measure}>
@@ -85,12 +105,7 @@ function drawing() {
             : "Or drop a STEP, IGES or DXF file on the page. It begins a new job with this robot, head and language; Undo brings the job before back."
         }
       </p>
-      ${part.why && html`<p class="fault">${part.why}</p>`}
-      ${
-        part.why &&
-        part.file &&
-        html`<button class="plain" onClick=${() => begin(part.file)}>Read it again</button>`
-      }
+      ${part.why && html`<p class="fault" role="alert">${part.why}</p>`}
     </section>`;
 }
 

@@ -15,7 +15,7 @@ const setWeights = (value, drag) =>
 
 /** The weights and the figures of all joints. */
 export function jointsPanel() {
-  const { job, scene, chosen: plans } = store;
+  const { valid: job, scene, chosen: plans } = store;
   const usual = job?.weights ?? [];
   const axes = axesOf(scene?.robot);
   // The weights of a changed job arrive before its scene.

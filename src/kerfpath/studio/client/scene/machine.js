@@ -20,15 +20,15 @@ import { creased, merged, mesh } from "./meshes.js";
 /** @typedef {import("../messages.js").BodyEntry} Body */
 /** @typedef {Body["kind"]} Kind */
 
-/** @type {Record<Kind, string>} */
+/** @type {Record<string, string>} by kind; a floor is drawn by its squares */
 const COLOURS = {
   robot: "--robot",
   head: "--head",
   part: "--part",
   fixture: "--fixture",
-  floor: "--fixture",
 };
 const MOST_EDGES = 60000;
+const BELOW = -0.001; // m, so that what stands on the floor hides its squares
 
 /** @typedef {{standing?: string[], move?: string}} Layout  from [layout] */
 
@@ -75,6 +75,7 @@ export class Machine {
     this.standing = [];
     this.ground = 0; // the fixed frame
     this.base = 0; // the frame of the robot's base
+    this.floor = BELOW; // the height of its squares, m
     this.moved = 0; // the frame in which the part is moved
     /** The part in the placement of the job, visible while it is shown elsewhere. */
     this.left = new Group();
@@ -106,7 +107,7 @@ export class Machine {
   /** Take the colours of the theme. */
   paint() {
     for (const [kind, material] of Object.entries(this.materials))
-      material.color.set(themeColour(COLOURS[/** @type {Kind} */ (kind)]));
+      material.color.set(themeColour(COLOURS[kind]));
     this.edge.color.set(themeColour("--edge"));
     this.leftMaterial.color.set(themeColour("--part"));
     this.ghostMaterial.color.set(themeColour("--ghost"));
@@ -118,7 +119,10 @@ export class Machine {
    * @param {Layout} layout
    */
   async build(scene, layout) {
-    const groups = Map.groupBy(scene.bodies, (body) =>
+    const bodies = scene.bodies.filter(({ kind }) => kind !== "floor");
+    const floor = scene.bodies.find(({ kind }) => kind === "floor");
+    const slab = floor && (await mesh(floor.mesh));
+    const groups = Map.groupBy(bodies, (body) =>
       [body.frame, goesWith(body, scene.robot, layout), body.kind, body.colour].join(" "),
     );
     const made = await Promise.all(
@@ -145,6 +149,7 @@ export class Machine {
     }
     this.standing[0].add(this.left);
     this.triangles = 0;
+    this.floor = BELOW + (slab ? Math.max(...slab.xyz.filter((_, i) => i % 3 === 2)) : 0);
     for (const { faces, edges, by, frame, kind, colour } of made) {
       const parent = this[by][frame];
       const body = new Mesh(faces, this.coloured(kind, colour));
@@ -161,7 +166,7 @@ export class Machine {
         left.raycast = () => {}; // it cannot be pointed at
         this.left.add(left);
       }
-      if (by === "frames" ? kind !== "floor" : frame !== this.ground)
+      if (by === "frames" || frame !== this.ground)
         for (const [order, material] of [this.veil, this.ghostMaterial].entries()) {
           const part = new Mesh(faces, material);
           part.renderOrder = 10 + order;
@@ -219,13 +224,13 @@ export class Machine {
     return found[found.length - 1];
   }
 
-  /** Return points of all bodies except a floor, in the room, to find their extent. */
+  /** Return points of all bodies, in the room, to find their extent. */
   outline() {
     this.group.updateMatrixWorld(true);
     /** @type {Vector3[]} */
     const found = [];
     this.group.traverse((each) => {
-      if (!(each instanceof Mesh) || each.name === "floor") return;
+      if (!(each instanceof Mesh)) return;
       const at = each.geometry.getAttribute("position");
       const stride = Math.max(1, Math.floor(at.count / 600));
       for (let i = 0; i < at.count; i += stride)

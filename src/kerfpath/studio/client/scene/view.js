@@ -35,7 +35,7 @@ export class SceneView {
     this.placing = new Placing(this);
     this.built = "";
     this.fitted = ""; // the robot that the view was fitted to
-    this.begun = false; // whether there has been a motion
+    this.begun = false; // whether the bodies have had a motion of their own
     this.ready = false;
     this.follow = false;
     /** @type {import("../timeline.js").Timeline | null} whose kerf is drawn */
@@ -140,6 +140,7 @@ export class SceneView {
     }
     if (key !== this.built && this.built) return;
     this.ready = true;
+    this.begun = false;
     this.placing.apply();
     this.lay();
     this.show(player.moment);
@@ -157,14 +158,20 @@ export class SceneView {
     this.stage.hold();
   }
 
+  /** Whether a contour has a plan for the scene that is shown. */
+  get planned() {
+    const { scene, plans } = store;
+    return [...plans.values()].some(([{ revision }]) => revision >= (scene?.revision ?? 0));
+  }
+
   /** Draw the floor under the bodies of the cell. */
   lay() {
     const { scene } = store;
-    if (!scene || !this.ready || scene.bodies.some(({ kind }) => kind === "floor")) return;
+    if (!scene || !this.ready) return;
     const box = new Box3();
     const still = this.machine.frames.slice(0, this.machine.base + 1);
     for (const body of still.flatMap(({ children }) => children)) box.expandByObject(body);
-    this.stage.layFloor(box.expandByScalar(0.5), -0.001);
+    this.stage.layFloor(box.expandByScalar(0.5), this.machine.floor);
   }
 
   /** Draw the contours again. */
@@ -219,7 +226,7 @@ export class SceneView {
       if (this.carried) this.stage.carry(at.clone().sub(this.carried));
       this.carried = at;
     }
-    if (moment && !this.begun) {
+    if (moment && !this.begun && this.planned) {
       this.begun = true;
       if (this.stage.held) this.fit(scene.robot.id); // the arm is elsewhere than before
     }
