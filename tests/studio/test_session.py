@@ -1,6 +1,7 @@
 """A session: the job is planned, changed and planned again, and every page sees the same."""
 
 import base64
+import re
 import struct
 import tomllib
 
@@ -351,6 +352,33 @@ def test_a_loop_that_there_is_not_is_a_fault(studio):
     assert "not valid TOML" in job["faults"][0]["message"]
     page.say("edit", path=["plan", "metric"], value="max")
     assert "not valid TOML" in page.until("error", about="edit")["message"]
+
+
+FAR = re.sub(r"xyz_mm = \[.*\]", "xyz_mm = [2500, -600, 500]", QUICK, count=1)
+
+
+def test_a_part_out_of_reach_is_moved_by_one_button_as_a_plan_says(folder):
+    path = write_job(folder, FAR, name="far.toml")
+    with serving(path) as client, talking(client) as page:
+        page.done(1)
+        found = {m["contour"]: m for m in page.heard if m["type"] == "nopath"}
+        assert set(found) == {"slot", "hole 10"}
+        failures = {cut.contour: cut.failure for cut in run_job(read_job(path)).cuts}
+        for name, answer in found.items():
+            assert failures[name].startswith(answer["remedy"])
+            (option,) = answer["relaxations"]  # slower motions have no poses, either
+            assert re.fullmatch(r"move the part \d+ mm towards the robot", option["label"])
+        page.say("relax", contour="slot", index=0)
+        moved = page.until("job", revision=2)
+        by = re.search(r"by (.*) mm in", found["slot"]["remedy"])[1].split()
+        moved_by = np.subtract(moved["values"]["part"]["xyz_mm"], [2500, -600, 500])
+        assert moved_by == pytest.approx([float(v) for v in by], abs=1e-6)
+        page.done(2)
+        now = [m for m in page.heard if m.get("revision") == 2]
+        assert {m["contour"] for m in now if m["type"] in ("plan", "nopath")} == set(found)
+        assert not any("moved" in m["remedy"] for m in now if m["type"] == "nopath")
+        page.say("undo")
+        assert page.until("job", revision=3)["text"] == FAR
 
 
 @pytest.mark.slow

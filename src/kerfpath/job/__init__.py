@@ -72,6 +72,7 @@ from kerfpath.job.run import fastest_along as fastest_along
 from kerfpath.job.run import fastest_speeds as fastest_speeds
 from kerfpath.job.run import foresee as foresee
 from kerfpath.job.run import measured as measured
+from kerfpath.job.run import moved_into_reach as moved_into_reach
 from kerfpath.job.run import order_cuts as order_cuts
 from kerfpath.job.run import require_foreseen as require_foreseen
 from kerfpath.job.run import run_job as run_job

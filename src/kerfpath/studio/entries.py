@@ -40,6 +40,7 @@ from kerfpath.studio.messages import (
     flat_or_none,
 )
 from kerfpath.studio.work import Stop
+from kerfpath.study.placing import Placement, changes_of
 
 # -----------------------------------------------------------------------------
 # The messages about a plan, and about the reason why there is none.
@@ -207,7 +208,7 @@ def no_path_message(
 # Changes that may make a path where there is none, as edits of the job.
 
 
-def alternatives(cut: CutResult, index: int) -> list[Relaxation]:
+def alternatives(cut: CutResult, index: int, placement: Placement) -> list[Relaxation]:
     """Return possible changes for a cut without a plan, first those that gave one.
 
     Parameters
@@ -216,8 +217,15 @@ def alternatives(cut: CutResult, index: int) -> list[Relaxation]:
         A cut without a plan, with its advice.
     index : int
         Index of its [[contour]] table in the job.
+    placement : Placement
+        That of the part, with which fixtures may move.
     """
     found, advice = list[Relaxation](), cut.advice
+    if advice is not None and advice.move is not None:
+        by = dict(zip(("x_mm", "y_mm", "z_mm"), (advice.move.by * 1e3).tolist(), strict=True))
+        changes = changes_of(placement.job, placement.numbers(by))
+        edits = [EditEntry(path=list(path), value=value) for path, value in changes]
+        return [Relaxation(label=f"move the part {advice.move.words}", edits=edits)]
     if advice is not None:
         if advice.without_windows:
             pins = EditEntry(path=["contour", index, "gamma_windows"], value=None)
@@ -245,7 +253,9 @@ def alternatives(cut: CutResult, index: int) -> list[Relaxation]:
 def _untried(cut: CutResult) -> list[Relaxation]:
     """Return changes that have not been tried and that the other options allow."""
     found, options = list[Relaxation](), cut.request.options
+    # A node without poses has none in a slower motion, either.
     plain = options.closure == "free" and options.rotation is None and options.objective == "sum"
+    plain = plain and not cut.lacks_poses
     grid = options.method in ("continuous", "exact")
     if plain and grid and options.feed == "constant" and options.interruptions == "none":
         found.append(_plan('not tried: slow down where needed: feed = "dip"', "feed", "dip"))

@@ -29,6 +29,7 @@ from kerfpath.job import (
     foresee,
     is_compiled,
     measured,
+    moved_into_reach,
     order_cuts,
     warm_up,
 )
@@ -69,6 +70,7 @@ from kerfpath.studio.program import cycle_of, exports_of, program_message
 from kerfpath.studio.scene import Meshes, scene_of, scene_of_robot, tables_of
 from kerfpath.studio.studies import Fronts, Layouts
 from kerfpath.studio.work import Newest, Seldom, Stop, said_of
+from kerfpath.study.placing import placement_of
 
 # -----------------------------------------------------------------------------
 # The fastest constant speed of a contour, as an edit of the job.
@@ -212,10 +214,18 @@ class Run:
         for i in sorted(range(len(cuts)), key=lambda i: cuts[i].contour != first):
             if cuts[i].plan is None:
                 cuts[i] = advised(self._prepared, cuts[i], self.progress)
-                self._broken(cuts[i], settled=True)
+                far = cuts[i].lacks_poses and cuts[i].advice is None
+                self._broken(cuts[i], settled=not far)
             elif cuts[i].request.options.certify is not None:
                 cuts[i] = self._proved(cuts[i])
                 self._plan(cuts[i], _of_same(cuts, cuts[i]), settled=True)
+        if any(cut.lacks_poses for cut in cuts):
+            self.progress("looking for a move of the part into reach", 0, 0)
+            moves = moved_into_reach(self._prepared, cuts)
+            for i, cut in enumerate(cuts):
+                if cut.lacks_poses and cut.advice is None:
+                    cuts[i] = replace(cut, advice=moves.get(cut.contour))
+                    self._broken(cuts[i], settled=True)
         self._stop.check()
         return measured(self._prepared, result.with_cuts(tuple(cuts)))
 
@@ -270,7 +280,10 @@ class Run:
         )
 
     def _broken(self, cut: CutResult, *, settled: bool) -> None:
-        relaxations = alternatives(cut, self._tables[cut.contour]) if settled else None
+        relaxations = None
+        if settled:
+            where = placement_of(self._prepared)
+            relaxations = alternatives(cut, self._tables[cut.contour], where)
         self._say(
             no_path_message(
                 cut,

@@ -45,19 +45,19 @@ WAYS = {
 def test_the_move_is_enough_and_a_shorter_one_is_not(tmp_path, where, xyz):
     job = placed(tmp_path, xyz)
     asked = contours(job)
-    words = move_into_reach(job, asked)
-    assert where in words
-    by = np.array([float(v) for v in re.search(r"by (.*) mm in", words)[1].split()]) / 1e3
-    assert reaches(shifted(job, by), asked)
-    length = np.linalg.norm(by)
-    assert f"{length * 1e3:.0f} mm" in words
-    assert not reaches(shifted(job, by * (1 - STEP / length)), asked)
+    move = move_into_reach(job, asked)
+    assert move.where == where
+    said = re.search(r"by (.*) mm in", str(move))[1]
+    assert [float(v) for v in said.split()] == pytest.approx(1e3 * move.by, abs=1e-9)
+    assert reaches(shifted(job, move.by), asked)
+    length = np.linalg.norm(move.by)
+    assert f"{length * 1e3:.0f} mm {where}" in str(move)
+    assert not reaches(shifted(job, move.by * (1 - STEP / length)), asked)
 
 
 def test_the_advice_of_a_plan_and_the_warning_of_a_check_name_it(tmp_path):
     job = placed(tmp_path, WAYS["towards the robot"])
-    words = move_into_reach(job, contours(job))
-    assert words
+    words = str(move_into_reach(job, contours(job)))
     assert words in check_job(job).warnings
     missing = [cut for cut in run_job(job).cuts if cut.broken is not None]
     assert missing
@@ -66,4 +66,4 @@ def test_the_advice_of_a_plan_and_the_warning_of_a_check_name_it(tmp_path):
 
 def test_where_no_move_helps_nothing_is_said(tmp_path):
     job = placed(tmp_path, (9000, 0, 500))
-    assert move_into_reach(job, contours(job)) == ""
+    assert move_into_reach(job, contours(job)) is None

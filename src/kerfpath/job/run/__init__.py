@@ -3,6 +3,7 @@
 from kerfpath.job.run.contour import advised as advised
 from kerfpath.job.run.contour import course_of_plans as course_of_plans
 from kerfpath.job.run.contour import cut_candidate as cut_candidate
+from kerfpath.job.run.contour import moved_into_reach as moved_into_reach
 from kerfpath.job.run.doubts import sides_in_doubt as sides_in_doubt
 from kerfpath.job.run.foresee import JobPreview as JobPreview
 from kerfpath.job.run.foresee import check_job as check_job

@@ -111,7 +111,7 @@ def check_job(job: Job, part: Part | None = None) -> JobPreview:
         if not job.robot.free.size:  # external axes stand only at a few places here
             far += _out_of_reach(job, task.name, nodes.points[some], graph)
     if far and (move := move_into_reach(job, asked)):
-        far.append(move)
+        far.append(str(move))
     doubts = (*far, *sides_in_doubt(job, contours, part.mesh()))
     return JobPreview(job=job, part=part, cell=cell, starts=tuple(starts), warnings=doubts)
 

@@ -22,6 +22,7 @@ from kerfpath.job.run.contour import (
     with_checks,
 )
 from kerfpath.job.run.foresee import require_foreseen
+from kerfpath.job.run.remedy import Remedy
 from kerfpath.job.run.results import CutResult, JobResult
 from kerfpath.planner import (
     with_bound,
@@ -210,7 +211,9 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
             )
     result = order_cuts(prepared, tried, stoppable)
     cuts = tuple(certified(cut, stoppable) for cut in result.cuts)
-    moves = moved_into_reach(prepared, cuts)
+    moves = dict[str, Remedy]()
+    with suppress(StopEarly):
+        moves = moved_into_reach(prepared, cuts)
     cuts = tuple(
         replace(cut, advice=moves[cut.contour]) if cut.contour in moves else cut for cut in cuts
     )

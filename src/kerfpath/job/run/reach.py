@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath.arrays import Array, spread
+from kerfpath.arrays import Array, short_repr, spread
 from kerfpath.contour import Contour
 from kerfpath.job.format import Job
 from kerfpath.options import PlanOptions
+from kerfpath.progress import may_stop
 
 STEP, FARTHEST = 0.02, 3.0
 """Step and largest length of the moves that are tried, m."""
@@ -20,26 +21,54 @@ PLACES = 12
 """Nodes of each contour that are looked at first."""
 
 
-def move_into_reach(job: Job, contours: Sequence[tuple[Contour, PlanOptions]]) -> str:
-    """Return words on the shortest move of the part after which every node has poses; "" if none.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Move:
+    """A move of the part after which every node has poses.
+
+    Parameters
+    ----------
+    by : (3,) m
+        In the robot base, whole mm.
+    where : str
+        Where it leads, such as "up".
+    """
+
+    by: Array
+    where: str
+
+    __repr__ = short_repr
+
+    @property
+    def words(self) -> str:
+        """How far it leads, and where."""
+        return f"{np.linalg.norm(self.by) * 1e3:.0f} mm {self.where}"
+
+    def __str__(self) -> str:
+        """Return what the move is and what comes of it."""
+        by = " ".join(f"{v:g}" for v in self.by * 1e3 + 0.0)
+        return (
+            f"with the part moved {self.words} (by {by} mm in the robot base, see xyz_mm in "
+            "[part]) every node has poses"
+        )
+
+
+def move_into_reach(job: Job, contours: Sequence[tuple[Contour, PlanOptions]]) -> Move | None:
+    """Return the shortest move of the part after which every node has poses, if one is known.
 
     It leads towards axis 1 of the robot or away from it, up or down. It is tried at every node of
     the contours, with all that their options ask of a pose; it is quickest if those without poses
     come first. It says nothing about motions and collisions. None is known with external axes.
     """
     if job.robot.free.size:
-        return ""
-    for where, move in _moves(job, contours):
-        moved = replace(job, placement=_shifted(job.placement, move))
+        return None
+    for where, by in _moves(job, contours):
+        may_stop()
+        moved = replace(job, placement=_shifted(job.placement, by))
         if all(_reaches(moved, *each, PLACES) for each in contours) and all(
             _reaches(moved, *each) for each in contours
         ):
-            by = " ".join(f"{v:g}" for v in move * 1e3 + 0.0)
-            return (
-                f"with the part moved {np.linalg.norm(move) * 1e3:.0f} mm {where} (by {by} mm in "
-                "the robot base, see xyz_mm in [part]) every node has poses"
-            )
-    return ""
+            return Move(by=by, where=where)
+    return None
 
 
 def _reaches(job: Job, nodes: Contour, options: PlanOptions, places: int = 0) -> bool:

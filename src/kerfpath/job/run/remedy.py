@@ -11,6 +11,7 @@ from kerfpath.cell import Cell
 from kerfpath.errors import NoFeasiblePath, Relaxation
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format import Candidate, CutRequest, Job
+from kerfpath.job.run.reach import Move
 from kerfpath.job.run.speeds import fastest_along, leaves_grid
 from kerfpath.options import PlanOptions
 from kerfpath.planner import (
@@ -60,9 +61,9 @@ class Remedy:
         Speed, m/min, from which on it is proved that no motion is possible at any rotation.
     without_windows : bool
         Whether there is a plan without gamma_windows, whatever the other values.
-    move : str
-        Where nodes have no pose: a move of the part after which they have, in words; "" if none is
-        known. There is no other advice then.
+    move : Move or None
+        Where nodes have no pose: a move of the part after which they have. There is no other advice
+        then.
     """
 
     other_method: bool
@@ -74,14 +75,14 @@ class Remedy:
     closed: tuple[str, ...] = ()
     never: str | None = None
     without_windows: bool = False
-    move: str = ""
+    move: Move | None = None
 
     __repr__ = short_repr
 
     def __str__(self) -> str:
         """Return the advice in one line."""
-        if self.move:
-            return self.move
+        if self.move is not None:
+            return str(self.move)
         if self.without_windows:
             alone = self.speed is None and not self.other_method
             rest = "" if alone else f"; with them {replace(self, without_windows=False)}"
