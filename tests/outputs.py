@@ -280,7 +280,8 @@ between_nodes = "reported"
 posture = "front/up"
 """
 HELP = """\
-plan check speed contours robots post audit compare touch-up script pareto batch layout studio demo
+plan check speed contours robots post audit compare run touch-up script
+pareto batch layout studio demo
 """
 MEASURED = """\
 nominal_x_mm,nominal_y_mm,nominal_z_mm,measured_x_mm,measured_y_mm,measured_z_mm

@@ -1,7 +1,9 @@
 """G code of LinuxCNC: times, switches, INI and HAL, and what the reader refuses."""
 
 import configparser
+import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.post.cases import CASES, CUT
 
-from kerfpath.post import JointMove, build_program
+from kerfpath.post import JointMove, build_program, preflight
 from kerfpath.post.linuxcnc.controller import cruise_time, time_from
+from kerfpath.post.linuxcnc.motion import stretch
 from kerfpath.transfer import least_time
 from programs import arc, changed, five_axis_program, hand_plan, with_steps
 
@@ -70,8 +73,79 @@ def test_the_last_switch_of_a_contour_waits_for_no_move(program):
 
 
 def test_lead_times_are_left_out_with_a_warning(program):
-    assert CASE.codes(program, "warning") == ["lead-time", "air-moves"]
-    assert CASE.codes(build_program([CASE.small], lead_time=0.0), "warning") == ["air-moves"]
+    assert CASE.codes(program, "warning") == ["lead-time", "look-ahead", "air-moves"]
+    assert "lead-time" not in CASE.codes(build_program([CASE.small], lead_time=0.0))
+
+
+# What its look-ahead holds.
+
+A = np.full(6, np.radians(300))
+"""Acceleration of each joint, rad/s^2."""
+
+
+def even(count, step_time, speed):
+    """How LinuxCNC runs moves in which joint 1 turns evenly, with targets at even times."""
+    robot = CASE.cell[0].with_limits(acceleration=A, velocity=np.full(6, 10.0))
+    q = np.outer(speed * step_time * np.arange(count + 1), np.eye(6)[0])
+    return stretch((), q, np.full(count, step_time), robot, CASE.settings)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.99, 1.0, 1.1, 2.0])
+def test_the_time_is_kept_up_to_the_speed_a_t_half(share):
+    """Between the ramps at both ends, each of which adds half of speed / (a / 2)."""
+    step_time, count = 0.1, 40
+    speed = share * A[0] * step_time / 2
+    run = even(count, step_time, speed)
+    ramps = speed / (A[0] / 2)
+    if share <= 1:
+        assert run.time == pytest.approx(count * step_time + ramps, rel=1e-9)
+    else:
+        # Each move speeds up for half of it, at a / 2: as fast as sqrt(way a / 2).
+        each = speed * step_time / np.sqrt(speed * step_time * A[0] / 2)
+        assert run.time == pytest.approx((count + 1) * each, rel=1e-9)
+
+
+def test_corners_are_parabolas_that_keep_the_limits(program):
+    """Targets on a curve: joints are continuous and pass from stop to stop within all limits.
+
+    Moves of like length are meant: where one is short for the speed of the next, LinuxCNC itself
+    exceeds the acceleration.
+    """
+    turn = np.linspace(0, 2, 61)[:, None]
+    q = 0.3 * np.sin(turn + np.arange(6)) - 0.3 * np.sin(np.arange(6))
+    run = stretch((), q, np.full(60, 0.05), program.robot, CASE.settings)
+    time = np.arange(0, run.time + 2e-3, 1e-3)
+    at = run.at(time)
+    np.testing.assert_allclose(at[[0, -1]], q[[0, -1]], atol=1e-12)
+    velocity, acceleration = program.robot.speed_limits()
+    assert (np.abs(np.diff(at, axis=0)) <= velocity * 1e-3 * (1 + 1e-9)).all()
+    bend = np.abs(np.diff(at, 2, axis=0)) / 1e-6 / acceleration
+    assert 0.49 < bend.max() < 1.02
+    # Rounded corners leave the lines between targets by a few hundredths of their length.
+    line = np.vstack([np.linspace(a, b, 50) for a, b in pairwise(q)])
+    off = [np.abs(line - one).max(axis=1).min() for one in at[::10]]
+    assert max(off) < 0.05 * np.abs(np.diff(q, axis=0)).max()
+
+
+def test_a_cut_that_is_too_fast_for_the_look_ahead_is_told_what_holds(program):
+    (said,) = (i for i in preflight(program, "linuxcnc", CASE.settings) if i.code == "look-ahead")
+    found = re.search(r"raise spacing_mm to ([\d.]+), or lower the speed to (\d+)%", said.message)
+    spacing, share = float(found[1]) * 1e-3, int(found[2]) / 100
+    # Both say the same: a spacing that is longer, or a speed that is lower, by its square root.
+    longest = max(move.duration for move in program.moves[2:-1]) * 0.12
+    assert spacing / longest == pytest.approx(1 / share**2, rel=0.05)
+    held = hand_plan(CASE.small.contour, *CASE.cell, speed=0.12 * (share - 0.01))
+    assert "look-ahead" not in CASE.codes(CASE.built([held]))
+    still = hand_plan(CASE.small.contour, *CASE.cell, speed=0.12 * (share + 0.05))
+    assert "look-ahead" in CASE.codes(CASE.built([still]))
+
+
+def test_joints_that_the_interpreter_cannot_move_as_slowly_are_refused(program):
+    """Joints 1 to 3 nearly stand while the wrist turns: LinuxCNC takes 0.1 deg/min for them."""
+    steps = list(program.sections[0].steps)
+    q = steps[4].q + np.array([1e-7, 0, 0, 0.1, 0, 0])
+    made = with_steps(program, [*steps[:5], replace(steps[5], q=q), *steps[6:]])
+    assert "slow" in CASE.codes(made, "error")
 
 
 # INI and HAL.

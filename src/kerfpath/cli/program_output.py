@@ -1,7 +1,8 @@
-"""Output of the commands for programs: post, audit, compare, touch-up and script."""
+"""Output of the commands for programs: post, audit, compare, run, touch-up and script."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from kerfpath.cli.show import (
 from kerfpath.errors import InputError, KerfpathError, about
 from kerfpath.job import (
     AuditReport,
+    ControllerRun,
     audit_file,
     compare_programs,
     prepare,
@@ -37,6 +39,7 @@ from kerfpath.job import (
     read_job,
     read_plan_file,
     require_folder,
+    run_program,
     touch_up,
 )
 from kerfpath.placement import MeasuredFrame, placement_from_points
@@ -46,9 +49,12 @@ from kerfpath.post import (
     identifier,
     languages,
     replace_program,
+    write_files,
     write_program,
 )
 from kerfpath.post import language as find_language
+from kerfpath.report import render_controller_run
+from kerfpath.robots import joint_identifiers
 
 # -----------------------------------------------------------------------------
 # `kerfpath post`: write or print the program of a plan.
@@ -272,6 +278,142 @@ def show_differences(a: Path, b: Path, job: Path) -> bool:
     alike = "the same" if not found.not_compared else "the same in what was compared"
     out.print(alike if same else "not the same")
     return same
+
+
+# -----------------------------------------------------------------------------
+# `kerfpath run`: run a program on a controller, and show what it did.
+
+RUN_COLUMNS = ("contour", "planned s", "foreseen s", "run s", "off path mm")
+
+
+def show_run(program: Path, on: str, job: Path | None, folder: Path) -> bool:
+    """Run a program, write its page, JSON and record, and return whether no check is an error."""
+    require_folder(folder, ("run.html", "run.json", "record.csv"))
+    with about(program), busy(f"running the program on {on}"):
+        done = run_program(program, job, on=on)
+    rows = [
+        [
+            c.name,
+            f"{c.planned:.3f}",
+            f"{c.foreseen:.3f}",
+            f"{c.time:.3f}",
+            f"{c.off_path * 1e3:.4f}",
+        ]
+        for c in done.contours
+    ]
+    entry = _run_entry(done, program, on)
+    files = {
+        "run.html": _run_page(done, program, rows),
+        "run.json": json.dumps(entry, indent=1, allow_nan=False) + "\n",
+        "record.csv": _record_text(done),
+    }
+    written = write_files(folder, files)
+    print_json(entry | {"files": [str(path) for path in written]})
+    table(
+        RUN_COLUMNS, [[escape(row[0]), *row[1:]] for row in rows], numbers=RUN_COLUMNS[1:],
+        whole=RUN_COLUMNS[:1],
+    )  # fmt: skip
+    table(
+        ["check", "largest", "allowed", "verdict"],
+        [
+            [c.title, format_value(c.value, c.unit), format_value(c.limit, c.unit),
+             "ok" if c.ok else c.level.upper()]
+            for c in done.checks
+        ],
+        numbers=["largest", "allowed"],
+        whole=["verdict"],
+    )  # fmt: skip
+    out.print(
+        f"run on {on} with simulated joints: {done.time:.3f} s; foreseen {done.foreseen:.3f} s, "
+        f"planned {done.planned:.3f} s"
+    )
+    show_files(written)
+    return all(check.ok or check.level == "warning" for check in done.checks)
+
+
+def _run_entry(done: ControllerRun, program: Path, on: str) -> dict[str, object]:
+    """Return a run for JSON."""
+    return {
+        "program": str(program),
+        "controller": on,
+        "joints": "simulated",
+        "planned_s": done.planned,
+        "foreseen_s": done.foreseen,
+        "run_s": done.time,
+        "contours": [
+            {
+                "name": each.name,
+                "planned_s": each.planned,
+                "foreseen_s": each.foreseen,
+                "run_s": each.time,
+                "off_path_mm": each.off_path * 1e3,
+            }
+            for each in done.contours
+        ],
+        "laser": [
+            {
+                "place": each.place,
+                "on": each.on,
+                "late_ms": each.late * 1e3,
+                "off_mm": each.off * 1e3,
+            }
+            for each in done.switches
+        ],
+        "velocity_share": dict(
+            zip(done.robot.joint_names, done.velocity.max(axis=0).tolist(), strict=True)
+        ),
+        "acceleration_share": dict(
+            zip(done.robot.joint_names, done.acceleration.max(axis=0).tolist(), strict=True)
+        ),
+        "checks": [
+            {"code": c.code, "value": c.value, "limit": c.limit, "unit": c.unit, "ok": c.ok}
+            for c in done.checks
+        ],
+    }
+
+
+def _run_page(done: ControllerRun, program: Path, rows: list[list[str]]) -> str:
+    units = ("", "s", "s", "s", "mm")
+    heads = [
+        (name.removesuffix(f" {unit}") if unit else name, unit)
+        for name, unit in zip(RUN_COLUMNS, units, strict=True)
+    ]
+    checks = [
+        (c.title, format_value(c.value, c.unit), format_value(c.limit, c.unit), c.ok,
+         c.level == "error")
+        for c in done.checks
+    ]  # fmt: skip
+    return render_controller_run(
+        program.stem,
+        done.robot,
+        time=done.record.time,
+        off_path=done.off_path,
+        shares=(done.velocity, done.acceleration),
+        laser=done.record.laser,
+        heads=heads,
+        rows=rows,
+        checks=checks,
+        facts=[
+            ("Robot", f"{done.robot.model}, simulated joints"),
+            ("Run", f"{done.time:.3f} s"),
+            ("Foreseen", f"{done.foreseen:.3f} s"),
+            ("Planned", f"{done.planned:.3f} s"),
+        ],
+    )
+
+
+def _record_text(done: ControllerRun) -> str:
+    """Return the record as CSV: time, joints, line of the program, outputs."""
+    record, robot = done.record, done.robot
+    scale = [np.degrees(1.0) if unit == "rad" else 1e3 for unit in robot.units]
+    names = joint_identifiers(robot)
+    units = ["deg" if unit == "rad" else "mm" for unit in robot.units]
+    axes = [f"{name}_{unit}" for name, unit in zip(names, units, strict=True)]
+    lines = [",".join(["t_s", *axes, "line", "laser", "gas"])]
+    columns = np.c_[record.time, record.q * scale, record.line, record.laser, record.gas]
+    text = ",".join(["%.3f", *["%.6f"] * robot.joints, "%d", "%d", "%d"])
+    lines += [text % tuple(row) for row in columns.tolist()]
+    return "\n".join([*lines, ""])
 
 
 # -----------------------------------------------------------------------------

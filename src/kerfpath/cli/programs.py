@@ -1,4 +1,4 @@
-"""The commands that write, audit, compare and touch up programs, or write a job as a script."""
+"""The commands that write, audit, compare, run and touch up programs, or write a job's script."""
 
 from __future__ import annotations
 
@@ -158,6 +158,37 @@ def touch_up(
 
     folder = to or Path(f"{program.stem}-touched")
     touch_up_program(program, job, plan, folder, ease_mm)
+
+
+@app.command("run")
+def run_program(
+    program: Annotated[
+        Path, typer.Argument(metavar="PROGRAM", help="A program with the files beside it.")
+    ],
+    on: Annotated[str, typer.Option(help="The controller: linuxcnc.")] = "linuxcnc",
+    job: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="JOB.toml", help="The job of the program; default: the plan.json beside it."
+        ),
+    ] = None,
+    to: Out = None,
+    as_json: Json = False,
+) -> None:
+    """Run a program on a controller that is installed here, and compare what it did with the plan.
+
+    LinuxCNC runs without a screen, with the INI and HAL of the program and simulated joints, in the
+    time that the program takes. Its commands are recorded every millisecond. The table shows the
+    time of each contour and how far the tip was off the lines between the targets; the checks are
+    about the laser, the limits of the joints and the time. The folder PROGRAM-run, or that of
+    --out, gets run.html, run.json and record.csv.
+
+    Example: kerfpath run door/door.ngc --on linuxcnc
+    """
+    from kerfpath.cli.program_output import show_run
+
+    if not show_run(program, on, job, to or Path(f"{program.stem}-run")):
+        raise typer.Exit(1)
 
 
 @app.command()

@@ -11,6 +11,9 @@ from kerfpath.job.audit import Audit as Audit
 from kerfpath.job.audit import audit_file as audit_file
 from kerfpath.job.audit_report import AuditReport as AuditReport
 from kerfpath.job.audit_report import collision_note as collision_note
+from kerfpath.job.controller_run import CONTROLLERS as CONTROLLERS
+from kerfpath.job.controller_run import ControllerRun as ControllerRun
+from kerfpath.job.controller_run import run_program as run_program
 from kerfpath.job.first_job import job_text as job_text
 from kerfpath.job.format import TABLES as TABLES
 from kerfpath.job.format import VARIABLES as VARIABLES

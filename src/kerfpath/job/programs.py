@@ -246,7 +246,7 @@ def program_from_file(
         options,
         file.moves,
         missing=file.missing,
-        expected=by_job or expected_of_plans(_job_of(file, options), file.plans),
+        expected=by_job or expected_of_plans(job_of_plans(file, options), file.plans),
         strict=strict,
         dry_share=dry_share,
     )
@@ -280,7 +280,7 @@ class _Externals(BaseModel):
     external: tuple[ExternalTable, ...] = ()
 
 
-def _job_of(file: PlanFile, options: ProgramOptions) -> Job:
+def job_of_plans(file: PlanFile, options: ProgramOptions) -> Job:
     """Return the job of a plan.json, without its drawing and its cell."""
     first = file.plans[0]
     sequence = None

@@ -1,9 +1,10 @@
-"""Self-contained HTML pages of a job, a drawing, a Pareto set, a layout, or a single table."""
+"""Self-contained HTML pages: a job, a drawing, a Pareto set, a layout, a run, a single table."""
 
 from kerfpath.extras import require_extra
 
 require_extra("report", "reports")
 
+from kerfpath.report.controller_run import render_controller_run
 from kerfpath.report.drawing import DrawnLoop, render_drawing
 from kerfpath.report.front import FrontAxis, FrontPlan, render_front
 from kerfpath.report.layout import LayoutEntry, render_layout
@@ -26,6 +27,7 @@ __all__ = [
     "plot",
     "reason_colours",
     "render",
+    "render_controller_run",
     "render_drawing",
     "render_front",
     "render_layout",

@@ -1,9 +1,15 @@
 """G code of LinuxCNC, with a robot's joints as its axes."""
 
 from kerfpath.post.languages import Language, no_settings_needed
+from kerfpath.post.linuxcnc.checks import check, without_leads
 from kerfpath.post.linuxcnc.controller import LinuxcncSettings as LinuxcncSettings
-from kerfpath.post.linuxcnc.controller import check, inherited, rules, without_leads
+from kerfpath.post.linuxcnc.controller import inherited, rules
+from kerfpath.post.linuxcnc.motion import Stretch as Stretch
+from kerfpath.post.linuxcnc.motion import stretches_of as stretches_of
 from kerfpath.post.linuxcnc.reader import read
+from kerfpath.post.linuxcnc.recorder import Record as Record
+from kerfpath.post.linuxcnc.recorder import record as record
+from kerfpath.post.linuxcnc.recorder import require_linuxcnc as require_linuxcnc
 from kerfpath.post.linuxcnc.writer import Linuxcnc as Linuxcnc
 
 LINUXCNC = Language(

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
 
 from kerfpath.arrays import Array
-from kerfpath.post.arcs import check_times
 from kerfpath.post.build import arm_joints, to_controller_units
 from kerfpath.post.languages import (
     Inherited,
@@ -20,14 +18,7 @@ from kerfpath.post.languages import (
     handshakes,
     setting,
 )
-from kerfpath.post.program import (
-    SIGNALS,
-    CircularMove,
-    LinearMove,
-    Program,
-    ProgramIssue,
-    switches_of,
-)
+from kerfpath.post.program import SIGNALS
 from kerfpath.robots import Robot
 
 # -----------------------------------------------------------------------------
@@ -258,54 +249,3 @@ def hal_lines(robot: Robot, settings: LinuxcncSettings) -> Iterator[str]:
         "net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared",
         "net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed",
     )
-
-
-# -----------------------------------------------------------------------------
-# What LinuxCNC cannot express, and where it will not keep the time.
-
-
-def without_leads(program: Program, settings: object = None) -> Program:
-    """Return the program without lead times: M62 acts as the next move begins."""
-
-    def late(move: LinearMove) -> LinearMove:
-        return replace(move, switches=tuple(replace(s, lead_time=0.0) for s in move.switches))
-
-    sections = tuple(
-        replace(
-            section,
-            steps=tuple(late(s) if switches_of(s) else s for s in section.steps),  # type: ignore[arg-type]
-        )
-        for section in program.sections
-    )
-    return replace(program, sections=sections)
-
-
-def check(program: Program, settings: LinuxcncSettings) -> Iterator[ProgramIssue]:
-    """Yield what the program cannot express, and where LinuxCNC will not keep its times."""
-    issues = [*check_times(program), *_check_shape(program)]
-    yield from issues
-    if any(issue.level == "error" for issue in issues):
-        return
-    yield from _check_leads(program)
-
-
-def _check_shape(program: Program) -> Iterator[ProgramIssue]:
-    """Check that there are no arcs, and that corners are rounded along the path alone."""
-    steps = [(section.name, step) for section in program.sections for step in section.moves]
-    for (name, move), (_, after) in zip(steps, [*steps[1:], ("", None)], strict=True):
-        if isinstance(move, CircularMove):
-            message = "the joints have no arcs; leave arcs_mm out of the job"
-            yield ProgramIssue("error", "arc", message, name)
-        if move.zone > 0 and not (isinstance(move, LinearMove) and isinstance(after, LinearMove)):
-            message = "a corner can only be rounded between linear moves; expected a stop"
-            yield ProgramIssue("error", "zone", message, name)
-
-
-def _check_leads(program: Program) -> Iterator[ProgramIssue]:
-    leads = [s.lead_time for move in program.moves for s in switches_of(move) if s.lead_time > 0]
-    if leads:
-        message = (
-            f"{len(leads)} switches are planned up to {max(leads) * 1e3:g} ms ahead, but LinuxCNC "
-            "switches as the tip arrives; measure the delay, and set no lead time"
-        )
-        yield ProgramIssue("warning", "lead-time", message, "program")
