@@ -39,6 +39,7 @@ ARMS = {
     "val3": "staubli_tx2_160l",
     "inform": "yaskawa_gp25",
     "urscript": "ur_ur10e",
+    "linuxcnc": "abb_irb4600_60_205",
 }
 ACCELERATION = [300, 300, 400, 1000, 1000, 1500]
 HOW = """\

@@ -30,7 +30,7 @@ __all__ = ["run"]
 TARGETS, SECTIONS = 50_000, 25
 LIMIT = 5.0
 """Time allowed for writing, and for reading back, s."""
-UNDIVIDED = ("urscript", "ros", "csv")
+UNDIVIDED = ("urscript", "linuxcnc", "ros", "csv")
 """Languages whose programs are one file."""
 ONE_FILE = 1_000_000
 """Number of lines that these files may have."""

@@ -7,6 +7,7 @@ is the inverse of the time of a move (G93). A move that ends with a stop has G61
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -167,19 +168,19 @@ class Linuxcnc(Formatter):
             for step, after in pairwise(steps)
             if isinstance(step, LinearMove)
             and isinstance(after, LinearMove | JointMove)
-            and self._words(step) != self._words(after)
+            and self._words[step] != self._words[after]
         }
         yield from super().lines(section)
 
     def joint_move(self, move: JointMove) -> Iterator[str]:
         """Yield a joint move; G53 marks it."""
         yield from self._path_mode(move)
-        yield f"G53 G1 {self._words(move)} F{number(MINUTE / self._cruise(move), 9)}"
+        yield f"G53 G1 {self._words[move]} F{number(MINUTE / self._cruise(move), 9)}"
 
     def linear_move(self, move: LinearMove) -> Iterator[str]:
         """Yield a move of the path, and what is switched at its end."""
         yield from self._path_mode(move)
-        yield f"G1 {self._words(move)} F{number(MINUTE / move.duration, 9)}"
+        yield f"G1 {self._words[move]} F{number(MINUTE / move.duration, 9)}"
         for switch in move.switches:
             yield self._switch(switch, now=move not in self.moving)
 
@@ -214,12 +215,6 @@ class Linuxcnc(Formatter):
             yield mode
         self.mode = mode
 
-    def _words(self, move: Move) -> str:
-        values = in_words(self.program.robot, move.q[None])[0]
-        return " ".join(
-            f"{word}{number(value, DECIMALS)}" for word, value in zip(WORDS, values, strict=False)
-        )
-
     def _cruise(self, move: JointMove) -> float:
         """Return the time (s) of a joint move at constant speed."""
         way, took = self._air[move]
@@ -227,12 +222,18 @@ class Linuxcnc(Formatter):
             return longest_way(self.program.robot) / move.speed
         return cruise_time(took, ramp_of(self.program.robot, way))
 
-    @property
+    @cached_property
+    def _words(self) -> dict[Move, str]:
+        """Words of the target of each move."""
+        moves, robot = list(dict.fromkeys(self.program.moves)), self.program.robot
+        values = in_words(robot, np.array([move.q for move in moves])).round(DECIMALS) + 0.0
+        text = " ".join(f"{word}%.{DECIMALS}f" for word in WORDS[: robot.joints])
+        return {move: text % tuple(row) for move, row in zip(moves, values.tolist(), strict=True)}
+
+    @cached_property
     def _air(self) -> dict[Move, tuple[Array, float | None]]:
         """Way (n,) rad and time (s) of each joint move."""
-        if not hasattr(self, "_found_air"):
-            moves = self.program.moves
-            q = np.array([move.q for move in moves])
-            ways, took = np.diff(q, axis=0, prepend=q[:1]), air_times(self.program)
-            self._found_air = dict(zip(moves, zip(ways, took, strict=True), strict=True))
-        return self._found_air
+        moves = self.program.moves
+        q = np.array([move.q for move in moves])
+        ways, took = np.diff(q, axis=0, prepend=q[:1]), air_times(self.program)
+        return dict(zip(moves, zip(ways, took, strict=True), strict=True))
