@@ -173,7 +173,7 @@ def timed_cut(key: tuple[str, int]) -> list[Timed]:
     program = build_program([made])
     (run,) = executed(program)
     began = perf_counter()
-    timing = timing_of(run, made.robot)
+    timing = timing_of(run)
     took = perf_counter() - began
     return [Timed(timing.programmed, timing.seconds, _by_toppra(run, program), timing.held, took)]
 

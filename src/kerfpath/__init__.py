@@ -20,7 +20,11 @@ if TYPE_CHECKING:
     from kerfpath.errors import InputError as InputError
     from kerfpath.errors import KerfpathError as KerfpathError
     from kerfpath.errors import NoFeasiblePath as NoFeasiblePath
+    from kerfpath.execution import Response as Response
+    from kerfpath.execution import Target as Target
     from kerfpath.execution import keep_limits as keep_limits
+    from kerfpath.execution import response as response
+    from kerfpath.execution import simulate as simulate
     from kerfpath.front import ParetoSet as ParetoSet
     from kerfpath.front import pareto as pareto
     from kerfpath.job import read_plan_file as read_plan_file
@@ -60,7 +64,9 @@ _HOME = {
     "Plan": "plans",
     "PlanOptions": "options",
     "Refinement": "refiner",
+    "Response": "execution",
     "Robot": "robots",
+    "Target": "execution",
     "Tilt": "tilt",
     "audit": "auditor",
     "external": "robots",
@@ -76,8 +82,10 @@ _HOME = {
     "plot": "report",
     "read_plan_file": "job",
     "refine": "refiner",
+    "response": "execution",
     "robot": "robots",
     "shortest_path": "search",
+    "simulate": "execution",
 }
 
 __all__ = sorted([*_HOME, "__version__"])

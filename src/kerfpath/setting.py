@@ -39,6 +39,10 @@ UNITS: Mapping[str, tuple[str, Callable[[Any], Any]]] = {
     "mm/s": ("m/s", lambda value: value / 1000),
     "%": ("", lambda value: value / 100),
     "1/deg": ("1/rad", np.degrees),
+    "urad": ("rad", lambda value: value / 1e6),
+    "ms": ("s", lambda value: value / 1e3),
+    "ms^2": ("s^2", lambda value: value / 1e6),
+    "ms^2/m^2": ("s^2/m^2", lambda value: value / 1e6),
 }
 """The SI unit of each unit that differs from it, and the conversion."""
 
@@ -150,6 +154,8 @@ class Setting:
                 return not_negative(value, self.name, unit=self.si_unit)
             above = None if self.above is None else self.si(self.above)
             return scalar(value, self.name, unit=self.si_unit, above=above)
+        elif kind is str and not isinstance(value, str):
+            raise InputError(f"{self.name}: expected {self.what or 'text'}, got {value!r}")
         elif kind is int and not (isinstance(value, int) and value >= (self.least or 0)):
             raise InputError(f"{self.name}: expected a whole number >= {self.least}, got {value!r}")
         elif isinstance(kind, type) and is_dataclass(kind) and not isinstance(value, kind):

@@ -16,7 +16,9 @@ from hypothesis import strategies as st
 from commands import assert_refused, run
 from jobs import DEMO, SMALL
 from kerfpath import robot
-from kerfpath.job import read_plan_file
+from kerfpath.execution import CommandedRun, Response
+from kerfpath.execution.path_error import STEP
+from kerfpath.job import read_job, read_plan_file, runs_of
 from kerfpath.planner import at_least, at_most
 from kerfpath.post import MANIFEST
 from programs import read_text
@@ -43,6 +45,31 @@ def fastest(folder):
     return json.loads(run("speed", "small.toml", "--json", cwd=folder).stdout)["contours"][0]
 
 
+def test_a_lag_is_fitted_to_logs_and_taken_by_the_job(planned, folder):
+    job = read_job(folder / "small.toml")
+    plans = read_plan_file(folder / "small-plan" / "plan.json").plans
+    truth = Response(sigma=[0.02])
+    q = np.concatenate(
+        [
+            truth.executed(truth.standing_around(run.q, STEP), STEP, job.robot)
+            for run in map(CommandedRun.of, runs_of(job, plans, "plan.json"))
+        ]
+    )
+    rows = np.c_[STEP * np.arange(len(q)), np.degrees(q)][::3]
+    names = ",".join(["t_s", *(f"q{i}_deg" for i in range(1, 7))])
+    np.savetxt(folder / "log.csv", rows, delimiter=",", header=names, comments="")
+    asked = ("fit", "log.csv", "--job", "small.toml")
+    result = run(*asked, "-o", "mine.toml", "--json", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert found["chosen"] == "one sigma"
+    assert found["tried"][1]["sigma_ms"] == [pytest.approx(20, abs=0.2)]
+    text = SMALL.replace("[tool]", '[robot.response]\nfile = "mine.toml"\n\n[tool]')
+    (folder / "own.toml").write_text(text)
+    assert read_job(folder / "own.toml").response.standing == "measured"
+    assert_refused(run(*asked, "--plan", "none.json", cwd=folder), "none.json")
+
+
 def test_the_demo_leaves_all_four_files(tmp_path):
     result = run("demo", "--out", tmp_path / "deep" / "demo")
     assert result.returncode == 0, result.stderr
@@ -63,8 +90,9 @@ def test_a_plan_says_what_it_did(planned, folder):
     assert all((folder / f).exists() for f in planned["files"])
     for contour in planned["contours"]:
         assert 0 < contour["peak_velocity_share"] <= 0.95
-        # 1 mm at 3 m/min is 20 ms, of 24 ms that are assumed.
-        assert all("[cycle-as-run]" in issue for issue in contour["issues"])
+        # 1 mm at 3 m/min is 20 ms, of 24 ms that are assumed; the lag of the joints is, too.
+        issues = contour["issues"]
+        assert all("[cycle-as-run]" in i or "[tip-as-run]" in i for i in issues)
         assert 0 < contour["bound"] <= contour["cost"]
         assert contour["gap"] <= 0.005  # what is asked for where the job says nothing
         assert "no motion within the limits costs less than" in contour["proof"]

@@ -53,7 +53,7 @@ def by_linear_program(run, arm, eta_a):
 @pytest.mark.parametrize("eta_a", [1.0, 0.3, 0.05])
 def test_no_pace_within_the_limits_is_faster(made, arm, eta_a):
     run = run_of(made)
-    timing = timing_of(run, arm, eta_a=eta_a)
+    timing = timing_of(run, eta_a=eta_a)
     best = by_linear_program(run, arm, eta_a)
     # Steps are finite: where the limits change fast the last digits of one step depend on it.
     np.testing.assert_allclose(timing.share**2, best, rtol=0, atol=1e-6 if eta_a > 0.1 else 1e-2)
@@ -65,12 +65,12 @@ def test_no_pace_within_the_limits_is_faster(made, arm, eta_a):
 
 def test_limits_that_bind_slow_it_down_and_say_where(made, arm):
     run = run_of(made)
-    free = timing_of(run, arm)
+    free = timing_of(run)
     assert free.held == 1.0
     assert free.slowest[0] > 0.99
     assert free.seconds < free.programmed + 0.2  # the ramps
     peak = run.peak_acceleration
-    tight = timing_of(run, arm, eta_a=0.7 * peak.share)
+    tight = timing_of(run, eta_a=0.7 * peak.share)
     assert tight.held < 1
     share, at = tight.slowest
     assert share < 0.95
@@ -82,13 +82,13 @@ def test_limits_that_bind_slow_it_down_and_say_where(made, arm):
 def test_velocity_alone_leaves_its_share(made, arm):
     run = run_of(made)
     share = 0.8 * run.peak_velocity.share
-    timing = timing_of(run, arm, eta_v=share, eta_a=1e6)
+    timing = timing_of(run, eta_v=share, eta_a=1e6)
     most = np.minimum(1, share / np.abs(run.velocity_share).max(axis=1))
     np.testing.assert_allclose(timing.share[3:-3], most[3:-3], rtol=1e-6)
     assert most.min() < 0.81
 
 
 def test_a_long_run_is_as_long_as_its_programmed_speeds_say(made, arm):
-    timing = timing_of(run_of(made), arm, eta_a=1e6)
+    timing = timing_of(run_of(made), eta_a=1e6)
     assert timing.seconds == pytest.approx(timing.programmed, rel=1e-2)
     assert timing.length[-1] == pytest.approx(made.contour.length, rel=1e-2)

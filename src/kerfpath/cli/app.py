@@ -302,8 +302,9 @@ def speed(
     limits and eta), and free of collisions in its cell, if it has one. The column refined has the
     speed after the rotation was moved off the grid, if the job refines; the limit shown belongs to
     that speed. Both keep the limits at the nodes. The column as run has a speed at which the
-    program keeps them between the nodes, too, if the job asks for it. The speeds in the job have no
-    effect.
+    program keeps them between the nodes, too, if the job asks for it, and the column true to path
+    one at which the executed path is within path_tolerance_mm, as the joints lag. The speeds in the
+    job have no effect.
 
     Example: kerfpath speed door.toml
     """

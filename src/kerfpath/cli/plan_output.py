@@ -25,6 +25,7 @@ from kerfpath.cli.show import (
     table,
 )
 from kerfpath.cli.stop import end_early, ended_early, exit_code
+from kerfpath.execution import PathError
 from kerfpath.job import (
     AsRun,
     ContourSpeed,
@@ -55,6 +56,7 @@ def show_speeds(answers: Sequence[ContourSpeed]) -> bool:
     rows = []
     for answer in answers:
         task, nodes, found, run = answer.task, answer.nodes, answer.at_nodes, answer.as_run
+        close = answer.true_to_path
         entry: dict[str, object] = {"name": task.name, "asked_m_min": task.speed * 60}
         row = [escape(task.name), f"{task.speed * 60:g}"]
         if isinstance(found, FastestSpeed):
@@ -63,6 +65,7 @@ def show_speeds(answers: Sequence[ContourSpeed]) -> bool:
                 "fastest_m_min": found.speed * 60,
                 "on_grid_m_min": None if found.on_grid is None else found.on_grid * 60,
                 "as_run_m_min": None if run is None else run * 60,
+                "true_to_path_m_min": None if close is None else close * 60,
                 "impossible_from_m_min": None if found.ceiling is None else found.ceiling * 60,
                 "joint": found.joint + 1,
                 "limit": found.limit,
@@ -75,11 +78,14 @@ def show_speeds(answers: Sequence[ContourSpeed]) -> bool:
             off_grid = "-" if found.on_grid is None else at_most(found.speed * 60)
             never = "-" if found.ceiling is None else at_least(found.ceiling * 60)
             kept = "-" if run is None else at_most(run * 60)
-            speeds = [at_most(on_grid * 60), off_grid, kept, never]
+            true = "-" if close is None else at_most(close * 60)
+            speeds = [at_most(on_grid * 60), off_grid, kept, true, never]
             rows.append([*row, *speeds, str(found.node), what, at])
         else:
             entry |= {"fastest_m_min": None, "reason": str(found), "proved_for": found.scope}
-            rows.append([*row, "-", "-", "-", "-", str(found.node + 1), "no admissible pose", ""])
+            rows.append(
+                [*row, "-", "-", "-", "-", "-", str(found.node + 1), "no admissible pose", ""]
+            )
         entries.append(entry)
     print_json({"contours": entries})
     columns = [
@@ -88,18 +94,20 @@ def show_speeds(answers: Sequence[ContourSpeed]) -> bool:
         "on the grid",
         "refined",
         "as run",
+        "true to path",
         "impossible from",
         "node",
         "what binds",
     ]
     at = "at x y z mm"
-    table([*columns, at], rows, numbers=columns[1:7], spare=[at])
+    table([*columns, at], rows, numbers=columns[1:8], spare=[at])
     out.print(
         "on the grid: the fastest constant speed there, exact; refined: the fastest speed "
         "found off the grid, not proved to be the fastest possible; both keep the limits at "
         "the nodes; as run: a speed at which the program keeps them between the nodes, too, "
-        "if the job asks for it (between_nodes) and one was found; impossible from: at this "
-        "speed and above it is proved that there is no motion, at any rotation"
+        "if the job asks for it (between_nodes) and one was found; true to path: a speed at which "
+        "that motion, run more slowly, is executed within path_tolerance_mm; impossible from: at "
+        "this speed and above it is proved that there is no motion, at any rotation"
     )
     return all(entry["fastest_m_min"] is not None for entry in entries)
 
@@ -258,7 +266,27 @@ def _as_run_entry(run: AsRun) -> dict[str, object]:
     if run.timing is not None:
         entry |= {"seconds": run.timing.seconds, "programmed_s": run.timing.programmed}
         entry |= {"speed_held": run.timing.held, "ramps_m": run.timing.ramps}
+    if run.path_error is not None:
+        entry["path_error"] = _path_error_entry(run.path_error)
+    if run.hole is not None:
+        entry["hole"] = {f"{name}_m": value for name, value in run.hole._asdict().items()}
     return entry
+
+
+def _path_error_entry(off: PathError) -> dict[str, object]:
+    """Return how far the executed motion is from the path, and by which response."""
+    response = off.response
+    return {
+        "largest_m": off.largest,
+        "of_95_percent_m": off.usual,
+        "at_m": float(off.s[off.worst]),
+        "cause": off.cause,
+        "largest_in_range_m": list(off.ends) or None,
+        "response": response.name,
+        "model": response.model,
+        "standing": response.standing,
+        "reversals_of_joints_1_to_3": len(off.reversals),
+    }
 
 
 def _show_cuts(cuts: Sequence[CutResult]) -> None:
@@ -272,7 +300,7 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
         ]
         sampling = _sampling(cut)
         if cut.plan is None:
-            rows.append([*row, *"---------", *sampling, "no feasible path"])
+            rows.append([*row, *"----------", *sampling, "no feasible path"])
             continue
         criteria = cut.plan.criteria
         rows.append(
@@ -281,6 +309,7 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
                 _postures(cut.plan),
                 f"{cut.plan.time[-1]:.2f}",
                 "" if cut.as_run.timing is None else f"{cut.as_run.timing.seconds:.2f}",
+                "" if (off := cut.as_run.path_error) is None else f"{off.largest * 1e3:.2g}",
                 "" if cut.plan.proof.grid_cost is None else f"{cut.plan.proof.grid_cost:.2f}",
                 f"{cut.plan.cost:.2f}",
                 cut.plan.proof.bound_shown,
@@ -291,12 +320,15 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
                 "passed" if cut.passed else "FAILED",
             ]
         )
-    columns = ["contour", "mm", "nodes", "m/min", "posture", "s", "run s", "grid", "cost"]
+    columns = ["contour", "mm", "nodes", "m/min", "posture", "s", "run s", "off mm"]
+    columns += ["grid", "cost"]
     columns += ["bound", "gap %", "vel", "acc", "chord mm", "step deg", "audit"]
-    spare = ["step deg", "chord mm", "grid", "bound", "m/min", "run s"]
+    spare = ["step deg", "chord mm", "grid", "bound", "m/min", "run s", "off mm"]
     table(columns, rows, numbers=columns[1:-1], whole=["audit"], spare=spare)
     out.print(
         "run s: time from rest to rest, with rounded corners and every joint limit kept; "
+        "off mm: largest distance of the executed tool tip from the path, "
+        f"{_response_of(cuts)}; "
         "cost: value of the objective; grid: lowest cost on the grid of rotations, before the "
         "refinement; bound: no motion that keeps the limits at the nodes costs less, at any "
         "rotation, posture and turn; gap: largest share of the cost that may lie above the best "
@@ -304,6 +336,7 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
         "largest distance of the CAD curve from the chords between nodes; step: largest rotation "
         "of the tool axis from node to node"
     )
+    _show_holes(cuts)
     unbound = [cut.name for cut in cuts if _is_unbound(cut)]
     if unbound:
         out.print(
@@ -321,6 +354,30 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
         out.print(f"rounded corners leave the drawing by up to {max(rounded) * 1e3:.4f} mm")
     if any(each.against == "points of the drawing" for each in found + loops):
         out.print("if the drawing has points, the lines through them are taken as the CAD curve")
+
+
+def _show_holes(cuts: Sequence[CutResult]) -> None:
+    """Print the sizes of circles as they are cut."""
+    rows = [
+        [
+            escape(cut.name),
+            f"{hole.drawn * 1e3:.2f}",
+            f"{hole.executed * 1e3:.2f}",
+            f"{(hole.executed - hole.drawn) * 1e3:+.2f}",
+            f"{hole.out_of_round * 1e3:.2f}",
+        ]
+        for cut in cuts
+        if (hole := cut.as_run.hole) is not None
+    ]
+    if rows:
+        columns = ["hole", "drawn mm", "executed mm", "change mm", "out of round mm"]
+        table(columns, rows, numbers=columns[1:])
+
+
+def _response_of(cuts: Sequence[CutResult]) -> str:
+    """Return by which model the joints follow what is commanded."""
+    found = {o.response.words for c in cuts if (o := c.as_run.path_error) is not None}
+    return f"by {' and '.join(sorted(found))}" if found else "where the motion is modelled"
 
 
 def _postures(plan: Plan) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -27,6 +28,7 @@ from kerfpath.cli.show import (
     write_text,
 )
 from kerfpath.errors import InputError, KerfpathError, about
+from kerfpath.execution import CommandedRun, fit_response, read_log, response_text
 from kerfpath.job import (
     AuditReport,
     ControllerRun,
@@ -40,6 +42,7 @@ from kerfpath.job import (
     read_plan_file,
     require_folder,
     run_program,
+    runs_of,
     touch_up,
 )
 from kerfpath.placement import MeasuredFrame, placement_from_points
@@ -418,6 +421,68 @@ def _record_text(done: ControllerRun) -> str:
 
 # -----------------------------------------------------------------------------
 # `kerfpath touch-up`: plan a job again around targets that a person has moved.
+
+
+def fit_to_logs(logs: Sequence[Path], job_file: Path, plan: Path, output: Path) -> None:
+    """Fit the response of the robot to logs of a plan's program, and write its file."""
+    require_output(output, "-o")
+    job = read_job(job_file)
+    runs = [CommandedRun.of(run) for run in runs_of(job, read_plan_file(plan).plans, f"{plan}")]
+    read = [read_log(log, job.robot, job.tool) for log in logs]
+    with busy("fitting the response"):
+        fit = fit_response(runs, read)
+    best = fit.tried[fit.chosen]
+    notes = [
+        f"{best.form}, fitted to {', '.join(sorted({e.log.name for e in fit.stretches}))[:150]}",
+        f"held-out distance of the logs from the executed path: {_three(best.held_out)} mm",
+    ]
+    text = response_text(fit.response, notes)
+    print_json(
+        {
+            "tried": [
+                {
+                    "form": each.form,
+                    "sigma_ms": (each.response.sigma * 1e3).tolist(),
+                    "friction_urad": each.response.friction * 1e6,
+                    "own_m": each.own,
+                    "held_out_m": each.held_out,
+                }
+                for each in fit.tried
+            ],
+            "chosen": best.form,
+            "joints_not_told": [joint + 1 for joint in fit.untold],
+            "unused_logs": list(fit.unused),
+            "files": [str(output)],
+        }
+    )
+    rows = [
+        [
+            f"{each.form}{' *' * (each is best)}",
+            ", ".join(f"{sigma * 1e3:.3g}" for sigma in each.response.sigma),
+            _three(each.own),
+            _three(each.held_out),
+        ]
+        for each in fit.tried
+    ]
+    table(["form", "sigma ms", "fitted to all, mm", "held out, mm"], rows)
+    cuts = {runs[each.run].name for each in fit.stretches}
+    out.print(
+        "mean / 95 % / largest distance of the logs from the executed path; held out: leaving out "
+        f"{fit.left_out}; *: taken. Compared: {len(fit.stretches)} stretches of {len(cuts)} cuts"
+    )
+    if fit.untold:
+        joints = ", ".join(str(joint + 1) for joint in fit.untold)
+        out.print(
+            f"note: the runs cannot tell sigma of joint {joints}, which moves too little or too "
+            "slowly; it has that of all joints"
+        )
+    for name in fit.unused:
+        out.print(f"note: {escape(name)} follows no cut of the program and was not used")
+    write_text(output, text, "-o")
+
+
+def _three(off: tuple[float, float, float]) -> str:
+    return " / ".join(f"{each * 1e3:.3f}" for each in off)
 
 
 def touch_up_program(program: Path, job: Path, plan: Path, folder: Path, ease_mm: float) -> None:

@@ -133,6 +133,39 @@ def compare(
 
 
 @app.command()
+def fit(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG.csv...", help="Logs of the program's runs.")
+    ],
+    job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job of the program.")],
+    plan: Annotated[
+        Path | None,
+        typer.Option(metavar="PLAN.json", help="Its plan; default: JOB-plan/plan.json."),
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="File to write.")] = Path(
+        "response.toml"
+    ),
+    as_json: Json = False,
+) -> None:
+    """Fit how the joints lag to logs of the robot, for the executed path of later plans.
+
+    A log is a table (CSV) with a column of times (t_s or t_ms) and one for each joint (q1_deg, or
+    q1_rad, and so on), or x_mm, y_mm and z_mm of the tracked tool tip in the robot base. Run the
+    program as it was written, at full override. The logs are compared as paths, so delays, missing
+    samples and times that jitter do not matter.
+
+    Forms of the response with more and more parameters are fitted. The simplest is taken that is
+    about as good as the best on what was left out of its fit. The file that is written is named by
+    file in [robot.response] of a job.
+
+    Example: kerfpath fit run1.csv run2.csv --job door.toml -o my_robot.toml
+    """
+    from kerfpath.cli.program_output import fit_to_logs
+
+    fit_to_logs(logs, job, plan or Path(f"{job.stem}-plan") / "plan.json", output)
+
+
+@app.command()
 def touch_up(
     program: Annotated[
         Path, typer.Argument(metavar="PROGRAM", help="A program with moved targets.")

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from kerfpath.arrays import Array, Bools, short_repr
 from kerfpath.auditor import ENCLOSED, rates_along
 from kerfpath.comfort import jacobian
-from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.execution.tool_motion import ToolMotion
 from kerfpath.post import PLAIN, Controller, JointMove, LinearMove, Program
@@ -73,6 +72,8 @@ def joints_with_wrist(robot: Robot, points: Array, near: Array, tool: Array) -> 
 
 WHERE = (0.1, 0.5, 0.9)
 """Shares of each smooth stretch at which the joints are sampled."""
+LONGEST = 0.02
+"""Longest stretch (s): longer ones are sampled in parts."""
 TIGHT = 1.02
 """Bounds are refined to this multiple of the sampled peak."""
 RESOLVED = 2e-5
@@ -97,6 +98,8 @@ class Executed:
     ----------
     section : str
         Name of the section of the program.
+    robot : Robot
+    T_base_part, T_flange_tip : (4, 4) m
     tool_motion : ToolMotion
     time : (m,) s
         Times of the samples, from the start of the run.
@@ -123,6 +126,9 @@ class Executed:
     """
 
     section: str
+    robot: Robot
+    T_base_part: Array
+    T_flange_tip: Array
     tool_motion: ToolMotion
     time: Array
     planned: Array
@@ -249,9 +255,13 @@ def run_along(
     robot.require_no_free_joint("the motion between the nodes")
     motion = ToolMotion.of(moves[0].T_part_tip, moves[1:], controller)
     borders = motion.borders
-    long = np.diff(borders)
+    parts = np.ceil(np.diff(borders) / LONGEST).astype(int)
+    ends = pairwise(borders)
+    within = [np.linspace(*of, n, endpoint=False) for of, n in zip(ends, parts, strict=True)]
+    begins = np.append(np.concatenate(within), borders[-1])
+    long = np.diff(begins)
     seen = long > min(RESOLVED, long.max() / 2)
-    begin, long = borders[:-1][seen], long[seen]
+    begin, long = begins[:-1][seen], long[seen]
     time = (begin[:, None] + long[:, None] * np.array(WHERE)).ravel()
     step = np.repeat(STEP * long, len(WHERE))
     targets = np.array([move.q for move in moves])
@@ -269,6 +279,9 @@ def run_along(
     v, a = (after - before) / (2 * step[:, None]), (after - 2 * q + before) / step[:, None] ** 2
     run = Executed(
         section=section,
+        robot=robot,
+        T_base_part=T_base_part,
+        T_flange_tip=T_flange_tip,
         tool_motion=motion,
         time=time,
         planned=np.interp(time, motion.time, np.cumsum([0.0, *(m.duration for m in moves[1:])])),
@@ -387,6 +400,8 @@ class Timing:
         Time at the programmed speeds throughout.
     time : (m,) s
         Samples, in programmed time from the start of the run.
+    clock : (m,) s
+        Time at which the robot passes them.
     share : (m,)
         Share of the programmed speed that the tool has there.
     length : (m,) m
@@ -396,6 +411,7 @@ class Timing:
     seconds: float
     programmed: float
     time: Array
+    clock: Array
     share: Array
     length: Array
 
@@ -430,40 +446,68 @@ class Timing:
         return float(min(share[k], 1.0)), float(self.length[k])
 
 
-def timing_of(run: Executed, robot: Robot, *, eta_v: float = 1.0, eta_a: float = 1.0) -> Timing:
+def timing_of(
+    run: Executed, *, eta_v: float = 1.0, eta_a: float = 1.0, speed_share: float = 1.0
+) -> Timing:
     """Return how long a run takes if every joint keeps its limits.
 
     Parameters
     ----------
     run : Executed
-    robot : Robot
-        Robot of the run.
     eta_v, eta_a : float
         Share of the velocity and acceleration limits that may be used.
+    speed_share : float
+        Share of the programmed speed that is not exceeded, above 0 and at most 1; zones stay.
 
     Raises
     ------
     InputError
         The posture does not reach some samples of the run (NaN).
     """
-    velocity, acceleration = robot.speed_limits()
+    velocity, acceleration = run.robot.speed_limits()
     first, second = run.velocity_share * velocity, run.acceleration_share * acceleration
     if np.isnan(second).any():
         raise InputError("timing_of: expected a run within reach, got joints that are NaN")
-    steps = np.diff(run.time)
-    room, lean, most = _rows(first, second, eta_v * velocity, eta_a * acceleration)
-    x = _forward(_backward(most, steps, room, lean), steps, room, lean)
-    rate = np.sqrt(x)
-    pace = np.maximum((rate[1:] + rate[:-1]) / 2, 1e-9)
+    limits = (eta_v * velocity, eta_a * acceleration)
+    rate = fastest_rates(run.time, first, second, limits, speed_share)
+    clock = clock_of(run.time, rate)
     gone = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(run.T[:, :3, 3], axis=0), axis=1)))
-    whole = float(run.tool_motion.time[-1])
     return Timing(
-        seconds=float((steps / pace).sum()),
-        programmed=whole,
+        seconds=float(clock[-1]),
+        programmed=float(run.tool_motion.time[-1]),
         time=run.time,
+        clock=clock,
         share=rate,
         length=gone,
     )
+
+
+def fastest_rates(
+    time: Array, first: Array, second: Array, limits: tuple[Array, Array], most: float = 1.0
+) -> Array:
+    """Return the largest rates (m,) at which programmed time may pass, from rest to rest.
+
+    Parameters
+    ----------
+    time : (m,) s
+        Samples, in programmed time.
+    first, second : (m, n)
+        Velocities and accelerations of the joints there, at the programmed speed.
+    limits : tuple of (n,), (n,)
+        Those that the joints may have.
+    most : float
+        Largest rate.
+    """
+    steps = np.diff(time)
+    room, lean, highest = _rows(first, second, *limits)
+    highest = np.minimum(highest, most**2)
+    return np.sqrt(_forward(_backward(highest, steps, room, lean), steps, room, lean))
+
+
+def clock_of(time: Array, rate: Array) -> Array:
+    """Return when samples of programmed time (m,) s are passed, s, at these rates (m,)."""
+    pace = np.maximum((rate[1:] + rate[:-1]) / 2, 1e-9)
+    return np.append(0.0, np.cumsum(np.diff(time) / pace))
 
 
 def _rows(
@@ -510,49 +554,3 @@ def _forward(reach: Array, steps: Array, room: Array, lean: Array) -> Array:
         u = (room[i] - lean[i] * x[i]).min()
         x[i + 1] = min(reach[i + 1], max(x[i] + 2 * step * u, 0.0))
     return x
-
-
-# -----------------------------------------------------------------------------
-# Deviation of a run from the contour that it cuts, at its targets and in its zones.
-
-SAMPLES = 8
-"""Number of samples of the path for each of its nodes, or each target."""
-
-
-class Deviation(NamedTuple):
-    """Largest distance of the tip, m, and largest angle of the tool axis, rad, with times, s."""
-
-    tip: float
-    tip_time: float
-    axis: float
-    axis_time: float
-
-
-def deviation_of(run: Executed, path: Contour) -> Deviation:
-    """Return how far the tip is from the path, and the tool axis from that of the nearest point.
-
-    Parameters
-    ----------
-    run : Executed
-        Evaluated at its samples.
-    path : Contour
-        The contour as drawn, in the part.
-    """
-    tip, axis = run.T[:, :3, 3], run.T[:, :3, 2]
-    even = np.linspace(path.s[0], path.s[-1], SAMPLES * max(len(path), len(run.tool_motion.T)))
-    at = np.unique(np.concatenate([path.s, even]))
-    points = path.at(at)[0]
-    near = np.asarray(cKDTree(points).query(tip)[1])
-    # On one of the two chords beside the nearest sample.
-    starts = np.clip(near[:, None] + [-1, 0], 0, len(at) - 2)
-    chord = points[starts + 1] - points[starts]
-    along = ((tip[:, None] - points[starts]) * chord).sum(-1) / (chord**2).sum(-1)
-    along = np.clip(along, 0.0, 1.0)
-    apart = np.linalg.norm(points[starts] + along[..., None] * chord - tip[:, None], axis=-1)
-    row, side = np.arange(len(tip)), np.argmin(apart, axis=1)
-    s = at[starts] + along * (at[starts + 1] - at[starts])
-    points, axes = path.at(s[row, side])
-    off = np.linalg.norm(tip - points, axis=1)
-    turned = np.arctan2(np.linalg.norm(np.cross(axes, axis), axis=1), (axes * axis).sum(axis=1))
-    k, m = int(np.argmax(off)), int(np.argmax(turned))
-    return Deviation(float(off[k]), float(run.time[k]), float(turned[m]), float(run.time[m]))

@@ -7,6 +7,7 @@ require_extra("programs", "jobs")
 from kerfpath.compiling import is_compiled as is_compiled
 from kerfpath.compiling import warm_up as warm_up
 from kerfpath.job.as_run import AsRun as AsRun
+from kerfpath.job.as_run import runs_of as runs_of
 from kerfpath.job.audit import Audit as Audit
 from kerfpath.job.audit import audit_file as audit_file
 from kerfpath.job.audit_report import AuditReport as AuditReport

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath.arrays import short_repr
+from kerfpath.arrays import Array, short_repr
 from kerfpath.auditor import Check, Level
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -15,11 +15,15 @@ from kerfpath.execution import (
     AT_SPEED,
     Executed,
     Kept,
+    PathError,
     Peak,
+    Roundness,
     Timing,
-    deviation_of,
     keep_limits,
     longest_run,
+    path_error,
+    roundness,
+    share_within,
     timing_of,
 )
 from kerfpath.job.format import Job
@@ -28,11 +32,14 @@ from kerfpath.post import REMEDY_SHORT, STRETCHED, Controller, Program, build_pr
 
 __all__ = [
     "AsRun",
+    "allowed_off",
     "as_run",
     "checks_of_unknown",
     "keeps_between_nodes",
     "kept_between_nodes",
     "run_judged",
+    "run_of",
+    "runs_of",
 ]
 
 ZONE_SLACK = 1e-3
@@ -49,10 +56,16 @@ class AsRun:
         Rows of the audit about the motion between the nodes.
     timing : Timing or None
         How long it takes and where it slows down; None if that is not known.
+    path_error : PathError or None
+        How far the executed motion is from the path; None if it stops at every node.
+    hole : Roundness or None
+        Size and roundness of the cut, if a circle is drawn.
     """
 
     checks: tuple[Check, ...] = ()
     timing: Timing | None = None
+    path_error: PathError | None = None
+    hole: Roundness | None = None
 
     __repr__ = short_repr
 
@@ -67,15 +80,28 @@ def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsR
     """
     if kept is not None and kept.run is not None:
         return run_judged(job, kept.run, plan, path, "" if kept.done else kept.statement)
-    unknown = _not_modelled(job)
-    if not unknown:
-        try:
-            run = longest_run(_program(job)(plan), job.program.rules.controller)
-        except InputError as fault:  # reported when the program is written
-            unknown = str(fault)
-    if unknown:
+    if unknown := _not_modelled(job):
         return AsRun(checks=checks_of_unknown(job, unknown))
+    try:
+        run = longest_run(_program(job)(plan), job.program.rules.controller)
+    except InputError as fault:  # reported when the program is written
+        return AsRun(checks=checks_of_unknown(job, str(fault)))
     return AsRun() if run is None else run_judged(job, run, plan, path)
+
+
+def run_of(job: Job, plan: Plan) -> Executed | None:
+    """Return a plan as its program is run; None if that is not known, or it stops at every node."""
+    if _not_modelled(job):
+        return None
+    try:
+        return longest_run(_program(job)(plan), job.program.rules.controller)
+    except InputError:  # reported when the program is written
+        return None
+
+
+def allowed_off(job: Job) -> float:
+    """Return the largest distance, m, by which the executed tip may be off the path."""
+    return job.tolerances.path if job.path_tolerance is None else job.path_tolerance
 
 
 def checks_of_unknown(job: Job, why: str) -> tuple[Check, ...]:
@@ -111,11 +137,12 @@ def run_judged(job: Job, run: Executed, plan: Plan, path: Contour, why: str = ""
     advice = [f"{row.advice}; {why}".removesuffix("; ") for row in shares]
     kept = [replace(r, level=level, advice=a) for r, a in zip(shares, advice, strict=True)]
     torque = [replace(row, level=level) for row in _torque(run, plan)]
-    rows = (*kept, *unproved, *torque, *_deviations(job, run, plan, path), *_cycle(run, plan))
-    if np.isnan(run.acceleration_share).any():
-        return AsRun(checks=rows)
-    timing = timing_of(run, job.robot)
-    return AsRun(checks=(*rows, _speed(run, plan, timing)), timing=timing)
+    timing = None if np.isnan(run.acceleration_share).any() else timing_of(run)
+    off = path_error(run, path, timing=timing, response=job.response)
+    rows = (*kept, *unproved, *torque, *_deviations(job, run, off, plan, path), *_cycle(run, plan))
+    if timing is not None:
+        rows = (*rows, _speed(run, plan, timing))
+    return AsRun(checks=rows, timing=timing, path_error=off, hole=roundness(off, path))
 
 
 def _torque(run: Executed, plan: Plan) -> Iterator[Check]:
@@ -170,30 +197,57 @@ def _speed(run: Executed, plan: Plan, timing: Timing) -> Check:
     )
 
 
-def _deviations(job: Job, run: Executed, plan: Plan, path: Contour) -> Iterator[Check]:
-    """Yield the checks of tip and tool axis against the path, with rounded corners."""
-    off, allowed = deviation_of(run, path), job.tolerances
+def _deviations(
+    job: Job, run: Executed, off: PathError, plan: Plan, path: Contour
+) -> Iterator[Check]:
+    """Yield the checks of tip and tool axis against the path, as the joints execute the run."""
+    allowed = job.tolerances
     cone = 0.0 if job.options.tilt is None else job.options.tilt.cone
+    tip = allowed_off(job)
+    # Of corners alone unless the joints lag; then by a model, which no program is refused for.
     yield Check(
         code="tip-as-run",
         title="distance of the tool tip from the path as run",
-        value=off.tip,
-        limit=allowed.path,
+        value=off.largest,
+        limit=tip,
         unit="m",
-        node=_node(run, plan, off.tip_time),
-        level="warning",
-        advice=f"{_narrower(run.controller)}, or sample the contour more finely",
+        node=_nearest(plan, off.T[off.worst]),
+        level="warning" if job.path_tolerance is None else "error",
+        advice=_closer(run, off, plan, path, tip),
     )
     yield Check(
         code="axis-as-run",
         title="angle of the tool axis to that of the path as run",
-        value=off.axis,
+        value=float(off.axis[off.worst_axis]),
         limit=allowed.axis + cone,
         unit="rad",
-        node=_node(run, plan, off.axis_time),
+        node=_nearest(plan, off.T[off.worst_axis]),
         level="warning",
         advice="sample the contour more finely, or smooth its axes",
     )
+
+
+def _closer(run: Executed, off: PathError, plan: Plan, path: Contour, tip: float) -> str:
+    """Return what a distance beyond `tip`, m, consists of, and what would reduce it."""
+    if off.largest <= tip:
+        return ""
+    k, response = off.worst, off.response
+    said = f"{off.cause}, at s = {off.s[k] * 1e3:.1f} mm"
+    if response.model != "ideal":
+        said += f" ({response.words}"
+        if response.sigma_range is not None:
+            low, high = (f"{end * 1e3:.2g}" for end in off.ends)
+            least, most = response.sigma_range * 1e3
+            said += f"; {low} to {high} mm for {least:g} to {most:g} ms"
+        said += ")"
+    if off.rounding[k] > tip:
+        return f"{said}; {_narrower(run.controller)}, or sample the contour more finely"
+    share = share_within(run, path, tip, response)
+    if share is None:
+        return f"{said}; no lower speed helps by itself: {_narrower(run.controller)}"
+    speed = 60 * share * (np.diff(plan.contour.s) / np.diff(plan.time)).max()
+    step = 10.0 ** (np.floor(np.log10(speed)) - 1)
+    return f"{said}; this motion keeps it at {np.floor(speed / step) * step:.2g} m/min"
 
 
 def _narrower(controller: Controller) -> str:
@@ -205,8 +259,12 @@ def _narrower(controller: Controller) -> str:
 
 def _node(run: Executed, plan: Plan, time: float) -> int:
     """Return the node nearest to the tip at a time, s."""
-    (there,) = run.tool_motion.poses(np.array([time]))[:, :3, 3]
-    return int(np.argmin(np.linalg.norm(plan.T_part_tip[:, :3, 3] - there, axis=1)))
+    return _nearest(plan, run.tool_motion.poses(np.array([time]))[0])
+
+
+def _nearest(plan: Plan, T: Array) -> int:
+    """Return the node nearest to the tip in a pose, (4, 4) m."""
+    return int(np.argmin(np.linalg.norm(plan.T_part_tip[:, :3, 3] - T[:3, 3], axis=1)))
 
 
 def kept_between_nodes(job: Job, plan: Plan) -> Kept | None:
@@ -228,6 +286,27 @@ def keeps_between_nodes(job: Job) -> bool:
     moves_gamma = options.method == "continuous" or (options.method == "exact" and options.refine)
     fits = moves_gamma and options.feed == "constant" and options.tilt is None
     return options.between_nodes != "reported" and fits and not _not_modelled(job)
+
+
+def runs_of(job: Job, plans: Sequence[Plan], of: str) -> list[Executed]:
+    """Return the runs of plans' programs whose joints and motion are known, `of` is their file.
+
+    Raises
+    ------
+    InputError
+        The motion of the job's programs between the nodes is not known, or there is no such run.
+    """
+    if unknown := _not_modelled(job):
+        raise InputError(f"{job.path}: {unknown}")
+    controller = job.program.rules.controller
+    found = []
+    for plan in plans:
+        run = longest_run(_program(job)(plan), controller)
+        if run is not None and not np.isnan(run.acceleration_share).any():
+            found.append(replace(run, section=plan.name))
+    if not found:
+        raise InputError(f"{of}: expected a cut whose motion is known, got none")
+    return found
 
 
 def _program(job: Job) -> Callable[[Plan], Program]:

@@ -6,6 +6,7 @@ require_extra("report", "reports")
 
 from kerfpath.report.controller_run import render_controller_run
 from kerfpath.report.drawing import DrawnLoop, render_drawing
+from kerfpath.report.executed import ExecutedPath
 from kerfpath.report.front import FrontAxis, FrontPlan, render_front
 from kerfpath.report.layout import LayoutEntry, render_layout
 from kerfpath.report.maps import feasibility_map, hidden_postures, shown_postures
@@ -18,6 +19,7 @@ from kerfpath.report.style import reason_colours
 __all__ = [
     "ContourSection",
     "DrawnLoop",
+    "ExecutedPath",
     "FrontAxis",
     "FrontPlan",
     "LayoutEntry",

@@ -17,6 +17,7 @@ from kerfpath.graph import LayeredGraph
 from kerfpath.losses import Loss, Reason
 from kerfpath.planner import ClearanceMap
 from kerfpath.plans import Plan
+from kerfpath.report.executed import ExecutedPath
 
 SPARE = (0.25, 0.5, 1.0)
 """Upper ends of the ranges of clearance that have colours, as shares of the map's band."""
@@ -75,6 +76,8 @@ class ContourSection:
         First node that no admissible path reaches (one after `NoFeasiblePath.node`), 0-based.
     sampling : sequence of (what, value)
         Sampling errors of the nodes, in rows such as ("Chord error", "0.01 mm").
+    executed : ExecutedPath, optional
+        The path as it is executed.
 
     Raises
     ------
@@ -93,6 +96,7 @@ class ContourSection:
     broken_at: int | None = None
     clearance: ClearanceMap | None = None
     sampling: Sequence[tuple[str, str]] = ()
+    executed: ExecutedPath | None = None
 
     __repr__ = short_repr
 

@@ -60,6 +60,17 @@ def entry(name: str) -> dict[str, Any]:
     return tomllib.loads((_HERE / "library" / f"{same[0]}.toml").read_text(encoding="utf-8"))
 
 
+def responses_of(name: str) -> dict[str, dict[str, Any]]:
+    """Return the responses of a robot of the library by name, see `kerfpath.execution.Response`.
+
+    Raises
+    ------
+    InputError
+        The robot is unknown.
+    """
+    return dict(entry(name).get("response", {}))
+
+
 def arm_of(data: Mapping[str, Any]) -> Arm:
     """Return the arm of an entry of the library."""
     return Arm(

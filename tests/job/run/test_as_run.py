@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from jobs import DEMO, SMALL
+from kerfpath.errors import InputError
 from kerfpath.job import AsRun, audit_file, read_job, run_job, write_result
 
+IDEAL = '[robot.response]\nsource = "ideal"\n\n'
 QUICK = (
     SMALL.replace("[plan]", "[plan]\ncertify = false")
     + "\n[program.rapid]\nshortest_move_ms = 12\n"
-)
+).replace("[tool]", IDEAL + "[tool]")
 
 
 def cuts_of(folder, text):
@@ -197,3 +199,78 @@ def test_a_zone_error_that_is_stated_is_kept(tmp_path):
     (tmp_path / "b_pillar.step").write_bytes((DEMO / "b_pillar.step").read_bytes())
     job.write_text(with_tolerance(0.3, "zone_error_mm = 0.05"))
     assert read_job(job).program.zone_error == pytest.approx(5e-5)
+
+
+# -----------------------------------------------------------------------------
+# The tip as the joints execute the run.
+
+LAGGING = QUICK.replace(IDEAL, "")
+
+
+def tip_of(cut):
+    (row,) = [row for row in cut.as_run.checks if row.code == "tip-as-run"]
+    return row
+
+
+def test_a_lag_that_is_assumed_warns_of_small_holes_and_says_what_keeps_the_path(tmp_path):
+    result = cuts_of(tmp_path, LAGGING)
+    hole, _ = result.cuts
+    row, off = tip_of(hole), hole.as_run.path_error
+    assert (row.ok, row.level, result.passed) == (False, "warning", True)
+    assert row.value == off.largest
+    assert "assumed" in row.advice
+    assert "15 to 35 ms" in row.advice
+    slower = float(re.search(r"keeps it at ([\d.]+) m/min", row.advice)[1])
+    assert 1 < slower < 3
+    again = LAGGING.replace("speed_m_min = 3", f"speed_m_min = {slower}")
+    # Planned anew, the joints move a little differently.
+    assert tip_of(cuts_of(tmp_path, again).cuts[0]).value < 1.02 * row.limit
+    size = hole.as_run.hole
+    assert size.drawn == pytest.approx(0.01, abs=1e-5)
+    assert size.executed < size.drawn
+    write_result(result, tmp_path / "out")
+    assert "Executed path" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_path_tolerance_is_kept_or_refuses_the_program(tmp_path):
+    tight = LAGGING.replace("[plan]\n", "[plan]\npath_tolerance_mm = 0.12\n")
+    result = cuts_of(tmp_path, tight)
+    row = tip_of(result.cuts[0])
+    assert (row.ok, row.level, result.passed) == (False, "error", False)
+    assert row.limit == pytest.approx(0.00012)
+    write_result(result, tmp_path / "out")
+    assert not list((tmp_path / "out").glob("*.mod"))
+    wide = LAGGING.replace("[plan]\n", "[plan]\npath_tolerance_mm = 0.5\n")
+    result = cuts_of(tmp_path, wide)
+    assert result.passed
+    assert tip_of(result.cuts[0]).ok
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("sigma_ms = [0]", "above 0"),
+        ("sigma_ms = [20, 30]", "expected sigma for the 6 joints"),
+        ('source = "real"', "expected one of assumed, ideal"),
+        ('file = "none.toml"', "none.toml"),
+        ('source = "ideal"\nsigma_ms = [20]', "one of source, file and sigma_ms"),
+        ('source = "ideal"\nsigma_range_ms = [1, 2]', "sigma_range_ms only with sigma_ms"),
+        ("sigma_ms = [20]\nsigma_range_ms = [30, 40]", "sigma_range"),
+    ],
+)
+def test_a_response_that_is_none_is_refused_at_its_key(tmp_path, table, said):
+    (tmp_path / "b_pillar.step").write_bytes((DEMO / "b_pillar.step").read_bytes())
+    (tmp_path / "job.toml").write_text(f"{LAGGING}\n[robot.response]\n{table}\n")
+    with pytest.raises(InputError, match=re.escape(said)) as caught:
+        read_job(tmp_path / "job.toml")
+    assert "\n" not in str(caught.value)
+    assert "job.toml" in str(caught.value)
+
+
+def test_a_file_of_a_response_is_taken(tmp_path):
+    (tmp_path / "b_pillar.step").write_bytes((DEMO / "b_pillar.step").read_bytes())
+    (tmp_path / "mine.toml").write_text('standing = "measured"\nruns = 2\nsigma_ms = [9]\n')
+    text = f'{LAGGING}\n[robot.response]\nfile = "mine.toml"\n'
+    (tmp_path / "job.toml").write_text(text)
+    response = read_job(tmp_path / "job.toml").response
+    assert (response.standing, response.runs, response.sigma[0]) == ("measured", 2, 0.009)

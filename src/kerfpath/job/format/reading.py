@@ -19,6 +19,7 @@ from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour
 from kerfpath.dynamics import STANDARD_GRAVITY
 from kerfpath.errors import InputError
+from kerfpath.execution import IDEAL, Response
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format.contour import ContourSpec, contour_request, keys_of_closed_loops
 from kerfpath.job.format.drawing import Drawing
@@ -83,6 +84,10 @@ class Job:
         Options of the robot program.
     source : mapping
         The parsed file: its tables and keys, with values that JSON can hold.
+    response : Response
+        How the joints of the robot follow what its controller commands.
+    path_tolerance : float m, optional
+        Largest distance of the executed tip from the path; None: it is only reported.
     text : str
         The text of the file, with its comments.
     accepts_incomplete : bool
@@ -105,6 +110,8 @@ class Job:
     tolerances: Tolerances
     program: ProgramOptions
     source: Mapping[str, Any]
+    response: Response = IDEAL
+    path_tolerance: float | None = None
     text: str = ""
     accepts_incomplete: bool = False
     switched_off: tuple[str, ...] = ()
@@ -274,6 +281,8 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         sequence=file.sequence,
         layout=file.layout,
         tolerances=file.audit.resolve(),
+        response=file.robot.response_in(path.parent),
+        path_tolerance=file.plan.executed_tolerance,
         program=file.program.resolve((copy_of or path).stem, file.audit.resolve().path),
         source=source,
         text=text,

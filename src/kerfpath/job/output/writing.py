@@ -15,6 +15,7 @@ from kerfpath.arrays import Array, short_repr
 from kerfpath.cad import Departure
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.files import require_replaceable
+from kerfpath.job.as_run import allowed_off
 from kerfpath.job.audit_report import collision_note
 from kerfpath.job.format import Job, refusal_at
 from kerfpath.job.plan_file import (
@@ -25,7 +26,7 @@ from kerfpath.job.plan_file import (
     plan_text,
 )
 from kerfpath.job.programs import expected_of_cuts, program_of
-from kerfpath.job.run import JobResult, sides_in_doubt
+from kerfpath.job.run import CutResult, JobResult, sides_in_doubt
 from kerfpath.plans import Plan, joint_columns
 from kerfpath.post import (
     MANIFEST,
@@ -40,7 +41,7 @@ from kerfpath.post import (
     replace_program,
     timed_lines,
 )
-from kerfpath.report import ContourSection, render
+from kerfpath.report import ContourSection, ExecutedPath, render
 from kerfpath.robots import Robot
 from kerfpath.sequence import PartPlan
 from kerfpath.transfer import TransferMove
@@ -116,6 +117,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
             broken_at=None if cut.broken is None else cut.broken.node + 1,
             clearance=cut.clearance,
             sampling=() if cut.departure is None else _sampling(cut.departure),
+            executed=_executed(job, cut),
         )
         for cut in outcome.cuts
     ]
@@ -151,6 +153,36 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
         faults=faults,
         notes=notes,
         job_text=job.text,
+    )
+
+
+def _executed(job: Job, cut: CutResult) -> ExecutedPath | None:
+    """Return the path of a cut as it is executed; None if that is not known."""
+    off, hole = cut.as_run.path_error, cut.as_run.hole
+    if off is None:
+        return None
+    facts = [
+        ("Largest distance", f"{off.largest * 1e3:.3g} mm at {off.s[off.worst] * 1e3:.1f} mm"),
+        ("It consists of", off.cause),
+        ("On 95 % of the way", f"at most {off.usual * 1e3:.3g} mm"),
+        ("Joints", off.response.words),
+        ("Reversals of joints 1 to 3", str(len(off.reversals))),
+    ]
+    if off.response.sigma_range is not None:
+        low, high = off.response.sigma_range * 1e3
+        least, most = (f"{end * 1e3:.2g}" for end in off.ends)
+        facts.insert(4, ("Range", f"{least} to {most} mm for sigma from {low:g} to {high:g} ms"))
+    if hole is not None:
+        facts.append(("Diameter", f"{hole.executed * 1e3:.2f} mm, drawn {hole.drawn * 1e3:.2f} mm"))
+        facts.append(("Out of round by", f"{hole.out_of_round * 1e3:.2f} mm"))
+    return ExecutedPath(
+        s=off.s,
+        nearest=cut.candidate.path.at(off.s)[0],
+        tip=off.T[:, :3, 3],
+        off=off.tip,
+        rounding=off.rounding,
+        allowed=allowed_off(job),
+        facts=tuple(facts),
     )
 
 

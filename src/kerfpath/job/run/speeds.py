@@ -10,11 +10,12 @@ from kerfpath.arrays import short_repr
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.execution import Executed, Kept
+from kerfpath.execution import Executed, Kept, share_within
 from kerfpath.graph import LayeredGraph
-from kerfpath.job.as_run import keeps_between_nodes, kept_between_nodes
+from kerfpath.job.as_run import allowed_off, keeps_between_nodes, kept_between_nodes, run_of
 from kerfpath.job.format import ContourSpec, Job, cell_of_job
 from kerfpath.planner import FastestSpeed, fastest_speed, plan
+from kerfpath.plans import Plan
 from kerfpath.progress import Progress, no_progress
 
 # -----------------------------------------------------------------------------
@@ -55,6 +56,22 @@ def speed_as_run(job: Job, nodes: Contour, cell: Cell | None, fastest: float) ->
     return low
 
 
+def speed_true_to_path(
+    job: Job, nodes: Contour, path: Contour, cell: Cell | None, fastest: float
+) -> float | None:
+    """Return a speed, m/s, at which the executed path is within the path tolerance of the job.
+
+    It is that of the motion planned at `fastest`, m/s, when it is run more slowly. None if no speed
+    helps, or the motion between the nodes is not known.
+    """
+    made = _planned(job, nodes, cell, fastest)
+    run = None if made is None else run_of(job, made)
+    if run is None or np.isnan(run.acceleration_share).any():
+        return None
+    share = share_within(run, path, allowed_off(job), job.response)
+    return None if share is None else fastest * share
+
+
 def _share(kept: Kept | None) -> float:
     """Return an estimate of the share of its speed at which a plan keeps the limits."""
     run: Executed | None = None if kept is None else kept.run
@@ -71,14 +88,19 @@ def _keeps(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> bool:
 
 def _kept(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Kept | None:
     """Return a plan at a speed with the limits kept between its nodes; None without a plan."""
+    made = _planned(job, nodes, cell, speed)
+    return None if made is None else kept_between_nodes(job, made)
+
+
+def _planned(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Plan | None:
+    """Return a plan at a speed, m/s; None if there is none."""
     try:
-        made = plan(
+        return plan(
             nodes, job.robot, tool=job.tool, placement=job.placement, speed=speed,
             options=replace(job.options, certify=None, between_nodes="reported"), cell=cell,
         )  # fmt: skip
     except NoFeasiblePath:
         return None
-    return kept_between_nodes(job, made)
 
 
 # -----------------------------------------------------------------------------
@@ -98,12 +120,16 @@ class ContourSpeed:
     as_run : float m/s, optional
         A speed at which they hold between the nodes, too, see `speed_as_run`; None if the job does
         not keep them there, or if none was found.
+    true_to_path : float m/s, optional
+        A speed at which the executed path is within the path tolerance, too, see
+        `speed_true_to_path`; None if none was found, or the motion between the nodes is not known.
     """
 
     task: ContourSpec
     nodes: Contour
     at_nodes: FastestSpeed | NoFeasiblePath
     as_run: float | None = None
+    true_to_path: float | None = None
 
     __repr__ = short_repr
 
@@ -170,5 +196,10 @@ def fastest_speeds(job: Job, *, progress: Progress = no_progress) -> list[Contou
         progress(f"{task.name}: between the nodes", 0, 0)
         free = replace(own, options=own.options.without_penalties)
         as_run = speed_as_run(free, nodes, cell, found.speed)
-        answers.append(ContourSpeed(task=task, nodes=nodes, at_nodes=found, as_run=as_run))
+        close = speed_true_to_path(
+            free, nodes, task.candidates(part)[0], cell, as_run or found.speed
+        )
+        answers.append(
+            ContourSpeed(task=task, nodes=nodes, at_nodes=found, as_run=as_run, true_to_path=close)
+        )
     return answers

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import create_model, model_validator
 
 from kerfpath.certificate import Certify
 from kerfpath.job.format.tables.table import Table, fields_of
-from kerfpath.job.format.values import fault
+from kerfpath.job.format.values import Positive, fault, key
 from kerfpath.options import CLEARANCE, EXACT_OR_BETTER, PENALTIES, OptionConflict, PlanOptions
 from kerfpath.robots import Robot, postures_named
 from kerfpath.setting import keys, settings
@@ -18,6 +18,11 @@ from kerfpath.tilt import Tilt
 
 class PlanTable(create_model("PlanKeys", __base__=Table, **fields_of(PlanOptions))):  # type: ignore[misc]  # made
     """[plan]: the search, the objective and the limits of every plan."""
+
+    path_tolerance_mm: Annotated[
+        Positive | None,
+        key("a number above 0, the largest distance of the tool from the path, in mm", "0.2"),
+    ] = None
 
     @model_validator(mode="after")
     def _details_go_with_what_they_are_of(self) -> PlanTable:
@@ -32,6 +37,11 @@ class PlanTable(create_model("PlanKeys", __base__=Table, **fields_of(PlanOptions
         """Return the keys of an option's details that the job gives."""
         given = [name for name in keys(kind) if name in self.model_fields_set]
         return [name for name in given if getattr(self, name) is not False]
+
+    @property
+    def executed_tolerance(self) -> float | None:
+        """Largest distance of the executed tip from the path, m; None if it is only reported."""
+        return None if self.path_tolerance_mm is None else self.path_tolerance_mm / 1000
 
     def resolve(self, robot: Robot, **others: Any) -> PlanOptions:
         """Return the plan options of the table, and `others` of other tables, in SI.

@@ -14,6 +14,7 @@ from pydantic_core import PydanticCustomError
 
 from kerfpath.arrays import Array
 from kerfpath.errors import InputError
+from kerfpath.execution import Response, read_response, response, response_from
 from kerfpath.job.format.tables.table import Table, given, require_distinct
 from kerfpath.job.format.values import (
     FAULT,
@@ -361,6 +362,60 @@ KEY_OF = {
 """The key for each parameter of `Robot.from_urdf` that its errors are about."""
 
 
+# -----------------------------------------------------------------------------
+# The [robot.response] table: how the joints follow what the controller commands.
+
+
+class ResponseTable(Table):
+    """[robot.response]: how the joints follow what the controller commands."""
+
+    source: Annotated[Text | None, key("a response of the library, assumed or ideal", '"real"')] = (
+        None
+    )
+    file: Annotated[
+        Text | None,
+        AfterValidator(existing("the file of a response")),
+        key("the path of a file that kerfpath fit wrote", '"response.toml"'),
+    ] = None
+    sigma_ms: Annotated[
+        JointsPositive | None,
+        key("numbers above 0, the lag of every joint or of all, in ms", "[30, 29, 21, 17, 20, 26]"),
+    ] = None
+    sigma_range_ms: Annotated[
+        tuple[Positive, Positive] | None,
+        key("2 numbers above 0, the least and the largest lag, in ms", "[15, 35]", strict=False),
+    ] = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> ResponseTable:
+        found = given(self, "source", "file", "sigma_ms")
+        if len(found) != 1:
+            got = " and ".join(found) or "none"
+            remedy = "remove all but one" if found else 'add, for example, source = "assumed"'
+            where = found[-1] if found else "source"
+            raise fault("one of source, file and sigma_ms", got, remedy, (where,))
+        if self.sigma_range_ms is not None and self.sigma_ms is None:
+            raise fault(
+                "sigma_range_ms only with sigma_ms", "it alone", "remove it", ("sigma_range_ms",)
+            )
+        return self
+
+    def resolve(self, model: str | None, folder: Path) -> Response:
+        """Return the response of a robot of the library, or of none of it.
+
+        Raises
+        ------
+        InputError
+            Its parameter is the key at fault.
+        """
+        if self.file is not None:
+            return read_response(folder / self.file)
+        if self.source is not None:
+            return response(model, self.source)
+        more = {} if self.sigma_range_ms is None else {"sigma_range_ms": list(self.sigma_range_ms)}
+        return response_from({"sigma_ms": list(self.sigma_ms or ())} | more, "the job")
+
+
 class RobotTable(Table):
     """[robot]: the robot, and limits that replace or complete its known limits."""
 
@@ -463,6 +518,7 @@ class RobotTable(Table):
     elbow_step_deg: Annotated[
         Positive | None, key("a number above 0, the step of joint 3 of seven, in deg", "10")
     ] = None
+    response: ResponseTable | None = None
     external: External = ()
 
     @model_validator(mode="after")
@@ -532,10 +588,15 @@ class RobotTable(Table):
                 ("upper_deg" if self.upper_deg else "lower_deg",),
             ) from None
         try:
-            self.resolve(folder)
+            whole = self.resolve(folder)
         except InputError as error:
             where = "external" if self.external else "urdf"
             raise fault_in_words(f"{error}", (where,)) from None
+        try:
+            self.response_in(folder).require_for(whole)
+        except InputError as error:
+            said = f"{error}".removeprefix("response: ")
+            raise fault_in_words(said, ("response",)) from None
         return self
 
     def _require_one_source(self) -> None:
@@ -593,6 +654,12 @@ class RobotTable(Table):
     def height_of_floor(self) -> float | None:
         """Return the height of the floor in the robot base, m; None where there is none."""
         return self.floor_mm / 1000 if self.floor else None
+
+    def response_in(self, folder: Path) -> Response:
+        """Return how the joints follow what is commanded: as the table says, else as is known."""
+        if self.response is None:
+            return response(self.model)
+        return self.response.resolve(self.model, folder)
 
     def resolve(self, folder: Path, *, bodies: bool = False) -> Robot:
         """Return the robot with this table's limits; `bodies` adds those of its description."""

@@ -1,0 +1,350 @@
+"""How far the tool is from the contour that it cuts, as the joints of the arm execute a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial import cKDTree
+
+from kerfpath.arrays import Array, Ints, short_repr
+from kerfpath.contour import Contour
+from kerfpath.execution.executed import Executed, Timing, timing_of
+from kerfpath.execution.response import IDEAL, PLACING, STILL, Response
+
+STEP = 0.002
+"""Time, s, between two samples of an executed motion."""
+SAMPLES = 8
+"""Number of samples of the path for each of its nodes, or each target."""
+
+
+SLOWEST = 0.05
+"""Smallest share of the speed at which a tolerance is looked for."""
+
+
+class Reversal(NamedTuple):
+    """A joint, counted from 0, that turns back under way, and the time, s, at which it does."""
+
+    joint: int
+    time: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PathError:
+    """Distance of the tool from the path that it cuts, sample by sample.
+
+    Parameters
+    ----------
+    response : Response
+        How the joints follow what is commanded.
+    time : (m,) s
+        Samples, from the start of the run.
+    s : (m,) m
+        Arc length of the point of the path that is nearest to the tip.
+    T : (m, 4, 4) m
+        Executed poses of the tip, in the part.
+    tip : (m,) m
+        Distance of the tip from the path.
+    axis : (m,) rad
+        Angle between the tool axis and the axis of the path there.
+    rounding : (m,) m
+        Distance of the tip from the path if the joints did not lag.
+    lag, friction : (m,) m
+        Distance of the way without friction from that without lag, and of the way from it.
+    ends : tuple of float m
+        Largest distances at the ends of the range of sigma; empty without one.
+    reversals : tuple of Reversal
+        Where joints 1 to 3 reverse, in order of time.
+    """
+
+    response: Response
+    time: Array
+    s: Array
+    T: Array
+    tip: Array
+    axis: Array
+    rounding: Array
+    lag: Array
+    friction: Array
+    ends: tuple[float, ...]
+    reversals: tuple[Reversal, ...]
+
+    __repr__ = short_repr
+
+    @property
+    def worst(self) -> int:
+        """The sample with the largest distance of the tip."""
+        return int(np.argmax(self.tip))
+
+    @property
+    def worst_axis(self) -> int:
+        """The sample with the largest angle of the tool axis."""
+        return int(np.argmax(self.axis))
+
+    @property
+    def largest(self) -> float:
+        """The largest distance of the tip, m."""
+        return float(self.tip[self.worst])
+
+    @property
+    def usual(self) -> float:
+        """The distance of the tip, m, that 95 % of its way keeps."""
+        way = np.linalg.norm(np.gradient(self.T[:, :3, 3], axis=0), axis=1)
+        order = np.argsort(self.tip)
+        gone = np.cumsum(way[order])
+        return float(self.tip[order][np.searchsorted(gone, 0.95 * gone[-1])])
+
+    @property
+    def cause(self) -> str:
+        """What the largest distance consists of, in words and mm."""
+        k = self.worst
+        found = [f"rounding of corners {self.rounding[k] * 1e3:.2g} mm"]
+        if self.response.model != "ideal":
+            found.append(f"lag of the joints {self.lag[k] * 1e3:.2g} mm")
+        before = [each for each in self.reversals if each.time <= self.time[k]]
+        if self.response.friction and before:
+            found.append(
+                f"friction after joint {before[-1].joint + 1} reversed "
+                f"{self.friction[k] * 1e3:.2g} mm"
+            )
+        return ", ".join(found)
+
+
+def path_error(
+    run: Executed, path: Contour, *, timing: Timing | None = None, response: Response = IDEAL
+) -> PathError:
+    """Return how far the tip is from the path, and the tool axis from that of the nearest point.
+
+    Parameters
+    ----------
+    run : Executed
+    path : Contour
+        The contour as drawn, in the part.
+    timing : Timing, optional
+        When the robot passes the samples of the run; without it, joints do not lag, and the
+        distances are those at the samples of the run.
+    response : Response
+        How the joints follow what is commanded.
+
+    Raises
+    ------
+    InputError
+        The response does not fit the robot.
+    """
+    drawn = _Drawn.of(path, len(run.tool_motion.T))
+    if timing is None:
+        s, tip, axis = drawn.nearest(run.T)
+        none = np.zeros(len(tip))
+        return PathError(
+            response=IDEAL, time=run.time, s=s, T=run.T, tip=tip, axis=axis, rounding=tip,
+            lag=none, friction=none, ends=(), reversals=(),
+        )  # fmt: skip
+    q = response.standing_around(commanded(run, timing), STEP)
+
+    def poses(how: Response) -> Array:
+        moved = run.robot.forward(how.executed(q, STEP, run.robot))
+        return np.asarray(np.linalg.inv(run.T_base_part) @ moved @ run.T_flange_tip)
+
+    asked, executed = poses(IDEAL), poses(response)
+    free = poses(response.without_friction()) if response.friction else executed
+    s, tip, axis = drawn.nearest(executed)
+    return PathError(
+        response=response,
+        time=np.linspace(0.0, STEP * (len(q) - 1), len(q)),
+        s=s,
+        T=executed,
+        tip=tip,
+        axis=axis,
+        rounding=drawn.nearest(asked)[1],
+        lag=_apart(free, asked),
+        friction=_apart(executed, free),
+        ends=tuple(float(drawn.nearest(poses(end))[1].max()) for end in response.ends()),
+        reversals=reversals(q, STEP),
+    )
+
+
+def _apart(T: Array, other: Array) -> Array:
+    """Return the distances (m,) m of poses (m, 4, 4) from the way of others (k, 4, 4)."""
+    return Polyline.of(other[:, :3, 3]).nearest(T[:, :3, 3])[2]
+
+
+class Roundness(NamedTuple):
+    """A hole that is drawn as a circle, and as it is cut.
+
+    Its diameters, m, and how far the cut is from its own circle, inwards and outwards together, m.
+    """
+
+    drawn: float
+    executed: float
+    out_of_round: float
+
+
+WHOLE = np.radians(330.0)
+"""rad: arcs of a larger angle are holes."""
+ON_CIRCLE = 5e-3
+"""Share of the radius by which points of a circle may be off it: chords of 12 deg."""
+
+
+def roundness(off: PathError, path: Contour) -> Roundness | None:
+    """Return size and roundness of the executed cut of a circle; None if none is drawn.
+
+    Both circles are those of least squares. Stretches that lead in and out are left out.
+    """
+    cut = np.array([kind in ("cut", "loop", "overlap") for kind in path.kinds])
+    if cut.sum() < 8:
+        return None
+    points = path.points[cut]
+    centre = points.mean(axis=0)
+    plane = np.linalg.svd(points - centre)[2][:2]
+    drawn = _circle((points - centre) @ plane.T)
+    if drawn is None or drawn.spread > ON_CIRCLE * drawn.radius or drawn.angle < WHOLE:
+        return None
+    of = np.clip(np.searchsorted(path.s, off.s, side="right") - 1, 0, len(path) - 1)
+    found = _circle((off.T[cut[of], :3, 3] - centre) @ plane.T)
+    if found is None:
+        return None
+    return Roundness(2 * drawn.radius, 2 * found.radius, found.spread)
+
+
+class _Circle(NamedTuple):
+    """The circle through points by least squares: its radius, the spread of theirs, the angle."""
+
+    radius: float
+    spread: float
+    angle: float
+
+
+def _circle(points: Array) -> _Circle | None:
+    """Return the circle through points (m, 2) m, equally weighted by length; None for a line."""
+    rows = np.c_[2 * points, np.ones(len(points))]
+    way = np.linalg.norm(np.gradient(points, axis=0), axis=1)[:, None] ** 0.5
+    (x, y, c), _, rank, _ = np.linalg.lstsq(rows * way, (points**2).sum(1) * way[:, 0], rcond=1e-9)
+    if rank < 3:
+        return None
+    away = points - (x, y)
+    radii = np.linalg.norm(away, axis=1)
+    angles = np.sort(np.arctan2(away[:, 1], away[:, 0]))
+    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+    radius = float(np.sqrt(c + x * x + y * y))
+    return _Circle(radius, float(np.ptp(radii)), float(2 * np.pi - gaps.max()))
+
+
+def share_within(
+    run: Executed, path: Contour, tolerance: float, response: Response
+) -> float | None:
+    """Return the largest share of its speed at which a run stays within a tolerance, m.
+
+    It is found by halving, to 2 %, with the zones of the program and the same way of the joints;
+    None if even `SLOWEST` of the speed is too fast, as the corners alone are too wide.
+    """
+    alone = replace(response, sigma_range=None)
+
+    def off(share: float) -> float:
+        timing = timing_of(run, speed_share=share)
+        return path_error(run, path, timing=timing, response=alone).largest
+
+    if off(1.0) <= tolerance:
+        return 1.0
+    low, high = SLOWEST, 1.0
+    if off(low) > tolerance:
+        return None
+    while high - low > 0.02 * high:
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if off(middle) <= tolerance else (low, middle)
+    return low
+
+
+def commanded(run: Executed, timing: Timing) -> Array:
+    """Return the joints (m, n) rad that are commanded every `STEP` s, from standing to standing."""
+    velocity, _ = run.robot.speed_limits()
+    return even_joints(
+        timing.clock, run.time, timing.share, run.q, run.velocity_share * velocity, STEP
+    )
+
+
+def even_joints(
+    clock: Array, time: Array, rate: Array, q: Array, first: Array, step: float
+) -> Array:
+    """Return joints (k, n) at even times from samples of a motion.
+
+    Between samples, programmed time passes at constant acceleration, and joints follow the cubics
+    through values and velocities.
+
+    Parameters
+    ----------
+    clock, time : (m,) s
+        When the samples are passed, and where they are in programmed time.
+    rate : (m,)
+        Rates at which programmed time passes there.
+    q, first : (m, n)
+        Joints, and their velocities by programmed time.
+    step : float s
+        Time between two samples that are returned.
+    """
+    even = np.append(np.arange(0.0, clock[-1], step), clock[-1])
+    within = CubicHermiteSpline(clock, time, rate)(even)
+    return np.asarray(CubicHermiteSpline(time, q, first)(np.clip(within, time[0], time[-1])))
+
+
+def reversals(q: Array, step: float) -> tuple[Reversal, ...]:
+    """Return where the first three joints of q (m, n) reverse, m samples every `step` s."""
+    rate = np.diff(q[:, :PLACING], axis=0) / step
+    found = []
+    for joint, moves in enumerate(rate.T):
+        at = np.flatnonzero(np.abs(moves) > STILL)
+        turned = at[1:][np.diff(np.sign(moves[at])) != 0]
+        found += [Reversal(joint, float(k * step)) for k in turned]
+    return tuple(sorted(found, key=lambda each: each.time))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Drawn:
+    """A path with samples along it, for the points of it that are nearest to others."""
+
+    path: Contour
+    at: Array
+    line: Polyline
+
+    @classmethod
+    def of(cls, path: Contour, targets: int) -> _Drawn:
+        even = np.linspace(path.s[0], path.s[-1], SAMPLES * max(len(path), targets))
+        at = np.unique(np.concatenate([path.s, even]))
+        return cls(path=path, at=at, line=Polyline.of(path.at(at)[0]))
+
+    def nearest(self, T: Array) -> tuple[Array, Array, Array]:
+        """Return for poses (m, 4, 4) the nearest arc lengths, distances and angles, (m,) each."""
+        tip, axis = T[:, :3, 3], T[:, :3, 2]
+        start, along, _ = self.line.nearest(tip)
+        s = self.at[start] + along * (self.at[start + 1] - self.at[start])
+        points, axes = self.path.at(s)
+        off = np.linalg.norm(tip - points, axis=1)
+        cross = np.linalg.norm(np.cross(axes, axis), axis=1)
+        return s, off, np.arctan2(cross, (axes * axis).sum(axis=1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Polyline:
+    """Points (k, 3) m joined by chords, for the places of it that are nearest to others."""
+
+    points: Array
+    tree: cKDTree
+
+    @classmethod
+    def of(cls, points: Array) -> Polyline:
+        return cls(points=points, tree=cKDTree(points))
+
+    def nearest(self, tip: Array) -> tuple[Ints, Array, Array]:
+        """Return for points (m, 3) the nearest chord, the share of it, and the distance."""
+        near: Ints = np.asarray(self.tree.query(tip)[1])
+        # On one of the two chords beside the nearest point.
+        starts = np.clip(near[:, None] + [-1, 0], 0, len(self.points) - 2)
+        chord = self.points[starts + 1] - self.points[starts]
+        long = np.maximum((chord**2).sum(-1), 1e-30)
+        along = ((tip[:, None] - self.points[starts]) * chord).sum(-1) / long
+        along = np.clip(along, 0.0, 1.0)
+        apart = self.points[starts] + along[..., None] * chord - tip[:, None]
+        far = np.linalg.norm(apart, axis=-1)
+        row, side = np.arange(len(tip)), np.argmin(far, axis=1)
+        return starts[row, side], along[row, side], far[row, side]

@@ -1,0 +1,129 @@
+"""The path as it is executed beside the one that is drawn, of one contour of a report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from kerfpath.arrays import Array, short_repr, spread
+from kerfpath.report.style import ACCENT, CHOSEN, FAINT, INK, axis, axis_title, base_layout
+
+HEIGHT, SCENE_HEIGHT = 220, 420
+MOST_POINTS = 1500
+"""Number of points of a line; more are not seen."""
+SHOWN = 0.04
+"""Share of the contour's size as which its largest error is drawn, about."""
+FACTORS = np.outer(10.0 ** np.arange(0, 6), [1, 2, 5]).ravel()
+"""Factors by which errors may be enlarged."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ExecutedPath:
+    """How far the executed tool tip is from the path, sample by sample.
+
+    Parameters
+    ----------
+    s : (m,) m
+        Arc length of the point of the path nearest to the tip.
+    nearest, tip : (m, 3) m
+        That point, and the tip, in the part.
+    off, rounding : (m,) m
+        Distance of the tip from the path, and without the lag of the joints.
+    allowed : float m
+        Largest distance that is allowed.
+    facts : sequence of (what, value)
+        Rows in words, such as ("Largest distance", "0.2 mm at 35 mm").
+    """
+
+    s: Array
+    nearest: Array
+    tip: Array
+    off: Array
+    rounding: Array
+    allowed: float
+    facts: tuple[tuple[str, str], ...] = ()
+
+    __repr__ = short_repr
+
+    @property
+    def factor(self) -> float:
+        """The factor by which errors are enlarged in the picture."""
+        size = float(np.linalg.norm(np.ptp(self.nearest, axis=0)))
+        largest = max(float(self.off.max()), 1e-9)
+        return float(FACTORS[np.argmin(np.abs(np.log(FACTORS * largest / (SHOWN * size))))])
+
+
+def error_along(path: ExecutedPath) -> go.Figure:
+    """Return the distance from the path along it, mm, with and without the lag of the joints."""
+    figure = go.Figure(layout=base_layout(HEIGHT, hovermode="x unified"))
+    figure.update_layout(
+        margin={"l": 62, "r": 44, "t": 40, "b": 48},
+        legend={"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "font": {"size": 12}},
+    )
+    order = np.argsort(path.s, kind="stable")
+    some = order[spread(len(order), MOST_POINTS)]
+    for name, values, colour in (
+        ("corners alone", path.rounding, FAINT),
+        ("as executed", path.off, CHOSEN),
+    ):
+        figure.add_scatter(
+            x=_mm(path.s[some]),
+            y=_mm(values[some]),
+            mode="lines",
+            name=name,
+            line={"color": colour, "width": 1.6},
+            hovertemplate="%{y:.3f} mm",
+        )
+    figure.add_hline(y=path.allowed * 1e3, line={"color": INK, "width": 1, "dash": "dash"})
+    top = 1.15e3 * max(float(path.off.max()), path.allowed)
+    figure.update_layout(
+        xaxis=axis(title=axis_title("length, mm"), unifiedhovertitle={"text": "%{x:.1f} mm"}),
+        yaxis=axis(title=axis_title("distance, mm"), range=[0, top]),
+    )
+    return figure
+
+
+def enlarged(path: ExecutedPath) -> go.Figure:
+    """Return the drawn path in the part and the executed one, its errors enlarged."""
+    figure = go.Figure(layout=base_layout(SCENE_HEIGHT))
+    some = spread(len(path.s), MOST_POINTS)
+    moved = path.nearest + path.factor * (path.tip - path.nearest)
+    for name, points, colour, width in (
+        ("drawn", path.nearest, ACCENT, 3),
+        (f"executed, errors x {path.factor:g}", moved, CHOSEN, 4),
+    ):
+        x, y, z = points[some].T
+        figure.add_scatter3d(
+            x=_mm(x), y=_mm(y), z=_mm(z), mode="lines", name=name, hoverinfo="skip",
+            line={"color": colour, "width": width},
+        )  # fmt: skip
+    hidden: dict[str, Any] = {"visible": False}
+    figure.update_layout(
+        margin={"l": 0, "r": 0, "t": 0, "b": 0},
+        legend={"orientation": "h", "x": 0, "y": 1, "yanchor": "top", "font": {"size": 12}},
+        scene={
+            "aspectmode": "data",
+            "dragmode": "turntable",
+            "xaxis": hidden,
+            "yaxis": hidden,
+            "zaxis": hidden,
+            "camera": _camera(path.nearest),
+        },
+    )
+    return figure
+
+
+def _mm(values: Array) -> list[float]:
+    return [float(f"{value * 1e3:.5g}") for value in values]
+
+
+def _camera(points: Array) -> dict[str, Any]:
+    """Return a camera that looks across the plane in which the points (m, 3) mostly lie."""
+    normal = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][2]
+    eye = 2.6 * (normal if normal[2] >= 0 else -normal)
+    up = {"x": 0, "y": 1, "z": 0} if abs(normal[2]) > 0.9 else {"x": 0, "y": 0, "z": 1}
+    x, y, z = (float(f"{value:.3g}") for value in eye)
+    return {"eye": {"x": x, "y": y, "z": z}, "up": up, "projection": {"type": "orthographic"}}
