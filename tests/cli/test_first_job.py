@@ -5,7 +5,8 @@ import json
 import ezdxf
 import numpy as np
 import pytest
-from tests.cad.test_meshes import box, stl
+from tests.cad.test_meshes import box, square_tube, stl
+from tests.cad.test_part import write_step
 
 import foreign
 from commands import assert_refused, run
@@ -233,3 +234,23 @@ def test_what_a_drawing_needs_is_handed_on_to_its_job(tmp_path, key):
     job = read_job(tmp_path / "first.toml")
     listed = json.loads(run("contours", name, *given, "--json", cwd=tmp_path).stdout)
     assert [loop.name for loop in job.read_part().loops] == [one["name"] for one in listed["loops"]]
+
+
+def test_what_would_be_cut_from_below_is_not_in_a_first_job(tmp_path):
+    """A tube has holes above; its ends would need a beam from below, unless something turns it."""
+    job = tmp_path / "tube.toml"
+    write_step(tmp_path / "tube.step", square_tube(3))
+    text = job_text(read(tmp_path / "tube.step"), job)
+    assert text.count("[[contour]]") == 3
+    assert "# 2 loops (skin1/outer2, ...) not in it: as the part lies, the beam would" in text
+    job.write_text(text)
+    assert not check_job(read_job(job)).warnings
+    write_step(tmp_path / "bare.step", square_tube(0))
+    assert job_text(read(tmp_path / "bare.step"), job).count("[[contour]]") == 2
+
+
+def test_points_alone_are_told_all_that_they_lack(tmp_path):
+    (tmp_path / "bare.csv").write_text("0,0,0\n9,0,0\n9,9,0\n")
+    assert_refused(run("new", "bare.csv", cwd=tmp_path), "--axis 0 0 -1", "--unit mm")
+    given = ("--axis", "0", "0", "-1", "--unit", "mm")
+    assert run("new", "bare.csv", *given, cwd=tmp_path).returncode == 0

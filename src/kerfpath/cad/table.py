@@ -265,6 +265,11 @@ def _rows(
         table = table.without_header()
     elif (count := len(table.rows[0])) in UNNAMED or (has_axis and count == len(POSITION)):
         columns = UNNAMED.get(count, POSITION)
+    elif count == len(POSITION):
+        raise InputError(
+            f"line {table.lines[0]}: has points without tool axes (x y z); {GIVE_AXIS}; and, as no "
+            "header states it, the unit of its numbers: --unit mm"
+        )
     else:
         raise InputError(
             f"line {table.lines[0]}: without a header expected 6 columns (x y z nx ny nz) or 7 "

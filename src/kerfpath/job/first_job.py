@@ -23,8 +23,12 @@ PLACEHOLDER = "abb_irb4600_60_205"
 """The robot of a job that no robot was given for."""
 REACH = 2.0
 """Reach of a robot for which the library has none, m."""
+MOST_LOOKED_AT = 40
+"""Most loops among which those of a first job are chosen; the longest are taken."""
+BELOW = np.radians(20.0)
+"""Angle by which the beam may come from below the horizontal."""
 MOST_LOOPS = 8
-"""Most loops in a first job; the longest are taken."""
+"""Most loops in a first job."""
 NODES = 400
 """Most nodes of a loop; shorter loops are spaced by `SPACING`."""
 SPACING = 2.0
@@ -78,7 +82,8 @@ def job_text(
 ) -> str:
     """Return a job that cuts the longest loops of a part, placed in front of the robot.
 
-    The loops are closed ones, or open lines if there are no others.
+    The loops are closed ones, or open lines if there are no others, and such as the beam need not
+    come from below for, if there are any.
 
     Parameters
     ----------
@@ -104,11 +109,15 @@ def job_text(
             f"{part.path}: every loop has a gap; `kerfpath contours {part.path}` shows how wide: "
             "give --gap-mm above it"
         )
-    chosen = sorted(main, key=lambda loop: loop.length)[-MOST_LOOPS:]
+    longest = sorted(main, key=lambda loop: loop.length)[-MOST_LOOKED_AT:]
+    along = {loop.name: part.contour(loop.name, closed=False) for loop in longest}
+    rpy = _turn(along)
+    level = [loop for loop in longest if _is_level(along[loop.name], rpy)]
+    chosen = (level or longest)[-MOST_LOOPS:]
     used = library_robot(robot or PLACEHOLDER)
-    dense = [part.contour(loop.name, closed=False) for loop in chosen]
+    dense = [along[loop.name] for loop in chosen]
     axes = [contour.axes for contour in dense]
-    xyz, rpy = _place(part, chosen, axes, used.reach or REACH)
+    xyz = _place(part, rpy, used.reach or REACH)
     file = Path(relpath(part.path, job.parent)).as_posix()
     head = HEAD.format(
         drawing=part.path.name,
@@ -120,7 +129,8 @@ def job_text(
         reading=("" if drawing is None else _reading(drawing)) + _frame(part),
         xyz=xyz,
         rpy=list(rpy),
-        cut=_cut(part, chosen, lines if main is not lines else ()),
+        cut=_below([loop for loop in longest if level and loop not in level])
+        + _cut(part, chosen, lines if main is not lines else ()),
     )
     spoken = (name for name, each in languages().items() if used.manufacturer in each.manufacturers)
     tail = TAIL.format(
@@ -232,19 +242,37 @@ def _contour(loop: Loop, spacing: float) -> str:
     return f"[[contour]]\npick = {name}\nspeed_m_min = 3\nspacing_mm = {spacing:g}\n\n"
 
 
-def _place(
-    part: Part, loops: Sequence[Loop], axes_of: Sequence[Array], reach: float
-) -> tuple[list[float], tuple[int, ...]]:
-    """Return xyz in mm and rpy in deg with which the beam comes mainly from above."""
-    axes = np.vstack([each.mean(axis=0) for each in axes_of])
-    weighed = (axes * np.array([[loop.length] for loop in loops])).sum(axis=0)
+def _turned(rpy: tuple[int, ...]) -> Array:
+    return np.asarray(pose((0.0, 0.0, 0.0), rpy)[:3, :3])
 
-    def turned(rpy: tuple[int, ...]) -> Array:
-        return np.asarray(pose((0.0, 0.0, 0.0), rpy)[:3, :3])
 
-    rpy = max(TURNS, key=lambda one: round(float(-(turned(one) @ weighed)[2]), 9))
-    corners = np.array(np.meshgrid(*part.bounding_box.T)).reshape(3, -1).T @ turned(rpy).T * 1e3
+def _turn(along: Mapping[str, Contour]) -> tuple[int, ...]:
+    """Return rpy in deg with which the beam comes mainly from above."""
+    weighed = np.sum([each.axes.mean(axis=0) * each.length for each in along.values()], axis=0)
+    return max(TURNS, key=lambda one: round(float(-(_turned(one) @ weighed)[2]), 9))
+
+
+def _is_level(contour: Contour, rpy: tuple[int, ...]) -> bool:
+    """Return whether the beam along a contour never comes from far below."""
+    return bool((contour.axes @ _turned(rpy)[2]).max() <= np.sin(BELOW))
+
+
+def _below(loops: Sequence[Loop]) -> str:
+    """Return words on loops that are not in a job because the beam would come from below."""
+    if not loops:
+        return ""
+    some = f"{loops[-1].name}{', ...' if loops[1:] else ''}"
+    return (
+        f"{counted(len(loops), 'loop')} ({some}) not in it: as the part lies, the beam would come "
+        "from below;\n# for these turn the part, or add a rotary axis that carries it "
+        "([[robot.external]]).\n# "
+    )
+
+
+def _place(part: Part, rpy: tuple[int, ...], reach: float) -> list[float]:
+    """Return xyz in mm with which the part is in front of the robot."""
+    corners = np.array(np.meshgrid(*part.bounding_box.T)).reshape(3, -1).T @ _turned(rpy).T * 1e3
     low, high = corners.min(axis=0), corners.max(axis=0)
     from_middle = np.array([*(low + high)[:2] / 2, low[2]])
     place = np.round(np.array(PLACE) * reach, 2) * 1e3
-    return (place - from_middle).round(1).tolist(), rpy
+    return [float(value) for value in (place - from_middle).round(1)]
