@@ -167,6 +167,30 @@ def test_arcs_are_chords_within_a_micrometre(tmp_path: Path, case: str) -> None:
     assert radius * (1 - np.cos(steps[0] / 2)) <= 1e-3
 
 
+KLARTEXT_ARCS = {
+    "left, a quarter": ("CC X+10 Y+10\nC X+20 Y+10 DR+ F500", (10, 10, 0), (0, 0, 1), 90),
+    "right, three quarters": ("CC X+10 Y+10\nC X+20 Y+10 DR- R0", (10, 10, 0), (0, 0, -1), 270),
+    "a full circle": ("CC X+15 Y+0\nC X+10 Y+0 DR+", (15, 0, 0), (0, 0, 1), 360),
+    "left, by its radius": ("CR X+20 Y+10 R+10 DR+ F500", (10, 10, 0), (0, 0, 1), 90),
+    "left, more than a half": ("CR X+20 Y+10 R-10 DR+", (20, 0, 0), (0, 0, 1), 270),
+    "right, by its radius": ("CR X+20,0 Y+10 R+10,0 DR- M8", (20, 0, 0), (0, 0, -1), 90),
+}
+
+
+@pytest.mark.parametrize("case", KLARTEXT_ARCS)
+def test_arcs_of_heidenhain_are_chords_within_a_micrometre(tmp_path: Path, case: str) -> None:
+    text, centre, normal, turn = KLARTEXT_ARCS[case]
+    text = f"BEGIN PGM A MM\nTOOL CALL 1 Z S100\nL X10 Y0 Z0 R0 FMAX\n{text}\nEND PGM A MM\n"
+    part = program(tmp_path, text, name="cut.h", axis=(0.6, 0.64, -0.48))
+    points = 1e3 * part.contour("cut1", closed=False).points
+    flat = points - centre
+    radius = np.linalg.norm(flat[0])
+    assert np.linalg.norm(flat, axis=1) == pytest.approx(radius, abs=1e-9)
+    steps = np.arctan2(np.cross(flat[:-1], flat[1:]) @ normal, (flat[:-1] * flat[1:]).sum(axis=1))
+    assert steps == pytest.approx(np.radians(turn) / len(steps), abs=1e-9)
+    assert radius * (1 - np.cos(steps[0] / 2)) <= 1e-3
+
+
 def test_a_vector_of_iso_programs_is_the_tool_axis(tmp_path: Path) -> None:
     """Under G43.5, missing ones of I, J and K are 0; a block without any keeps the vector."""
     text = "G21\nG43.5 H1\nG0 X0 Y0 Z0 K1\nG1 X10\nX20 I3 K4\nG49\nM30\n"
@@ -232,7 +256,16 @@ REFUSED = {
     "a dwell with X": (S + "G4 X5\n", "line 6: G4 with X, Y or Z"),
     "a block after the end": (S + "M30\nX5\n", "line 7: a block after the end .* in line 6"),
     "Heidenhain, no unit": (H.replace(" MM", ""), "line 1: expected one BEGIN PGM NAME MM or INCH"),
-    "Heidenhain, an arc": (H + "C X5 Y5 DR+\n", r"line 5: 'C X5 Y5 DR\+': a curve, or a move that"),
+    "Heidenhain, an arc without a pole": (H + "C X5 Y5 DR+\n", "line 5: an arc without its centre"),
+    "Heidenhain, an arc without its way": (H + "CC X0 Y0\nC X5 Y5\n", "line 6: expected C X Y DR"),
+    "Heidenhain, an arc without a radius": (H + "CR X5 Y5 DR+\n", "line 5: expected C X Y DR"),
+    "Heidenhain, half a pole": (H + "CC X5\n", "line 5: 'CC X5': expected CC X Y, absolute"),
+    "Heidenhain, an increment of a pole": (H + "CC IX5 Y0\n", "line 5: 'CC IX5 Y0': expected CC X"),
+    "Heidenhain, a rising arc": (H + "CC X0 Y0\nC X5 Y5 Z5 DR+\n", "line 6: an arc: expected X"),
+    "Heidenhain, a polar arc": (H + "CP IPA+90 DR+\n", r"line 5: 'CP IPA\+90 DR\+': a curve, or"),
+    "Heidenhain, another tool axis": (
+        H + "TOOL CALL 2 Y S9\nL X0 Y0 Z0 FMAX\nCC X5 Y0\nC X0 Y0 DR+\n", "line 8: an arc about"
+    ),
     "Heidenhain, a rounding": (H + "RND R5\n", "line 5: 'RND R5': a curve, or a move that"),
     "Heidenhain, increments": (H + "L IX+5\n", r"line 5: 'IX\+5': increments; write absolute"),
     "Heidenhain, compensation": (H + "L X5 RL\n", "line 5: 'RL': the controller would offset"),
@@ -255,7 +288,7 @@ REFUSED = {
     ),
     "Heidenhain, X twice": (H + "L X5 X6\n", "line 5: X twice in one block"),
     "Heidenhain, a block after the end": (H + "M30\nL X5\n", "line 6: a block after the end"),
-    "Heidenhain, an end beside an arc": (H + "C X5 Y5 M30\n", "line 5: 'C X5 Y5 M30': a curve"),
+    "Heidenhain, an end beside an arc": (H + "CT X5 Y5 M30\n", "line 5: 'CT X5 Y5 M30': a curve"),
 }  # fmt: skip
 
 

@@ -1,12 +1,22 @@
-"""Read moves of Heidenhain's programs: L and LN, with tool axis TX TY TZ or rotary axes."""
+"""Read moves of Heidenhain's programs: L, LN, C and CR, with tool axes or rotary axes."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+
+import numpy as np
 
 from kerfpath.cad.machine import GIVE_MACHINE, Machine
-from kerfpath.cad.toolpath import Tip, ToolPath, Triple, finite, unit_axis
+from kerfpath.cad.toolpath import (
+    Arc,
+    Tip,
+    ToolPath,
+    Triple,
+    centre_by_radius,
+    finite,
+    unit_axis,
+)
 from kerfpath.errors import InputError
 from kerfpath.text import upper
 
@@ -25,6 +35,11 @@ CHANGING = ("M89", "M99", "M114", "M118", "M130", "M140", "M144")
 """Called cycles, compensated tool axes, handwheel, other systems: moves that are not supported."""
 NO_TCPM = re.compile(r"FUNCTION RESET TCPM$|M129$")
 WORD = re.compile(r"([TN]?[XYZ]|[ABCFM])([-+]?[0-9.,]+|MAX)|(R[0LR])$")
+RADIUS = re.compile(r"R([-+][0-9.,]+)")
+TURNS = {"DR+": 1.0, "DR-": -1.0}
+"""Which way an arc turns about the tool axis."""
+TOOL_AXIS = re.compile(r"TOOL CALL\b.*\s([XYUVW])(?:\s|$)")
+"""A tool axis other than Z, about which arcs would turn."""
 
 
 def is_klartext(lines: Sequence[str]) -> bool:
@@ -59,6 +74,8 @@ class _Program:
         self.tip = Tip(machine)
         self.unit = ""
         self.unused: set[str] = set()
+        self._pole: dict[str, float] = {}
+        self._arcs_refused = ""
         self._end = 0
 
     def take(self, line: int, where: str, text: str) -> None:
@@ -79,6 +96,10 @@ class _Program:
             self.unit = UNITS[unit]
         elif kind in ("L", "LN"):
             self._line(line, where, words)
+        elif kind == "CC":
+            self._take_pole(where, words)
+        elif kind in ("C", "CR"):
+            self._circle(line, where, kind, words)
         elif text.startswith("END PGM") or text.removeprefix("STOP ") in ENDS:
             self._end = line
         elif NO_TCPM.match(text):
@@ -92,13 +113,57 @@ class _Program:
                 self.tip.even = "PATHCTRL VECTOR" in text
                 self._keep_tip(line, keeps=True)
             elif kind == "TOOL":
+                if other := TOOL_AXIS.match(text):
+                    self._arcs_refused = f"about the tool axis {other[1]}"
                 self.tip.forget(line)
             self.unused.add(kind)
         else:
             raise InputError(f"{where}: {text[:40]!r}: {_reason(kind)}")
 
-    def _line(self, line: int, where: str, words: Sequence[str]) -> None:
-        """Take a straight line: its position, tool axis, feed and other words."""
+    def _take_pole(self, where: str, words: Sequence[str]) -> None:
+        """Take the centre of the arcs that follow."""
+        found = [WORD.fullmatch(word) for word in words]
+        values = {each[1]: each[2] for each in found if each is not None}
+        if sorted(values) != ["X", "Y"] or len(words) != 2:
+            raise InputError(
+                f"{where}: {' '.join(['CC', *words])[:40]!r}: expected CC X Y, absolute"
+            )
+        self._pole = {
+            name: finite(value.replace(",", "."), f"{where}: {name}")
+            for name, value in values.items()
+        }
+
+    def _circle(self, line: int, where: str, kind: str, words: Sequence[str]) -> None:
+        """Take an arc in the plane of X and Y, about the pole or by its radius."""
+        turns = [TURNS[word] for word in words if word in TURNS]
+        radii = [found[1] for word in words if (found := RADIUS.fullmatch(word))]
+        rest = [word for word in words if word not in TURNS and not RADIUS.fullmatch(word)]
+        if self._arcs_refused:
+            raise InputError(f"{where}: an arc {self._arcs_refused}; only Z is read")
+        if len(turns) != 1 or len(radii) != (kind == "CR"):
+            raise InputError(
+                f"{where}: expected C X Y DR+ or DR- after CC, or CR X Y R DR+ or DR-, with signs"
+            )
+        if kind == "C" and not self._pole:
+            raise InputError(f"{where}: an arc without its centre; expected CC X Y before it")
+        pole, normal = dict(self._pole), np.array([0.0, 0.0, turns[0]])
+        radius = finite(radii[0].replace(",", "."), f"{where}: R") if radii else None
+
+        def arc(before: Triple, after: Triple) -> Arc:
+            start, end = np.array(before), np.array(after)
+            centre = np.array([pole.get("X", 0.0), pole.get("Y", 0.0), start[2]])
+            if radius is not None:
+                centre = centre_by_radius(start, end, normal, radius, where)
+            x, y, z = centre.tolist()
+            return Arc((x, y, z), (0.0, 0.0, turns[0]))
+
+        self._line(line, where, rest, arc)
+
+    def _line(
+        self, line: int, where: str, words: Sequence[str],
+        arc: Callable[[Triple, Triple], Arc] | None = None,
+    ) -> None:  # fmt: skip
+        """Take a line or an arc: its position, tool axis, feed and other words."""
         values: dict[str, float] = {}
         extras: set[str] = set()
         is_rapid = False
@@ -121,7 +186,9 @@ class _Program:
         if "M128" in extras:
             self._keep_tip(line, keeps=True)
         self.unused |= {each[0] for each in extras} | {n for n in NORMAL if n in values}
-        self._go(line, where, values, extras, is_rapid)
+        if arc is not None and (is_rapid or any(name in values for name in (*AXIS, *NORMAL, "Z"))):
+            raise InputError(f"{where}: an arc: expected X and Y at feed, without Z and tool axis")
+        self._go(line, where, values, extras, is_rapid, arc)
         if "M129" in extras:
             self._keep_tip(line, keeps=False)
         if any(each in extras for each in ENDS):
@@ -134,8 +201,9 @@ class _Program:
             self.tip.forget(line)
 
     def _go(
-        self, line: int, where: str, values: dict[str, float], extras: set[str], is_rapid: bool
-    ) -> None:
+        self, line: int, where: str, values: dict[str, float], extras: set[str], is_rapid: bool,
+        arc: Callable[[Triple, Triple], Arc] | None,
+    ) -> None:  # fmt: skip
         place = {name: values[name] for name in "XYZ" if name in values}
         angles = {name: values[name] for name in "ABC" if name in values}
         axis: Triple | None = None
@@ -154,11 +222,11 @@ class _Program:
                 )
             self.tip.go_away(line, angles)
         elif place or axis or angles:
-            self.tip.go(line, feed=not is_rapid, place=place, axis=axis, angles=angles)
+            self.tip.go(line, feed=not is_rapid, place=place, axis=axis, arc=arc, angles=angles)
 
 
 def _reason(word: str) -> str:
-    if word in ("C", "CC", "CR", "CT", "CP", "RND", "CHF", "APPR", "DEP", "SPL"):
+    if word in ("CT", "CP", "LP", "RND", "CHF", "APPR", "DEP", "SPL"):
         return "a curve, or a move that is not written out; have the CAM system write lines only"
     if word in ("RL", "RR"):
         return "the controller would offset the path; write the path of the tip"

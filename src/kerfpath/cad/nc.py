@@ -18,6 +18,7 @@ from kerfpath.cad.toolpath import (
     Tip,
     ToolPath,
     Triple,
+    centre_by_radius,
     finite,
     lines_of,
     part_of_tool_path,
@@ -66,8 +67,6 @@ REFUSED = {
                     "a curve; have the CAM system write linear moves only"),
     "ORIMKS": "tool axes in the machine, not in the part; write ORIWKS",
 }  # fmt: skip
-ROUNDED = 1e-3
-"""Share by which rounding may leave a radius too short for its chord."""
 ENDS = (2, 17, 30)
 TOOL_CHANGE = 6
 CALLS = (98, 99)
@@ -298,16 +297,7 @@ class _Program:
             start, end = np.array(before), np.array(after)
             centre = start + [offset.get(name, 0.0) for name in CENTRE]
             if radii:
-                way = end - start
-                way[self._plane] = 0.0
-                half, radius = float(np.linalg.norm(way)) / 2, abs(radii[0])
-                if not 0 < half <= radius * (1 + ROUNDED):
-                    raise InputError(
-                        f"{where}: an arc of radius {radius:g} between places {2 * half:g} apart; "
-                        "give a full circle by its centre"
-                    )
-                aside = np.cross(normal, way) / (2 * half) * np.copysign(1.0, radii[0])
-                centre = start + way / 2 + np.sqrt(max(radius**2 - half**2, 0.0)) * aside
+                centre = centre_by_radius(start, end, normal, radii[0], where)
             x, y, z = centre.tolist()
             i, j, k = normal.tolist()
             return Arc((x, y, z), (i, j, k))

@@ -60,6 +60,32 @@ class Arc(NamedTuple):
     normal: Triple
 
 
+ROUNDED = 1e-3
+"""Share by which rounding may leave a radius too short for its chord."""
+
+
+def centre_by_radius(start: Array, end: Array, normal: Array, radius: float, where: str) -> Array:
+    """Return the centre (3,) of an arc that runs counter-clockwise about a unit `normal` (3,).
+
+    A negative radius is that of an arc of more than a half turn.
+
+    Raises
+    ------
+    InputError
+        Ends (3,) too far apart for the radius, or in one place; the message begins with `where`.
+    """
+    way = end - start
+    way = way - (way @ normal) * normal
+    half, size = float(np.linalg.norm(way)) / 2, abs(radius)
+    if not 0 < half <= size * (1 + ROUNDED):
+        raise InputError(
+            f"{where}: an arc of radius {size:g} between places {2 * half:g} apart; give a full "
+            "circle by its centre"
+        )
+    aside = np.cross(normal, way) / (2 * half) * np.copysign(1.0, radius)
+    return np.asarray(start + way / 2 + np.sqrt(max(size**2 - half**2, 0.0)) * aside)
+
+
 class Rotary(NamedTuple):
     """The rotary axes of a machine at the end of a move.
 
