@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -92,28 +93,28 @@ def record(program: Path, robot: Robot, settings: LinuxcncSettings, *, longest: 
         folder = Path(name)
         _prepare(folder, program, robot, settings)
         said = _run(folder, program, longest + STARTUP)
-        rows = folder / "record.txt"
-        if not rows.exists() or said:
-            raise InputError(f"{program}: {said or 'LinuxCNC did not start'}")
-        return _read(rows, robot)
+        if said:
+            raise InputError(f"{program}: {said}")
+        return _read(folder / "record.txt", robot)
 
 
 def _prepare(folder: Path, program: Path, robot: Robot, settings: LinuxcncSettings) -> None:
     """Copy program, INI and HAL, and add what drives and records the run."""
     for end in (program.suffix, ".hal"):
         shutil.copy(program.with_suffix(end), folder)
-    ini = program.with_suffix(".ini").read_text()
-    hal = f"HALFILE = {program.stem}.hal"
-    ini = ini.replace("DISPLAY = axis", "DISPLAY = ./driver.py")
-    ini = ini.replace(hal, f"{hal}\nHALFILE = record.hal")
+    ini = program.with_suffix(".ini").read_text(encoding="utf-8")
+    ini = re.sub(r"(?m)^[ \t]*DISPLAY[ \t]*=.*", "DISPLAY = ./driver.py", ini)
+    ini = re.sub(r"(?m)^[ \t]*HALFILE[ \t]*=.*", r"\g<0>\nHALFILE = record.hal", ini)
     (folder / "run.ini").write_text(ini)
     (folder / "record.hal").write_text("\n".join([*_sampler(robot, settings), ""]))
     driver = folder / "driver.py"
     shutil.copy(Path(__file__).with_name("driver.py"), driver)
     for file in ("linuxcnc.var", "tool.tbl"):
         (folder / file).touch()
-    for each in (folder, *folder.iterdir()):
-        each.chmod(0o777)
+    driver.chmod(0o755)
+    if os.geteuid() == 0:
+        for each in (folder, *folder.iterdir()):
+            shutil.chown(each, int(NOBODY))
 
 
 def _sampler(robot: Robot, settings: LinuxcncSettings) -> list[str]:
@@ -159,15 +160,18 @@ def _run(folder: Path, program: Path, longest: float) -> str:
         process.communicate()
         return f"LinuxCNC did not end after {longest:.0f} s"
     found = [line for line in said.splitlines() if line.startswith("LinuxCNC: ")]
+    if not found and not (folder / "record.txt").exists():
+        found = [f"LinuxCNC did not start: {line}" for line in said.splitlines() if line.strip()]
+        return found[-1] if found else "LinuxCNC did not start"
     return found[0] if found else ""
 
 
 def _read(path: Path, robot: Robot) -> Record:
     """Return the record, without standing still before the first motion and after the last."""
-    rows = path.read_text().splitlines()
-    if "overrun" in rows:
+    rows = path.read_text().splitlines()[:-1]  # the last one may be cut off
+    values = np.array([row.split() for row in rows if row != "overrun"], dtype=float)
+    if len(values) < len(rows) or (np.diff(values[:, 0]) != 1).any():
         raise InputError("the record of LinuxCNC has gaps: the machine is too slow; run it again")
-    values = np.array([row.split() for row in rows if row.count(" ") > robot.joints], dtype=float)
     n, arm = robot.joints, robot.family.joints
     words = values[:, 1 : n + 1]
     q = np.hstack([np.radians(words[:, :arm]), from_controller_units(robot, words[:, arm:])])
