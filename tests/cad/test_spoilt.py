@@ -10,7 +10,7 @@ import pytest
 
 import spoilt
 from kerfpath.cad import read
-from kerfpath.cell import read_stl
+from kerfpath.cell import read_mesh
 from kerfpath.errors import InputError, about
 from kerfpath.job import read_job
 from kerfpath.robots import Robot
@@ -124,11 +124,11 @@ def test_a_mesh_takes_memory_as_it_is_large(tmp_path):
     path = tmp_path / "binary.stl"
     whole = spoilt.Whole(path, path)
     size = path.stat().st_size
-    assert spoilt.taken(lambda path: read_stl(path, "m"), whole) * 1e6 < 300 * size
+    assert spoilt.taken(lambda path: read_mesh(path, "m"), whole) * 1e6 < 300 * size
     crowd = np.random.default_rng(0).uniform(0, 1e-8, (3000, 3))
     corners[: len(crowd)][: len(corners)] = crowd[: len(corners)]
     write_meshes(tmp_path, corners, faces)
-    assert spoilt.taken(lambda path: read_stl(path, "m"), whole) * 1e6 < 300 * size
+    assert spoilt.taken(lambda path: read_mesh(path, "m"), whole) * 1e6 < 300 * size
 
 
 # --- time ------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from kerfpath.cell import (
     box_between,
     cell_of,
     frustum,
-    read_stl,
+    read_mesh,
     weld,
 )
 from kerfpath.cell.scene import Scene
@@ -401,9 +401,30 @@ def test_an_stl_is_read_in_the_unit_that_is_given(tmp_path, data):
     file = tmp_path / "block.stl"
     file.write_bytes(data(box([100, 200, 300])))
     for unit, scale in (("mm", 1e-3), ("cm", 1e-2)):
-        mesh = read_stl(file, unit)
+        mesh = read_mesh(file, unit)
         assert len(mesh.vertices) == 8
         np.testing.assert_allclose(np.ptp(mesh.bounds, axis=0), np.array([100, 200, 300]) * scale)
+
+
+def test_meshes_of_other_formats_are_read_alike(tmp_path):
+    shape = box([100, 200, 300])
+    corners, faces = shape.points, shape.triangles
+    lines = ["v " + " ".join(map(str, corner)) for corner in corners]
+    obj = lines + ["f " + " ".join(str(i + 1) for i in face) for face in faces]
+    ply = [
+        *("ply", "format ascii 1.0", f"element vertex {len(corners)}"),
+        *(f"property float {axis}" for axis in "xyz"),
+        *(f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"),
+        *(line[2:] for line in lines),
+        *("3 " + " ".join(map(str, face)) for face in faces),
+    ]
+    for name, text in {"block.obj": obj, "block.PLY": ply}.items():
+        (tmp_path / name).write_text("\n".join(text) + "\n")
+        mesh = read_mesh(tmp_path / name, "mm")
+        np.testing.assert_allclose(np.ptp(mesh.bounds, axis=0), [0.1, 0.2, 0.3], atol=1e-9)
+    (tmp_path / "block.off").write_text("OFF")
+    with pytest.raises(InputError, match=r"block.off: expected a mesh as .stl, .obj, .ply"):
+        read_mesh(tmp_path / "block.off", "mm")
 
 
 @pytest.mark.parametrize(
@@ -428,9 +449,9 @@ def test_bad_stl_files_are_refused(tmp_path, data, unit, message):
     file = tmp_path / "block.stl"
     file.write_bytes(data)
     with pytest.raises(InputError, match=message):
-        read_stl(file, unit)
+        read_mesh(file, unit)
     with pytest.raises(InputError, match="cannot be read"):
-        read_stl(tmp_path / "none.stl", "mm")
+        read_mesh(tmp_path / "none.stl", "mm")
 
 
 def test_a_mesh_that_is_no_solid_is_refused():

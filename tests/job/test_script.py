@@ -51,6 +51,11 @@ name = "post"
 size_mm = [60, 60, 900]
 xyz_mm = [900, 300, 450]
 rpy_deg = [0, 0, 30]
+[[cell.fixture]]
+name = "pin"
+cylinder_mm = [80, 300]
+xyz_mm = [-900, 300, 450]
+rpy_deg = [0, 90, 0]
 [[cell.pair]]
 between = ["post", "head"]
 near_miss_mm = 8

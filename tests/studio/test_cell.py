@@ -6,7 +6,10 @@ import tomllib
 import ezdxf
 import pytest
 
+from cell.test_cell import stl_bytes
 from conftest import ROOT
+from jobs import DEMO
+from kerfpath.cell import box
 from kerfpath.errors import InputError
 from kerfpath.job import read_job
 from kerfpath.robots import robot, robot_ids
@@ -83,6 +86,33 @@ def test_what_is_no_drawing_is_refused_and_leaves_no_file(session, tmp_path):
     assert session.document.text == JOB
     begin(session, "plate.dxf", data, unit="mm")
     assert tomllib.loads(session.document.text)["part"]["unit"] == "mm"
+
+
+def test_a_solid_is_kept_beside_the_job_and_measured(session, tmp_path):
+    data = stl_bytes(box([80, 120, 60]))
+
+    def solid(name, data, unit="mm"):
+        return asyncio.run(session.solid(name, data, unit=unit))
+
+    assert solid("clamp.stl", data) == {
+        "file": "clamp.stl",
+        "unit": "mm",
+        "bounds_mm": [[-40, -60, -30], [40, 60, 30]],
+    }
+    assert solid("clamp.stl", data, "cm")["bounds_mm"][1] == [400, 600, 300]
+    found = solid("b_pillar.step", (DEMO / "b_pillar.step").read_bytes())
+    assert set(found) == {"file", "bounds_mm"}  # a STEP file says its unit
+    there = sorted(file.name for file in tmp_path.iterdir())
+    for name, bad, said in (
+        ("clamp.stl", data[:-50], "neither a text STL nor a complete binary one"),
+        ("clamp.dxf", plate(tmp_path), "expected a solid, such as .step"),
+        ("../clamp.stl", data, "expected a solid"),
+    ):
+        with pytest.raises(InputError, match=said) as refused:
+            solid(name, bad)
+        assert str(tmp_path) not in str(refused.value)
+    assert sorted({file.name for file in tmp_path.iterdir()} - {"drawn.dxf"}) == there
+    assert session.document.text == JOB
 
 
 def test_the_page_can_choose_among_all_robots_and_see_them():

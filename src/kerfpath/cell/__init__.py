@@ -17,10 +17,11 @@ from kerfpath.cell.glb import glb_of as glb_of
 from kerfpath.cell.links import allowed_pairs as allowed_pairs
 from kerfpath.cell.links import link_bodies as link_bodies
 from kerfpath.cell.links import link_capsules as link_capsules
+from kerfpath.cell.mesh import MESHES as MESHES
 from kerfpath.cell.mesh import Mesh as Mesh
 from kerfpath.cell.mesh import edges_of as edges_of
 from kerfpath.cell.mesh import mesh_of as mesh_of
-from kerfpath.cell.mesh import read_stl as read_stl
+from kerfpath.cell.mesh import read_mesh as read_mesh
 from kerfpath.cell.mesh import read_surface as read_surface
 from kerfpath.cell.mesh import thicken as thicken
 from kerfpath.cell.mesh import weld as weld
@@ -32,5 +33,6 @@ from kerfpath.cell.shapes import Hull as Hull
 from kerfpath.cell.shapes import Shape as Shape
 from kerfpath.cell.shapes import box as box
 from kerfpath.cell.shapes import box_between as box_between
+from kerfpath.cell.shapes import cylinder as cylinder
 from kerfpath.cell.shapes import frustum as frustum
 from kerfpath.cell.shapes import surface as surface

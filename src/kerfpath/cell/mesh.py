@@ -388,6 +388,8 @@ def _require_closed(triangles: Ints, name: str) -> None:
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Metres in each unit."""
+MESHES = (".stl", ".obj", ".ply")
+"""Suffixes of meshes whose unit is not in the file."""
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)")
@@ -406,21 +408,26 @@ class TriangleMesh(Protocol):
         """Indices (F, 3) of the vertices of each triangle."""
 
 
-def read_stl(path: str | Path, unit: str) -> Mesh:
-    """Return the solid in an STL file whose numbers are in `unit`: mm, cm, m or in.
+def read_mesh(path: str | Path, unit: str) -> Mesh:
+    """Return the solid in an STL, OBJ or PLY file whose numbers are in `unit`: mm, cm, m or in.
 
     Raises
     ------
     InputError
-        An unknown unit, a file that cannot be read or is cut short, or a mesh that `Mesh` refuses.
+        An unknown unit, another format, a file that cannot be read or is cut short, or a mesh that
+        `Mesh` refuses.
     """
     path = Path(path)
     if unit not in UNITS:
         raise InputError(
-            f"{path.name}: an STL file does not state its unit; expected one of "
-            f"{', '.join(UNITS)}, got {unit!r}"
+            f"{path.name}: a mesh does not state its unit; expected one of {', '.join(UNITS)}, "
+            f"got {unit!r}"
         )
-    return close_surface(*_stl(_bytes(path), path.name), UNITS[unit], path.name)
+    if path.suffix.lower() not in MESHES:
+        raise InputError(
+            f"{path.name}: expected a mesh as {', '.join(MESHES)}, got {path.suffix!r}"
+        )
+    return close_surface(*read_surface(path, path.name), UNITS[unit], path.name)
 
 
 def mesh_of(mesh: TriangleMesh, unit: str, name: str = "mesh") -> Mesh:

@@ -162,6 +162,17 @@ def box_between(low: ArrayLike, high: ArrayLike) -> Hull:
     return Hull(np.array(np.meshgrid(*np.array([a, b]).T)).reshape(3, -1).T)
 
 
+def cylinder(size: ArrayLike, T: ArrayLike | None = None) -> Hull:
+    """Return a solid that holds a cylinder, its diameter and height `size` (2,) m, as `frustum`.
+
+    Its axis is the z axis of pose T (4, 4) m, with its middle at the origin.
+    """
+    diameter, height = positive(size, "cylinder size", (2,))
+    end = np.array([0.0, 0.0, height / 2])
+    whole = frustum(-end, end, (diameter / 2, diameter / 2))
+    return whole if T is None else whole.moved(T)
+
+
 def frustum(start: ArrayLike, end: ArrayLike, radii: tuple[float, float]) -> Hull:
     """Return a truncated cone from `start` to `end` (3,) m with a radius (m) at each end.
 

@@ -16,6 +16,7 @@ from kerfpath.job.controller_run import CONTROLLERS as CONTROLLERS
 from kerfpath.job.controller_run import ControllerRun as ControllerRun
 from kerfpath.job.controller_run import run_program as run_program
 from kerfpath.job.first_job import job_text as job_text
+from kerfpath.job.format import SOLIDS as SOLIDS
 from kerfpath.job.format import TABLES as TABLES
 from kerfpath.job.format import VARIABLES as VARIABLES
 from kerfpath.job.format import Candidate as Candidate
@@ -37,6 +38,7 @@ from kerfpath.job.format import places_of as places_of
 from kerfpath.job.format import pose as pose
 from kerfpath.job.format import prepare as prepare
 from kerfpath.job.format import read_job as read_job
+from kerfpath.job.format import read_solid as read_solid
 from kerfpath.job.format import with_loops as with_loops
 from kerfpath.job.format import with_map as with_map
 from kerfpath.job.format import without_contour as without_contour

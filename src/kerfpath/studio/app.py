@@ -8,7 +8,7 @@ import hmac
 import os
 import re
 from base64 import b64encode
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import asynccontextmanager, suppress
 from hashlib import sha256
 from http.cookies import CookieError, SimpleCookie
@@ -24,6 +24,7 @@ from starlette.requests import Request
 from starlette.responses import (
     FileResponse,
     HTMLResponse,
+    JSONResponse,
     PlainTextResponse,
     RedirectResponse,
     Response,
@@ -203,8 +204,8 @@ KINDS = {
 """Media types of the page's files that are served, by suffix."""
 LONGEST = 12_000_000
 """Largest message in bytes: a job of the largest size, quoted as JSON."""
-LARGEST_PART = 300_000_000
-"""Largest size of a drawing that a page sends, bytes."""
+LARGEST_FILE = 300_000_000
+"""Largest size of a file that a page sends, bytes."""
 MOST_LOOKS = 8
 """Number of questions of a page that are answered at the same time; further ones wait."""
 MOST_SAID = 300
@@ -254,6 +255,7 @@ def application(
             Route("/kept/{number}", _kept),
             Route("/robot/{name}.svg", _robot),
             Route("/part/{name}", _part, methods=["POST"]),
+            Route("/solid/{name}", _solid, methods=["POST"]),
             Route("/export/{name}", _export),
             Route("/report", _report),
             WebSocketRoute("/ws", _socket),
@@ -343,23 +345,40 @@ async def _robot(request: Request) -> Response:
 
 async def _part(request: Request) -> Response:
     """Begin a new job with the drawing that a page sends."""
+    asked = request.query_params
+
+    async def begin(session: Session, name: str, data: bytes) -> Response:
+        robot, unit = asked.get("robot") or None, asked.get("unit") or None
+        await session.begin(name, data, robot=robot, unit=unit)
+        return PlainTextResponse("")
+
+    return await _with_file(request, begin)
+
+
+async def _solid(request: Request) -> Response:
+    """Write the solid that a page sends beside the job."""
+
+    async def read(session: Session, name: str, data: bytes) -> Response:
+        unit = request.query_params.get("unit") or ""
+        return JSONResponse(await session.solid(name, data, unit=unit))
+
+    return await _with_file(request, read)
+
+
+async def _with_file(
+    request: Request, take: Callable[[Session, str, bytes], Awaitable[Response]]
+) -> Response:
+    """Return the answer to a file that a page sends, or why it is refused."""
     session, data = await _session(request.app), bytearray()
     async for piece in request.stream():
         data += piece
-        if len(data) > LARGEST_PART:
-            said = f"the drawing has more than {LARGEST_PART // 10**6} MB; put it beside the job"
+        if len(data) > LARGEST_FILE:
+            said = f"the file has more than {LARGEST_FILE // 10**6} MB; put it beside the job"
             return PlainTextResponse(said, status_code=413)
-    asked = request.query_params
     try:
-        await session.begin(
-            request.path_params["name"],
-            bytes(data),
-            robot=asked.get("robot") or None,
-            unit=asked.get("unit") or None,
-        )
+        return await take(session, request.path_params["name"], bytes(data))
     except KerfpathError as error:
         return PlainTextResponse(str(error), status_code=409)
-    return PlainTextResponse("")
 
 
 async def _kept(request: Request) -> Response:

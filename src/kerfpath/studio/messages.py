@@ -189,6 +189,10 @@ class OptionsMessage(Message):
     """Ends of the names of drawings that can be read, with their dots."""
     units: list[str] = []
     """Units of a drawing."""
+    solids: list[str] = []
+    """Ends of the names of files with a solid, as of a fixture, with their dots."""
+    solid_units: list[str] = []
+    """Units of a mesh in such a file."""
 
 
 class JointEntry(Message):

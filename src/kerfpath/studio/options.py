@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 
 from kerfpath.cad import SUFFIXES, UNITS_MM
 from kerfpath.front import CRITERIA
-from kerfpath.job import TABLES, VARIABLES, JobFile, heads
+from kerfpath.job import SOLIDS, TABLES, VARIABLES, JobFile, heads
 from kerfpath.options import PlanOptions
 from kerfpath.post import languages
 from kerfpath.report.layout import GOALS
@@ -187,6 +187,8 @@ def options_message(robot: Robot | None, external: Sequence[str] = ()) -> Option
         heads=list(heads()),
         suffixes=sorted(SUFFIXES),
         units=sorted(UNITS_MM),
+        solids=list(SOLIDS),
+        solid_units=_words(_declaration("cell.fixture.unit").annotation),
     )
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from itertools import count
@@ -12,9 +12,12 @@ from pathlib import Path
 from typing import NamedTuple, TypeVarTuple
 
 from kerfpath.cad import SUFFIXES, unit_question
+from kerfpath.cell import MESHES
 from kerfpath.errors import InputError, KerfpathError
 from kerfpath.files import write_whole
 from kerfpath.job import (
+    SOLIDS,
+    TABLES,
     Drawing,
     FileTexts,
     Job,
@@ -24,6 +27,7 @@ from kerfpath.job import (
     program_texts,
     python_script,
     read_job,
+    read_solid,
     result_texts,
     with_loops,
     without_contour,
@@ -251,38 +255,48 @@ class OutdatedFilter:
         return message.model_copy(update={"previous_cost": before})
 
 
-def _stored(folder: Path, name: str, data: bytes) -> tuple[Path, bool]:
-    """Return the file beside the job with a drawing's content, and whether it is new.
+@contextmanager
+def _stored(folder: Path, name: str, data: bytes) -> Iterator[Path]:
+    """Yield the file beside the job with this content; a new one goes if it is refused.
 
     Raises
     ------
     InputError
-        Its name is not that of a drawing, or it cannot be written.
+        It cannot be written.
     """
     given = Path(name)
-    if given.name != name or not name.isprintable() or given.suffix.lower() not in SUFFIXES:
-        raise InputError(
-            f"expected a drawing, such as .step, .iges, .dxf or .stl, got {name!r:.80}; export the "
-            "part as one"
-        )
     for number in count(1):
-        own = name if number == 1 else f"{given.stem}-{number}{given.suffix}"
-        file = folder / own
+        file = folder / (name if number == 1 else f"{given.stem}-{number}{given.suffix}")
         if not file.exists():
             break
         if file.is_file() and file.read_bytes() == data:
-            return file, False
+            break
+    new = not file.exists()
     try:
-        write_whole({file: data})
+        if new:
+            write_whole({file: data})
     except OSError as error:
-        raise InputError(f"{file}: cannot be written ({error.strerror})") from None
-    return file, True
+        raise InputError(f"{file.name}: cannot be written ({error.strerror})") from None
+    try:
+        yield file
+    except InputError as error:
+        if new:
+            file.unlink()
+        raise InputError(str(error).replace(str(file), file.name)) from None
+
+
+def _require_suffix(name: str, suffixes: Collection[str], what: str) -> None:
+    given = Path(name)
+    if given.name != name or not name.isprintable() or given.suffix.lower() not in suffixes:
+        raise InputError(f"expected {what}, got {name!r:.80}; export it as one")
 
 
 # -----------------------------------------------------------------------------
 # A session: one job that is edited, planned and shown; all open pages see the same state.
 
 _Ts = TypeVarTuple("_Ts")
+FINE = TABLES["cell"].model_fields["deviation_mm"].default / 1000
+"""Largest distance of the triangles of a solid from its faces, m, unless a job says otherwise."""
 
 
 class Session:
@@ -381,18 +395,14 @@ class Session:
         path = self.document.path
 
         def text() -> str:
-            file, new = _stored(path.parent, name, data)
-            try:
+            _require_suffix(name, SUFFIXES, "a drawing, such as .step, .iges, .dxf or .stl")
+            with _stored(path.parent, name, data) as file:
                 drawing = Drawing(file=file, unit=unit)
                 part = drawing.read()
                 question = unit_question(part.unit, part.bounding_box)
                 if unit is None and question:
                     raise InputError(question)
                 return job_text(part, path, robot=robot, drawing=drawing)
-            except InputError as error:
-                if new:
-                    file.unlink()
-                raise InputError(str(error).replace(str(file), file.name)) from None
 
         made = await asyncio.to_thread(text)
         before = {} if self._job is None else self._job.source
@@ -402,6 +412,33 @@ class Session:
             if key in before.get(table, {})
         ]
         self._replace(with_values(made, kept) if kept else made)
+
+    async def solid(self, name: str, data: bytes, *, unit: str) -> dict[str, object]:
+        """Write a file with a solid beside the job; return its keys of a fixture, and its bounds.
+
+        A file that is there keeps its content.
+
+        Returns
+        -------
+        dict
+            `file`, its `unit` if it is a mesh, and `bounds_mm`, the corners (2, 3) of the box
+            around the solid.
+
+        Raises
+        ------
+        InputError
+            There is no closed solid in it.
+        """
+
+        def read() -> dict[str, object]:
+            _require_suffix(name, SOLIDS, "a solid, such as .step, .stl, .obj or .ply")
+            own = {"unit": unit} if name.lower().endswith(MESHES) else {}
+            with _stored(self.document.path.parent, name, data) as file:
+                shape = read_solid(file, own.get("unit"), FINE)
+            bounds = (shape.bounds * 1e3).round(3).tolist()
+            return {"file": file.name, **own, "bounds_mm": bounds}
+
+        return await asyncio.to_thread(read)
 
     async def script(self) -> File:
         """Return the job as a Python script.

@@ -236,6 +236,8 @@ def test_pairs_and_files_of_the_job_make_its_cell(folder):
     text += '\n[[cell.fixture]]\nname = "lump"\nfile = "lump.stl"\nunit = "mm"\n'
     text += "xyz_mm = [2000, 0, 0]\n"
     text += '[[cell.fixture]]\nname = "twin"\nfile = "b_pillar.step"\nxyz_mm = [0, 3000, 0]\n'
+    text += '[[cell.fixture]]\nname = "pin"\ncylinder_mm = [80, 500]\n'
+    text += "xyz_mm = [0, 2000, 1000]\nrpy_deg = [0, 90, 0]\n"
     text += "[cell.head]\nbody_radius_mm = 55\n"
     read = read_job(job(folder, text))
     cell = cell_of_job(read, read_drawing(read.part_file))
@@ -245,6 +247,11 @@ def test_pairs_and_files_of_the_job_make_its_cell(folder):
     assert "link 3 - head (the bracket is drawn too thick)" in collision_note(cell)
     assert cell.required[cell.pair_names.index(("part", "nozzle"))] == 0.25e-3
     np.testing.assert_allclose(bodies["lump"].bounds, [[1.95, -0.05, -0.05], [2.05, 0.05, 0.05]])
+    # A round body of 24 sides around the cylinder, along x once its z axis is turned there.
+    pin = bodies["pin"].points - [0, 2, 1]
+    assert np.ptp(pin[:, 0]) == pytest.approx(0.5, abs=1e-12)
+    around = np.hypot(pin[:, 1], pin[:, 2])
+    assert around == pytest.approx(0.04 / np.cos(np.pi / 24), abs=1e-12)
     assert bodies["twin"].deviation == 0.2e-3
     assert np.ptp(bodies["twin"].bounds[:, 0]) == pytest.approx(1.2, abs=1e-3)
 
@@ -257,9 +264,14 @@ FAULTS = [
     ('name = "post"', 'name = "part"', "two bodies are called 'part'; rename one"),
     ("size_mm = [60, 60, 600]", "", "cell.fixture.size_mm: expected one of size_mm .*got none"),
     ("size_mm = [60, 60, 600]", 'file = "no.stl"', "cell.fixture.file: .*it is not in"),
-    ("size_mm = [60, 60, 600]", 'file = "a.obj"', "cell.fixture.file: expected an STL or STEP"),
+    (
+        "size_mm = [60, 60, 600]",
+        'file = "a.off"',
+        r"cell.fixture.file: expected a mesh or STEP.*\.ply",
+    ),
     ("size_mm = [60, 60, 600]", 'file = "lump.stl"', "cell.fixture.unit: expected the unit of the"),
     ("size_mm = [60, 60, 600]", 'size_mm = [1, 1, 1]\nunit = "mm"', "unit only with file"),
+    ("size_mm = [60, 60, 600]", "cylinder_mm = [0, 60]", r"fixture.cylinder_mm: .*got 0"),
     ("size_mm = [60, 60, 600]", "size_mm = [60, 60]", r"fixture.size_mm: .*got \[60, 60\]"),
     (
         "size_mm = [60, 60, 600]",

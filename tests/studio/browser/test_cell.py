@@ -5,8 +5,10 @@ import tomllib
 
 import pytest
 
+from cell.test_cell import stl_bytes
 from commands import run
 from jobs import DEMO
+from kerfpath.cell import box
 from studio.browser.test_page import serious, until
 from studio.browser.test_studio import JOB, REVISION, TWO_FRAMES, Server, settled
 from studio.test_cell import plate
@@ -91,6 +93,10 @@ def test_a_job_is_made_on_the_page_and_planned(opened, folder, tmp_path):
     edit(page, lambda: cell.get_by_role("button", name="Add a box").click())
     width = cell.get_by_label("box 1, size x, mm")
     edit(page, lambda: (width.fill("450"), width.press("Enter")))
+    edit(page, lambda: cell.get_by_role("button", name="Add a cylinder").click())
+    across = cell.get_by_label("cylinder 1, size diameter, mm")
+    edit(page, lambda: (across.fill("50"), across.press("Enter")))
+    edit(page, lambda: drop(page, "clamp.stl", stl_bytes(box([80, 120, 60])), ".fixtures"))
     settled(page)
     assert serious(page) == []
     for width, height in ((1400, 900), (1000, 700)):
@@ -106,7 +112,13 @@ def test_a_job_is_made_on_the_page_and_planned(opened, folder, tmp_path):
     assert job["robot"]["model"] == "kuka_kr60_ha"
     assert job["tool"] == {"head": "laser-head-90"}
     assert len(job["sequence"]["home_deg"]) == 6
-    assert job["cell"]["fixture"][0]["size_mm"] == [450, 300, 50]
+    first, second, third = fixtures = job["cell"]["fixture"]
+    assert first["size_mm"] == [450, 300, 50]
+    assert second["cylinder_mm"] == [50, 200]
+    assert (third["name"], third["file"], third["unit"]) == ("clamp", "clamp.stl", "mm")
+    # Its top is as far below the contours as those of the others.
+    tops = [each["xyz_mm"][2] + h for each, h in zip(fixtures, (25, 100, 30), strict=True)]
+    assert len(set(tops)) == 1
     done = run("plan", folder / "job.toml", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
 
@@ -128,6 +140,8 @@ def test_bad_input_is_said_in_one_line_and_leaves_the_job(opened, tmp_path):
     edit(page, lambda: cell.get_by_label("Unit of the drawing").select_option("mm"))
     assert not said.is_visible()
 
+    drop(page, "open.stl", stl_bytes(box([80, 120, 60]))[:-50], ".fixtures")
+    until(page, lambda: said.count() == 1 and said.inner_text().startswith("open.stl: "))
     edit(page, lambda: cell.get_by_role("button", name="Add a box").click())
     height = cell.get_by_label("box 1, size z, mm")
     height.fill("0")

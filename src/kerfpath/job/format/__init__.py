@@ -1,6 +1,7 @@
 """The job file: its tables, their values in SI, and one-line messages about faults."""
 
 from kerfpath.job.format.cell import cell_of_job as cell_of_job
+from kerfpath.job.format.cell import read_solid as read_solid
 from kerfpath.job.format.cell import with_map as with_map
 from kerfpath.job.format.contour import ContourSpec as ContourSpec
 from kerfpath.job.format.drawing import Drawing as Drawing
@@ -20,6 +21,7 @@ from kerfpath.job.format.reading import home_of as home_of
 from kerfpath.job.format.reading import machine_of as machine_of
 from kerfpath.job.format.reading import places_of as places_of
 from kerfpath.job.format.reading import read_job as read_job
+from kerfpath.job.format.tables import SOLIDS as SOLIDS
 from kerfpath.job.format.tables import TABLES as TABLES
 from kerfpath.job.format.tables import VARIABLES as VARIABLES
 from kerfpath.job.format.tables import AuditTable as AuditTable

@@ -14,6 +14,7 @@ from kerfpath.cad import Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.cell import (
     MAY_TOUCH,
+    MESHES,
     Cell,
     CuttingHead,
     Mesh,
@@ -22,9 +23,10 @@ from kerfpath.cell import (
     allowed_pairs,
     box,
     cell_of,
+    cylinder,
     edges_of,
     link_capsules,
-    read_stl,
+    read_mesh,
     thicken,
     weld,
 )
@@ -40,6 +42,8 @@ SIZES = (
     "nozzle_length_mm", "nozzle_radii_mm", "body_length_mm", "body_radius_mm", "arm_radius_mm",
 )  # fmt: skip
 """Keys of [cell.head] that are arguments of `CuttingHead` without their unit."""
+SHAPES = {"size_mm": box, "cylinder_mm": cylinder}
+"""Keys of a fixture with the size of a shape, and what makes the shape of a size and a pose, m."""
 
 
 def cell_of_job(job: Job, part: Part) -> Cell | None:
@@ -173,7 +177,7 @@ def _head(table: CellTable, folder: Path) -> CuttingHead | MeshHead:
         sizes[name.removesuffix("_mm")] = tuple(v / 1000 for v in mm) if many else mm / 1000
     if head.file is None:
         return CuttingHead(**sizes)
-    solid = _read_solid(folder / head.file, head.unit, table.deviation_mm / 1000)
+    solid = read_solid(folder / head.file, head.unit, table.deviation_mm / 1000)
     place = pose(head.xyz_mm or (0.0, 0.0, 0.0), head.rpy_deg or (0.0, 0.0, 0.0))
     return MeshHead(mesh=solid.moved(place), **sizes)
 
@@ -215,14 +219,27 @@ def _solid(job: Job, table: CellTable, part: Part) -> Mesh:
 
 def _shape(fixture: FixtureTable, folder: Path, deviation: float) -> Shape:
     place = pose(fixture.xyz_mm, fixture.rpy_deg)
-    if fixture.size_mm is not None:
-        return box([mm / 1000 for mm in fixture.size_mm], place)
+    for name in given(fixture, *SHAPES):
+        return SHAPES[name]([mm / 1000 for mm in getattr(fixture, name)], place)
     assert fixture.file is not None
-    return _read_solid(folder / fixture.file, fixture.unit, deviation).moved(place)
+    return read_solid(folder / fixture.file, fixture.unit, deviation).moved(place)
 
 
-def _read_solid(path: Path, unit: str | None, deviation: float) -> Mesh:
-    """Return the solid in an STL file of a given unit, or in a STEP file, which states its own."""
+def read_solid(path: Path, unit: str | None, deviation: float) -> Mesh:
+    """Return the solid in a mesh of a given unit, or in a STEP file, which states its own.
+
+    Parameters
+    ----------
+    path : Path
+    unit : str or None
+    deviation : float m
+        Largest distance of the triangles from the faces of a STEP file.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read, or no closed solid in it.
+    """
     stamp = path.stat()
     return _solid_in(path, unit, deviation, (stamp.st_mtime_ns, stamp.st_size))
 
@@ -230,9 +247,9 @@ def _read_solid(path: Path, unit: str | None, deviation: float) -> Mesh:
 @lru_cache(maxsize=16)
 def _solid_in(path: Path, unit: str | None, deviation: float, _stamp: tuple[int, int]) -> Mesh:
     """Read a solid; cached because a layout study reads the same file for every placement."""
-    if path.suffix.lower() == ".stl":
+    if path.suffix.lower() in MESHES:
         assert unit is not None
-        return read_stl(path, unit)
+        return read_mesh(path, unit)
     vertices, triangles = _triangles(read_drawing(path, unit=unit), deviation)
     return Mesh(vertices=vertices, triangles=triangles, deviation=deviation, name=path.name)
 

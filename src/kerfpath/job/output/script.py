@@ -16,7 +16,8 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.job.as_run import keeps_between_nodes
 from kerfpath.job.format import ContourSpec, CutRequest, Job, PreparedJob, pose
-from kerfpath.job.format.tables import CellTable
+from kerfpath.job.format.cell import SHAPES
+from kerfpath.job.format.tables import CellTable, given
 from kerfpath.operations import Side
 from kerfpath.options import PlanOptions
 from kerfpath.post import ProgramOptions
@@ -58,8 +59,9 @@ def cell_lines(job: Job, cell: Cell) -> Iterator[str]:
         named |= {"part": "solid"}
     yield "fixtures = {"
     for fixture in table.fixture:
-        size = ", ".join(f"{mm!r} * MM" for mm in fixture.size_mm or ())
-        yield f"    {fixture.name!r}: box("
+        (key,) = given(fixture, *SHAPES)
+        size = ", ".join(f"{mm!r} * MM" for mm in getattr(fixture, key))
+        yield f"    {fixture.name!r}: {SHAPES[key].__name__}("
         yield f"        [{size}],"
         yield "        np.array(["
         yield from (
@@ -108,7 +110,7 @@ ANGLES = {"angle", "lower", "upper", "velocity", "acceleration"} | {
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 CLASSES = ("Band", "Certify", "Comfort", "PlanOptions", "Tilt")
 """Names that the planning options may use."""
-OF_CELL = ("CuttingHead", "Mesh", "box", "cell_of", "link_capsules", "thicken", "weld")
+OF_CELL = ("CuttingHead", "Mesh", "box", "cell_of", "cylinder", "link_capsules", "thicken", "weld")
 """Names that a cell may use."""
 SAY = "print"
 """The function with which the script prints; no module of this package except the CLI calls it."""

@@ -137,6 +137,10 @@ export interface OptionsMessage {
   suffixes: string[];
   /** Units of a drawing. */
   units: string[];
+  /** Ends of the names of files with a solid, as of a fixture, with their dots. */
+  solids: string[];
+  /** Units of a mesh in such a file. */
+  solid_units: string[];
 }
 
 /** A joint of the robot, or an external axis. */

@@ -5,6 +5,7 @@ x, y and z, R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF. Messages about a field s
 as the expected value and its example as the way to write it.
 """
 
+from kerfpath.job.format.tables.cell import SOLIDS as SOLIDS
 from kerfpath.job.format.tables.cell import CellTable as CellTable
 from kerfpath.job.format.tables.cell import FixtureTable as FixtureTable
 from kerfpath.job.format.tables.job import LIMITS_MARGIN as LIMITS_MARGIN

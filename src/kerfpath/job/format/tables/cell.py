@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from kerfpath.arrays import Array
+from kerfpath.cell import MESHES
 from kerfpath.dynamics import Load
 from kerfpath.errors import InputError
 from kerfpath.job.format.tables.table import Table, given, require_distinct, require_one
@@ -125,11 +126,12 @@ class ToolTable(Table):
 
 Unit = Literal["mm", "cm", "m", "in"]
 ThreePositive = Annotated[tuple[Positive, ...], Field(strict=False, min_length=3, max_length=3)]
+TwoPositive = Annotated[tuple[Positive, ...], Field(strict=False, min_length=2, max_length=2)]
 Pair = Annotated[tuple[Text, ...], Field(strict=False, min_length=2, max_length=2)]
 
 
 def unit_of(table: HeadTable | FixtureTable) -> None:
-    """Require a unit for an STL file, which does not state it, and none without a file.
+    """Require a unit for a mesh, which does not state it, and none without a file.
 
     Raises
     ------
@@ -138,33 +140,38 @@ def unit_of(table: HeadTable | FixtureTable) -> None:
     """
     if table.file is None and table.unit is not None:
         raise fault("unit only with file", "no file", "remove unit", ("unit",))
-    if table.file is not None and table.file.lower().endswith(".stl") and table.unit is None:
+    if table.file is not None and table.file.lower().endswith(MESHES) and table.unit is None:
         raise fault(
-            "the unit of the STL file, which does not state it",
+            "the unit of the mesh, which does not state it",
             "none",
             'add, for example, unit = "mm"',
             ("unit",),
         )
 
 
-def _mesh_file(value: str) -> str:
-    if not value.lower().endswith((".stl", ".step", ".stp")):
-        raise fault("an STL or STEP file (.stl, .step, .stp)", None, "export the solid as one")
+SOLIDS = (*MESHES, ".step", ".stp")
+"""Suffixes of files with a solid."""
+
+
+def _solid_file(value: str) -> str:
+    if not value.lower().endswith(SOLIDS):
+        known = ", ".join(SOLIDS)
+        raise fault(f"a mesh or STEP file ({known})", None, "export the solid as one")
     return value
 
 
-MeshFile = Annotated[
+SolidFile = Annotated[
     Text,
-    AfterValidator(_mesh_file),
-    AfterValidator(existing("an STL or STEP file")),
+    AfterValidator(_solid_file),
+    AfterValidator(existing("a mesh or STEP file")),
 ]
-MESH_FILE = key("the path of an STL or STEP file", '"clamp.stl"')
+SOLID_FILE = key("the path of a mesh (STL, OBJ, PLY) or STEP file", '"clamp.stl"')
 
 
 class HeadTable(Table):
     """[cell.head]: a solid from a file, or sizes that replace those of the generic head."""
 
-    file: Annotated[MeshFile | None, MESH_FILE] = None
+    file: Annotated[SolidFile | None, SOLID_FILE] = None
     unit: Annotated[Unit | None, key("the unit of the file's numbers", '"mm"')] = None
     xyz_mm: Annotated[
         Three | None, key("3 numbers, the file's origin in the flange in mm", "[0, 0, 0]")
@@ -174,14 +181,8 @@ class HeadTable(Table):
     ] = None
     nozzle_length_mm: Annotated[Positive | None, key("a number above 0, in mm", "60")] = None
     nozzle_radii_mm: Annotated[
-        tuple[Positive, ...] | None,
-        key(
-            "2 numbers above 0, the radii at the nozzle's end and at the body, in mm",
-            "[2.5, 16]",
-            strict=False,
-            min_length=2,
-            max_length=2,
-        ),
+        TwoPositive | None,
+        key("2 numbers above 0, the radii at the nozzle's end and at the body, in mm", "[2.5, 16]"),
     ] = None
     body_length_mm: Annotated[Positive | None, key("a number above 0, in mm", "140")] = None
     body_radius_mm: Annotated[Positive | None, key("a number above 0, in mm", "40")] = None
@@ -203,18 +204,22 @@ class HeadTable(Table):
 
 
 class FixtureTable(Table):
-    """[[cell.fixture]]: a box or a solid from a file, standing still or on an external axis."""
+    """[[cell.fixture]]: a box, a cylinder or a file's solid, at rest or on an external axis."""
 
     name: Annotated[Text, key("a name that no other body has", '"table"')]
     size_mm: Annotated[
         ThreePositive | None, key("3 numbers above 0, the edges of a box in mm", "[1000, 800, 50]")
     ] = None
-    file: Annotated[MeshFile | None, MESH_FILE] = None
+    cylinder_mm: Annotated[
+        TwoPositive | None,
+        key("2 numbers above 0, the diameter and height of a cylinder in mm", "[120, 600]"),
+    ] = None
+    file: Annotated[SolidFile | None, SOLID_FILE] = None
     unit: Annotated[Unit | None, key("the unit of the file's numbers", '"mm"')] = None
     xyz_mm: Annotated[
         Three,
         key(
-            "3 numbers, the box's centre or the file's origin in the robot base in mm",
+            "3 numbers, the centre or the file's origin in the robot base in mm",
             "[1450, -600, 0]",
         ),
     ] = (0.0, 0.0, 0.0)
@@ -227,8 +232,9 @@ class FixtureTable(Table):
 
     @model_validator(mode="after")
     def _one_shape(self) -> FixtureTable:
-        what = "one of size_mm (a box) and file (STL or STEP)"
-        require_one(self, ("size_mm", "file"), what, "size_mm = [1000, 800, 50]")
+        what = "one of size_mm (a box), cylinder_mm and file (a mesh or STEP)"
+        keys = ("size_mm", "cylinder_mm", "file")
+        require_one(self, keys, what, "size_mm = [1000, 800, 50]")
         unit_of(self)
         return self
 

@@ -3,14 +3,15 @@
 import { player, store } from "../app.js";
 import { axesOf } from "../axes.js";
 import { isGiven, setKeys, valueOf } from "../job.js";
-import { Input, NUMBER, html, icon, options, redraw } from "../ui.js";
+import { html, icon, options } from "../ui.js";
+import { opener, said, sent } from "./files.js";
+import { fixtures, hold } from "./fixtures.js";
 import { openSheet } from "./sheet.js";
 
 /** @typedef {import("../messages.js").RobotChoice} Robot */
-/** @typedef {Record<string, any> & {name: string}} Fixture */
 
-const NEAR_MISS = 5; // mm, as the comments of a first job say
-const part = { reading: "", why: "", unit: "", /** @type {File | null} */ file: null };
+/** @type {{reading: string, why: string, unit: string, file: File | null}} */
+const part = { reading: "", why: "", unit: "", file: null };
 
 /** @type {import("./sheet.js").Sheet} */
 export const cellSheet = {
@@ -18,65 +19,32 @@ export const cellSheet = {
   content: () => ({ title: "Cell", body }),
 };
 
-/** Take drawings that are dropped anywhere on the page. */
+/** Take files that are dropped: on the fixtures as one, elsewhere as the drawing of the part. */
 export function followDrops() {
   document.addEventListener("dragover", (event) => event.preventDefault());
   document.addEventListener("drop", (event) => {
     const file = event.dataTransfer?.files[0];
     if (!file) return;
     event.preventDefault();
+    if (/** @type {Element} */ (event.target).closest(".fixtures")) return hold(file);
     openSheet("cell");
     begin(file);
   });
 }
 
-let turn = Promise.resolve(); // files are read one after the other
-
 /**
  * Begin a new job with a drawing.
  * @param {File} file
  */
-const begin = (file) => (turn = turn.then(() => read(file)));
-
-/** @param {File} file */
-async function read(file) {
-  Object.assign(part, { reading: file.name, why: "", file });
-  redraw();
-  const query = new URLSearchParams({ robot: valueOf("robot.model") ?? "", unit: part.unit });
-  try {
-    const address = `part/${encodeURIComponent(file.name)}?${query}`;
-    const answer = await fetch(address, { method: "POST", body: file });
-    part.why = answer.ok ? "" : await answer.text();
-  } catch {
-    part.why = "The studio's server does not answer; try again.";
-  }
-  part.reading = "";
-  redraw();
+function begin(file) {
+  part.file = file;
+  sent(part, file, "part", () => ({ robot: valueOf("robot.model") ?? "", unit: part.unit }));
 }
 
 const body = () => html`
   <div class="cards">
     ${drawing()}${robot()}${headAndLanguage()}${home()}${fixtures()}
   </div>`;
-
-/**
- * A button that opens a file of this machine.
- * @param {string} words
- * @param {string[]} suffixes
- * @param {(file: File) => void} take
- */
-function opener(words, suffixes, take) {
-  const pick = (/** @type {any} */ { target }) => {
-    if (target.files.length) take(target.files[0]);
-    target.value = ""; // the same file may be opened again
-  };
-  return html`
-    <label class="plain">
-      ${icon("file")}${words}
-      <input type="file" class="unseen" accept=${suffixes.join(",")}
-        disabled=${!store.live} onChange=${pick} />
-    </label>`;
-}
 
 function drawing() {
   const { suffixes = [], units = [] } = store.options ?? {};
@@ -98,14 +66,7 @@ function drawing() {
           ${options(choices)}
         </select>
       </p>
-      <p class="quiet small" aria-live="polite">
-        ${
-          part.reading
-            ? `Reading ${part.reading} …`
-            : "Or drop a STEP, IGES or DXF file on the page. It begins a new job with this robot, head and language; Undo brings the job before back."
-        }
-      </p>
-      ${part.why && html`<p class="fault" role="alert">${part.why}</p>`}
+      ${said(part, "Or drop a STEP, IGES or DXF file on the page. It begins a new job with this robot, head and language; Undo brings the job before back.")}
     </section>`;
 }
 
@@ -237,93 +198,4 @@ function home() {
         ${now ? `${now.join(", ")} deg` : "None: the program begins and ends at the contours."}
       </p>
     </section>`;
-}
-
-/** @returns {Fixture[]} those of the job, with the keys that they have */
-const known = () =>
-  (valueOf("cell.fixture") ?? []).map((/** @type {Fixture} */ each) =>
-    Object.fromEntries(Object.entries(each).filter(([, value]) => value !== null)),
-  );
-
-/** Whether the drawing has faces, with which collisions can be checked. */
-const isSolid = () => store.scene?.bodies.some(({ kind }) => kind === "part") ?? false;
-
-/** @param {Fixture[]} list  a job without [cell] gets one, with a near-miss distance */
-function keep(list) {
-  /** @type {[string, unknown][]} */
-  const added = [];
-  if (valueOf("cell") === null) {
-    added.push(["cell.near_miss_mm", NEAR_MISS]);
-    if (!isSolid()) added.push(["cell.part", false]);
-  }
-  setKeys(...added, ["cell.fixture", list.length ? list : null]);
-}
-
-/** A box below the contours. */
-function below() {
-  const points = (store.scene?.contours ?? []).flatMap(({ points: xyz }) => xyz);
-  const along = [0, 1, 2].map((axis) => points.filter((_, i) => i % 3 === axis));
-  const [x, y, z] = along.map((values) => [Math.min(...values), Math.max(...values)]);
-  const mm = (/** @type {number} */ m) => Math.round(m * 1e3);
-  const names = known().map(({ name }) => name);
-  let number = 1;
-  while (names.includes(`box ${number}`)) number++;
-  return {
-    name: `box ${number}`,
-    size_mm: [mm(x[1] - x[0]) + 100, mm(y[1] - y[0]) + 100, 50],
-    xyz_mm: [mm((x[0] + x[1]) / 2), mm((y[0] + y[1]) / 2), mm(z[0]) - 175],
-  };
-}
-
-function fixtures() {
-  const list = known();
-  const off = !store.live || !store.scene?.contours.length;
-  return html`
-    <section class="card">
-      <header>
-        <h3>Fixtures</h3><span class="grow" />
-        <button class="plain" disabled=${off} onClick=${() => keep([...list, below()])}>
-          Add a box
-        </button>
-      </header>
-      ${list.map((each, i) => fixture(each, i, list))}
-      <p class="quiet small">
-        ${
-          isSolid()
-            ? "With a fixture, collisions of robot, head, part and fixtures are checked."
-            : "With a fixture, collisions of robot, head and fixtures are checked; those with the part are not, as its drawing has only curves."
-        }
-      </p>
-    </section>`;
-}
-
-/** @type {(each: Fixture, i: number, list: Fixture[]) => unknown} */
-function fixture(each, i, list) {
-  /** @type {(key: string, k: number) => unknown} */
-  const field = (key, k) => {
-    const set = (/** @type {string} */ text) => {
-      if (text === "" || !Number.isFinite(Number(text))) return;
-      const now = list.map((one) => ({ ...one }));
-      now[i][key] = each[key].map((/** @type {number} */ old, /** @type {number} */ at) =>
-        at === k ? Number(text) : old,
-      );
-      keep(now);
-    };
-    const words = `${each.name}, ${key === "size_mm" ? "size" : "centre"} ${"xyz"[k]}, mm`;
-    return html`
-      <${Input} ...${NUMBER} value=${String(each[key][k])} aria-label=${words}
-        disabled=${!store.live} onSet=${set} />`;
-  };
-  const row = (/** @type {string} */ key, /** @type {string} */ words) => html`
-    <span>${words}</span>${[0, 1, 2].map((k) => field(key, k))}<span class="unit">mm</span>`;
-  return html`
-    <div class="fixture" key=${each.name}>
-      <strong>${each.name}</strong>
-      <button class="tool" aria-label=${`Remove ${each.name}`} disabled=${!store.live}
-        onClick=${() => keep(list.filter((_, at) => at !== i))}>${icon("close")}</button>
-      <div class="sizes">
-        ${each.size_mm ? row("size_mm", "Size") : html`<span>${each.file}</span>`}
-        ${row("xyz_mm", each.size_mm ? "Centre" : "Origin")}
-      </div>
-    </div>`;
 }
