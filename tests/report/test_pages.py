@@ -359,11 +359,42 @@ def test_scene_draws_part_and_contour_in_millimetres(
     part = figure.data[0]
     assert part.type == "mesh3d"
     assert max(part.x) == 1000.0
-    assert figure.layout.scene.aspectmode == "data"
+    sides = figure.layout.scene.aspectratio
+    assert sides.x / sides.y == pytest.approx(1150 / 1100, rel=1e-6)  # to one scale
     assert figure.layout.scene.xaxis.title.text == "x, mm"
     assert [t.name for t in figure.data].count("slot: fails here") == 1
     with pytest.raises(InputError, match="mesh triangles: expected indices from 0 to 2"):
         scene([section], (vertices, [[0, 1, 3]]))
+
+
+@pytest.mark.parametrize("size", [(3, 2, 0), (0.2, 0.2, 6), (1, 5, 1)], ids=str)
+def test_the_first_view_has_all_of_a_part_however_flat_or_long(
+    section: ContourSection, size: tuple[float, float, float]
+) -> None:
+    corners = np.array(np.meshgrid(*[(0.0, s) for s in size])).reshape(3, -1).T
+    figure = scene([section], (corners, [[0, 1, 2]]))
+    seen = figure.layout.scene
+    eye, up, sides = (
+        np.array([each.x, each.y, each.z])
+        for each in (seen.camera.eye, seen.camera.up, seen.aspectratio)
+    )
+    eye /= np.linalg.norm(eye)
+    right = np.cross(up, eye) / np.linalg.norm(np.cross(up, eye))
+    box = np.array(np.meshgrid(*[(-s / 2, s / 2) for s in sides])).reshape(3, -1).T
+    across, along = (np.abs(box @ way).max() for way in (right, np.cross(eye, right)))
+    # A browser draws 1.18 of these units above and below the middle; labels need some of them.
+    assert max(across / 1.2, along) == pytest.approx(0.9, rel=1e-3)
+
+
+def test_labels_of_near_contours_lie_beside_each_other(section: ContourSection) -> None:
+    near = [replace(section, name=f"hole {k} of many", path=section.path) for k in range(8)]
+    labels = scene(near, None).layout.scene.annotations
+    ends = {(each.ax, each.ay) for each in labels}  # they all begin at the same place
+    assert len(ends) == len(near)
+    for one in labels:
+        for other in labels:
+            beside = (one.ax > 0) != (other.ax > 0) or abs(one.ay - other.ay) >= 20
+            assert one is other or beside
 
 
 def test_scene_draws_moves_between_contours_and_marks_in_their_measure(

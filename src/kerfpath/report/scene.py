@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -29,8 +29,22 @@ LABELS = 12
 BODY_COLOURS = {"robot": "#c9a227", "head": "#5b6675", "fixture": "#8fa8c4"}
 CELL_HEIGHT = 760
 """Height of the figure, px; a cell is larger than a part."""
-FILL = 1.35
-"""Factor on the size at which plotly would draw the scene."""
+FILL = 0.9
+"""Half the height that the scene has at most in the first view, in plotly's units."""
+UNIT = 0.423
+"""plotly's unit on the screen, as a share of the height of a figure, with the camera of a scene."""
+WIDE = 1.2
+"""Width of the narrowest figure, in heights."""
+FLAT = 0.1
+"""Share of the longest side of a scene below which the ticks of a side have no room for numbers."""
+UNSAID = {"showticklabels": False, "title": {"text": ""}}
+"""The look of the axis along such a side."""
+LETTER = 7.5, 20
+"""Width and height of a letter of a label, px."""
+START = 6
+"""Half the size of the mark at a start, px."""
+OFFSETS = [(x, y) for far in (34, 66, 98, 130) for x in (34, -34) for y in (-far, far)]
+"""Where labels may lie from what they name, px right and down; the first with room is taken."""
 MOST_POSES = 12
 """Number of poses to choose from."""
 
@@ -62,17 +76,23 @@ def scene(
         hoverinfo="skip",
         name="cursor",
     )
+    camera = _camera(sections, cell)
     if cell is not None and cell.T_base_part is not None:
+        figure.layout.height = CELL_HEIGHT
         plans = [section.plan for section in sections if section.plan is not None]
         add_cell(figure, cell, cell.T_base_part, poses_shown(plans))
+    sides, places = _first_view(figure, camera)
+    flat = FLAT * max(sides.values())
     figure.update_layout(
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
         scene={
-            "aspectmode": "data" if cell is None else "manual",
+            "aspectmode": "manual",
+            "aspectratio": sides,
             "dragmode": "turntable",
-            "camera": _camera(sections, cell),
-            "annotations": _labels(sections),
-            **{f"{a}axis": space_axis(a) for a in "xyz"},
+            "camera": camera,
+            "annotations": _labels(sections, places),
+            **{f"{a}axis": space_axis(a) for a in sides},
+            **{f"{a}axis": space_axis(a) | UNSAID for a in sides if sides[a] < flat},
         },
     )
     return figure
@@ -134,21 +154,42 @@ def add_cell(
         "y": 0.0,
         "yanchor": "bottom",
     }
-    figure.update_layout(
-        height=CELL_HEIGHT, sliders=[{"steps": steps, **look}], scene={"aspectratio": _size(figure)}
-    )
+    figure.update_layout(sliders=[{"steps": steps, **look}])
 
 
-def _size(figure: go.Figure) -> dict[str, float]:
-    """Return the sides of the box around the scene, to one scale, so that it fills the figure."""
-    sides = {}
+def _first_view(
+    figure: go.Figure, camera: Mapping[str, Mapping[str, float]]
+) -> tuple[dict[str, float], Callable[[Array], Array]]:
+    """Return how the scene is seen first: to one scale, and whole, however flat it is.
+
+    Returns
+    -------
+    dict of str to float
+        Sides of the box around it, as plotly takes them.
+    callable
+        It maps points (P, 3) mm to places (P, 2) px from the middle of the figure, right and down.
+    """
+    ends = []
     for coordinate in "xyz":
         # Breaks in lines and the unset cursor are NaN.
         drawn = [np.array(t[coordinate], np.float64) for t in figure.data if t.visible is not False]
         points = np.concatenate(drawn)
-        sides[coordinate] = float(np.ptp(points[np.isfinite(points)]))
-    mean = float(np.prod(list(sides.values()))) ** (1 / 3)
-    return {axis: FILL * side / mean for axis, side in sides.items()}
+        points = points[np.isfinite(points)]
+        ends.append((points.min(), points.max()) if points.size else (0.0, 1.0))
+    low, high = np.array(ends).T
+    towards, up = (np.array([camera[key][a] for a in "xyz"]) for key in ("eye", "up"))
+    right = np.cross(up, towards)
+    ways = np.array([right, np.cross(towards, right)])
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    # Half the width and height of the box as the camera sees it.
+    across, along = np.abs(ways) @ (high - low) / 2
+    scale = FILL / max(across / WIDE, along)
+    pixels = UNIT * scale * figure.layout.height * np.array([[1.0], [-1.0]]) * ways
+
+    def places(points: Array) -> Array:
+        return np.asarray((points - (low + high) / 2) @ pixels.T)
+
+    return dict(zip("xyz", (scale * (high - low)).tolist(), strict=True)), places
 
 
 def _add_body(
@@ -257,34 +298,59 @@ def _add_move(figure: go.Figure, points: Array, number: int) -> None:
     )
 
 
-def _labels(sections: Sequence[ContourSection]) -> list[dict[str, object]]:
+def _labels(
+    sections: Sequence[ContourSection], places: Callable[[Array], Array]
+) -> list[dict[str, object]]:
     """Return the names of contours at their starts, and the first failure of each failed one.
 
-    Alternate heights keep neighbouring names apart.
+    In the first view they lie beside each other and beside all starts, where there is room.
     """
     named = sections if len(sections) <= LABELS else ()
     labels = [(section.path.points[0], section.name, INK) for section in named]
     failed = [section for section in sections if section.marks][:LABELS]
     labels += [(s.marks[0].point, f"{s.name}: {s.marks[0].words}", ALERT) for s in failed]
-    return [
-        {
-            **dict(zip("xyz", (point * 1e3).tolist(), strict=True)),
-            "text": escape(text),
-            "font": {"size": 13, "color": colour},
-            "bgcolor": "rgba(255, 255, 255, 0.8)",
-            "showarrow": True,
-            "arrowhead": 0,
-            "arrowwidth": 1,
-            "arrowcolor": FAINT,
-            "ax": 34,
-            "ay": (-34, 34, -66, 66)[i % 4],
-            "xanchor": "left",
-        }
-        for i, (point, text, colour) in enumerate(labels)
-    ]
+    if not labels:
+        return []
+    at = places(np.array([point for point, _, _ in labels]) * 1e3)
+    taken = [np.array([place - START, place + START]) for place in at]
+    found = []
+    for (point, text, colour), place in zip(labels, at, strict=True):
+        boxes = [_text_box(place, text, *offset) for offset in OFFSETS]
+        free = (k for k, box in enumerate(boxes) if not any(_overlap(box, b) for b in taken))
+        chosen = next(free, 0)
+        taken.append(boxes[chosen])
+        ax, ay = OFFSETS[chosen]
+        found.append(
+            {
+                **dict(zip("xyz", (point * 1e3).tolist(), strict=True)),
+                "text": escape(text),
+                "font": {"size": 13, "color": colour},
+                "bgcolor": "rgba(255, 255, 255, 0.8)",
+                "showarrow": True,
+                "arrowhead": 0,
+                "arrowwidth": 1,
+                "arrowcolor": FAINT,
+                "ax": ax,
+                "ay": ay,
+                "xanchor": "left" if ax > 0 else "right",
+            }
+        )
+    return found
 
 
-def _camera(sections: Sequence[ContourSection], cell: Cell | None) -> dict[str, object]:
+def _text_box(place: Array, text: str, ax: int, ay: int) -> Array:
+    """Return the corners (2, 2) px of a label, its lower values first."""
+    width, height = LETTER[0] * len(text), LETTER[1]
+    left = place[0] + ax - (width if ax < 0 else 0)
+    top = place[1] + ay - height / 2
+    return np.array([[left, top], [left + width, top + height]])
+
+
+def _overlap(a: Array, b: Array) -> bool:
+    return bool((a[0] < b[1]).all() and (b[0] < a[1]).all())
+
+
+def _camera(sections: Sequence[ContourSection], cell: Cell | None) -> dict[str, Any]:
     """Return a camera on the side of the nozzle, a little above and beside the part.
 
     Its up direction is that of the cell, or of the part without a cell.
