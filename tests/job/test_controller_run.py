@@ -195,6 +195,9 @@ def stand_in(path, monkeypatch):
         (path / name).write_text("#!/bin/sh\n")
         (path / name).chmod(0o755)
     monkeypatch.setenv("PATH", str(path))
+    lock = path / "linuxcnc.lock"
+    monkeypatch.setattr("kerfpath.post.linuxcnc.recorder.LOCK", lock)
+    return lock
 
 
 def test_without_linuxcnc_one_line_says_how_to_install_it(folder, tmp_path, monkeypatch):
@@ -205,7 +208,11 @@ def test_without_linuxcnc_one_line_says_how_to_install_it(folder, tmp_path, monk
 
 def test_what_cannot_be_run_is_refused(folder, tmp_path, monkeypatch):
     assert_refused(run("run", "out/job.ngc", "--on", "krc5", cwd=folder), "expected linuxcnc")
-    stand_in(tmp_path, monkeypatch)
+    lock = stand_in(tmp_path, monkeypatch)
+    lock.touch()
+    assert_refused(run("run", "out/job.ngc", cwd=folder), "LinuxCNC runs already, or was ended by")
+    lock.unlink()
+    assert_refused(run("run", "out/job.ngc", cwd=folder), "LinuxCNC did not start")
     shutil.copytree(folder / "out", tmp_path / "out")
     (tmp_path / "out/plan.json").unlink()
     assert_refused(run("run", "out/job.ngc", cwd=tmp_path), "give the job with --job JOB.toml")
