@@ -386,6 +386,16 @@ def test_the_first_view_has_all_of_a_part_however_flat_or_long(
     assert max(across / 1.2, along) == pytest.approx(0.9, rel=1e-3)
 
 
+def test_a_panel_without_curves_says_why(section: ContourSection) -> None:
+    assert section.plan is not None
+    arm = section.plan.robot
+    where = {"tool": TOOL, "placement": PLACEMENT, "gamma_step": np.radians(15)}
+    line = Contour([[0, 0, 0], [0.01, 0, 0]], [[0, 0, -1.0]] * 2, closed=False)
+    (said,) = limit_shares(plan(line, arm, **where, speed=0.05)).layout.annotations
+    assert said.text == "No acceleration to draw: it takes 3 nodes, and the plan has 2"
+    assert said.yref == "y2 domain"
+
+
 def test_labels_of_near_contours_lie_beside_each_other(section: ContourSection) -> None:
     near = [replace(section, name=f"hole {k} of many", path=section.path) for k in range(8)]
     labels = scene(near, None).layout.scene.annotations

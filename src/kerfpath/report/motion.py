@@ -169,6 +169,18 @@ def limit_shares(plan: Plan) -> go.Figure:
                 range=_share_range(share),
             ),
         }
+        if not len(share):
+            annotations.append(
+                {
+                    "text": f"No {what} to draw: it takes 3 nodes, and the plan has {len(plan.q)}",
+                    "font": {"size": 14, "color": QUIET},
+                    "x": 0.5,
+                    "xref": f"{x} domain",
+                    "y": 0.5,
+                    "yref": f"{y} domain",
+                    "showarrow": False,
+                }
+            )
         for joint, name in enumerate(plan.robot.joint_names):
             figure.add_scatter(
                 x=_short(time),

@@ -143,6 +143,29 @@ def test_before_anything_is_there_the_page_says_what_it_waits_for(page, studio, 
     assert serious(page) == []
 
 
+def test_a_plot_without_curves_says_why(page, studio, first):
+    studio.open(*first)
+    ready(page)
+    state = page.locator("#plot-state")
+    assert state.inner_text() == ""
+    joints = page.locator("#plot-legend .joint")
+    for k in range(joints.count()):
+        joints.nth(k).click()
+    assert state.inner_text() == "All joints are hidden; show one above."
+    joints.first.click()
+    assert state.inner_text() == ""
+    page.get_by_role("button", name="Accel.").click()
+    # The first two nodes of the plan alone.
+    page.evaluate("""() => {
+        const { plans, selected } = studio.store;
+        const [plan] = plans.get(selected);
+        studio.store.plans.set(selected, [{ ...plan, time: plan.time.slice(0, 2) }]);
+        studio.store.emit("plan");
+    }""")
+    said = "No acceleration to plot: it takes 3 nodes, and this cut has 2."
+    until(page, lambda: state.inner_text() == said)
+
+
 @pytest.mark.slow
 def test_no_path_says_where_and_why_and_its_relaxations_are_buttons(page, studio, first, messages):
     (answer,) = messages["nopath"]

@@ -58,10 +58,24 @@ export class Plots {
 
   /** A text if there is nothing to plot. */
   state() {
-    if (store.chosen.length) return null;
-    return store.nopaths.has(store.selected ?? "")
-      ? html`<p>No motion to plot: this contour has no path.</p>`
-      : html`<p>Speeds and accelerations appear with the plan.</p>`;
+    const why = this.why();
+    return why && html`<p>${why}</p>`;
+  }
+
+  /** Why nothing is plotted, or "". */
+  why() {
+    const { plans, axes } = this.shown();
+    if (store.nopaths.has(store.selected ?? "") && !plans.length)
+      return "No motion to plot: this contour has no path.";
+    if (!plans.length)
+      return store.progress.busy
+        ? "Speeds and accelerations appear with the plan."
+        : "No motion to plot: this contour is not planned.";
+    if (axes.every((_, j) => this.off.has(j))) return "All joints are hidden; show one above.";
+    const most = Math.max(...plans.map(({ time }) => time.length));
+    if (this.kind === "acceleration" && most < 3)
+      return `No acceleration to plot: it takes 3 nodes, and this cut has ${most}.`;
+    return "";
   }
 
   /** The shown plans, the joints of the robot, and their axes. */

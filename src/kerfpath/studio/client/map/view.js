@@ -121,7 +121,7 @@ export class MapView {
         <p>${grid.message.hidden.join("; ")}</p>`;
     return store.progress.busy || store.connection !== "open"
       ? html`<div class="spinner" /><p>The map appears with the first plan of this contour.</p>`
-      : html`<p>Choose a contour to see its map.</p>`;
+      : html`<p>${store.selected ? "No map: this contour is not planned." : "Choose a contour to see its map."}</p>`;
   }
 
   legend() {

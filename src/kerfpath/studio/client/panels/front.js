@@ -183,6 +183,8 @@ function statement(front, axes) {
       .map(({ words, unit }, i) => `${words} ${digits(point.values[i], 3)} ${unit}`)
       .join(", ");
   if (store.stale(front)) return STALE;
+  if (front.state !== "running" && !front.points.length)
+    return `No point to draw: none of ${front.done} runs found a plan. Without one, the result says what would help.`;
   const best = `${front.points.filter((each) => each.best).length} non-dominated plans`;
   if (front.state === "running") return `${front.done} of ${front.total} runs, ${best}.`;
   const stopped = front.state === "stopped" ? "; stopped" : "";
