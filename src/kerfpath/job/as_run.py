@@ -318,7 +318,7 @@ def _not_modelled(job: Job) -> str:
     if job.program.language == "none":
         return "there is no program; name a language in [program]"
     if not job.program.robot_language.zones:
-        return f"{job.program.language} has no zones, so the motion of its controller is unknown"
+        return f"{job.program.language} has no zones: its corners are not modelled here"
     if job.program.zone == 0:
         return 'the robot stops at every node; write zone_mm = "auto" in [program]'
     return ""
