@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from kerfpath import Certify, Contour, fastest_speed, pareto, plan, plan_in_pieces, refine, refiner
-from kerfpath.certifier import Certified
+from kerfpath.certifier import Certified, SharedWork, certify
+from kerfpath.certifier.bound import most_pairs
+from kerfpath.effort import changed_effort
 from kerfpath.placement import placed
 from kerfpath.planner import planning, with_bound
 from kerfpath.plans import Proof
@@ -21,7 +23,7 @@ def asked(monkeypatch):
     """Stand in for the certifier, which proves 0.9 of every cost: what it is asked for."""
     calls = []
 
-    def certify(made, *, gap, seconds, checkable, progress):
+    def certify(made, *, gap, seconds, checkable, most, progress):
         calls.append((made, gap, seconds))
         progress("cells", 1, 2)
         proof = replace(made.proof, bound=0.9 * made.cost, gap=0.1)
@@ -151,6 +153,28 @@ def test_of_a_part_only_what_is_chosen_is_certified(asked, task, circle, arm):
     assert len(asked) == len(made.plans) == 1
     assert made.plans[0].proof.gap == 0.1
     assert made.plans[0].settings.certify == Certify()
+
+
+def test_the_bounds_of_a_part_share_the_work_of_one():
+    with changed_effort(certificate_pairs=1000, certificate_pairs_per_node=10):
+        work, alone = SharedWork([11, 101, 51]), most_pairs(101)
+    assert alone == 2000
+    taken = []
+    for wanted in (0.1 * alone, np.inf, np.inf):
+        taken.append(min(wanted, work.share))
+        work.take(taken[-1])
+    # The first one leaves some of its third, and the others take half and all of what is left.
+    assert taken == pytest.approx([0.1 * alone, 0.45 * alone, 0.45 * alone])
+    assert work.share == 0
+
+
+def test_a_bound_takes_no_more_work_than_it_may(circle, arm, task):
+    made = plan(circle, arm, certify=None, **task)
+    free = certify(made, gap=1e-6, checkable=False, most=3e6)
+    few = certify(made, gap=1e-6, checkable=False, most=free.pairs / 10)
+    assert few.stages < free.stages  # the stage that goes beyond is the last one
+    assert few.pairs < free.pairs
+    assert 0 < few.plan.proof.bound <= free.plan.proof.bound
 
 
 def test_plans_that_nobody_sees_are_not_certified(asked, task, circle, arm):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from time import monotonic
@@ -86,12 +87,44 @@ class Certified:
     __repr__ = short_repr
 
 
+class SharedWork:
+    """The limit on the work of the bounds of several plans: that of the one with the most nodes.
+
+    Each may take an equal share of what those before it have left, so that they take no longer
+    than one of them could, however many they are.
+
+    Parameters
+    ----------
+    nodes : sequence of int
+        Number of nodes of each plan.
+    """
+
+    def __init__(self, nodes: Sequence[int]) -> None:
+        self._pairs, self._plans = most_pairs(max(nodes, default=1)), len(nodes)
+
+    @property
+    def share(self) -> float:
+        """Most steps from cell to cell that the next plan may take."""
+        return self._pairs / max(self._plans, 1)
+
+    def take(self, pairs: int) -> None:
+        """Count the steps that a plan has taken."""
+        self._pairs, self._plans = max(self._pairs - pairs, 0.0), self._plans - 1
+
+
+def most_pairs(nodes: int) -> float:
+    """Return the most steps from cell to cell that the bound of a plan alone takes."""
+    effort = current_effort()
+    return float(effort.certificate_pairs + effort.certificate_pairs_per_node * (nodes - 1))
+
+
 def certify(
     plan: Plan,
     *,
     gap: float = 0.005,
     seconds: float | None = None,
     checkable: bool = True,
+    most: float | None = None,
     progress: Progress = no_progress,
 ) -> Certified:
     """Return the plan with a proved lower bound on the cost of any motion along its contour.
@@ -113,6 +146,9 @@ def certify(
         Whether the plan gets a certificate that others can check with enclosures that may be wider.
         Then cells drop out only if their motions clearly cost too much, which is more work, and (6)
         is left out, as the multipliers of parts do not fit into a certificate.
+    most : float, optional
+        Most steps from cell to cell that are bounded, see `SharedWork`; default: by the number of
+        nodes. Objective "sum" only.
     progress : Progress
         Called with the progress of the proof.
 
@@ -135,7 +171,8 @@ def certify(
         )
         found = _certified(plan, best, gap, None, rounds, pairs)
         return replace(found, statement=f"{found.statement}; {NOT_KEPT}") if checkable else found
-    certification = _Certification(plan, steps, gap, until, checkable, progress)
+    most = most_pairs(len(plan.q)) if most is None else most
+    certification = _Certification(plan, steps, gap, until, most, checkable, progress)
     try:
         certification.run()
     except StopEarly:  # a certificate must be whole
@@ -202,6 +239,7 @@ class _Certification:
         steps: Steps,
         gap: float,
         until: float,
+        most: float,
         checkable: bool,
         progress: Progress,
     ) -> None:
@@ -217,8 +255,7 @@ class _Certification:
         self.cost, self.until, self.progress = plan.cost, until, progress
         self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
         self.last = len(plan.q) - 1
-        effort = current_effort()
-        self.most_pairs = effort.certificate_pairs + effort.certificate_pairs_per_node * self.last
+        self.most_pairs = most
         longest = max(1, int(LONGEST / self.steps.velocity.max()))
         self.nodes = turning_nodes(plan, TURNED, longest)
         self.best, self.pairs, self.count = 0.0, 0, 0

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from kerfpath.arrays import Bools
 from kerfpath.cell import Cell
 from kerfpath.certificate import Certify
-from kerfpath.certifier import certify
+from kerfpath.certifier import SharedWork, certify
 from kerfpath.compiling import finish_compiling
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
@@ -147,6 +147,7 @@ def with_bound(
     made: Plan,
     asked: Certify | None,
     *,
+    work: SharedWork | None = None,
     phase: Callable[[str], None] | None = None,
     progress: Progress = no_progress,
 ) -> Plan:
@@ -159,6 +160,8 @@ def with_bound(
     made : Plan
     asked : Certify or None
         How to certify it; becomes part of its settings. None: the plan stays without a bound.
+    work : SharedWork, optional
+        Work that its bound shares with those of other plans.
     phase : callable, optional
         Called with "certificate" when this begins.
     progress : callable
@@ -172,11 +175,18 @@ def with_bound(
     finish_compiling()
     try:
         found = certify(
-            made, gap=asked.gap, seconds=asked.seconds, checkable=asked.keep, progress=progress
+            made,
+            gap=asked.gap,
+            seconds=asked.seconds,
+            checkable=asked.keep,
+            most=None if work is None else work.share,
+            progress=progress,
         )
     except StopEarly:
         proof = made.proof.without_bound().also("stopped before a bound was proved")
         return replace(made, settings=settings, proof=proof)
+    if work is not None:
+        work.take(found.pairs)
     proof = replace(
         found.plan.proof,
         statement=f"{made.proof.without_bound().statement}; {found.statement}",
