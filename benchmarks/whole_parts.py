@@ -1,13 +1,19 @@
-"""Whole parts: one free job against jobs restricted to one posture or to less of the ranges."""
+"""Whole parts: one free job against jobs restricted to one posture or to less of the ranges.
+
+``python -m benchmarks.whole_parts [FIRST [COUNT]]`` plans random parts alone and prints their rows.
+"""
 
 from __future__ import annotations
 
+import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from math import pi, tan
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
+import numpy as np
 from ezdxf.filemanagement import new
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
@@ -18,7 +24,7 @@ from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
 from benchmarks._figures import Report, Sheet
 from kerfpath.job import JobResult, read_job, run_job
 
-__all__ = ["PLATE", "TUBE", "run", "write_plate", "write_tube"]
+__all__ = ["PLATE", "TUBE", "random_part", "run", "write_plate", "write_tube"]
 
 HOW = """\
 Two parts, planned free and once more in each posture alone or within half a turn. Tube: a square
@@ -26,6 +32,12 @@ tube of 60 mm, lying along y, with three holes in its top and one in each side, 
 Plate: ten contours in a flat sheet on a UR10, whose joints turn 360 deg either way. Cycle: cuts,
 moves, approaches, retracts and piercing together. Seconds: `run_job` in one process, the kernels
 compiled before, bounds included. A restricted job is never to be better than the free one."""
+RANDOM = """\
+Random plates and square tubes with three to six round holes, at a random place before an IRB 4600
+with a head of 90 deg or a UR10 with a straight one, half of them from and to a home position. Each
+is planned free, in every posture alone, and within half a turn of each joint, without bounds. Best
+restricted: the least cycle of all these. Worse: how much longer the free cycle is than that, less
+than 0 if it is shorter. Seconds: processor time of the free job."""
 
 TUBE = """\
 [robot]
@@ -81,13 +93,21 @@ POSTURES = tuple(
 )
 
 
-def write_tube(path: Path) -> None:
-    """Write a square tube along y as STEP: three holes in its top, one in each side."""
+Hole = tuple[tuple[float, float, float], tuple[float, float, float], float]
+"""Where a drill begins, mm, its direction and its radius, mm; it is 20 mm long."""
+HOLES: tuple[Hole, ...] = (
+    *(((30.0, y, 50.0), (0.0, 0.0, 1.0), 8.0) for y in (50.0, 150.0, 250.0)),
+    ((-1.0, 100.0, 30.0), (1.0, 0.0, 0.0), 10.0),
+    ((50.0, 200.0, 30.0), (1.0, 0.0, 0.0), 10.0),
+)
+"""Three holes in the top of the tube, one in each side."""
+
+
+def write_tube(path: Path, holes: Sequence[Hole] = HOLES) -> None:
+    """Write a square tube along y as STEP, with round holes."""
     shape = BRepPrimAPI_MakeBox(60.0, 300.0, 60.0).Shape()
     hollow = BRepPrimAPI_MakeBox(gp_Pnt(3, -1, 3), 54.0, 302.0, 54.0).Shape()
     shape = BRepAlgoAPI_Cut(shape, hollow).Shape()
-    holes = [((30, y, 50), (0, 0, 1), 8.0) for y in (50, 150, 250)]
-    holes += [((-1, 100, 30), (1, 0, 0), 10.0), ((50, 200, 30), (1, 0, 0), 10.0)]
     for start, along, radius in holes:
         axis = gp_Ax2(gp_Pnt(*start), gp_Dir(*along))
         drill = BRepPrimAPI_MakeCylinder(axis, radius, 20.0).Shape()
@@ -124,7 +144,10 @@ def run(*, quick: bool) -> list[Report]:
             rows += _rows(folder, "plate", PLATE, narrow)
     columns = ("part", "restricted to", "computing s", "cycle s", "air s")
     sheet = Sheet(columns=columns, rows=rows, words=2)
-    return [Report(title="Whole parts, free and restricted", how=HOW, sheets=[sheet])]
+    return [
+        Report(title="Whole parts, free and restricted", how=HOW, sheets=[sheet]),
+        _random(quick),
+    ]
 
 
 def _in_posture(text: str, posture: str) -> str:
@@ -135,12 +158,138 @@ def _rows(
     folder: Path, part: str, free: str, restricted: dict[str, str]
 ) -> Iterator[tuple[str, ...]]:
     for name, text in {"-": free, **restricted}.items():
-        job = folder / "job.toml"
-        job.write_text(text, encoding="utf-8")
         start = perf_counter()
-        found: JobResult = run_job(read_job(job))
+        found = _planned(folder, text)
         took = perf_counter() - start
         cycle, air = ("-", "-")
         if found.part is not None and found.passed:
             cycle, air = f"{found.part.cycle_time:.2f}", f"{found.part.air_time:.2f}"
         yield part, name, f"{took:.1f}", cycle, air
+
+
+def _planned(folder: Path, text: str) -> JobResult:
+    job = folder / "job.toml"
+    job.write_text(text, encoding="utf-8")
+    return run_job(read_job(job))
+
+
+# -----------------------------------------------------------------------------
+# Random parts.
+
+COUNT = 20
+"""Number of random parts."""
+RANDOM_JOB = """\
+[part]
+file = "{file}"
+xyz_mm = {at}
+rpy_deg = [0, 0, 0]
+[[contour]]
+speed_m_min = 3
+spacing_mm = 2
+[contour.pick_all]
+{pick}
+[plan]
+certify = false
+gamma_step_deg = 10
+[sequence]
+{home}"""
+COLUMNS = (
+    "seed", "part", "robot", "cuts", "home", "computing s", "cycle s", "restricted jobs",
+    "best restricted s", "restricted to", "worse %",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RandomPart:
+    """A random part and its free job; `write` writes its drawing into a folder."""
+
+    kind: str
+    robot: str
+    holes: int
+    home: bool
+    job: str
+    write: Callable[[Path], None]
+
+
+def random_part(seed: int) -> RandomPart:
+    """Return a plate or, for an odd seed, a tube; two on a UR10 and two on an IRB 4600 in turn."""
+    rng = np.random.default_rng(seed)
+    is_tube, is_ur, count = bool(seed % 2), seed % 4 < 2, int(rng.integers(3, 7))
+    arm, pose = (PLATE, "0, -90, -90, -90, 90, 0") if is_ur else (TUBE, "0, -20, 10, 0, 60, 0")
+    least, most = ((400, -300, 0), (600, 0, 300)) if is_ur else ((1000, -300, 400), (1400, 0, 800))
+    at, home = rng.uniform(least, most).round().tolist(), bool(rng.random() < 0.5)
+    drawing = "tube.step" if is_tube else "plate.dxf"
+    job = arm[: arm.index("[part]")] + RANDOM_JOB.format(
+        file=drawing,
+        at=at,
+        pick='side = "outer"\nkind = "inner"' if is_tube else 'layer = "0"',
+        home=f"home_deg = [{pose}]\n" if home else "",
+    )
+    job += arm[arm.index("[program]") :]
+    radii = rng.uniform(6, 18 if is_tube else 30, count)
+    spots = rng.permutation(count if is_tube else 9)[:count].tolist()
+    sides = rng.integers(0, 3, count).tolist()
+
+    def write(folder: Path) -> None:
+        if is_tube:
+            drills = [_drill(sides[k], 25 + 48 * spots[k], float(radii[k])) for k in range(count)]
+            write_tube(folder / drawing, drills)
+            return
+        document = new("R2010", units=4)
+        for spot, radius in zip(spots, radii.tolist(), strict=True):
+            document.modelspace().add_circle((50 + 90 * (spot % 3), 50 + 90 * (spot // 3)), radius)
+        document.saveas(folder / drawing)
+
+    return RandomPart(
+        kind="tube" if is_tube else "plate",
+        robot="UR10" if is_ur else "IRB 4600",
+        holes=count,
+        home=home,
+        job=job,
+        write=write,
+    )
+
+
+def _drill(side: int, y: float, radius: float) -> Hole:
+    """Return the drill of a hole in the top, the left or the right wall of the tube."""
+    if side == 0:
+        return (30.0, y, 50.0), (0.0, 0.0, 1.0), radius
+    return (-1.0 if side == 1 else 50.0, y, 30.0), (1.0, 0.0, 0.0), radius
+
+
+def _random(quick: bool) -> Report:
+    rows = [_random_row(seed) for seed in range(2 if quick else COUNT)]
+    sheet = Sheet(columns=COLUMNS, rows=rows, words=3)
+    return Report(title="Random whole parts, free and restricted", how=RANDOM, sheets=[sheet])
+
+
+def _random_row(seed: int) -> tuple[str, ...]:
+    part = random_part(seed)
+    narrowed = {"half a turn": part.job.replace("[robot]\n", "[robot]\n" + HALF_TURN)}
+    narrowed |= {posture: _in_posture(part.job, posture) for posture in POSTURES}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        part.write(folder)
+        start = process_time()
+        free = _cycle(_planned(folder, part.job))
+        took = process_time() - start
+        cycles = {to: _cycle(_planned(folder, text)) for to, text in narrowed.items()}
+    best = min(cycles, key=cycles.__getitem__)
+    feasible = sum(bool(np.isfinite(cycle)) for cycle in cycles.values())
+    worse = f"{100 * (free / cycles[best] - 1):.2f}" if feasible else "-"
+    return (
+        f"{seed}", part.kind, part.robot, f"{part.holes}", "yes" if part.home else "no",
+        f"{took:.1f}", f"{free:.2f}", f"{feasible}", f"{cycles[best]:.2f}",
+        best if feasible else "-", worse,
+    )  # fmt: skip
+
+
+def _cycle(found: JobResult) -> float:
+    return found.part.cycle_time if found.part is not None and found.passed else np.inf
+
+
+if __name__ == "__main__":
+    first, count = (int(given) for given in (*sys.argv[1:], "0", str(COUNT))[:2])
+    print("\t".join(COLUMNS), flush=True)
+    for seed in range(first, first + count):
+        print("\t".join(_random_row(seed)), flush=True)

@@ -1,5 +1,6 @@
 """Refinement off the grid: gamma and external axes are continuous, postures and turns fixed."""
 
+from kerfpath.refiner.joint_curves import JointCurves as JointCurves
 from kerfpath.refiner.rates import KeptShares as KeptShares
 from kerfpath.refiner.refinement import Binding as Binding
 from kerfpath.refiner.refinement import Refinement as Refinement

@@ -4,6 +4,7 @@ from kerfpath.sequence.order import Order as Order
 from kerfpath.sequence.order import best_order as best_order
 from kerfpath.sequence.order import inner_first as inner_first
 from kerfpath.sequence.part import PartPlan as PartPlan
+from kerfpath.sequence.part import PlannedCuts as PlannedCuts
 from kerfpath.sequence.part import common_postures as common_postures
 from kerfpath.sequence.part import distances_between as distances_between
 from kerfpath.sequence.part import longest_search as longest_search

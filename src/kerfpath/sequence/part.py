@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TypedDict, TypeVar, Unpack, cast
+from typing import Generic, Protocol, TypedDict, TypeVar, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from kerfpath.arrays import Array, Bools, Ints, floats, not_negative, scalar, short_repr, spread
 from kerfpath.cell import Cell
+from kerfpath.certifier import SharedWork
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.options import PlanKeywords, PlanOptions, with_keywords
@@ -22,6 +23,7 @@ from kerfpath.planner import best_motion, folds, layered_graph, plan, with_bound
 from kerfpath.plans import Plan
 from kerfpath.robots import Robot, posture_name
 from kerfpath.sequence.order import HOME, PATIENCE, MoveTimes, Order, best_order
+from kerfpath.sequence.turned import turned
 from kerfpath.setup import Setup
 from kerfpath.transfer import End, TransferMove, back_off, explain_collision
 
@@ -331,7 +333,8 @@ def plan_part(
 
     Every candidate is planned, and the plans are ordered by `order_plans`. Where no way to or from
     a contour is found, its first candidate is also planned in each of the other `postures`. Only
-    the chosen plans are certified.
+    the chosen plans are certified; together their bounds take the work of one, see
+    `kerfpath.certifier.SharedWork`.
 
     Parameters
     ----------
@@ -365,7 +368,7 @@ def plan_part(
     order = cast(OrderKeywords, {k: v for k, v in keywords.items() if k in of_order})
     rest = {k: v for k, v in keywords.items() if k not in of_order}
     asked = with_keywords(options, rest, PartKeywords)
-    wanted = replace(asked, certify=None)  # only the chosen candidates are certified
+    wanted = replace(asked.on(robot), certify=None)  # only the chosen candidates are certified
 
     def planned(i: int, contour: Contour, options: PlanOptions) -> Plan:
         return plan(
@@ -387,14 +390,23 @@ def plan_part(
         if broken is not None and not tried[i]:
             raise broken
 
-    def in_posture(i: int, posture: int, quick: bool) -> Plan:
-        contour, own = groups[i][0], replace(wanted, postures=(posture,))
-        if not (quick and own.method == "continuous"):
-            return planned(i, contour, own)
-        setup = Setup.of(robot, tool, placement, order.get("cell"))
-        return best_motion(
-            contour, setup, own, speed=None if contour.time is not None else speeds[i]
-        )
+    class Cuts(PlannedCuts[Plan]):
+        def plan_of(self, one: Plan) -> Plan:
+            return one
+
+        def in_posture(self, contour: int, posture: int, *, quick: bool) -> Plan:
+            nodes, own = groups[contour][0], replace(wanted, postures=(posture,))
+            if not (quick and own.method == "continuous"):
+                return planned(contour, nodes, own)
+            setup = Setup.of(robot, tool, placement, order.get("cell"))
+            at = None if nodes.time is not None else speeds[contour]
+            return best_motion(nodes, setup, own, speed=at)
+
+        def with_plan(self, one: Plan, plan: Plan) -> Plan:
+            return plan
+
+        def settled(self, one: Plan) -> Plan:
+            return one
 
     postures = [wanted.postures] * len(groups)
     served: list[Iterable[int]] = [()] * len(groups)
@@ -407,39 +419,165 @@ def plan_part(
             )  # fmt: skip
             served[i] = graph.postures_throughout.tolist()
     common = common_postures(served, postures)
-    found = order_candidates(tried, lambda made: made, in_posture, postures, common, **order)
-    return replace(found, plans=tuple(with_bound(made, asked.certify) for made in found.plans))
+    found = order_candidates(tried, Cuts(), postures, common, **order)
+    work = SharedWork([len(made.q) for made in found.plans])
+    bounded = tuple(with_bound(made, asked.certify, work=work) for made in found.plans)
+    return replace(found, plans=bounded)
+
+
+class PlannedCuts(Protocol[T]):
+    """How the candidates of contours are planned, for `order_candidates`."""
+
+    def plan_of(self, one: T) -> Plan:
+        """Return the plan of a candidate."""
+        ...
+
+    def in_posture(self, contour: int, posture: int, *, quick: bool) -> T | None:
+        """Plan a contour in one posture, both given by number, quickly or thoroughly.
+
+        Returns None or raises NoFeasiblePath where that is not possible.
+        """
+        ...
+
+    def with_plan(self, one: T, plan: Plan) -> T | None:
+        """Return a candidate with its plan turned about the beam; None if it must not be."""
+        ...
+
+    def settled(self, one: T) -> T | None:
+        """Return a quickly planned or turned candidate that an order has chosen in its final form.
+
+        Returns None if it may not be used.
+        """
+        ...
+
+
+class _Candidates(Generic[T]):
+    """The candidates of each contour, and those among them that are not in their final form."""
+
+    def __init__(self, tried: Sequence[list[T]], cuts: PlannedCuts[T], order: OrderOptions) -> None:
+        self.tried, self._cuts, self._order = tried, cuts, order
+        self._rough = list[T]()
+
+    @property
+    def plans(self) -> list[list[Plan]]:
+        """The plans of the candidates of each contour."""
+        return [[self._cuts.plan_of(one) for one in each] for each in self.tried]
+
+    def add(
+        self,
+        contour: int,
+        wanted: Iterable[int] | None,
+        progress: Callable[[int, int, int], None],
+        *,
+        quick: bool,
+    ) -> list[Plan]:
+        """Plan a contour in the wanted postures (None: all) that it has no plan in."""
+        each = self.tried[contour]
+        made = len(each)
+        unused = unused_postures(self.plans[contour], wanted)
+        for k, posture in enumerate(unused):
+            progress(contour, k, len(unused))
+            one = None
+            with suppress(NoFeasiblePath):
+                one = self._cuts.in_posture(contour, posture, quick=quick)
+            each += [] if one is None else [one]
+        self._rough += each[made:] if quick else []
+        return self.plans[contour][made:]
+
+    def turn_alike(self, contours: Iterable[int]) -> None:
+        """Offer candidates of contours turned about the beam, alike in each posture.
+
+        They are turned towards the first one in their posture, and that one towards home, or the
+        first one of all if there is no home. Turned candidates replace quickly planned ones.
+        """
+        near, first = dict[int, Array](), self._home
+        for i in contours:
+            for c, one in enumerate(self.tried[i][:]):
+                posture = int(self._cuts.plan_of(one).posture[0])
+                first = self._mean(one) if first is None else first
+                aim = near.get(posture, first)
+                other = self._turned(one, aim, aim)
+                if other is not None and self._is_rough(one):
+                    self.tried[i][c] = other
+                elif other is not None:
+                    self.tried[i].append(other)
+                near.setdefault(posture, self._mean(one if other is None else other))
+
+    def turn_between(self, found: PartPlan, contours: Collection[int]) -> bool:
+        """Offer the chosen candidates turned towards their neighbours; return whether any is new.
+
+        They are turned to where the moves before and after them come from and go to.
+        """
+        starts, ends = (
+            [back_off(made, end, found.retract) for made in found.plans] for end in ("start", "end")
+        )
+        before, after = [self._home, *ends[:-1]], [*starts[1:], self._home]
+        new = False
+        for (i, c), one, two in zip(found.chosen, before, after, strict=True):
+            behind, ahead = (two if one is None else one), (one if two is None else two)
+            if i in contours and behind is not None and ahead is not None:
+                other = self._turned(self.tried[i][c], behind, ahead)
+                self.tried[i] += [] if other is None else [other]
+                new |= other is not None
+        return new
+
+    def settle(self, found: PartPlan) -> bool:
+        """Bring the chosen candidates into their final form; return whether they stay the same."""
+        chosen = [(i, self.tried[i][c]) for i, c in found.chosen]
+        new = [(i, one) for i, one in chosen if self._is_rough(one)]
+        same = True
+        for i, one in new:
+            settled, each = self._cuts.settled(one), self.tried[i]
+            self._rough = [other for other in self._rough if other is not one]
+            same &= settled is not None and np.array_equal(
+                self._cuts.plan_of(settled).q, self._cuts.plan_of(one).q
+            )
+            at = next(c for c, other in enumerate(each) if other is one)
+            each[at : at + 1] = [] if settled is None else [settled]
+        return same
+
+    @property
+    def _home(self) -> Array | None:
+        home = self._order.home
+        return None if home is None else np.asarray(home, dtype=np.float64)
+
+    def _mean(self, one: T) -> Array:
+        return np.asarray(self._cuts.plan_of(one).q.mean(axis=0))
+
+    def _is_rough(self, one: T) -> bool:
+        return any(one is other for other in self._rough)
+
+    def _turned(self, one: T, before: Array, after: Array) -> T | None:
+        made = turned(self._cuts.plan_of(one), before, after, self._order.cell)
+        other = None if made is None else self._cuts.with_plan(one, made)
+        self._rough += [] if other is None else [other]
+        return other
 
 
 def order_candidates(
     tried: Sequence[list[T]],
-    plan_of: Callable[[T], Plan],
-    in_posture: Callable[[int, int, bool], T | None],
+    cuts: PlannedCuts[T],
     postures: Sequence[Sequence[int] | None],
     common: Sequence[Sequence[int]],
-    settle: Callable[[T], T | None] = lambda made: made,
     progress: Callable[[int, int, int], None] = lambda contour, done, total: None,
     **order: Unpack[OrderKeywords],
 ) -> PartPlan:
     """Order candidates by `order_plans`, planned in common postures, and in others where needed.
 
+    Candidates in common postures are also offered turned about the beam, see `turned`: alike in
+    each posture, and once an order is found, towards their neighbours in it.
+
     Parameters
     ----------
     tried : sequence of lists
         The planned candidates of each contour; candidates in other postures are appended.
-    plan_of : callable
-        Returns the plan of a candidate.
-    in_posture : callable
-        Plans a contour in one posture, both given by number, and quickly or thoroughly; returns
-        None or raises NoFeasiblePath where that is not possible.
+    cuts : PlannedCuts
+        How further candidates are planned. Where the final form of a chosen one is not the same, an
+        order is sought again.
     postures : sequence of sequences of int, or None
         Postures that each contour may be cut in; None: all.
     common : sequence of sequences of int
         Postures that each contour is planned in before the order is sought, see `common_postures`.
-    settle : callable
-        Returns a quickly planned candidate that an order has chosen in its final form, which
-        replaces it, or None if it may not be used. Where one is not the same, an order is sought
-        again.
     progress : callable
         Called with the number of a contour, how many other postures of it are done, and how many
         there are.
@@ -455,38 +593,28 @@ def order_candidates(
     NoFeasiblePath, InputError
         As `order_plans`.
     """
+    offered = _Candidates(tried, cuts, OrderOptions(**order))
+    for i, wanted in enumerate(common):
+        offered.add(i, wanted, progress, quick=True)
+    may_turn = [i for i, wanted in enumerate(common) if wanted]
+    offered.turn_alike(may_turn)
 
-    def add(i: int, wanted: Iterable[int] | None, *, quick: bool = False) -> list[Plan]:
-        made = len(tried[i])
-        unused = unused_postures([plan_of(one) for one in tried[i]], wanted)
-        for k, posture in enumerate(unused):
-            progress(i, k, len(unused))
-            one = None
-            with suppress(NoFeasiblePath):
-                one = in_posture(i, posture, quick)
-            tried[i] += [] if one is None else [one]
-        return [plan_of(one) for one in tried[i][made:]]
+    def ordered() -> PartPlan:
+        return order_plans(
+            offered.plans,
+            more=lambda i: offered.add(i, postures[i], progress, quick=False),
+            **order,
+        )
 
-    rough = list[T]()
-    for i, offered in enumerate(common):
-        first = len(tried[i])
-        add(i, offered, quick=True)
-        rough += tried[i][first:]
-    while True:
-        plans = [[plan_of(one) for one in each] for each in tried]
-        found = order_plans(plans, more=lambda i: add(i, postures[i]), **order)
-        chosen = [(i, c, tried[i][c]) for i, c in found.chosen]
-        new = [(i, c, one) for i, c, one in chosen if any(one is each for each in rough)]
-        rough = [one for one in rough if not any(one is each for _, _, each in new)]
-        same = True
-        for i, c, one in new:
-            settled = settle(one)
-            same &= settled is not None and np.array_equal(plan_of(settled).q, plan_of(one).q)
-            tried[i][c : c + 1] = [] if settled is None else [settled]
-        if same:  # on the turns that the order has chosen
-            made = zip(found.chosen, found.plans, strict=True)
-            last = (replace(plan_of(tried[i][c]), q=on.q, turn=on.turn) for (i, c), on in made)
-            return replace(found, plans=tuple(last))
+    found = ordered()
+    if offered.turn_between(found, may_turn):
+        found = ordered()
+    while not offered.settle(found):
+        found = ordered()
+    # On the turns that the order has chosen.
+    made = zip(found.chosen, found.plans, strict=True)
+    last = (replace(offered.plans[i][c], q=on.q, turn=on.turn) for (i, c), on in made)
+    return replace(found, plans=tuple(last))
 
 
 def order_plans(
@@ -540,9 +668,11 @@ def order_plans(
         for i, c in places:
             one = every[i][c]
             aim = near.setdefault(int(one.posture[0]), one.q.mean(axis=0))
-            turned = [p for p in on_near_turns(one, home, aim) if _can_back_off(p, options.retract)]
-            plans = [*plans, *turned]
-            offered += [(i, c)] * len(turned)
+            near_by = [
+                p for p in on_near_turns(one, home, aim) if _can_back_off(p, options.retract)
+            ]
+            plans = [*plans, *near_by]
+            offered += [(i, c)] * len(near_by)
         group = np.array([i for i, _ in offered])
         air = (
             MoveTimes(plans, group, cell, options.retract, options.seconds, options.air_speed)

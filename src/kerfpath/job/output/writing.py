@@ -438,13 +438,16 @@ def order_note(part: PartPlan) -> str:
         "seconds in [sequence])"
     )
     common = " and in those that at least half of the contours can have"
+    rotations = "more than one rotation about the beam in each"
     if part.plans[0].robot.free.size:
         common = ""  # with external axes, other postures are planned only where moves need them
+    elif part.plans[0].settings.method == "continuous":
+        rotations = "rotations about the beam that cost over 1 % more"
     return (
         f"Cycle time {part.cycle_time:.1f} s: cutting {part.cutting_time:.1f} s, air "
         f"{part.air_time:.1f} s, piercing {part.piercing_time:.1f} s; with these candidates and "
         f"moves {proved}. Each contour was planned in its best posture{common}; not compared: the "
-        "other postures, and more than one rotation about the beam in each."
+        f"other postures, and {rotations}."
     )
 
 

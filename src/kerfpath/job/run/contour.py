@@ -190,8 +190,8 @@ def cut_in_posture(
 ) -> CutResult | None:
     """Return the candidate of a cut with a plan cut in one posture; None where its audit fails.
 
-    If `quick`, it is given up where it would be planned on the grid, and audited at its nodes only
-    until it is `settled`.
+    If `quick`, it is given up where it would be planned on the grid, and not audited until it is
+    `settled`.
 
     Raises
     ------
@@ -213,7 +213,9 @@ def cut_in_posture(
             graph=None if job.robot.free.size else graph,
         )  # fmt: skip
     other = CutResult(request=request, candidate=candidate, graph=graph)
-    other = with_checks(prepared, other, made) if quick else _audited(prepared, other, made)
+    if quick:
+        return replace(other, plan=made)
+    other = _audited(prepared, other, made)
     return other if other.passed else None
 
 
@@ -229,7 +231,7 @@ def moved_into_reach(prepared: PreparedJob, cuts: Sequence[CutResult]) -> dict[s
 
 
 def settled(prepared: PreparedJob, cut: CutResult) -> CutResult | None:
-    """Return a cut that was planned quickly, audited between its nodes too; None if that fails."""
+    """Return a cut that was planned quickly or turned, with its audit; None where that fails."""
     assert cut.plan is not None
     whole = CutResult(request=cut.request, candidate=cut.candidate, graph=cut.graph)
     done = _audited(prepared, whole, cut.plan)

@@ -11,6 +11,7 @@ import numpy as np
 
 from kerfpath.auditor import bound_checks, transfer_checks, worst_of
 from kerfpath.cad import Part
+from kerfpath.certifier import SharedWork
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.job.format import Job, PreparedJob, prepare
 from kerfpath.job.run.contour import (
@@ -24,12 +25,10 @@ from kerfpath.job.run.contour import (
 from kerfpath.job.run.foresee import require_foreseen
 from kerfpath.job.run.remedy import Remedy
 from kerfpath.job.run.results import CutResult, JobResult
-from kerfpath.planner import (
-    with_bound,
-)
+from kerfpath.planner import with_bound
 from kerfpath.plans import Plan
 from kerfpath.progress import Progress, StopEarly, may_stop, no_progress
-from kerfpath.sequence import common_postures, longest_search, order_candidates
+from kerfpath.sequence import PlannedCuts, common_postures, longest_search, order_candidates
 
 # -----------------------------------------------------------------------------
 # The order in which the contours of a job are cut, and the transfer moves between them.
@@ -91,13 +90,9 @@ def order_cuts(
     try:
         part = order_candidates(
             units,
-            _plan,
-            lambda unit, posture, quick: cut_in_posture(
-                prepared, units[unit][0], posture, quick=quick
-            ),
+            _JobCuts(prepared, units),
             others,
             common_postures(served, others),
-            settle=lambda cut: settled(prepared, cut),
             progress=lambda unit, done, total: progress(
                 f"{requests[unit].task.name}: other postures", done, total
             ),
@@ -125,6 +120,26 @@ def order_cuts(
         for m in part.moves
     )
     return replace(result, cuts=(*cuts, *missing), part=part, air=tuple(worst_of(audited)))
+
+
+class _JobCuts(PlannedCuts[CutResult]):
+    """How the cuts of a job are planned for an order; numbers of contours are those of units."""
+
+    def __init__(self, prepared: PreparedJob, units: Sequence[Sequence[CutResult]]) -> None:
+        self._prepared, self._first = prepared, [unit[0] for unit in units]
+
+    def plan_of(self, one: CutResult) -> Plan:
+        return _plan(one)
+
+    def in_posture(self, contour: int, posture: int, *, quick: bool) -> CutResult | None:
+        return cut_in_posture(self._prepared, self._first[contour], posture, quick=quick)
+
+    def with_plan(self, one: CutResult, plan: Plan) -> CutResult | None:
+        is_whole = len(plan.q) == len(one.candidate.nodes)  # its intervals are not divided
+        return replace(one, plan=plan, checks=()) if is_whole else None
+
+    def settled(self, one: CutResult) -> CutResult | None:
+        return settled(self._prepared, one)
 
 
 def _units(
@@ -210,7 +225,8 @@ def run_prepared(prepared: PreparedJob, *, progress: Progress = no_progress) -> 
                 [tuple(advised(prepared, cut, progress) for cut in cuts) for cuts in found]
             )
     result = order_cuts(prepared, tried, stoppable)
-    cuts = tuple(certified(cut, stoppable) for cut in result.cuts)
+    work = shared_work(result.cuts)
+    cuts = tuple(certified(cut, stoppable, work) for cut in result.cuts)
     moves = dict[str, Remedy]()
     with suppress(StopEarly):
         moves = moved_into_reach(prepared, cuts)
@@ -233,10 +249,17 @@ def measured(prepared: PreparedJob, result: JobResult) -> JobResult:
     )
 
 
-def certified(cut: CutResult, progress: Progress) -> CutResult:
+def shared_work(cuts: Sequence[CutResult]) -> SharedWork:
+    """Return the work that the bounds of a job's cuts share."""
+    made = [cut.plan for cut in cuts if cut.plan is not None and cut.request.options.certify]
+    return SharedWork([len(one.q) for one in made])
+
+
+def certified(cut: CutResult, progress: Progress, work: SharedWork | None = None) -> CutResult:
     """Return a cut with the bound of its plan, if one is asked for.
 
-    The bound is audited if plan.json is to keep its certificate.
+    Its `work` may be shared with the bounds of other cuts. It is audited if plan.json is to keep
+    its certificate.
     """
     asked = cut.request.options.certify
     if cut.plan is None or asked is None:
@@ -246,7 +269,7 @@ def certified(cut: CutResult, progress: Progress) -> CutResult:
         share = f", {100 * done // total} %" if total else ""
         progress(f"{cut.name}: {what}{share}", 0, 0)
 
-    made = with_bound(cut.plan, asked, progress=named)
+    made = with_bound(cut.plan, asked, work=work, progress=named)
     if not asked.keep:
         return replace(cut, plan=made)
     named("audit of the certificate", 0, 0)
