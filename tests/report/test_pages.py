@@ -441,6 +441,9 @@ def test_tables_add_up(section: ContourSection) -> None:
     table = _table(page, "Candidates")
     assert sum(counts.values()) == section.graph.reason.size
     assert all(word in table for word in counts)
+    assert max(counts.values()) >= 1000
+    shown = {int(n.replace(",", "")) for n in re.findall(r'<td class="n">([\d,]+)</td>', table)}
+    assert shown == set(counts.values())
     row = _table(page, "Contours")
     assert "3.00" in row, "0.05 m/s is 3 m/min"
     assert f"{section.path.length * 1e3:.1f}" in row

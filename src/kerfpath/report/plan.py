@@ -125,8 +125,7 @@ def _counts(graph: LayeredGraph) -> Iterator[tuple[str, str, str, float]]:
     counts, colours = graph.counts(), reason_colours(graph.reasons)
     for words, count in counts.items():
         share = 100 * count / sum(counts.values())
-        shown = f"{count:,}".replace(",", "\N{THIN SPACE}")
-        yield colours[graph.reasons.index(words)], words, shown, share
+        yield colours[graph.reasons.index(words)], words, f"{count:,}", share
 
 
 def _legend(graph: LayeredGraph) -> Iterator[tuple[str, str]]:
