@@ -26,6 +26,7 @@ WIDTH, WIDEST = 118, 130
 """Most characters of a line of prose, and of a row of a table."""
 SHOTS = {
     "lesson-report.png": ("hole/report.html", "Part and contours"),
+    "lesson-executed.png": ("hole/report.html", "Executed path"),
     "lesson-pareto.png": ("front/pareto.html", "Criteria in pairs"),
 }
 """The pictures: the page of each, and the heading at its top."""

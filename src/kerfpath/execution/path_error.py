@@ -20,7 +20,7 @@ SAMPLES = 8
 """Number of samples of the path for each of its nodes, or each target."""
 
 
-SLOWEST = 0.05
+SLOWEST = 0.1
 """Smallest share of the speed at which a tolerance is looked for."""
 
 
@@ -236,23 +236,30 @@ def share_within(
 ) -> float | None:
     """Return the largest share of its speed at which a run stays within a tolerance, m.
 
-    It is found by halving, to 2 %, with the zones of the program and the same way of the joints;
-    None if even `SLOWEST` of the speed is too fast, as the corners alone are too wide.
+    It is found by halving, to 3 %, with the zones of the program and the same way of the joints;
+    None if the corners alone are too wide, or if `SLOWEST` of the speed is too fast.
     """
     alone = replace(response, sigma_range=None)
 
-    def off(share: float) -> float:
+    def at(share: float) -> PathError:
         timing = timing_of(run, speed_share=share)
-        return path_error(run, path, timing=timing, response=alone).largest
+        return path_error(run, path, timing=timing, response=alone)
 
-    if off(1.0) <= tolerance:
+    full = at(1.0)
+    if full.largest <= tolerance:
         return 1.0
-    low, high = SLOWEST, 1.0
-    if off(low) > tolerance:
+    corners = float(full.rounding.max())
+    if corners >= tolerance:
         return None
-    while high - low > 0.02 * high:
+    # The lag moves the tip about as the square of the speed.
+    high, low = 1.0, float(np.sqrt((tolerance - corners) / (full.largest - corners)))
+    while at(low).largest > tolerance:
+        high, low = low, 0.8 * low
+        if low < SLOWEST:
+            return None
+    while high - low > 0.03 * high:
         middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if off(middle) <= tolerance else (low, middle)
+        low, high = (middle, high) if at(middle).largest <= tolerance else (low, middle)
     return low
 
 

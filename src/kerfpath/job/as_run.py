@@ -244,7 +244,7 @@ def _closer(run: Executed, off: PathError, plan: Plan, path: Contour, tip: float
         return f"{said}; {_narrower(run.controller)}, or sample the contour more finely"
     share = share_within(run, path, tip, response)
     if share is None:
-        return f"{said}; no lower speed helps by itself: {_narrower(run.controller)}"
+        return f"{said}; a lower speed alone does not keep it: {_narrower(run.controller)}"
     speed = 60 * share * (np.diff(plan.contour.s) / np.diff(plan.time)).max()
     step = 10.0 ** (np.floor(np.log10(speed)) - 1)
     return f"{said}; this motion keeps it at {np.floor(speed / step) * step:.2g} m/min"
