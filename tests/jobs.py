@@ -116,8 +116,10 @@ name = "job"
 pierce_time_s = 0.25
 lead_time_s = 0.005
 """
-WHOLE = HEAD + CONTOURS + PLAN + SEQUENCE
-"""A whole part: lead-ins, micro-joints, corners, a bevel, and transfer moves."""
+WITHOUT_LAG = '[robot.response]\nsource = "ideal"\n\n[tool]'
+"""What stands in place of [tool] where joints are to be where they are commanded to be."""
+WHOLE = HEAD.replace("[tool]", WITHOUT_LAG) + CONTOURS + PLAN + SEQUENCE
+"""A whole part: lead-ins, micro-joints, corners, a bevel, and transfer moves; without lag."""
 
 ROBOT_AND_HEAD = """\
 [robot]

@@ -5,15 +5,14 @@ import re
 import numpy as np
 import pytest
 
-from jobs import DEMO, SMALL
+from jobs import DEMO, SMALL, WITHOUT_LAG
 from kerfpath.errors import InputError
 from kerfpath.job import AsRun, audit_file, read_job, run_job, write_result
 
-IDEAL = '[robot.response]\nsource = "ideal"\n\n'
 QUICK = (
     SMALL.replace("[plan]", "[plan]\ncertify = false")
     + "\n[program.rapid]\nshortest_move_ms = 12\n"
-).replace("[tool]", IDEAL + "[tool]")
+).replace("[tool]", WITHOUT_LAG)
 
 
 def cuts_of(folder, text):
@@ -204,7 +203,7 @@ def test_a_zone_error_that_is_stated_is_kept(tmp_path):
 # -----------------------------------------------------------------------------
 # The tip as the joints execute the run.
 
-LAGGING = QUICK.replace(IDEAL, "")
+LAGGING = QUICK.replace(WITHOUT_LAG, "[tool]")
 
 
 def tip_of(cut):
