@@ -102,7 +102,8 @@ def test_arcs_of_a_program_are_arcs(tmp_path: Path, name: str) -> None:
     part = cad.read(main, beam=BEAMS[name])
     (loop,) = part.loops
     assert loop.closed
-    assert len(part.contour("cut1")) > 3 * 60  # chords of 1 um instead of the nodes
+    # Chords of 1 um instead of the nodes; how many depends on where the arcs of the plan end.
+    assert len(part.contour("cut1")) > 2 * 60
     assert loop.diameter == pytest.approx(0.04, abs=ARC)
 
 
