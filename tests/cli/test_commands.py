@@ -363,11 +363,12 @@ def test_speed_names_the_fastest_and_what_binds(folder, fastest):
     result = run("speed", "small.toml", cwd=folder)
     assert result.returncode == 0, result.stderr
     number = r" +\d+\.\d+"
-    row = rf"hole 10 +3{number}{number}{number}{number} +\d+ +joint \d acceleration"
+    row = rf"hole 10 +3{number}{number}{number}{number}{number} +\d+ +joint \d acceleration"
     assert re.search(row, result.stdout)
     assert fastest["impossible_from_m_min"] > fastest["fastest_m_min"]
     assert fastest["fastest_m_min"] > fastest["on_grid_m_min"] > fastest["asked_m_min"]
     assert fastest["fastest_m_min"] >= fastest["as_run_m_min"] > fastest["asked_m_min"]
+    assert 0 < fastest["true_to_path_m_min"] < fastest["asked_m_min"]  # by the lag assumed
     assert fastest["asked_m_min"] == pytest.approx(3)
     # A job at that speed is feasible, one a little over it is not, unless gamma leaves its grid.
     for share, refine, code in ((0.999, "false", 0), (1.01, "false", 1), (1.01, "true", 0)):
