@@ -22,7 +22,7 @@ PAGE = ROOT / "docs" / "tutorials.md"
 DRAWINGS = [ROOT / "examples" / "parts" / name for name in ("bracket.step", "beam.step")]
 BLOCK = re.compile(r"^```(toml|console)\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?", re.DOTALL | re.M)
 """A file or commands, and what the commands print."""
-WIDTH, WIDEST = 118, 130
+WIDTH, WIDEST = 118, 140
 """Most characters of a line of prose, and of a row of a table."""
 SHOTS = {
     "lesson-report.png": ("hole/report.html", "Part and contours"),
@@ -109,7 +109,7 @@ def _photograph(folder: Path) -> None:
             view.goto((folder / page).as_uri())
             top = view.get_by_text(heading, exact=True).first
             top.evaluate("at => scrollTo(0, scrollY + at.getBoundingClientRect().top - 24)")
-            view.wait_for_timeout(4000)
+            view.wait_for_timeout(8000)
             view.screenshot(path=ROOT / "docs" / name)
 
 

@@ -101,11 +101,17 @@ def enlarged(path: ExecutedPath) -> go.Figure:
             line={"color": colour, "width": width},
         )  # fmt: skip
     hidden: dict[str, Any] = {"visible": False}
+    # To one scale; not by "data", which enlarges what is flat beyond the picture.
+    sizes = np.ptp(np.vstack([path.nearest, moved]), axis=0)
+    shares = np.maximum(sizes / sizes.max(), 1e-3)
     figure.update_layout(
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
         legend={"orientation": "h", "x": 0, "y": 1, "yanchor": "top", "font": {"size": 12}},
         scene={
-            "aspectmode": "data",
+            "aspectmode": "manual",
+            "aspectratio": {
+                name: float(f"{share:.3g}") for name, share in zip("xyz", shares, strict=True)
+            },
             "dragmode": "turntable",
             "xaxis": hidden,
             "yaxis": hidden,
@@ -123,7 +129,7 @@ def _mm(values: Array) -> list[float]:
 def _camera(points: Array) -> dict[str, Any]:
     """Return a camera that looks across the plane in which the points (m, 3) mostly lie."""
     normal = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][2]
-    eye = 2.6 * (normal if normal[2] >= 0 else -normal)
+    eye = 1.5 * (normal if normal[2] >= 0 else -normal)
     up = {"x": 0, "y": 1, "z": 0} if abs(normal[2]) > 0.9 else {"x": 0, "y": 0, "z": 1}
     x, y, z = (float(f"{value:.3g}") for value in eye)
-    return {"eye": {"x": x, "y": y, "z": z}, "up": up, "projection": {"type": "orthographic"}}
+    return {"eye": {"x": x, "y": y, "z": z}, "up": up}

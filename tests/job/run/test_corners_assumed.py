@@ -9,6 +9,8 @@ JOB = """\
 [robot]
 model = "{robot}"
 acceleration_deg_s2 = [215, 175, 260, 760, 860, 1190]
+[robot.response]
+source = "ideal"
 [tool]
 head = "laser-head-45"
 [part]
