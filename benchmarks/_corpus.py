@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -111,7 +111,9 @@ def _nested(path: Path, unit: str, rng: Any, family: str) -> Known:
         space.add_arc((-2 * radius, 0), radius, 200, 20)
 
     loops = [("inner" if k % 2 else "outer", size * 10 / 3 * mm) for k, size in enumerate(sizes)]
-    return _dxf(path, unit, family, draw, [*loops, *[("outer", 2 * np.pi * radius * mm)] * 2])
+    known = _dxf(path, unit, family, draw, [*loops, *[("outer", 2 * np.pi * radius * mm)] * 2])
+    # The outer rectangle could be a drawing frame.
+    return replace(known, options={**known.options, "drawing_frame": "cut"})
 
 
 def _grid(path: Path, unit: str, rng: Any, family: str) -> Known:

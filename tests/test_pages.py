@@ -86,6 +86,12 @@ def script(page, folder):
     return done.stdout
 
 
+def test_a_program_of_targets_is_executed(tmp_path):
+    seconds, joints = script("execution.md", tmp_path).split(" ", 1)
+    assert 2 < float(seconds) < 6  # 0.2 m at 0.1 m/s, and standing before and after
+    assert joints.strip().endswith(", 6)")
+
+
 def test_the_angles_of_controllers_become_those_of_a_job(tmp_path):
     said = dict(line.split(" ", 1) for line in script("measuring.md", tmp_path).splitlines())
     assert said["ABB"] == "[0.0, 0.0, 90.0]"

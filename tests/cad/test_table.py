@@ -263,7 +263,7 @@ BAD = {
     "only a header": (SQUARE.split("\n")[0], "a header but no rows"),
     "no unit": (ROWS, "states no length unit"),
     "no axes": ("x_mm,y_mm,z_mm\n0,0,0\n", "expected columns x y z, then nx ny nz .*got x y z"),
-    "three columns": ("0,0,0\n1,1,1\n", "line 1: without a header expected 6 columns"),
+    "three columns": ("0,0,0\n1,1,1\n", "line 1: has points without tool axes"),
     "unknown unit": (SQUARE.replace("_mm", "_yd"), "units are yd, yd, yd; expected one"),
     "two units": (SQUARE.replace("z_mm", "z_in"), "units are mm, mm, in; expected one"),
     "a column twice": (SQUARE.replace("ny", "nx"), "names the column 'nx' twice"),

@@ -93,7 +93,15 @@ def test_joints_that_may_be_anywhere_do_not_make_coarse_cells_worthless():
     arm = arm.with_limits(acceleration=3 * arm.speed_limits()[1], endless=np.zeros(6, bool))
     space = {"tool": _arm.tool(), "placement": _arm.placement(), "speed": 1 / 6}
     made = plan(_arm.wave(100), arm, certify=None, **space)
-    course = bound._Certification(made, bound._steps_of(made), 0.9, np.inf, False, lambda *_: None)
+    course = bound._Certification(
+        made,
+        bound._steps_of(made),
+        0.9,
+        np.inf,
+        bound.most_pairs(len(made.q)),
+        False,
+        lambda *_: None,
+    )
     turns = CellMaker(made.robot, made.frames, made.T_flange_tip, made.settings.postures)
     for maker in (course.maker, turns):
         steps = replace(course.steps, endless=maker.endless)

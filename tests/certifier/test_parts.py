@@ -48,7 +48,10 @@ def every(stride, first, last):
 
 
 def course_of(one, gap=0.1):
-    return proving._Certification(one, proving._steps_of(one), gap, np.inf, False, lambda *_: None)
+    most = proving.most_pairs(len(one.q))
+    return proving._Certification(
+        one, proving._steps_of(one), gap, np.inf, most, False, lambda *_: None
+    )
 
 
 @pytest.mark.slow
@@ -87,9 +90,7 @@ def test_the_multipliers_of_a_plan_bound_it_closer(metric, planned, others, monk
 @pytest.mark.slow
 def test_the_cheapest_cells_are_joined_by_steps(planned):
     """They stand for a motion: prices about it show where it breaks (6)."""
-    one = proving._Certification(
-        planned(), proving._steps_of(planned()), 0.1, np.inf, False, lambda *_: None
-    )
+    one = course_of(planned())
     result = solve_stage(one.maker.coarsest(np.arange(one.last + 1)), one.steps)
     motion = result.cheapest()
     assert result.cells.node[motion].tolist() == list(range(one.last + 1))
@@ -106,14 +107,7 @@ def test_a_certificate_is_there_for_those_who_check_it_only(planned):
 
 
 def test_multipliers_ask_for_cells_at_every_node(planned):
-    one = proving._Certification(
-        planned(speed=0.3),
-        proving._steps_of(planned(speed=0.3)),
-        0.1,
-        np.inf,
-        False,
-        lambda *_: None,
-    )
+    one = course_of(planned(speed=0.3))
     cells = one.maker.coarsest(one.nodes)
     with pytest.raises(ValueError, match="at each of their nodes"):
         solve_stage(cells, one.steps, np.zeros((one.last + 1, 6)))

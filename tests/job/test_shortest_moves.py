@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from jobs import DEMO, SMALL
+from jobs import DEMO, SMALL, WITHOUT_LAG
 from kerfpath.job import audit_file, read_job, run_job, write_result
 
-TEXT = SMALL.replace("[plan]", "[plan]\ncertify = false")
+TEXT = SMALL.replace("[plan]", "[plan]\ncertify = false").replace("[tool]", WITHOUT_LAG)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -81,9 +81,11 @@ from kerfpath.post import (
     LinearMove,
     ReadProgram,
     Rules,
+    languages,
     unsafe_paths,
     unsafe_restarts,
 )
+from kerfpath.robots import Robot
 from kerfpath.tolerances import SAME_POINT
 from kerfpath.transfer import End, TransferMove, back_off
 
@@ -653,11 +655,30 @@ class Audit:
                 continue  # compared elsewhere, or not at all
             if key == "sequence" and len(plans) < len(planned):
                 continue  # a contour is refused already, and its times are not known
-            found = compare(whole[key], own[key], of=JOB, under=(key,))
+            asked, said = whole[key], own[key]
+            if key == "limits":
+                for name in (job.program.language, file.program("job").language):
+                    asked, said = (_expressible(each, job.robot, name) for each in (asked, said))
+            found = compare(asked, said, of=JOB, under=(key,))
             rows += [row for row in found if not row.ok]
         if job.sequence is not None and data["sequence"] is None:
             rows.append(count("moves", "missing moves between contours", 1))
         return rows or compare({}, {}, of=JOB)
+
+
+def _expressible(limits: Any, robot: Robot, name: str) -> Any:
+    """Return the data of limits as a language bounds them, which a job plans within.
+
+    A plan that was made for another language may have wider or narrower ones; its joints are
+    checked with those of the job.
+    """
+    language = languages().get(name)
+    if language is None or language.bounds is None or language.refusal(robot):
+        return limits
+    arm, (least, most) = robot.family.joints, language.bounds(robot)
+    lower, upper = (np.array(limits[key]) for key in ("lower_rad", "upper_rad"))
+    lower[:arm], upper[:arm] = np.maximum(lower[:arm], least), np.minimum(upper[:arm], most)
+    return dict(limits) | {"lower_rad": lower.tolist(), "upper_rad": upper.tolist()}
 
 
 def _entry(plan: Plan, said: PlanData, made: Sequence[Check], file: PlanFile) -> PlanData:
