@@ -25,11 +25,11 @@ BLOCK = re.compile(r"^```(toml|console)\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?"
 WIDTH, WIDEST = 118, 140
 """Most characters of a line of prose, and of a row of a table."""
 SHOTS = {
-    "lesson-report.png": ("hole/report.html", "Part and contours"),
-    "lesson-executed.png": ("hole/report.html", "Executed path"),
-    "lesson-pareto.png": ("front/pareto.html", "Criteria in pairs"),
+    "lesson-report.png": ("hole/report.html", "Part and contours", 760),
+    "lesson-executed.png": ("hole/report.html", "Executed path", 980),
+    "lesson-pareto.png": ("front/pareto.html", "Criteria in pairs", 760),
 }
-"""The pictures: the page of each, and the heading at its top."""
+"""The pictures: the page of each, the heading at its top, and its height, px."""
 Run = Callable[[list[str], Path], tuple[int, str]]
 """Runs the words of a command in a folder; returns its exit code and what it prints."""
 
@@ -104,8 +104,9 @@ def _photograph(folder: Path) -> None:
     switches = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=switches)
-        for name, (page, heading) in SHOTS.items():
-            view = browser.new_page(viewport={"width": 1100, "height": 760}, color_scheme="light")
+        for name, (page, heading, height) in SHOTS.items():
+            size = {"width": 1100, "height": height}
+            view = browser.new_page(viewport=size, color_scheme="light")
             view.goto((folder / page).as_uri())
             top = view.get_by_text(heading, exact=True).first
             top.evaluate("at => scrollTo(0, scrollY + at.getBoundingClientRect().top - 24)")
