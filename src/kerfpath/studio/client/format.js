@@ -96,6 +96,7 @@ export function inUnits(value, unit) {
   if (unit === "rad") return degrees(value);
   if (unit === "m")
     return Math.abs(value) < 1e-6 ? "0 mm" : millimetres(value, Math.abs(value) < 1e-3 ? 4 : 2);
+  if (unit === "share") return `${digits(100 * value, 3)} %`;
   return `${digits(value, 3)}${unit ? ` ${unit}` : ""}`;
 }
 
