@@ -31,6 +31,10 @@ FAR = 100.0
 _ROTATION_TOLERANCE = 1e-6
 """How far R^T R may be from the identity: seven printed decimals pass, a typo fails."""
 
+# OpenBLAS takes its memory at the first product, and ends the process if there is none. Taken here,
+# before anything large is loaded, too little memory is an error of Python, which says so.
+np.linalg.inv(np.eye(2))
+
 
 def freeze(array: _A) -> _A:
     """Return `array` itself, made read-only."""

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from kerfpath.arrays import Array, floats, freeze, short_repr
 from kerfpath.comfort import jacobian
@@ -223,6 +222,8 @@ class Response:
         InputError
             The response does not fit the robot.
         """
+        from scipy.ndimage import gaussian_filter1d  # loaded where joints lag
+
         self.require_for(robot)
         sigma = np.broadcast_to(self.sigma, (robot.joints,)) / step
         lagging = np.stack(

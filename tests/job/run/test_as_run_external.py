@@ -7,6 +7,7 @@ import pytest
 from benchmarks import program_edits
 
 from conftest import ROOT
+from jobs import WITHOUT_LAG
 from kerfpath.job import audit_file, fastest_speeds, read_job, run_job, write_result
 
 
@@ -15,7 +16,7 @@ def text(tmp_path_factory):
     """A job of a hole and a slit, as programs are written for in other tests."""
     folder = tmp_path_factory.mktemp("job")
     list(program_edits.subjects(folder, only=("rapid",), external=True))
-    said = (folder / "rapid.toml").read_text()
+    said = (folder / "rapid.toml").read_text().replace("[tool]", WITHOUT_LAG)
     return said.replace('"points.csv"', f'"{folder / "points.csv"}"').replace(
         "[plan]\n", '[plan]\ncertify = false\nbetween_nodes = "guaranteed"\n'
     )
