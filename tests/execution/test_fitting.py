@@ -140,7 +140,7 @@ def test_logs_of_another_program_are_not_used(tmp_path, robot, runs):
 def test_a_fitted_response_is_read_back_from_its_file(tmp_path):
     made = Response(
         sigma=[0.0301, 0.029], friction=129e-6, standing="measured", runs=3, fastest=0.403,
-        reference="run1.csv",
+        reference='run "1".csv',
     )  # fmt: skip
     file = tmp_path / "mine.toml"
     file.write_text(response_text(made, ["one note"]))
@@ -151,17 +151,23 @@ def test_a_fitted_response_is_read_back_from_its_file(tmp_path):
 
 
 def test_what_is_no_log_of_the_robot_is_refused_in_one_line(tmp_path, robot):
-    row = "1,2,3,4,5,6"
+    head, row = ",".join(["t_s", *JOINTS]), "1,2,3,4,5,6"
     for text, said in (
-        ("", "row of names"),
+        ("", "holds no rows"),
         (f"{','.join(JOINTS)}\n{row}\n{row}\n", "column of times"),
         ("t_s,a\n1,2\n2,3\n", "a column for each joint"),
         ("t_s,q1_deg,q2_deg\n1,2,3\n2,3,4\n", "another robot"),
-        (f"t_s,{','.join(JOINTS)}\n2,{row}\n1,{row}\n", "go back"),
-        (f"t_s,{','.join(JOINTS)}\n1,{row}\n2,1,2,3,4,5,x\n", ":3: expected a number"),
-        (f"t_s,{','.join(JOINTS)}\n1,{row}\n2,1,2,3\n", ":3: expected a number"),
-        (f"t_s,{','.join(JOINTS)}\n1,900,2,3,4,5,6\n2,{row}\n", "within the limits"),
-        (f"t_s,{','.join(JOINTS)}\n1,nan,2,3,4,5,6\n2,{row}\n", "finite"),
+        (f"{head}\n2,{row}\n1,{row}\n", "go back"),
+        (
+            f"{head}\n1,{row}\n2,1,2,3,4,5,x\n",
+            "line 3, column q6_deg: expected a number",
+        ),
+        (f"{head}\n1,{row}\n2,1,2,3\n", "line 3: expected 7 columns, got 4"),
+        (f"{head}\n1,900,2,3,4,5,6\n2,{row}\n", "within the limits"),
+        (
+            f"{head}\n1,nan,2,3,4,5,6\n2,{row}\n",
+            "line 2, column q1_deg: expected a number, got 'nan'",
+        ),
     ):
         file = tmp_path / "log.csv"
         file.write_text(text)
@@ -169,5 +175,5 @@ def test_what_is_no_log_of_the_robot_is_refused_in_one_line(tmp_path, robot):
             read_log(file, robot, TOOL)
         assert "\n" not in str(caught.value)
         assert str(caught.value).startswith(str(file))
-    with pytest.raises(InputError, match="expected a table"):
+    with pytest.raises(InputError, match="no such file"):
         read_log(tmp_path / "none.csv", robot, TOOL)

@@ -22,6 +22,7 @@ from kerfpath.execution.keep import longest_run as longest_run
 from kerfpath.execution.path_error import PathError as PathError
 from kerfpath.execution.path_error import Reversal as Reversal
 from kerfpath.execution.path_error import Roundness as Roundness
+from kerfpath.execution.path_error import on_chords as on_chords
 from kerfpath.execution.path_error import path_error as path_error
 from kerfpath.execution.path_error import roundness as roundness
 from kerfpath.execution.path_error import share_within as share_within

@@ -145,6 +145,11 @@ class Executed:
     __repr__ = short_repr
 
     @property
+    def reached(self) -> bool:
+        """Whether the posture of the targets reaches every sample."""
+        return not np.isnan(self.acceleration_share).any()
+
+    @property
     def peak_velocity(self) -> Peak:
         """The largest share of a velocity limit."""
         return self._peak(self.velocity_share)
@@ -466,7 +471,7 @@ def timing_of(
     """
     velocity, acceleration = run.robot.speed_limits()
     first, second = run.velocity_share * velocity, run.acceleration_share * acceleration
-    if np.isnan(second).any():
+    if not run.reached:
         raise InputError("timing_of: expected a run within reach, got joints that are NaN")
     limits = (eta_v * velocity, eta_a * acceleration)
     rate = fastest_rates(run.time, first, second, limits, speed_share)

@@ -6,7 +6,7 @@ samples and an unknown delay do not matter.
 
 from __future__ import annotations
 
-import csv
+import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from kerfpath.arrays import Array, Bools, short_repr, spread
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, about
 from kerfpath.execution.executed import Executed, timing_of
 from kerfpath.execution.path_error import STEP, Polyline, commanded
 from kerfpath.execution.response import Response
@@ -31,6 +31,9 @@ TIME = {"t_s": 1.0, "time_s": 1.0, "t_ms": 1e-3, "time_ms": 1e-3}
 """Names of the column of times, and their factors to s."""
 ANGLE = re.compile(r"[qj]_?(\d+)_(deg|rad)")
 LENGTHS = {"mm": 1e-3, "m": 1.0}
+PLACES = ("x_", "y_", "z_")
+"""Names of the columns of a tracked tip, and the units that follow them."""
+EXPECTED = "a column for each joint (q1_deg, ...) or the tool tip (x_mm, y_mm, z_mm)"
 BEYOND = np.radians(1.0)
 """rad: joints further outside their limits are of another robot."""
 
@@ -68,20 +71,26 @@ def read_log(path: str | Path, robot: Robot, T_flange_tip: Array) -> Log:
         number, times that go back, joints of another robot, or outside its limits.
     """
     path = Path(path)
-    names, rows = _table(path)
+    with about(path):
+        return _log(path, robot, T_flange_tip)
+
+
+def _log(path: Path, robot: Robot, T_flange_tip: Array) -> Log:
+    """Return the run that a table has logged; messages do not name its file."""
+    names, rows = _numbers(path)
     times = next((name for name in TIME if name in names), None)
     if times is None:
-        raise InputError(f"{path}: expected a column of times, {' or '.join(TIME)}, got none")
+        raise InputError(f"expected a column of times, {' or '.join(TIME)}, got none")
     if (np.diff(rows[:, names.index(times)]) < 0).any():
-        raise InputError(f"{path}: expected times that do not go back in column {times}, got some")
+        raise InputError(f"expected times that do not go back in column {times}, got some")
     found = {
         int(each[1]): (i, each[2]) for i, n in enumerate(names) if (each := ANGLE.fullmatch(n))
     }
     if not found:
-        return Log(name=path.name, tip=_tracked(path, names, rows), tracked=True)
+        return Log(name=path.name, tip=_tracked(names, rows), tracked=True)
     if sorted(found) != list(range(1, robot.arm.joints + 1)):
         raise InputError(
-            f"{path}: expected joints 1 to {robot.arm.joints} of {robot.id!r}, got "
+            f"expected joints 1 to {robot.arm.joints} of {robot.id!r}, got "
             f"{', '.join(map(str, sorted(found)))}; is it the log of another robot?"
         )
     columns = [found[joint] for joint in sorted(found)]
@@ -92,52 +101,37 @@ def read_log(path: str | Path, robot: Robot, T_flange_tip: Array) -> Log:
     if outside.any():
         joint = int(np.argmax(outside))
         raise InputError(
-            f"{path}: expected joints within the limits of {robot.id!r}, got joint {joint + 1} "
+            f"expected joints within the limits of {robot.id!r}, got joint {joint + 1} "
             f"from {np.degrees(q[:, joint].min()):.1f} to {np.degrees(q[:, joint].max()):.1f} deg"
         )
     return Log(name=path.name, tip=(robot.arm.forward(q) @ T_flange_tip)[:, :3, 3])
 
 
-def _table(path: Path) -> tuple[list[str], Array]:
-    """Return the names of the columns of a table, and its rows of numbers."""
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as fault:
-        raise InputError(f"{path}: expected a table (CSV), got {fault}") from None
-    if len(rows) < 3:
-        raise InputError(
-            f"{path}: expected a row of names and rows of numbers, got {len(rows)} rows"
-        )
-    names = [name.strip().lower() for name in rows[0]]
-    known = [i for i, n in enumerate(names) if n in TIME or ANGLE.fullmatch(n) or n[:2] in PLACES]
-    numbers = np.full((len(rows) - 1, len(names)), np.nan)
-    for line, row in enumerate(rows[1:], 2):
-        for i in known:
-            try:
-                numbers[line - 2, i] = float(row[i])
-            except (ValueError, IndexError):
-                got = row[i] if i < len(row) else "nothing"
-                raise InputError(
-                    f"{path}:{line}: expected a number in column {names[i]}, got {got!r}"
-                ) from None
-    if not np.isfinite(numbers[:, known]).all():
-        raise InputError(f"{path}: expected finite numbers, got others")
-    return names, numbers
+def _numbers(path: Path) -> tuple[list[str], Array]:
+    """Return the names of the columns of a log, and its rows; NaN where a column is not used."""
+    from kerfpath.cad.reading import content_of  # logs are read by one command
+    from kerfpath.cad.table import cells_of
+
+    table = cells_of(content_of(path, "a log"), EXPECTED)
+    names = [name.lower() for name in table.rows[0]]
+    table = table.without_header()
+    table.require_width(len(names))
+    if len(table.rows) < 2:
+        raise InputError(f"expected a row of names and rows of numbers, got {len(table.rows)} rows")
+    rows = np.full((len(table.rows), len(names)), np.nan)
+    for i, name in enumerate(names):
+        if name in TIME or ANGLE.fullmatch(name) or name.startswith(PLACES):
+            rows[:, i] = [table.number(k, i, name) for k in range(len(rows))]
+    return names, rows
 
 
-PLACES = ("x_", "y_", "z_")
-
-
-def _tracked(path: Path, names: list[str], rows: Array) -> Array:
+def _tracked(names: list[str], rows: Array) -> Array:
+    """Return the logged tips (m, 3) m."""
     for unit, factor in LENGTHS.items():
         wanted = [f"{axis}{unit}" for axis in PLACES]
         if all(name in names for name in wanted):
             return np.asarray(factor * rows[:, [names.index(name) for name in wanted]])
-    raise InputError(
-        f"{path}: expected a column for each joint (q1_deg, ...) or the tool tip (x_mm, y_mm, "
-        f"z_mm), got {', '.join(names[:8])}"
-    )
+    raise InputError(f"expected {EXPECTED}, got {', '.join(names[:8])}")
 
 
 # -----------------------------------------------------------------------------
@@ -512,13 +506,9 @@ def response_text(response: Response, notes: Sequence[str] = ()) -> str:
     lines, usual = [f"# {note}" for note in notes], Response()
     for name, each in settings(Response).items():
         value = getattr(response, name)
-        plain = each.kind is not str and not isinstance(value, str | int)
         if np.array_equal(value, getattr(usual, name)):
             continue
-        if plain:
-            scale = each.si(1.0)
-            value = np.round(np.asarray(value) / scale, 4).tolist()
-        lines.append(
-            f'{each.key} = "{value}"' if isinstance(value, str) else f"{each.key} = {value}"
-        )
+        if not isinstance(value, str | int):
+            value = np.round(np.asarray(value) / each.si(1.0), 4).tolist()
+        lines.append(f"{each.key} = {json.dumps(value, ensure_ascii=False)}")
     return "\n".join(lines) + "\n"

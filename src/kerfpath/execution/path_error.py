@@ -97,6 +97,15 @@ class PathError:
         return float(self.tip[order][np.searchsorted(gone, 0.95 * gone[-1])])
 
     @property
+    def range_words(self) -> str:
+        """The largest distances at the ends of the range of sigma, in words; empty without one."""
+        if self.response.sigma_range is None:
+            return ""
+        low, high = (f"{end * 1e3:.2g}" for end in self.ends)
+        least, most = self.response.sigma_range * 1e3
+        return f"{low} to {high} mm for {least:g} to {most:g} ms"
+
+    @property
     def cause(self) -> str:
         """What the largest distance consists of, in words and mm."""
         k = self.worst
@@ -147,7 +156,8 @@ def path_error(
         moved = run.robot.forward(how.executed(q, STEP, run.robot))
         return np.asarray(np.linalg.inv(run.T_base_part) @ moved @ run.T_flange_tip)
 
-    asked, executed = poses(IDEAL), poses(response)
+    asked = poses(IDEAL)
+    executed = asked if response.model == "ideal" else poses(response)
     free = poses(response.without_friction()) if response.friction else executed
     s, tip, axis = drawn.nearest(executed)
     return PathError(
@@ -347,11 +357,14 @@ class Polyline:
         near: Ints = np.asarray(self.tree.query(tip)[1])
         # On one of the two chords beside the nearest point.
         starts = np.clip(near[:, None] + [-1, 0], 0, len(self.points) - 2)
-        chord = self.points[starts + 1] - self.points[starts]
-        long = np.maximum((chord**2).sum(-1), 1e-30)
-        along = ((tip[:, None] - self.points[starts]) * chord).sum(-1) / long
-        along = np.clip(along, 0.0, 1.0)
-        apart = self.points[starts] + along[..., None] * chord - tip[:, None]
-        far = np.linalg.norm(apart, axis=-1)
+        along, far = on_chords(tip[:, None], self.points[starts], self.points[starts + 1])
         row, side = np.arange(len(tip)), np.argmin(far, axis=1)
         return starts[row, side], along[row, side], far[row, side]
+
+
+def on_chords(tip: Array, start: Array, end: Array) -> tuple[Array, Array]:
+    """Return the shares of chords (..., 3) m at the places nearest to points, and the distances."""
+    chord = end - start
+    long = np.maximum((chord**2).sum(-1), 1e-300)
+    along = np.clip(((tip - start) * chord).sum(-1) / long, 0.0, 1.0)
+    return along, np.linalg.norm(start + along[..., None] * chord - tip, axis=-1)

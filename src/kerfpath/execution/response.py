@@ -19,7 +19,7 @@ import numpy as np
 
 from kerfpath.arrays import Array, floats, freeze, short_repr
 from kerfpath.comfort import jacobian
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, about
 from kerfpath.robots import Robot, responses_of
 from kerfpath.setting import check, documented, setting, settings
 
@@ -345,10 +345,8 @@ def read_response(path: str | Path) -> Response:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as fault:
         raise InputError(f"{path}: expected a response of an arm in TOML, got {fault}") from None
-    try:
+    with about(path):
         return response_from(data, path.name)
-    except InputError as fault:
-        raise InputError(f"{path}: {fault}") from None
 
 
 def response_from(data: Mapping[str, Any], name: str) -> Response:

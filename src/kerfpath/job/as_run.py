@@ -10,7 +10,7 @@ import numpy as np
 from kerfpath.arrays import Array, short_repr
 from kerfpath.auditor import Check, Level
 from kerfpath.contour import Contour
-from kerfpath.errors import InputError
+from kerfpath.errors import InputError, about
 from kerfpath.execution import (
     AT_SPEED,
     Executed,
@@ -80,23 +80,24 @@ def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsR
     """
     if kept is not None and kept.run is not None:
         return run_judged(job, kept.run, plan, path, "" if kept.done else kept.statement)
-    if unknown := _not_modelled(job):
-        return AsRun(checks=checks_of_unknown(job, unknown))
     try:
-        run = longest_run(_program(job)(plan), job.program.rules.controller)
-    except InputError as fault:  # reported when the program is written
+        run = run_of(job, plan)
+    except InputError as fault:
         return AsRun(checks=checks_of_unknown(job, str(fault)))
     return AsRun() if run is None else run_judged(job, run, plan, path)
 
 
 def run_of(job: Job, plan: Plan) -> Executed | None:
-    """Return a plan as its program is run; None if that is not known, or it stops at every node."""
-    if _not_modelled(job):
-        return None
-    try:
-        return longest_run(_program(job)(plan), job.program.rules.controller)
-    except InputError:  # reported when the program is written
-        return None
+    """Return a plan as its program is run; None if the robot stops at every node.
+
+    Raises
+    ------
+    InputError
+        The motion of the job's programs between the nodes is not known, or there is no program.
+    """
+    if unknown := _not_modelled(job):
+        raise InputError(unknown)
+    return longest_run(_program(job)(plan), job.program.rules.controller)
 
 
 def allowed_off(job: Job) -> float:
@@ -137,7 +138,7 @@ def run_judged(job: Job, run: Executed, plan: Plan, path: Contour, why: str = ""
     advice = [f"{row.advice}; {why}".removesuffix("; ") for row in shares]
     kept = [replace(r, level=level, advice=a) for r, a in zip(shares, advice, strict=True)]
     torque = [replace(row, level=level) for row in _torque(run, plan)]
-    timing = None if np.isnan(run.acceleration_share).any() else timing_of(run)
+    timing = timing_of(run) if run.reached else None
     off = path_error(run, path, timing=timing, response=job.response)
     rows = (*kept, *unproved, *torque, *_deviations(job, run, off, plan, path), *_cycle(run, plan))
     if timing is not None:
@@ -235,11 +236,7 @@ def _closer(run: Executed, off: PathError, plan: Plan, path: Contour, tip: float
     said = f"{off.cause}, at s = {off.s[k] * 1e3:.1f} mm"
     if response.model != "ideal":
         said += f" ({response.words}"
-        if response.sigma_range is not None:
-            low, high = (f"{end * 1e3:.2g}" for end in off.ends)
-            least, most = response.sigma_range * 1e3
-            said += f"; {low} to {high} mm for {least:g} to {most:g} ms"
-        said += ")"
+        said += f"; {off.range_words})" if off.range_words else ")"
     if off.rounding[k] > tip:
         return f"{said}; {_narrower(run.controller)}, or sample the contour more finely"
     share = share_within(run, path, tip, response)
@@ -294,16 +291,11 @@ def runs_of(job: Job, plans: Sequence[Plan], of: str) -> list[Executed]:
     Raises
     ------
     InputError
-        The motion of the job's programs between the nodes is not known, or there is no such run.
+        As `run_of`, or there is no such run.
     """
-    if unknown := _not_modelled(job):
-        raise InputError(f"{job.path}: {unknown}")
-    controller = job.program.rules.controller
-    found = []
-    for plan in plans:
-        run = longest_run(_program(job)(plan), controller)
-        if run is not None and not np.isnan(run.acceleration_share).any():
-            found.append(replace(run, section=plan.name))
+    with about(job.path):
+        runs = [(plan.name, run_of(job, plan)) for plan in plans]
+    found = [replace(run, section=name) for name, run in runs if run is not None and run.reached]
     if not found:
         raise InputError(f"{of}: expected a cut whose motion is known, got none")
     return found

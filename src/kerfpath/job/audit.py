@@ -672,12 +672,9 @@ def _expressible(limits: Any, robot: Robot, name: str) -> Any:
     A plan that was made for another language may have wider or narrower ones; its joints are
     checked with those of the job.
     """
-    language = languages().get(name)
-    if language is None or language.bounds is None or language.refusal(robot):
+    if (language := languages().get(name)) is None:
         return limits
-    arm, (least, most) = robot.family.joints, language.bounds(robot)
-    lower, upper = (np.array(limits[key]) for key in ("lower_rad", "upper_rad"))
-    lower[:arm], upper[:arm] = np.maximum(lower[:arm], least), np.minimum(upper[:arm], most)
+    lower, upper = language.expressible(robot, limits["lower_rad"], limits["upper_rad"])
     return dict(limits) | {"lower_rad": lower.tolist(), "upper_rad": upper.tolist()}
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.auditor import Check
 from kerfpath.errors import InputError
+from kerfpath.execution import on_chords
 from kerfpath.job.audit_report import check, count
 from kerfpath.job.format import Job, read_job
 from kerfpath.job.plan_file import read_plan_file
@@ -282,20 +283,8 @@ def _distances(job: Job, q: Array, targets: Array) -> Array:
         ahead = ends[at : at + 4]
         at += int(np.argmin(np.linalg.norm(ahead - tip, axis=1)))
         nearest[k] = at
-    found = [
-        _from_line(tips, ends[np.clip(nearest + i, 0, len(ends) - 2)],
-                   ends[np.clip(nearest + i, 0, len(ends) - 2) + 1])
-        for i in (-1, 0)
-    ]  # fmt: skip
-    return np.asarray(np.minimum(*found))
-
-
-def _from_line(tips: Array, start: Array, end: Array) -> Array:
-    """Return the distances (M,) m of points from line segments."""
-    way = end - start
-    share = ((tips - start) * way).sum(axis=1) / np.maximum((way * way).sum(axis=1), 1e-300)
-    foot = start + np.clip(share, 0, 1)[:, None] * way
-    return np.asarray(np.linalg.norm(tips - foot, axis=1))
+    first = np.clip(nearest[:, None] + [-1, 0], 0, len(ends) - 2)
+    return np.asarray(on_chords(tips[:, None], ends[first], ends[first + 1])[1].min(axis=1))
 
 
 def _switches(done: Record, read: ReadProgram, job: Job) -> tuple[tuple[BeamSwitch, ...], int]:

@@ -12,6 +12,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
 from kerfpath.arrays import Array, short_repr
@@ -740,6 +741,17 @@ class Language:
     def controller(self, settings: LanguageSettings | None = None) -> Controller:
         """Return the controller that settings describe, by default the language's defaults."""
         return self.rules(self.completed(settings)).controller
+
+    def expressible(self, robot: Robot, lower: ArrayLike, upper: ArrayLike) -> tuple[Array, Array]:
+        """Return limits (n,) of a robot's joints, narrowed to what targets can express.
+
+        External axes, last, keep theirs, and all joints do if the language cannot move the robot.
+        """
+        least, most = np.array(lower, dtype=float), np.array(upper, dtype=float)
+        if self.bounds is not None and not self.refusal(robot):
+            arm, (low, high) = slice(robot.family.joints), self.bounds(robot)
+            least[arm], most[arm] = np.maximum(least[arm], low), np.minimum(most[arm], high)
+        return least, most
 
     def refusal(self, robot: Robot) -> str:
         """Return why no program in this language can move a robot; empty if one can."""

@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from kerfpath.arrays import Array, short_repr, spread
-from kerfpath.report.style import ACCENT, CHOSEN, FAINT, INK, axis, axis_title, base_layout
+from kerfpath.report.style import ACCENT, CHOSEN, FAINT, INK, axis, axis_title, base_layout, short
 
 HEIGHT, SCENE_HEIGHT = 220, 420
 MOST_POINTS = 1500
@@ -70,8 +70,8 @@ def error_along(path: ExecutedPath) -> go.Figure:
         ("as executed", path.off, CHOSEN),
     ):
         figure.add_scatter(
-            x=_mm(path.s[some]),
-            y=_mm(values[some]),
+            x=short(path.s[some] * 1e3),
+            y=short(values[some] * 1e3),
             mode="lines",
             name=name,
             line={"color": colour, "width": 1.6},
@@ -95,9 +95,9 @@ def enlarged(path: ExecutedPath) -> go.Figure:
         ("drawn", path.nearest, ACCENT, 3),
         (f"executed, errors x {path.factor:g}", moved, CHOSEN, 4),
     ):
-        x, y, z = points[some].T
+        x, y, z = short(points[some].T * 1e3)
         figure.add_scatter3d(
-            x=_mm(x), y=_mm(y), z=_mm(z), mode="lines", name=name, hoverinfo="skip",
+            x=x, y=y, z=z, mode="lines", name=name, hoverinfo="skip",
             line={"color": colour, "width": width},
         )  # fmt: skip
     hidden: dict[str, Any] = {"visible": False}
@@ -120,10 +120,6 @@ def enlarged(path: ExecutedPath) -> go.Figure:
         },
     )
     return figure
-
-
-def _mm(values: Array) -> list[float]:
-    return [float(f"{value * 1e3:.5g}") for value in values]
 
 
 def _camera(points: Array) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from kerfpath.report.style import (
     band,
     base_layout,
     joint_colours,
+    short,
 )
 from kerfpath.robots import posture_name
 
@@ -81,8 +82,8 @@ def joint_positions(plan: Plan) -> go.Figure:
             ),
         }
         figure.add_scatter(
-            x=_short(plan.time),
-            y=_short(q),
+            x=short(plan.time),
+            y=short(q),
             mode="lines",
             line={"color": joint_colours(robot)[joint], "width": 2},
             name=name,
@@ -122,8 +123,8 @@ def cutting_speed(plan: Plan) -> go.Figure:
     figure.update_layout(meta={"nodes": np.round(s, 2).tolist()})
     speed = np.diff(plan.contour.s) / np.diff(plan.time) * 60
     figure.add_scatter(
-        x=_short(s),
-        y=_short(np.append(speed, speed[-1])),
+        x=short(s),
+        y=short(np.append(speed, speed[-1])),
         mode="lines",
         line={"color": INK, "width": 1.6, "shape": "hv"},
         hovertemplate="%{y:.2f} m/min",
@@ -183,8 +184,8 @@ def limit_shares(plan: Plan) -> go.Figure:
             )
         for joint, name in enumerate(plan.robot.joint_names):
             figure.add_scatter(
-                x=_short(time),
-                y=_short(share[:, joint] * 100),
+                x=short(time),
+                y=short(share[:, joint] * 100),
                 mode="lines",
                 line={"color": joint_colours(plan.robot)[joint], "width": 1.6},
                 name=name,
@@ -281,11 +282,6 @@ def _level(value: float, x: str, y: str, colour: str, dash: str) -> dict[str, ob
         "line": {"color": colour if dash == "solid" else FAINT, "width": 1, "dash": dash},
         "layer": "below",
     }
-
-
-def _short(values: Array) -> Any:
-    """Return `values` in single precision, whose seven digits are enough for a screen."""
-    return values.astype(np.float32)
 
 
 def _axis(kind: str, panel: int) -> str:

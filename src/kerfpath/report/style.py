@@ -8,8 +8,10 @@ from itertools import cycle
 from textwrap import wrap
 from typing import Any
 
+import numpy as np
 import plotly.graph_objects as go
 
+from kerfpath.arrays import Array
 from kerfpath.losses import Loss, Reason
 from kerfpath.robots import Robot
 
@@ -94,6 +96,11 @@ def axis(**more: Any) -> dict[str, object]:
         "tickfont": {"size": 11, "color": QUIET},
         "title": {"font": {"size": 12, "color": QUIET}},
     } | more
+
+
+def short(values: Array) -> Any:
+    """Return `values` in single precision, whose seven digits are enough for a screen."""
+    return values.astype(np.float32)
 
 
 def axis_title(text: str) -> dict[str, object]:

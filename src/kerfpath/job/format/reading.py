@@ -345,15 +345,10 @@ def _loaded(path: Path, file: JobFile, robot: Robot) -> Robot:
 
 def _expressible(path: Path, file: JobFile, robot: Robot) -> Robot:
     """Return the robot with the joints that targets in the language of the program can express."""
-    name = file.program.language
-    language = None if name == "none" else languages()[name]
-    if language is None or language.bounds is None or language.refusal(robot):
+    if (language := languages().get(file.program.language)) is None or language.bounds is None:
         return robot
     limits = robot.joint_limits()
-    lower, upper = limits.lower.copy(), limits.upper.copy()
-    least, most = language.bounds(robot)
-    arm = slice(robot.family.joints)
-    lower[arm], upper[arm] = np.maximum(lower[arm], least), np.minimum(upper[arm], most)
+    lower, upper = language.expressible(robot, limits.lower, limits.upper)
     if (bad := np.flatnonzero(lower > upper)).size:
         joint = int(bad[0])
         ends = np.degrees([limits.lower[joint], limits.upper[joint]])

@@ -168,10 +168,8 @@ def _executed(job: Job, cut: CutResult) -> ExecutedPath | None:
         ("Joints", off.response.words),
         ("Reversals of joints 1 to 3", str(len(off.reversals))),
     ]
-    if off.response.sigma_range is not None:
-        low, high = off.response.sigma_range * 1e3
-        least, most = (f"{end * 1e3:.2g}" for end in off.ends)
-        facts.insert(4, ("Range", f"{least} to {most} mm for sigma from {low:g} to {high:g} ms"))
+    if off.range_words:
+        facts.insert(4, ("Largest, by sigma", off.range_words))
     if hole is not None:
         facts.append(("Diameter", f"{hole.executed * 1e3:.2f} mm, drawn {hole.drawn * 1e3:.2f} mm"))
         facts.append(("Out of round by", f"{hole.out_of_round * 1e3:.2f} mm"))

@@ -9,7 +9,7 @@ import numpy as np
 from kerfpath.arrays import short_repr
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
-from kerfpath.errors import NoFeasiblePath
+from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.execution import Executed, Kept, share_within
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.as_run import allowed_off, keeps_between_nodes, kept_between_nodes, run_of
@@ -28,48 +28,55 @@ SLOWER = 0.97
 TRIES = 4
 
 
-def speed_as_run(job: Job, nodes: Contour, cell: Cell | None, fastest: float) -> float | None:
+def speed_as_run(
+    job: Job, nodes: Contour, cell: Cell | None, fastest: float
+) -> tuple[float, Kept] | None:
     """Return a speed, m/s, at which the program of a plan keeps the limits between the nodes.
 
     It is at most `fastest`, m/s, at which a path exists at the nodes. It is found by planning, and
-    proved for that speed; a faster one may exist. None if the job does not ask for it, or if none
-    is found.
+    proved for that speed and the plan that is returned; a faster one may exist. None if the job
+    does not ask for it, or if none is found.
     """
     if not keeps_between_nodes(job):
         return None
     first = _kept(job, nodes, cell, fastest)
     if first is not None and first.done:
-        return fastest
+        return fastest, first
     low, high = fastest * _share(first), fastest
     for _ in range(TRIES):
-        if _keeps(job, nodes, cell, low):
+        if (found := _done(job, nodes, cell, low)) is not None:
             break
         low, high = SLOWER * low, low
     else:
         return None
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        if _keeps(job, nodes, cell, middle):
-            low = middle
+        if (faster := _done(job, nodes, cell, middle)) is not None:
+            low, found = middle, faster
         else:
             high = middle
-    return low
+    return low, found
 
 
-def speed_true_to_path(
-    job: Job, nodes: Contour, path: Contour, cell: Cell | None, fastest: float
-) -> float | None:
+def speed_true_to_path(job: Job, run: Executed | None, path: Contour, speed: float) -> float | None:
     """Return a speed, m/s, at which the executed path is within the path tolerance of the job.
 
-    It is that of the motion planned at `fastest`, m/s, when it is run more slowly. None if no speed
-    helps, or the motion between the nodes is not known.
+    It is that of a run at `speed`, m/s, when it is run more slowly. None if no speed helps, or the
+    motion between the nodes is not known.
     """
-    made = _planned(job, nodes, cell, fastest)
-    run = None if made is None else run_of(job, made)
-    if run is None or np.isnan(run.acceleration_share).any():
+    if run is None or not run.reached:
         return None
     share = share_within(run, path, allowed_off(job), job.response)
-    return None if share is None else fastest * share
+    return None if share is None else speed * share
+
+
+def _run_at(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Executed | None:
+    """Return the run of a plan at a speed, m/s; None without a plan, or if it is not known."""
+    made = _planned(job, nodes, cell, speed)
+    try:
+        return None if made is None else run_of(job, made)
+    except InputError:  # reported when the program is written
+        return None
 
 
 def _share(kept: Kept | None) -> float:
@@ -81,9 +88,10 @@ def _share(kept: Kept | None) -> float:
     return float(0.999 / slower) if np.isfinite(slower) else SLOWER
 
 
-def _keeps(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> bool:
+def _done(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Kept | None:
+    """Return a plan at a speed that keeps the limits between its nodes; None without one."""
     kept = _kept(job, nodes, cell, speed)
-    return kept is not None and kept.done
+    return kept if kept is not None and kept.done else None
 
 
 def _kept(job: Job, nodes: Contour, cell: Cell | None, speed: float) -> Kept | None:
@@ -195,11 +203,18 @@ def fastest_speeds(job: Job, *, progress: Progress = no_progress) -> list[Contou
             continue
         progress(f"{task.name}: between the nodes", 0, 0)
         free = replace(own, options=own.options.without_penalties)
-        as_run = speed_as_run(free, nodes, cell, found.speed)
-        close = speed_true_to_path(
-            free, nodes, task.candidates(part)[0], cell, as_run or found.speed
-        )
+        kept = speed_as_run(free, nodes, cell, found.speed)
+        if kept is None:
+            speed, run = found.speed, _run_at(free, nodes, cell, found.speed)
+        else:
+            speed, run = kept[0], kept[1].run
         answers.append(
-            ContourSpeed(task=task, nodes=nodes, at_nodes=found, as_run=as_run, true_to_path=close)
+            ContourSpeed(
+                task=task,
+                nodes=nodes,
+                at_nodes=found,
+                as_run=None if kept is None else speed,
+                true_to_path=speed_true_to_path(free, run, task.candidates(part)[0], speed),
+            )
         )
     return answers
