@@ -110,6 +110,10 @@ def test_the_library_says_what_its_responses_stand_on():
     assert response("abb_irb6640_180_255", "robotstudio").model == "filter"
     assert response("abb_irb4600_60_205") is response(None) is ASSUMED
     assert "assumed" in ASSUMED.words
+    real = response("abb_irb6640_180_255").words
+    assert real == "lag, deflection and friction of the joints fitted to 7 runs, sigma 18.7 ms"
+    mine = Response(sigma=[0.02, 0.03], standing="measured", runs=1).words
+    assert mine == "lag of the joints measured in 1 run, sigma 20 to 30 ms"
 
 
 def test_what_a_response_is_not():

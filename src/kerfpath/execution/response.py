@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from kerfpath.arrays import Array, floats, freeze, short_repr
+from kerfpath.arrays import Array, counted, floats, freeze, short_repr
 from kerfpath.comfort import jacobian
 from kerfpath.errors import InputError, about
 from kerfpath.robots import Robot, responses_of
@@ -160,13 +160,12 @@ class Response:
         """The model and its standing in one phrase."""
         if self.model == "ideal":
             return "ideal joints, without lag"
-        by = f"{self.standing}" + f" to {self.runs} runs" * (self.runs > 0)
+        by = {"assumed": "assumed", "fitted": "fitted to", "measured": "measured in"}[self.standing]
+        by += f" {counted(self.runs, 'run')}" if self.standing != "assumed" else ""
         what = {"filter": "lag", "elastic": "lag, deflection and friction"}[self.model]
-        sizes = np.unique(np.round(self.sigma[[0, -1]] * 1e3, 1))
-        sigma = f"{self.sigma.min() * 1e3:.3g} ms"
-        if len(sizes) > 1 or np.ptp(self.sigma) > 0:
-            sigma = f"{self.sigma.min() * 1e3:.3g} to {self.sigma.max() * 1e3:.3g} ms"
-        return f"{what} of the joints {by}, sigma {sigma}"
+        low, high = (f"{s * 1e3:.3g}" for s in (self.sigma.min(), self.sigma.max()))
+        sigma = low if low == high else f"{low} to {high}"
+        return f"{what} of the joints {by}, sigma {sigma} ms"
 
     def standing_around(self, q: Array, step: float) -> Array:
         """Return joints (m, n) every `step` s with those before and after, where they stand still.
