@@ -192,7 +192,9 @@ def judge(done: Record, read: ReadProgram, stretches: Sequence[Stretch], job: Jo
         if not len(found) or stretch.moves[0].kind == "joint":
             continue
         off_path[found] = _distances(job, done.q[found], stretch.q)
-        if done.laser[found].any():
+        # A way to a contour ends with the laser switched on, as near as that may be to its node.
+        lit = found[done.laser[found]]
+        if len(lit) and done.time[lit[-1]] - done.time[lit[0]] > BEAM:
             contours.append(
                 ContourRun(
                     name=_contour_of(read, stretch.moves[0]),
