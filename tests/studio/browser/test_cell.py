@@ -89,6 +89,7 @@ def test_a_job_is_made_on_the_page_and_planned(opened, folder, tmp_path):
     edit(page, lambda: cell.get_by_label("Head", exact=True).select_option("laser-head-90"))
     language = cell.get_by_label("Language of the controller")
     assert language.input_value() == "krl"  # that of the robot's maker
+    settled(page)
     edit(page, lambda: cell.get_by_role("button", name="Take the shown pose").click())
     edit(page, lambda: cell.get_by_role("button", name="Add a box").click())
     width = cell.get_by_label("box 1, size x, mm")

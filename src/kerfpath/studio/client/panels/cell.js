@@ -182,15 +182,16 @@ const worded = (word) => ({ value: word, label: word });
 function home() {
   const now = valueOf("sequence.home_deg");
   const take = () => {
-    const q = player.moment?.q ?? store.scene?.sample.q;
+    const { moment } = player;
     const axes = axesOf(store.scene?.robot).filter(({ external }) => !external);
-    if (q) setKeys(["sequence.home_deg", axes.map(({ of }, j) => Number(of(q[j]).toFixed(2)))]);
+    if (moment) setKeys(["sequence.home_deg", axes.map(({ of }, j) => Number(of(moment.q[j]).toFixed(2)))]);
   };
   return html`
     <section class="card">
       <header>
         <h3>Home</h3><span class="grow" />
-        <button class="plain" disabled=${!store.live || !store.scene} onClick=${take}>
+        <button class="plain" title="The pose of the plan at the moment that is shown"
+          disabled=${!store.live || !player.moment} onClick=${take}>
           ${icon("follow")}Take the shown pose
         </button>
       </header>
