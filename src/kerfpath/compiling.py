@@ -15,6 +15,7 @@ from kerfpath.graph import build, gamma_grid
 from kerfpath.isolated import start_python
 from kerfpath.kernels import CACHE, is_kept
 from kerfpath.kernels.metric import MANHATTAN, maximum_distance, total_distance
+from kerfpath.kernels.rays import first_met
 from kerfpath.kernels.screening import Energy, energies, newton_steps
 from kerfpath.robots import Robot, robot
 from kerfpath.search import compile_search
@@ -33,7 +34,7 @@ def _example(kinematics: str) -> tuple[Robot, Contour]:
 
 
 def _compile_poses(kinematics: str) -> None:
-    """Compile the kernels of frames, poses, their layered graph, and the measures of a path."""
+    """Compile the kernels of frames, poses, their layered graph, measures of a path, and rays."""
     robot, contour = _example(kinematics)
     for kind in FRAME_KINDS:
         frames = contour.frames(kind)
@@ -43,6 +44,8 @@ def _compile_poses(kinematics: str) -> None:
     for distance in (total_distance, maximum_distance):
         distance(increments, graph.q[0], MANHATTAN)
         distance(freeze(increments.copy()), graph.q[0], MANHATTAN)
+    ray, body = np.ones((1, 3)), np.zeros(1, np.int64)
+    first_met(ray, ray, body, np.zeros((1, 3, 3)), body, np.zeros((2, 2, 3)))
 
 
 def _compile_searches(_: str) -> None:

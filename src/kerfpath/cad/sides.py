@@ -22,16 +22,10 @@ import numpy as np
 from kerfpath.arrays import Array, Bools, Ints
 from kerfpath.cad.curves import label_connected
 from kerfpath.cad.part import Side
+from kerfpath.kernels.rays import LEAF, first_met
 
 # -----------------------------------------------------------------------------
-# The first triangle that each ray meets: a hierarchy of boxes, which all rays descend together.
-
-LEAF = 4
-"""Number of triangles in the smallest boxes."""
-AT_ONCE = 4096
-"""Number of rays that descend together: memory does not grow with the part."""
-START = 1e-6
-"""Distance (mm) from the start of a ray up to which it meets nothing."""
+# The first triangle that each ray meets.
 
 
 class Triangles:
@@ -48,52 +42,21 @@ class Triangles:
     def __init__(self, corners: Array, body: Ints) -> None:
         self._order = _spread(corners)
         self._corners, self._body = corners[self._order], body[self._order]
-        depth = max(0, int(np.ceil(np.log2(max(1, -(-len(corners) // LEAF))))))
-        size = LEAF << depth
-        filled = np.minimum(np.arange(size), len(corners) - 1)
-        boxes = np.stack([self._corners.min(axis=1), self._corners.max(axis=1)], axis=1)[filled]
-        level = boxes.reshape(-1, LEAF, 2, 3)
-        self._levels = [np.stack([level[:, :, 0].min(1), level[:, :, 1].max(1)], axis=1)]
-        while len(self._levels[-1]) > 1:
-            level = self._levels[-1].reshape(-1, 2, 2, 3)
-            self._levels.append(np.stack([level[:, :, 0].min(1), level[:, :, 1].max(1)], axis=1))
+        leaves = 1 << max(0, (-(-len(corners) // LEAF) - 1).bit_length())
+        filled = self._corners[np.minimum(np.arange(LEAF * leaves), len(corners) - 1)]
+        filled = filled.reshape(leaves, -1, 3)
+        self._boxes = np.empty((2 * leaves, 2, 3))
+        self._boxes[leaves:] = np.stack([filled.min(axis=1), filled.max(axis=1)], axis=1)
+        while leaves > 1:
+            pairs = self._boxes[leaves : 2 * leaves].reshape(-1, 2, 2, 3)
+            leaves //= 2
+            self._boxes[leaves : 2 * leaves, 0] = pairs[:, :, 0].min(axis=1)
+            self._boxes[leaves : 2 * leaves, 1] = pairs[:, :, 1].max(axis=1)
 
     def first(self, origins: Array, directions: Array, body: Ints) -> tuple[Array, Ints]:
         """Return distance (K,) mm and triangle (K,) that rays (K, 3) meet; inf and -1 for none."""
-        distance, index = np.full(len(origins), np.inf), np.full(len(origins), -1)
-        for k in range(0, len(origins), AT_ONCE):
-            part = slice(k, k + AT_ONCE)
-            distance[part], index[part] = self._first(origins[part], directions[part], body[part])
-        return distance, index
-
-    def _first(self, o: Array, d: Array, body: Ints) -> tuple[Array, Ints]:
-        with np.errstate(divide="ignore"):
-            inverse = 1 / d
-        ray, node = np.arange(len(o)), np.zeros(len(o), dtype=np.int64)
-        for level in self._levels[::-1]:
-            if level is not self._levels[-1]:
-                ray, node = np.repeat(ray, 2), np.repeat(2 * node, 2)
-                node[1::2] += 1
-            with np.errstate(invalid="ignore"):  # 0 * inf: the ray lies in the plane of a side
-                sides = (level[node] - o[ray, None]) * inverse[ray, None]
-            near, far = np.fmin(sides[:, 0], sides[:, 1]), np.fmax(sides[:, 0], sides[:, 1])
-            enter, leave = np.fmax.reduce(near, axis=1), np.fmin.reduce(far, axis=1)
-            met = (enter <= leave + START) & (leave >= 0)
-            ray, node = ray[met], node[met]
-        ray, node = np.repeat(ray, LEAF), np.repeat(LEAF * node, LEAF)
-        node += np.tile(np.arange(LEAF), len(node) // LEAF)
-        there = node < len(self._corners)
-        ray, node = ray[there], node[there]
-        same = body[ray] == self._body[node]
-        ray, node = ray[same], node[same]
-        t = _meet(o[ray], d[ray], self._corners[node])
-        met = np.isfinite(t)
-        ray, node, t = ray[met], node[met], t[met]
-        order = np.lexsort((t, ray))
-        rays, place = np.unique(ray[order], return_index=True)
-        distance, index = np.full(len(o), np.inf), np.full(len(o), -1)
-        distance[rays], index[rays] = t[order][place], self._order[node[order][place]]
-        return distance, index
+        far, met = first_met(origins, directions, body, self._corners, self._body, self._boxes)
+        return far, np.where(met >= 0, self._order[met], -1)
 
 
 def _spread(corners: Array) -> Ints:
@@ -113,20 +76,6 @@ def _spread(corners: Array) -> Ints:
         order[low:high] = own[np.argpartition(middle[own, along], half)]
         runs += [(low, low + half), (low + half, high)]
     return order
-
-
-def _meet(o: Array, d: Array, corners: Array) -> Array:
-    """Return how far (K,) rays go to a triangle each, inf if they miss (Moeller and Trumbore)."""
-    a, e1, e2 = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    h = np.cross(d, e2)
-    volume = (e1 * h).sum(1)
-    flat = np.abs(volume) <= 1e-12 * np.linalg.norm(e1, axis=1) * np.linalg.norm(e2, axis=1)
-    inverse = 1 / np.where(flat, 1.0, volume)
-    s = o - a
-    u, q = inverse * (s * h).sum(1), np.cross(s, e1)
-    v, t = inverse * (q * d).sum(1), inverse * (e2 * q).sum(1)
-    met = ~flat & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (t > START)
-    return np.where(met, t, np.inf)
 
 
 # -----------------------------------------------------------------------------
