@@ -82,6 +82,22 @@ def test_plans_lead_the_tip_along_their_contours_in_the_scene(planned):
         assert max(made["joint_load"]) == pytest.approx(max(s.max() for s in shares), abs=1e-6)
 
 
+def test_executed_paths_are_beside_their_contours_as_far_as_the_audit_says(planned):
+    _, _, heard = planned
+    for contour in last(heard, "scene")["contours"]:
+        made = last(heard, "plan", contour=contour["name"])
+        drawn, tip = (np.array(made["executed"][key]).reshape(-1, 3) for key in ("drawn", "tip"))
+        off = np.linalg.norm(tip - drawn, axis=1)
+        (said,) = [each for each in made["checks"] if each["code"] == "tip-as-run"]
+        assert made["executed"]["largest"] == said["value"]
+        # Points are rounded to 0.1 um, and are not at the very instant of the largest error.
+        assert 0.9 * said["value"] < off.max() < said["value"] + 1e-6
+        assert "assumed" in made["executed"]["joints"]
+        points = np.array(contour["points"]).reshape(-1, 3)
+        apart = np.linalg.norm(drawn[:, None] - points[None], axis=2).min(axis=1)
+        assert apart.max() < 2e-3  # as far as nodes are from each other
+
+
 def test_robot_and_head_are_seen_before_the_drawing_has_been_read(planned):
     _, _, heard = planned
     soon, scene = (message for message in heard if message["type"] == "scene")
@@ -274,6 +290,7 @@ def test_an_edit_is_planned_again_at_once_and_undone(studio):
     assert draft["graph"] == before["graph"]
     assert draft["statement"].startswith("a draft")
     assert (draft["settled"], draft["checks"], draft["passed"]) == (False, None, None)
+    assert draft["executed"] is None
     made = page.until("plan", revision=2, contour="slot")
     assert made["passed"]
     # A draft keeps the limits; what the search finds everywhere is better, or as good.

@@ -1,6 +1,6 @@
 """The messages between the studio's server and its page: a section of the site, and types.
 
-Both are made from the models of the messages. `python docs/_ext/reference/studio_messages.py`
+Both are made from the models of the messages. In `docs/_ext`, `python -m reference.studio_messages`
 writes the types, which the checks of the page read; a test compares them.
 """
 

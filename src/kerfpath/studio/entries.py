@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from kerfpath.arrays import Array
+from kerfpath.arrays import Array, spread
 from kerfpath.auditor import Check
 from kerfpath.cad import Loop, Part
 from kerfpath.cell import Cell
@@ -26,6 +26,7 @@ from kerfpath.studio.messages import (
     ContourName,
     CriteriaEntry,
     EditEntry,
+    ExecutedEntry,
     FaceEntry,
     Fault,
     JobMessage,
@@ -41,6 +42,9 @@ from kerfpath.studio.messages import (
 )
 from kerfpath.studio.work import Stop
 from kerfpath.study.placing import Placement, changes_of
+
+EXECUTED = 1500
+"""Number of points of an executed path; more are not seen."""
 
 # -----------------------------------------------------------------------------
 # The messages about a plan, and about the reason why there is none.
@@ -109,8 +113,25 @@ def plan_message(
         joint_load=flat(_load(velocity, acceleration), 6),
         checks=check_entries((*cut.checks, *cut.as_run.checks)) if audited else None,
         passed=cut.passed if audited else None,
+        executed=_executed(cut, made) if audited else None,
         feed=None if made.feed is None else str(made.feed),
         seconds=seconds,
+    )
+
+
+def _executed(cut: CutResult, made: Plan) -> ExecutedEntry | None:
+    """Return the executed tip of a cut with its plan; None if it is not known."""
+    off = cut.as_run.path_error
+    if off is None:
+        return None
+    some = spread(len(off.s), EXECUTED)
+    rotation, origin = made.T_base_part[:3, :3], made.T_base_part[:3, 3]
+    drawn, tip = cut.candidate.path.at(off.s[some])[0], off.T[some, :3, 3]
+    return ExecutedEntry(
+        drawn=flat(drawn @ rotation.T + origin, 7),
+        tip=flat(tip @ rotation.T + origin, 7),
+        largest=off.largest,
+        joints=off.response.words,
     )
 
 

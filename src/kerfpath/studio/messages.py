@@ -373,6 +373,19 @@ class CheckEntry(Message):
     node: int | None
 
 
+class ExecutedEntry(Message):
+    """The tool tip as the joints execute a plan, beside the path as drawn."""
+
+    drawn: Numbers
+    """(M 3) m, the points of the path that are nearest to the tip."""
+    tip: Numbers
+    """(M 3) m, at instants that are evenly spread."""
+    largest: float
+    """m, the largest distance of the two."""
+    joints: str
+    """How the joints follow what is commanded, and whether that is assumed, fitted or measured."""
+
+
 class PlanMessage(Message):
     """One motion along a contour, or along a piece of one."""
 
@@ -426,6 +439,8 @@ class PlanMessage(Message):
     """The audit, null until it is complete."""
     passed: bool | None
     """Whether it passes; null until it is complete."""
+    executed: ExecutedEntry | None
+    """Null until the audit is complete, and if the robot stops at every node."""
     feed: str | None
     """In words."""
     seconds: float

@@ -1,4 +1,4 @@
-"""Contours by clearance: the nearest pair is lit, and its distance stands beside the tip."""
+"""What the scene draws on request: the nearest pair of bodies, ghosts, and executed paths."""
 
 import pytest
 
@@ -68,3 +68,31 @@ def test_ghosts_stay_where_the_robot_was_until_they_are_cleared(page, studio, fi
     for _ in range(8):
         page.locator("#ghost-keep").click()
     assert page.evaluate("() => studio.view.ghosts.group.children.length") == 6
+
+
+DRAWN = """() => {
+    const { visible, geometry } = studio.view.paths.executed;
+    if (!visible) return null;
+    return ["instanceStart", "instanceEnd"].flatMap((name) => {
+        const of = geometry.getAttribute(name);
+        return [of.getX(0), of.getY(0), of.getZ(0)];
+    });
+}"""
+
+
+def test_the_executed_path_is_drawn_with_its_errors_enlarged(page, studio, first):
+    studio.open(*first)
+    ready(page)
+    assert page.evaluate(DRAWN) is None
+    plan = next(m for m in first if m["type"] == "plan")
+    drawn, tip = (plan["executed"][key][:6] for key in ("drawn", "tip"))
+    for word, factor in (("1", 1), ("50", 50)):
+        page.locator("#executed").select_option(word)
+        asked = [a + factor * (b - a) for a, b in zip(drawn, tip, strict=True)]
+        assert page.evaluate(DRAWN) == pytest.approx(asked, abs=1e-6)  # in single precision
+    until(page, lambda: "at most 0.17 mm off" in page.locator("#scale").inner_text())
+    assert "assumed, sigma 25 ms" in page.locator("#scale").inner_text()
+    assert serious(page) == []
+    page.locator("#executed").select_option("0")
+    assert page.evaluate(DRAWN) is None
+    until(page, lambda: "executed" not in page.locator("#scale").inner_text())

@@ -306,6 +306,18 @@ export interface CheckEntry {
   node: number | null;
 }
 
+/** The tool tip as the joints execute a plan, beside the path as drawn. */
+export interface ExecutedEntry {
+  /** (M 3) m, the points of the path that are nearest to the tip. */
+  drawn: number[];
+  /** (M 3) m, at instants that are evenly spread. */
+  tip: number[];
+  /** m, the largest distance of the two. */
+  largest: number;
+  /** How the joints follow what is commanded, and whether that is assumed, fitted or measured. */
+  joints: string;
+}
+
 /** One motion along a contour, or along a piece of one. */
 export interface PlanMessage {
   type: "plan";
@@ -358,6 +370,8 @@ export interface PlanMessage {
   checks: CheckEntry[] | null;
   /** Whether it passes; null until it is complete. */
   passed: boolean | null;
+  /** Null until the audit is complete, and if the robot stops at every node. */
+  executed: ExecutedEntry | null;
   /** In words. */
   feed: string | null;
   /** The time of the search. */

@@ -184,7 +184,8 @@ function home() {
   const take = () => {
     const { moment } = player;
     const axes = axesOf(store.scene?.robot).filter(({ external }) => !external);
-    if (moment) setKeys(["sequence.home_deg", axes.map(({ of }, j) => Number(of(moment.q[j]).toFixed(2)))]);
+    if (moment)
+      setKeys(["sequence.home_deg", axes.map(({ of }, j) => Number(of(moment.q[j]).toFixed(2)))]);
   };
   return html`
     <section class="card">

@@ -113,11 +113,17 @@ function proof(plans) {
 }
 
 /** @param {import("../messages.js").CheckEntry} check */
-function failure({ title, value, limit, unit, ok }) {
+function failure({ title, value, limit, unit, level, ok }) {
   const is = value === null ? "" : `: ${inUnits(value, unit)}`;
   const most = limit === null ? "" : `, the limit is ${inUnits(limit, unit)}`;
-  return !ok && html`<p class="fault">${icon("warning")}${` ${title}${is}${most}`}</p>`;
+  return !ok && html`<p class=${classOf(level)}>${icon("warning")}${` ${title}${is}${most}`}</p>`;
 }
+
+/**
+ * A plan passes with a warning.
+ * @param {string} level
+ */
+const classOf = (level) => (level === "warning" ? "doubt" : "fault");
 
 /** The audit of the plan of the chosen contour, and its margins. */
 export function auditPanel() {
@@ -132,13 +138,13 @@ export function auditPanel() {
         <summary>${audit || "Margins"}</summary>
         ${table(
           near.map(({ name, value, unit }) => ({
-            ...{ name: `nearest: ${name}`, ok: true },
+            ...{ name: `nearest: ${name}`, level: "", ok: true },
             value: value === null ? "none" : inUnits(value, unit),
           })),
         )}
         ${table(
-          checks.map(({ title: name, value, unit, ok }) => ({
-            ...{ name, ok },
+          checks.map(({ title: name, value, unit, level, ok }) => ({
+            ...{ name, level, ok },
             value: value === null ? (ok ? "yes" : "no") : inUnits(value, unit),
           })),
         )}
@@ -147,13 +153,13 @@ export function auditPanel() {
     </section>`;
 }
 
-/** @param {{name: string, value: string, ok: boolean}[]} rows */
+/** @param {{name: string, value: string, level: string, ok: boolean}[]} rows */
 const table = (rows) => html`
   <table class="figures-list">
     <tbody>
       ${rows.map(
-        ({ name, value, ok }) =>
-          html`<tr><th scope="row">${name}</th><td class=${ok ? "" : "fault"}>${value}</td></tr>`,
+        ({ name, value, level, ok }) =>
+          html`<tr><th scope="row">${name}</th><td class=${ok ? "" : classOf(level)}>${value}</td></tr>`,
       )}
     </tbody>
   </table>`;

@@ -75,14 +75,25 @@ export class Paths {
     this.all = line(2.6, "", 2, { vertexColors: true });
     this.kerf = line(3.8, "--kerf", 3);
     this.beam = line(2.6, "--beam", 4, { opacity: 0.9 });
+    this.executed = line(2.6, "--executed", 4);
     this.mark = line(7, "--alert", 5, { depthTest: false });
-    this.lines = [this.chosen, this.through, this.all, this.kerf, this.beam, this.mark];
+    this.lines = [
+      this.chosen,
+      this.through,
+      this.all,
+      this.kerf,
+      this.beam,
+      this.executed,
+      this.mark,
+    ];
     // All of these move with the part; the beam moves with the head.
     this.group.add(...this.lines.filter((each) => each !== this.beam));
     /** @type {Track[]} */
     this.tracks = [];
     /** @type {ColourBy} */
     this.by = "kind";
+    /** Factor by which the errors of the executed paths are enlarged; 0: they are not drawn. */
+    this.enlarged = 0;
     /** @type {[number, number]} of the values that are coloured by */
     this.range = [0, 1];
     /** @type {{end: number, begin: number, first: number, time: number[]}[]} spans in the kerf */
@@ -102,7 +113,23 @@ export class Paths {
   load(tracks) {
     this.tracks = tracks;
     fill(this.all, tracks);
+    this.enlarge();
     this.colour();
+  }
+
+  /**
+   * Draw the executed paths with their errors enlarged.
+   * @param {number} [factor]  0: none
+   */
+  enlarge(factor = this.enlarged) {
+    this.enlarged = factor;
+    const known = this.tracks.flatMap(({ plan }) => plan?.executed ?? []);
+    fill(
+      this.executed,
+      (factor ? known : []).map(({ drawn, tip }) => ({
+        points: drawn.map((at, i) => at + factor * (tip[i] - at)),
+      })),
+    );
   }
 
   /**

@@ -92,6 +92,11 @@ export class SceneView {
       this.paths.colour(/** @type {import("./paths.js").ColourBy} */ (by.value));
       this.show(player.moment);
     });
+    const executed = byId("executed", HTMLSelectElement);
+    executed.addEventListener("change", () => {
+      this.paths.enlarge(Number(executed.value));
+      this.stage.invalidate();
+    });
   }
 
   /**
