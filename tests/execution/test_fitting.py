@@ -1,12 +1,15 @@
 """Responses fitted to logs: known ones are found again, and logs of something else are refused."""
 
 import csv
+import shutil
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import kerfpath
+from commands import run
+from jobs import DEMO, SMALL
 from kerfpath import InputError, Response, Target, simulate
 from kerfpath.execution import (
     CommandedRun,
@@ -15,6 +18,8 @@ from kerfpath.execution import (
     read_response,
     response_text,
 )
+from kerfpath.execution.path_error import STEP
+from kerfpath.job import read_job, read_plan_file, runs_of
 
 TOOL = np.eye(4)
 TOOL[:3, 3] = [0.1, 0.0, 0.4]
@@ -177,3 +182,33 @@ def test_what_is_no_log_of_the_robot_is_refused_in_one_line(tmp_path, robot):
         assert str(caught.value).startswith(str(file))
     with pytest.raises(InputError, match="no such file"):
         read_log(tmp_path / "none.csv", robot, TOOL)
+
+
+@pytest.mark.slow
+def test_logs_of_a_job_are_fitted_by_the_command_and_shown_on_a_page(tmp_path):
+    shutil.copy(DEMO / "b_pillar.step", tmp_path)
+    path, plan = tmp_path / "small.toml", tmp_path / "out" / "plan.json"
+    path.write_text(SMALL.replace("[plan]", "[plan]\ncertify = false"))
+    assert run("plan", path, "--out", plan.parent).returncode == 0
+    job, truth = read_job(path), Response(sigma=np.array([0.03]))
+    logs = []
+    for of in runs_of(job, read_plan_file(plan).plans, "plan"):
+        commanded = CommandedRun.of(of)
+        q = truth.executed(truth.standing_around(commanded.q, STEP), STEP, job.robot)
+        name = f"log{len(logs)}.csv"
+        logs.append(
+            table_of(tmp_path / name, ["t_s", *JOINTS], STEP * np.arange(len(q)), np.degrees(q))
+        )
+    stray = table_of(tmp_path / "stray.csv", ["t_s", *JOINTS], [0, 1], np.eye(2, 6))
+    asked = ("fit", *logs, stray, "--job", path, "--plan", plan, "-o")
+    done = run(*asked, tmp_path / "own.toml")
+    assert done.returncode == 0, done.stderr
+    found = read_response(tmp_path / "own.toml")
+    assert found.sigma == pytest.approx(0.03, abs=1e-3)
+    page = (tmp_path / "own.html").read_text()
+    for words in ("one sigma *", "stray.csv follows no cut", "Held out"):
+        assert words in page
+    assert page.count('type="application/octet-stream"') == 1
+    refused = run(*asked, tmp_path / "own.html")
+    assert refused.returncode == 2
+    assert "expected the name of a TOML file" in refused.stderr

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from rich.markup import escape
 
+from kerfpath.arrays import counted
 from kerfpath.auditor import format_value
 from kerfpath.cad import read_measured
 from kerfpath.cli.drawing_output import drawing_of
@@ -56,7 +57,7 @@ from kerfpath.post import (
     write_program,
 )
 from kerfpath.post import language as find_language
-from kerfpath.report import render_controller_run
+from kerfpath.report import FittedCut, render_controller_run, render_fit
 from kerfpath.robots import joint_identifiers
 
 # -----------------------------------------------------------------------------
@@ -424,8 +425,12 @@ def _record_text(done: ControllerRun) -> str:
 
 
 def fit_to_logs(logs: Sequence[Path], job_file: Path, plan: Path, output: Path) -> None:
-    """Fit the response of the robot to logs of a plan's program, and write its file."""
+    """Fit the response of the robot to logs of a plan's program; write its file and a page."""
+    page = output.with_suffix(".html")
+    if page == output:
+        raise InputError(f"{output}: expected the name of a TOML file; a page is written beside it")
     require_output(output, "-o")
+    require_output(page, "-o")
     job = read_job(job_file)
     runs = [CommandedRun.of(run) for run in runs_of(job, read_plan_file(plan).plans, f"{plan}")]
     read = [read_log(log, job.robot, job.tool) for log in logs]
@@ -452,7 +457,7 @@ def fit_to_logs(logs: Sequence[Path], job_file: Path, plan: Path, output: Path) 
             "chosen": best.form,
             "joints_not_told": [joint + 1 for joint in fit.untold],
             "unused_logs": list(fit.unused),
-            "files": [str(output)],
+            "files": [str(output), str(page)],
         }
     )
     rows = [
@@ -466,19 +471,34 @@ def fit_to_logs(logs: Sequence[Path], job_file: Path, plan: Path, output: Path) 
     ]
     table(["form", "sigma ms", "fitted to all, mm", "held out, mm"], rows)
     cuts = {runs[each.run].name for each in fit.stretches}
-    out.print(
+    caption = (
         "mean / 95 % / largest distance of the logs from the executed path; held out: leaving out "
-        f"{fit.left_out}; *: taken. Compared: {len(fit.stretches)} stretches of {len(cuts)} cuts"
+        f"{fit.left_out}; *: taken. Compared: {counted(len(fit.stretches), 'logged run')} of "
+        f"{counted(len(cuts), 'cut')}"
     )
+    out.print(caption)
+    doubts = list[str]()
     if fit.untold:
         joints = ", ".join(str(joint + 1) for joint in fit.untold)
-        out.print(
-            f"note: the runs cannot tell sigma of joint {joints}, which moves too little or too "
-            "slowly; it has that of all joints"
+        doubts.append(
+            f"the runs cannot tell sigma of joint {joints}, which moves too little or too slowly; "
+            "it has that of all joints"
         )
-    for name in fit.unused:
-        out.print(f"note: {escape(name)} follows no cut of the program and was not used")
+    doubts += [f"{name} follows no cut of the program and was not used" for name in fit.unused]
+    for doubt in doubts:
+        out.print(f"note: {escape(doubt)}")
     write_text(output, text, "-o")
+    compared = zip(fit.stretches, fit.without, fit.left, strict=True)
+    shown = render_fit(
+        output.stem,
+        [FittedCut(f"{runs[e.run].name}, {e.log.name}", e.s, *off) for e, *off in compared],
+        heads=[("Form", ""), ("Sigma", "ms"), ("Fitted to all", "mm"), ("Held out", "mm")],
+        rows=rows,
+        caption=f"{caption[0].upper()}{caption[1:]}.",
+        facts=[("Robot", job.robot.model), ("Response", fit.response.words)],
+        notes=doubts,
+    )
+    write_text(page, shown, "-o")
 
 
 def _three(off: tuple[float, float, float]) -> str:

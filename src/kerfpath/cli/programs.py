@@ -156,7 +156,7 @@ def fit(
 
     Forms of the response with more and more parameters are fitted. The simplest is taken that is
     about as good as the best on what was left out of its fit. The file that is written is named by
-    file in [robot.response] of a job.
+    file in [robot.response] of a job; a page of the same name shows the distances, cut by cut.
 
     Example: kerfpath fit run1.csv run2.csv --job door.toml -o my_robot.toml
     """

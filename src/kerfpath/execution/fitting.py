@@ -164,6 +164,11 @@ class Stretch:
 
     __repr__ = short_repr
 
+    @property
+    def s(self) -> Array:
+        """Length of the way, m, up to each point, (k,)."""
+        return _length(self.points)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CommandedRun:
@@ -296,6 +301,9 @@ class Fit:
         Joints, counted from 0, whose sigma the runs cannot tell; they have that of all joints.
     stretches : tuple of Stretch
         What was compared.
+    without, left : tuple of (k,) m
+        For each stretch, the distances of its points from the path without lag, and from the
+        executed path.
     unused : tuple of str
         Names of logs that follow no run of the program.
     left_out : str
@@ -307,6 +315,8 @@ class Fit:
     chosen: int
     untold: tuple[int, ...]
     stretches: tuple[Stretch, ...]
+    without: tuple[Array, ...]
+    left: tuple[Array, ...]
     unused: tuple[str, ...]
     left_out: str
 
@@ -369,6 +379,8 @@ def fit_response(runs: Sequence[CommandedRun], logs: Sequence[Log]) -> Fit:
         chosen=chosen,
         untold=untold,
         stretches=tuple(every),
+        without=tuple(_off(runs, each, Response()) for each in every),
+        left=tuple(_off(runs, each, response) for each in every),
         unused=tuple(log.name for log, own in zip(logs, found, strict=True) if not own),
         left_out=left_out,
     )

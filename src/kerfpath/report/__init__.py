@@ -1,4 +1,4 @@
-"""Self-contained HTML pages: a job, a drawing, a Pareto set, a layout, a run, a single table."""
+"""Self-contained HTML pages: a job, a drawing, a Pareto set, a layout, a run, a fit, a table."""
 
 from kerfpath.extras import require_extra
 
@@ -7,6 +7,7 @@ require_extra("report", "reports")
 from kerfpath.report.controller_run import render_controller_run
 from kerfpath.report.drawing import DrawnLoop, render_drawing
 from kerfpath.report.executed import ExecutedPath
+from kerfpath.report.fit import FittedCut, render_fit
 from kerfpath.report.front import FrontAxis, FrontPlan, render_front
 from kerfpath.report.layout import LayoutEntry, render_layout
 from kerfpath.report.maps import feasibility_map, hidden_postures, shown_postures
@@ -20,6 +21,7 @@ __all__ = [
     "ContourSection",
     "DrawnLoop",
     "ExecutedPath",
+    "FittedCut",
     "FrontAxis",
     "FrontPlan",
     "LayoutEntry",
@@ -31,6 +33,7 @@ __all__ = [
     "render",
     "render_controller_run",
     "render_drawing",
+    "render_fit",
     "render_front",
     "render_layout",
     "render_table",
