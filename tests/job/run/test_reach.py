@@ -8,7 +8,7 @@ import pytest
 
 from jobs import DEMO, SMALL
 from kerfpath.job import check_job, prepare, read_job, run_job
-from kerfpath.job.run.reach import STEP, move_into_reach
+from kerfpath.job.run.reach import STEP, _moves, move_into_reach
 
 
 def placed(folder, xyz):
@@ -67,3 +67,16 @@ def test_the_advice_of_a_plan_and_the_warning_of_a_check_name_it(tmp_path):
 def test_where_no_move_helps_nothing_is_said(tmp_path):
     job = placed(tmp_path, (9000, 0, 500))
     assert move_into_reach(job, contours(job)) is None
+
+
+def test_no_move_leads_into_the_base_of_the_robot(tmp_path):
+    job = placed(tmp_path, (200, -900, 200))
+    asked = contours(job)
+    points = np.concatenate([nodes.points for nodes, _ in asked])
+    # Base and link 1 of an IRB 4600 are thicker than that up to axis 2, 0.495 m above the floor.
+    inside, tried = [], [by for _, by in _moves(job, asked)]
+    for by in tried:
+        at = points @ job.placement[:3, :3].T + job.placement[:3, 3] + by
+        inside.append(((np.hypot(*at[:, :2].T) < 0.25) & (at[:, 2] > 0) & (at[:, 2] < 0.5)).any())
+    assert len(tried) > 100
+    assert not any(inside)

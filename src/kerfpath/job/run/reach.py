@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath.arrays import Array, short_repr, spread
+from kerfpath.arrays import Array, Bools, short_repr, spread
+from kerfpath.cell import Capsule, link_capsules
 from kerfpath.contour import Contour
 from kerfpath.job.format import Job
 from kerfpath.options import PlanOptions
 from kerfpath.progress import may_stop
+from kerfpath.robots import Robot
 
 STEP, FARTHEST = 0.02, 3.0
 """Step and largest length of the moves that are tried, m."""
@@ -57,7 +59,8 @@ def move_into_reach(job: Job, contours: Sequence[tuple[Contour, PlanOptions]]) -
 
     It leads towards axis 1 of the robot or away from it, up or down. It is tried at every node of
     the contours, with all that their options ask of a pose; it is quickest if those without poses
-    come first. It says nothing about motions and collisions. None is known with external axes.
+    come first. No node comes to where the robot's base and link 1 are; otherwise it says nothing
+    about motions and collisions. None is known with external axes.
     """
     if job.robot.free.size:
         return None
@@ -84,8 +87,10 @@ def _moves(
     job: Job, contours: Sequence[tuple[Contour, PlanOptions]]
 ) -> Iterator[tuple[str, Array]]:
     """Yield moves (3,) m in whole mm, the shortest first, and where they lead."""
-    middle = np.concatenate([nodes.points for nodes, _ in contours]).mean(axis=0)
-    x, y, _ = job.placement[:3, :3] @ middle + job.placement[:3, 3]
+    points = np.concatenate([nodes.points for nodes, _ in contours])
+    points = points @ job.placement[:3, :3].T + job.placement[:3, 3]
+    x, y, _ = points.mean(axis=0)
+    column = _Column.of(job.robot)
     towards = -np.array([x, y, 0.0]) / max(np.hypot(x, y), STEP)
     up = np.array([0.0, 0.0, 1.0])
     ways = {
@@ -96,8 +101,40 @@ def _moves(
     }
     for far in STEP * np.arange(1, round(FARTHEST / STEP) + 1):
         for where, way in ways.items():
-            if where != "towards the robot" or far < np.hypot(x, y):
-                yield where, np.round(far * way, 3)
+            by = np.round(far * way, 3)
+            beyond = where == "towards the robot" and far >= np.hypot(x, y)
+            if not beyond and not column.holds(points + by).any():
+                yield where, by
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    """The upright cylinder about the base's z that holds base and link 1, of typical sizes, m."""
+
+    radius: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, robot: Robot) -> _Column:
+        frames = robot.arm.joint_chain().frames(np.zeros((1, robot.arm.joints)))[0]
+        ends, radii = np.empty((0, 3)), list[float]()
+        for body in link_capsules(robot):
+            frame = body.frame - len(robot.externals)
+            if frame <= 1 and isinstance(body.shape, Capsule):
+                placed = body.shape.moved(frames[frame])
+                ends = np.vstack([ends, placed.start, placed.end])
+                radii += [placed.radius, placed.radius]
+        return cls(
+            float((np.hypot(ends[:, 0], ends[:, 1]) + radii).max()),
+            float((ends[:, 2] - radii).min()),
+            float((ends[:, 2] + radii).max()),
+        )
+
+    def holds(self, points: Array) -> Bools:
+        """Return which of the points (m, 3) m it holds."""
+        level = (self.low < points[:, 2]) & (points[:, 2] < self.high)
+        return np.asarray(level & (np.hypot(points[:, 0], points[:, 1]) < self.radius))
 
 
 def _shifted(placement: Array, move: Array) -> Array:
