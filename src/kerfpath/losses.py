@@ -39,6 +39,7 @@ class Loss(IntEnum):
     FLOOR = 15, "below the floor"
     PINNED = 16, "outside the pinned window of gamma"
     TORQUE = 17, "torque, joint {}"
+    LEAP = 18, "change of posture between nodes"
 
 
 class Reason(str):

@@ -131,11 +131,12 @@ def motion_from_finer_grid(attempt: Attempt) -> Plan | None:
     return None if made is None else _improved(made, attempt.finder)
 
 
+FROM_GRID: tuple[Strategy, ...] = (motion_from_grid, motion_from_finer_grid)
+"""The strategies of the grid, which are tried last."""
 OVER_CONTINUOUS_GAMMA: tuple[Strategy, ...] = (
     motion_with_reduced_feed,
     best_motion_found,
-    motion_from_grid,
-    motion_from_finer_grid,
+    *FROM_GRID,
 )
 """The strategies over continuous gamma, in the order in which they are tried."""
 

@@ -20,6 +20,7 @@ from kerfpath.planner.quickest import alike, clear_paths
 from kerfpath.planner.refinements import plan_first_order
 from kerfpath.planner.starts import Bounds, refined_clear
 from kerfpath.planner.statements import STOPPED
+from kerfpath.planner.straight_moves import follows, least_times
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
 from kerfpath.progress import StopEarly, counted, unstopped
@@ -78,7 +79,7 @@ def slowed_motion(task: Task, finder: CollisionFreeSearch) -> Plan | None:
         if not clear:
             raise
         clear = [replace(plan, proof=plan.proof.also(STOPPED)) for plan in clear]
-    return min(clear, key=_time_and_cost) if clear else None
+    return min(clear, key=_quickest_followed) if clear else None
 
 
 def may_keep_speed(task: Task, made: Plan) -> bool:
@@ -126,8 +127,11 @@ def _slowed_between(
     def refine(within: Bounds | None) -> Refinement:
         return refiner.refine(_with_reduced_excess(task, made, within), within=within)
 
+    if not np.isfinite(refiner.promise(made)):
+        return None
     found = refined_clear(finder, path, made, refine)
-    slowed = _with_least_times(task, made if found is None else found.plan)
+    at_nodes = refiner.reduce_excess(made, most=0) if found is None else found.plan
+    slowed = _with_least_times(task, at_nodes)
     if found is None and _broken(task, finder, slowed):
         return None
     return replace(slowed, proof=_claim(finder))
@@ -153,12 +157,12 @@ def plan_slowed(task: Task, finder: CollisionFreeSearch, *, refine: bool) -> Pla
         A node has no pose, or no path joins the nodes at any speed.
     """
     starts = list(_on_grid(task, finder))
-    on_grid = min((_with_least_times(task, start) for start in starts), key=_time_and_cost)
+    on_grid = min((_with_least_times(task, start) for start in starts), key=_quickest_followed)
     if not (refine and task.robot.family.free_rotation):
         return on_grid
     why = "take longer"
-    for made in sorted((_off_grid(task, start) for start in starts), key=_time_and_cost):
-        if _time_and_cost(made) > _time_and_cost(on_grid):
+    for made in sorted((_off_grid(task, start) for start in starts), key=_quickest_followed):
+        if _quickest_followed(made) > _quickest_followed(on_grid):
             break
         broken = _broken(task, finder, made)
         if not broken:
@@ -197,7 +201,7 @@ def _off_grid(task: Task, start: Plan) -> Plan:
     claim = f"{start.proof.statement}; gamma moved off the grid to lose little time"
     proof = Proof(optimal=False, statement=claim)
     moved = replace(_with_reduced_excess(task, start), proof=proof)
-    return min(moved, _with_least_times(task, refiner.refine(moved).plan), key=_time_and_cost)
+    return min(moved, _with_least_times(task, refiner.refine(moved).plan), key=_quickest_followed)
 
 
 # -----------------------------------------------------------------------------
@@ -206,6 +210,11 @@ def _off_grid(task: Task, start: Plan) -> Plan:
 def _time_and_cost(made: Plan) -> tuple[float, float]:
     """Return the time of a plan, s, rounded to 1 ns, and its cost."""
     return round(float(made.time[-1]), 9), made.cost
+
+
+def _quickest_followed(made: Plan) -> tuple[bool, float, float]:
+    """Return a key that sorts plans whose moves the arm can follow first, then the quickest."""
+    return (not follows(made), *_time_and_cost(made))
 
 
 def _broken(task: Task, finder: CollisionFreeSearch, made: Plan) -> str:
@@ -222,8 +231,13 @@ def _with_reduced_excess(task: Task, start: Plan, within: Bounds | None = None) 
 
 
 def _with_least_times(task: Task, made: Plan) -> Plan:
-    """Return the plan with the least times and its feed reduction."""
-    limits = task.problem.limits
-    tau = retime(made.increments, task.dt, limits)
+    """Return the plan with the least times and its feed reduction.
+
+    They also keep the velocities on the straight moves between the nodes that the arm can follow.
+    """
+    limits, asked = task.problem.limits, least_times(made)
+    tau = retime(
+        made.increments, np.where(asked < np.inf, np.maximum(asked, task.dt), task.dt), limits
+    )
     dips = feed(tau, task.dt, made.increments, limits, np.diff(made.contour.s))
     return replace(made, time=np.concatenate([[0.0], np.cumsum(tau)]), feed=dips)

@@ -19,10 +19,12 @@ from kerfpath.compiling import finish_compiling
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, NoFeasiblePath
 from kerfpath.graph import LayeredGraph
+from kerfpath.losses import Loss
 from kerfpath.options import KEEPS, PlanKeywords, PlanOptions, with_keywords
 from kerfpath.planner.attempt import Attempt, Strategy, first_plan, unheard
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.continuous import (
+    FROM_GRID,
     OVER_CONTINUOUS_GAMMA,
     better_motion,
     claimed,
@@ -36,6 +38,7 @@ from kerfpath.planner.refinements import refine_plan
 from kerfpath.planner.screening import within
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.statements import add_window_note, limits_named
+from kerfpath.planner.straight_moves import remedy
 from kerfpath.planner.task import Task, planning_task
 from kerfpath.plans import Plan, Proof
 from kerfpath.progress import Progress, StopEarly, no_progress
@@ -310,13 +313,8 @@ def plan(
             progress=progress,
             unfold=unfold,
         )
-        attempt = Attempt(
-            task=task,
-            finder=CollisionFreeSearch(task),
-            begin=phase or unheard,
-            refine=asked.refine,
-        )
-        return first_plan(attempt, strategies(task))
+        made, attempt = _planned(task, asked, phase or unheard)
+        return made
 
     try:
         made = within_ranges(robot, planned)
@@ -332,6 +330,43 @@ def plan(
             better, beyond = unfolded(better, robot)
             made = made if beyond.any() else with_bound(better, asked.certify, phase=phase)
     return made
+
+
+def _planned(task: Task, asked: PlanOptions, begin: Callable[[str], None]) -> tuple[Plan, Attempt]:
+    """Return the plan of a task, and the attempt that found it.
+
+    Where the motion found changes its posture between two nodes, it is the quickest and then the
+    cheapest motion found in one posture.
+
+    Raises
+    ------
+    NoFeasiblePath
+        There is none.
+    """
+
+    def attempt_of(task: Task) -> Attempt:
+        return Attempt(
+            task=task, finder=CollisionFreeSearch(task), begin=begin, refine=asked.refine
+        )
+
+    attempt = attempt_of(task)
+    try:
+        return first_plan(attempt, strategies(task)), attempt
+    except NoFeasiblePath as none:
+        if not none.lost_by(Loss.LEAP):
+            raise
+        found = []
+        for posture in () if none.proved else task.graph.postures_throughout.tolist():
+            one = replace(task.settings, postures=(posture,))
+            attempt = replace(attempt_of(task.with_settings(one)), failure=none)
+            quick = [each for each in strategies(task) if each not in FROM_GRID]
+            with suppress(NoFeasiblePath):
+                found.append((first_plan(attempt, tuple(quick)), attempt))
+        if not found:
+            raise none.with_message(f"{none}; {remedy(task.contour)}") from None
+    made, attempt = min(found, key=lambda each: (round(float(each[0].time[-1]), 9), each[0].cost))
+    said = made.proof.also("in one posture, as straight moves cannot change it")
+    return replace(made, settings=task.settings, proof=said), attempt
 
 
 def strategies(task: Task) -> tuple[Strategy, ...]:

@@ -28,6 +28,7 @@ from kerfpath.planner.layers import (
     samples_of,
     within_margins,
 )
+from kerfpath.planner.straight_moves import largest_steps
 from kerfpath.plans import Plan, Proof, on_turns, path_cost
 from kerfpath.robots import Robot
 from kerfpath.search import ContinuousPath, GammaSamples, SearchProblem
@@ -346,6 +347,7 @@ def _layers(
         objective=options.objective,
         closure=options.closure,
         rotation=options.rotation,
+        most=largest_steps(contour, robot),
         method="exact" if options.method == "continuous" else options.method,
         posture=graph.posture if options.method == "known" else None,
     )

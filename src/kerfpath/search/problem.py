@@ -436,6 +436,8 @@ class SearchProblem:
         As in `kerfpath.shortest_path`; q is not copied.
     limits : Limits
         Limits (5) and (6) and on the torque of each step; searches do not keep a jerk limit.
+    most : (n,) rad, optional
+        Largest change of each joint from node to node, whatever its limits; default: none.
     method : {"exact", "paper", "known"}
         Method of `find_shortest`; all other searches are exact.
 
@@ -459,6 +461,7 @@ class SearchProblem:
     objective: ObjectiveKind
     closure: Closure
     rotation: Array
+    most: Array
     method: Method
     posture: Ints | None
 
@@ -479,6 +482,7 @@ class SearchProblem:
         objective: ObjectiveKind = "sum",
         closure: Closure = "free",
         rotation: ArrayLike | None = None,
+        most: ArrayLike | None = None,
         method: Method = "exact",
         posture: ArrayLike | None = None,
     ) -> None:
@@ -510,6 +514,9 @@ class SearchProblem:
             "objective": objective,
             "closure": closure,
             "rotation": rotation_limits(rotation, turning),
+            "most": floats(
+                np.full(n, np.inf) if most is None else most, "most", (n,), infinite=True
+            ),
             "method": method,
             "posture": None if posture is None else integers(posture, "posture", (N,)),
         }
@@ -545,7 +552,7 @@ class SearchProblem:
             weight=self.weights,
             metric=METRIC_CODES[self.metric],
             minimax=self.objective == "max",
-            velocity=self.limits.velocity.per_interval(self.dt),
+            velocity=freeze(np.minimum(self.limits.velocity.per_interval(self.dt), self.most)),
             acceleration=self.limits.acceleration.per_interval(self.dt),
             torque=NO_TORQUE
             if torque is None

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.limits import AccelerationLimit
+from kerfpath.limits import AccelerationLimit, VelocityLimit
+from kerfpath.losses import Loss, Reason
 from kerfpath.search.least_interval import (
     LeastInterval,
     binding,
@@ -39,6 +40,25 @@ def velocity_allows(problem: SearchProblem, dt: float) -> bool:
     return True
 
 
+def require_steps(problem: SearchProblem) -> None:
+    """Raise NoFeasiblePath if no path keeps the largest steps of a problem, however slowly."""
+    if not np.isfinite(problem.most).any():
+        return
+    free = VelocityLimit(bound=np.full(len(problem.weights), np.inf))
+    slow = _first_order(problem, problem.dt)
+    try:
+        find_shortest(replace(slow, limits=replace(slow.limits, velocity=free)))
+    except NoFeasiblePath as broken:
+        k = broken.node + 1
+        raise NoFeasiblePath(
+            f"no path leads from node {broken.node} to node {k} without a change of posture, which "
+            "no straight move makes",
+            proved=True,
+            node=broken.node,
+            counts={Reason(Loss.LEAP): sum(broken.counts.values())},
+        ) from None
+
+
 def find_slow_path(problem: SearchProblem) -> LeastInterval:
     """Return the shortest path that keeps (5) in the least interval in which any path does.
 
@@ -48,9 +68,11 @@ def find_slow_path(problem: SearchProblem) -> LeastInterval:
     Raises
     ------
     NoFeasiblePath
-        A layer is empty, or closed vertices and shut edges leave no path; the message says where.
+        A layer is empty, or closed vertices, shut edges and the largest steps of the problem leave
+        no path; the message says where.
     """
     require_joined(problem.layers)
+    require_steps(problem)
     v, a = problem.limits.velocity.usable, problem.limits.acceleration.usable
     quickest, dt = None, first_guess(problem.layers, v)
     while quickest is None:

@@ -29,6 +29,7 @@ from kerfpath.search.problem import (
     require_joined,
     sort_layers,
 )
+from kerfpath.search.slow_path import require_steps
 
 FIRST_STRETCH = 2.0
 """Steps longer than this many node intervals are left out at first; the number doubles."""
@@ -78,7 +79,8 @@ def find_slowed(problem: SearchProblem, *, penalty: float = 100.0) -> SlowedPath
     Raises
     ------
     NoFeasiblePath
-        A layer is empty, or closed vertices and shut edges leave no path; the message says where.
+        A layer is empty, or closed vertices, shut edges and the largest steps of the problem leave
+        no path; the message says where.
     InputError
         Another objective, a closure, a limit on rotation, torque or jerk, or a penalty that is not
         positive.
@@ -90,7 +92,8 @@ def find_slowed(problem: SearchProblem, *, penalty: float = 100.0) -> SlowedPath
     penalty = scalar(penalty, "penalty", above=0.0)
     layers, aim = problem.layers, problem.aim
     require_joined(layers)
-    index, least = _least(layers, aim, penalty)
+    require_steps(problem)
+    index, least = _least(layers, aim, penalty, problem.most)
     path = layers.q[layers.start[:-1] + index]
     time, sharp = (
         asked.max(axis=1)
@@ -101,18 +104,18 @@ def find_slowed(problem: SearchProblem, *, penalty: float = 100.0) -> SlowedPath
     return SlowedPath(index=freeze(index), cost=least, lost=freeze(lost))
 
 
-def _least(layers: Layers, aim: Aim, penalty: float) -> tuple[Ints, float]:
+def _least(layers: Layers, aim: Aim, penalty: float, most: Array) -> tuple[Ints, float]:
     """Return the best path, as vertices of each layer, and its cost.
 
     Steps beyond `stretch` times the velocity are left out. In their place a leap may lead from
     any vertex to any other, at the least price that such a step can have. A best path without a
     leap is the best of all; else more steps are let in.
     """
-    reach = np.where(layers.endless, np.pi, np.ptp(layers.q, axis=0))
+    reach = np.minimum(np.where(layers.endless, np.pi, np.ptp(layers.q, axis=0)), most)
     every = float((reach / aim.velocity).max())
     stretch = FIRST_STRETCH
     while True:
-        bound = stretch * aim.velocity
+        bound = np.minimum(stretch * aim.velocity, most)
         leap = float((aim.weight * bound).min()) + penalty * (stretch - 1)
         lost = LostTime(penalty, stretch, leap if stretch < every else np.inf)
         stretched = aim._replace(velocity=freeze(bound), timed=True, lost=lost)

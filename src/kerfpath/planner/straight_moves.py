@@ -1,0 +1,118 @@
+"""Straight moves from node to node: whether the arm follows them, and the time that they take.
+
+A search joins nodes by the change of each joint. Where the tool axis jumps, as at a sharp edge of a
+sheet, or where nodes are far apart in time, the ends of a change may lie on two branches of the
+arm: on the straight move between them the joints would have to leap. Near a singularity they can
+follow it, but are faster on the way than the change from node to node says.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kerfpath.arrays import Array, Ints
+from kerfpath.contour import Contour, angle_between
+from kerfpath.errors import NoFeasiblePath
+from kerfpath.losses import Loss, Reason
+from kerfpath.plans import Plan
+from kerfpath.robots import Robot, base_in_part
+
+PARTS, FINE = 16, 256
+"""Numbers of parts of a move at whose ends the joints are solved: first, and where they do not run
+evenly."""
+UNEVEN = 1.1
+"""Multiple of the time that the change from node to node takes, from which a move is uneven."""
+LEAP = np.radians(45)
+"""rad: a joint that changes by more in one of these parts has left its branch, or passes so near a
+singularity that the arm would nearly stop there."""
+
+
+def largest_steps(contour: Contour, robot: Robot) -> Array:
+    """Return the largest change (n,) rad of each joint that a search allows from node to node.
+
+    It is a quarter turn more than the tool axis turns: beyond it, the arm passes a singularity or
+    changes its posture. A linear axis may go any way.
+    """
+    turn = float(angle_between(contour.axes[:-1], contour.axes[1:]).max())
+    rotary = np.array([unit == "rad" for unit in robot.units])
+    return np.where(rotary, np.pi / 2 + turn, np.inf)
+
+
+def least_times(made: Plan) -> Array:
+    """Return the least time of each interval, (K-1,) s, in which straight moves keep (5).
+
+    It is infinite where the joints cannot follow the move. Without a free rotation, it is that of
+    the change from node to node.
+
+    Parameters
+    ----------
+    made : Plan
+        Its times do not matter.
+    """
+    change, velocity = np.abs(made.increments), made.settings.limits(made.robot).velocity.usable
+    evenly = (change / velocity).max(axis=1)
+    if not made.robot.family.free_rotation:
+        return np.asarray(evenly)
+    least = _times_in_parts(made, np.arange(len(change)), PARTS)
+    uneven = np.flatnonzero((least > UNEVEN * evenly) & (least < np.inf))
+    least[uneven] = _times_in_parts(made, uneven, FINE)
+    return np.asarray(np.maximum(least, evenly))
+
+
+def _times_in_parts(made: Plan, moves: Ints, parts: int) -> Array:
+    """Return the least times (M,) s of some moves, from joints at the ends of equal parts."""
+    robot, velocity = made.robot, made.settings.limits(made.robot).velocity.usable
+    n, T = robot.alone().joints, made.T_part_tip
+    begin, change = made.q[moves], made.increments[moves]
+    R, start, to = T[moves, :3, :3], T[moves, :3, 3], T[moves + 1]
+    turn = Rotation.from_matrix(R.transpose(0, 2, 1) @ to[:, :3, :3]).as_rotvec()
+    tool, before, least = np.linalg.inv(made.T_flange_tip), begin, np.zeros(len(moves))
+    for f in np.arange(1, parts + 1) / parts:
+        evenly = begin + f * change
+        wanted = np.tile(np.eye(4), (len(moves), 1, 1))
+        wanted[:, :3, :3] = R @ Rotation.from_rotvec(f * turn).as_matrix()
+        wanted[:, :3, 3] = start + f * (to[:, :3, 3] - start)
+        wanted = made.T_base_part @ wanted
+        if robot.externals:
+            wanted = np.linalg.inv(base_in_part(robot.externals, evenly[:, n:])) @ wanted
+        after = before.copy()
+        after[:, robot.free] = evenly[:, robot.free]
+        after[:, :n] = robot.arm.nearest(wanted @ tool, after[:, :n])
+        after = evenly if f == 1.0 else after
+        step = np.abs(after - before)
+        leaps = ~(step[:, :n].max(axis=1) <= LEAP)  # a pose out of reach has no joints
+        least = np.maximum(least, np.where(leaps, np.inf, parts * (step / velocity).max(axis=1)))
+        before = np.where(leaps[:, None], evenly, after)
+    return least
+
+
+def follows(made: Plan) -> bool:
+    """Return whether the arm can follow every straight move of a plan."""
+    return bool(np.isfinite(least_times(made)).all())
+
+
+def not_followed(made: Plan) -> NoFeasiblePath | None:
+    """Return the answer that the arm cannot follow a straight move of a plan; None if it can."""
+    leaps = np.flatnonzero(np.isinf(least_times(made)))
+    if not leaps.size:
+        return None
+    k = int(leaps[0])
+    return NoFeasiblePath(
+        f"contour {made.name!r}: the motion found changes its posture between nodes {k} and "
+        f"{k + 1}, which no straight move does, and none was found in one posture",
+        proved=False,
+        node=k,
+        counts={Reason(Loss.LEAP): len(leaps)},
+    )
+
+
+def remedy(contour: Contour) -> str:
+    """Return what may give a motion where the tool axis turns sharply."""
+    turns = angle_between(contour.axes[:-1], contour.axes[1:])
+    k = int(np.argmax(turns))
+    return (
+        f"the tool axis turns by up to {np.degrees(turns[k]):.1f} deg from node to node (at node "
+        f"{k}): round the corner or write smooth_axes, allow a tilt, place the part otherwise, or "
+        'stop where the posture changes (interruptions = "fewest")'
+    )

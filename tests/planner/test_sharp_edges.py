@@ -1,0 +1,47 @@
+"""Where the tool axis jumps, a motion that the planner passes is one that its audit passes."""
+
+import numpy as np
+import pytest
+
+from kerfpath import Contour, NoFeasiblePath, audit, plan, robot
+from kerfpath.planner.straight_moves import follows, least_times
+
+STRAIGHT = {"tip-at-nodes", "axis-at-nodes", "straight-move", "joint-step", "velocity-between"}
+"""What a change of posture, or a singularity, between two nodes breaks."""
+
+
+def _over_an_edge(seed: int) -> tuple[Contour, np.ndarray]:
+    """A straight cut over a sharp edge of a sheet, and where it lies before an IRB 4600."""
+    rng = np.random.default_rng(seed)
+    half = np.linspace(0.0, 0.02, 11)
+    turn, lean = rng.uniform(np.radians(30), np.radians(100)), rng.uniform(-1, 1)
+    before, after = lean - turn / 2, lean + turn / 2
+    down, along = rng.permutation(3)[:2]
+    points, axes = np.zeros((21, 3)), np.zeros((21, 3))
+    points[:, along] = np.concatenate([half[:-1] - half[-1], half])
+    angle = np.where(np.arange(21) < 10, before, after)
+    angle[10] = lean
+    axes[:, down], axes[:, along] = -np.cos(angle), np.sin(angle)
+    placement = np.eye(4)
+    placement[:3, 3] = rng.uniform((0.9, -0.6, 0.1), (1.5, 0.6, 1.2))
+    return Contour(points, axes, name="edge"), placement
+
+
+@pytest.mark.parametrize("feed", ["dip", "constant"])
+def test_a_planned_cut_over_a_sharp_edge_passes_its_audit(feed):
+    arm = robot("abb_irb4600_60_205").with_limits(acceleration=[5.0, 5, 5, 20, 20, 20])
+    tool = np.eye(4)
+    tool[:3, 3] = 0.1, 0.0, 0.3
+    planned = 0
+    for seed in range(16):
+        contour, placement = _over_an_edge(seed)
+        where = {"tool": tool, "placement": placement, "gamma_step": np.radians(10)}
+        try:
+            made = plan(contour, arm, speed=0.002, feed=feed, certify=None, **where)
+        except NoFeasiblePath:
+            continue
+        planned += 1
+        assert [issue for issue in audit(made, axis_tolerance=3.0) if issue.code in STRAIGHT] == []
+        assert follows(made)
+        assert (np.diff(made.time) >= least_times(made) * (1 - 1e-9)).all() or feed == "constant"
+    assert planned >= 4
