@@ -84,6 +84,7 @@ def render(
         margin_of=_margin,
         objective_of=_objective,
         postures_of=_postures,
+        posture_words=_posture_words,
         proof_of=_proof,
         **page,
     )
@@ -169,6 +170,11 @@ def _postures(plan: Plan) -> str:
     stretches = [f"{posture_name(mu)} (nodes {a} to {b})" for mu, a, b in runs[:6]]
     more = f", and {len(runs) - 6} more" if len(runs) > 6 else ""
     return f"{len(runs) - 1} changes of posture, shaded: {', '.join(stretches)}{more}."
+
+
+def _posture_words(plan: Plan) -> str:
+    """Return the postures of a plan in the order in which they are taken, as text."""
+    return ", ".join(posture_name(mu) for mu, _, _ in motion.posture_runs(plan)[:3])
 
 
 def _verdict(sections: Sequence[ContourSection], faults: Sequence[str]) -> tuple[str, str]:

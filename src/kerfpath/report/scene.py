@@ -90,7 +90,7 @@ def scene(
             "aspectratio": sides,
             "dragmode": "turntable",
             "camera": camera,
-            "annotations": _labels(sections, places),
+            "annotations": _labels(sections, places, numbered=bool(moves)),
             **{f"{a}axis": space_axis(a) for a in sides},
             **{f"{a}axis": space_axis(a) | UNSAID for a in sides if sides[a] < flat},
         },
@@ -299,14 +299,19 @@ def _add_move(figure: go.Figure, points: Array, number: int) -> None:
 
 
 def _labels(
-    sections: Sequence[ContourSection], places: Callable[[Array], Array]
+    sections: Sequence[ContourSection], places: Callable[[Array], Array], *, numbered: bool
 ) -> list[dict[str, object]]:
     """Return the names of contours at their starts, and the first failure of each failed one.
+
+    If they are `numbered`, names begin with the place of each in the order of cutting.
 
     In the first view they lie beside each other and beside all starts, where there is room.
     """
     named = sections if len(sections) <= LABELS else ()
-    labels = [(section.path.points[0], section.name, INK) for section in named]
+    labels = [
+        (section.path.points[0], f"{k}. {section.name}" if numbered else section.name, INK)
+        for k, section in enumerate(named, 1)
+    ]
     failed = [section for section in sections if section.marks][:LABELS]
     labels += [(s.marks[0].point, f"{s.name}: {s.marks[0].words}", ALERT) for s in failed]
     if not labels:

@@ -125,7 +125,9 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
     robot, options = job.robot, job.options
     n = robot.arm.joints
     velocity, acceleration = (np.degrees(v[:n]).round(1) for v in robot.speed_limits())
+    part = outcome.part
     facts = [
+        *([] if part is None else [("Cycle time", f"{part.cycle_time:.1f} s")]),
         ("Job", job.path.name),
         ("Part", job.part_file.name),
         ("Robot", f"{robot.manufacturer} {robot.model}".strip() or robot.id),
@@ -135,7 +137,7 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
         ("Method", f"{options.method}, {options.frames} frames"),
         ("Limits used", f"{options.eta_v:.0%} velocity, {options.eta_a:.0%} acceleration"),
         ("Joint velocity limits", f"{_row(velocity)} deg/s"),
-        ("Joint acceleration limits", f"{_row(acceleration)} deg/s^2"),  # the footer says whence
+        ("Joint acceleration limits", f"{_row(acceleration)} deg/s²"),  # the footer says whence
         *_more_limits(robot),
         ("Endless axes", _row(np.flatnonzero(robot.endless[:n]) + 1) or "none"),
         *_external_facts(robot),
@@ -205,7 +207,7 @@ def _external_facts(robot: Robot) -> list[tuple[str, str]]:
         )
         travel = "endless" if robot.endless[i] else f"{low} to {high} {unit}"
         said = f"{axis.kind}, carries the {axis.carries}; {travel}"
-        said += f", {velocity} {unit}/s, {acceleration} {unit}/s^2"
+        said += f", {velocity} {unit}/s, {acceleration} {unit}/s²"
         facts.append((f"External axis {axis.name}", said))
     return facts
 

@@ -212,11 +212,20 @@ def cut_in_posture(
             speed=candidate.speed, options=_at_nodes(job), cell=prepared.cell,
             graph=None if job.robot.free.size else graph,
         )  # fmt: skip
-    other = CutResult(request=request, candidate=candidate, graph=graph)
+    other = _without_plan(cut)
+    if job.robot.free.size:
+        other = CutResult(request=request, candidate=candidate, graph=graph)
     if quick:
         return replace(other, plan=made)
     other = _audited(prepared, other, made)
     return other if other.passed else None
+
+
+def _without_plan(cut: CutResult) -> CutResult:
+    """Return a cut with no plan; its graph has all postures that the job allows, for the report."""
+    return CutResult(
+        request=cut.request, candidate=cut.candidate, graph=cut.graph, clearance=cut.clearance
+    )
 
 
 def moved_into_reach(prepared: PreparedJob, cuts: Sequence[CutResult]) -> dict[str, Remedy]:
@@ -233,7 +242,7 @@ def moved_into_reach(prepared: PreparedJob, cuts: Sequence[CutResult]) -> dict[s
 def settled(prepared: PreparedJob, cut: CutResult) -> CutResult | None:
     """Return a cut that was planned quickly or turned, with its audit; None where that fails."""
     assert cut.plan is not None
-    whole = CutResult(request=cut.request, candidate=cut.candidate, graph=cut.graph)
+    whole = _without_plan(cut)
     done = _audited(prepared, whole, cut.plan)
     return done if done.passed else None
 
