@@ -22,6 +22,7 @@ from OCP.Message import Message
 from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
 
 from benchmarks._figures import Report, Sheet
+from kerfpath.errors import InputError
 from kerfpath.job import JobResult, read_job, run_job
 
 __all__ = ["PLATE", "TUBE", "random_part", "run", "write_plate", "write_tube"]
@@ -271,9 +272,9 @@ def _random_row(seed: int) -> tuple[str, ...]:
         folder = Path(name)
         part.write(folder)
         start = process_time()
-        free = _cycle(_planned(folder, part.job))
+        free = _cycle(folder, part.job)
         took = process_time() - start
-        cycles = {to: _cycle(_planned(folder, text)) for to, text in narrowed.items()}
+        cycles = {to: _cycle(folder, text) for to, text in narrowed.items()}
     best = min(cycles, key=cycles.__getitem__)
     feasible = sum(bool(np.isfinite(cycle)) for cycle in cycles.values())
     worse = f"{100 * (free / cycles[best] - 1):.2f}" if feasible else "-"
@@ -284,7 +285,12 @@ def _random_row(seed: int) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _cycle(found: JobResult) -> float:
+def _cycle(folder: Path, text: str) -> float:
+    """Return the cycle time of a job, s; infinite if it is refused or does not pass."""
+    try:
+        found = _planned(folder, text)
+    except InputError:  # known before planning, such as no room to back off in this posture
+        return np.inf
     return found.part.cycle_time if found.part is not None and found.passed else np.inf
 
 
