@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks._certified import in_processes
+from benchmarks._compensation import compensation_reports
 from benchmarks._figures import Report, Sheet
 from benchmarks._random_contours import ROBOTS, cut
 from benchmarks._shipped import report_shipped
@@ -18,7 +19,7 @@ from kerfpath import NoFeasiblePath, Plan, plan
 from kerfpath.execution import Executed, executed, keep_limits, timing_of
 from kerfpath.post import Program, Zone, build_program
 
-__all__ = ["run", "zones_of_cut"]
+__all__ = ["densest", "run", "zones_of_cut"]
 
 COUNTS = (134, 133, 133)
 """Cuts of each robot."""
@@ -99,6 +100,7 @@ def run(*, quick: bool) -> list[Report]:
         _kept_report([one for each in kept for one in each], len(keys)),
         _timed_report([one for each in timed for one in each], len(keys)),
         report_shipped(quick=quick),
+        *compensation_reports(quick=quick),
     ]
 
 
@@ -145,7 +147,7 @@ def kept_of_cut(key: tuple[str, int]) -> list[Brought]:
         kept = keep_limits(made, program)
         took = perf_counter() - began
         assert kept.run is not None
-        over = kept.done and _densest(kept.run, program(kept.plan)) > 1
+        over = kept.done and densest(kept.run, program(kept.plan)) > 1
         found.append(
             Brought(
                 error, kept.done, kept.rounds, kept.plan.cost / made.cost - 1, over,
@@ -242,7 +244,7 @@ def _program(error: float, made: Plan) -> Program:
     return build_program([made], zone_error=error)
 
 
-def _densest(run: Executed, program: Program) -> float:
+def densest(run: Executed, program: Program) -> float:
     """Return the largest share of a limit found by dense sampling with inverse kinematics."""
     robot, end = program.robot, float(run.tool_motion.time[-1])
     step = end / (len(run.tool_motion.T) * DENSER)

@@ -25,7 +25,7 @@ from kerfpath.cli.show import (
     table,
 )
 from kerfpath.cli.stop import end_early, ended_early, exit_code
-from kerfpath.execution import PathError
+from kerfpath.execution import Compensation, PathError
 from kerfpath.job import (
     AsRun,
     ContourSpeed,
@@ -268,9 +268,22 @@ def _as_run_entry(run: AsRun) -> dict[str, object]:
         entry |= {"speed_held": run.timing.held, "ramps_m": run.timing.ramps}
     if run.path_error is not None:
         entry["path_error"] = _path_error_entry(run.path_error)
+    if run.compensation is not None:
+        entry["compensation"] = _compensation_entry(run.compensation)
     if run.hole is not None:
         entry["hole"] = {f"{name}_m": value for name, value in run.hole._asdict().items()}
     return entry
+
+
+def _compensation_entry(made: Compensation) -> dict[str, object]:
+    """Return what moved targets give; they are those of the program unless there is a failure."""
+    return {
+        "before_m": made.before,
+        "rest_m": made.rest,
+        "largest_displacement_m": made.largest,
+        "rounds": made.rounds,
+        "failure": made.failure or None,
+    }
 
 
 def _path_error_entry(off: PathError) -> dict[str, object]:
@@ -337,6 +350,7 @@ def _show_cuts(cuts: Sequence[CutResult]) -> None:
         "of the tool axis from node to node"
     )
     _show_holes(cuts)
+    _show_compensation(cuts)
     unbound = [cut.name for cut in cuts if _is_unbound(cut)]
     if unbound:
         out.print(
@@ -371,6 +385,24 @@ def _show_holes(cuts: Sequence[CutResult]) -> None:
     ]
     if rows:
         columns = ["hole", "drawn mm", "executed mm", "change mm", "out of round mm"]
+        table(columns, rows, numbers=columns[1:])
+
+
+def _show_compensation(cuts: Sequence[CutResult]) -> None:
+    """Print how far targets are moved, and what that gives."""
+    found = [(cut.name, each) for cut in cuts if (each := cut.as_run.compensation) is not None]
+    rows = [
+        [
+            escape(name),
+            f"{each.before * 1e3:.3f}",
+            f"{each.rest * 1e3:.3f}",
+            f"{each.largest * 1e3:.3f}",
+        ]
+        for name, each in found
+        if not each.failure
+    ]
+    if rows:
+        columns = ["compensated", "off mm as drawn", "off mm", "targets moved mm"]
         table(columns, rows, numbers=columns[1:])
 
 

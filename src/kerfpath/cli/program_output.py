@@ -29,7 +29,16 @@ from kerfpath.cli.show import (
     write_text,
 )
 from kerfpath.errors import InputError, KerfpathError, about
-from kerfpath.execution import CommandedRun, fit_response, read_log, response_text
+from kerfpath.execution import (
+    CommandedRun,
+    Correction,
+    correct,
+    correction_text,
+    fit_response,
+    read_log,
+    response_text,
+    smoothing,
+)
 from kerfpath.job import (
     AuditReport,
     ControllerRun,
@@ -38,6 +47,7 @@ from kerfpath.job import (
     prepare,
     program_from_file,
     program_language,
+    programmed_plans,
     python_script,
     read_job,
     read_plan_file,
@@ -421,7 +431,7 @@ def _record_text(done: ControllerRun) -> str:
 
 
 # -----------------------------------------------------------------------------
-# `kerfpath touch-up`: plan a job again around targets that a person has moved.
+# `kerfpath fit`: fit the response of the robot to logs.
 
 
 def fit_to_logs(logs: Sequence[Path], job_file: Path, plan: Path, output: Path) -> None:
@@ -432,7 +442,8 @@ def fit_to_logs(logs: Sequence[Path], job_file: Path, plan: Path, output: Path) 
     require_output(output, "-o")
     require_output(page, "-o")
     job = read_job(job_file)
-    runs = [CommandedRun.of(run) for run in runs_of(job, read_plan_file(plan).plans, f"{plan}")]
+    made = programmed_plans(job, read_plan_file(plan))
+    runs = [CommandedRun.of(run) for run in runs_of(job, made, f"{plan}")]
     read = [read_log(log, job.robot, job.tool) for log in logs]
     with busy("fitting the response"):
         fit = fit_response(runs, read)
@@ -503,6 +514,68 @@ def fit_to_logs(logs: Sequence[Path], job_file: Path, plan: Path, output: Path) 
 
 def _three(off: tuple[float, float, float]) -> str:
     return " / ".join(f"{each * 1e3:.3f}" for each in off)
+
+
+# -----------------------------------------------------------------------------
+# `kerfpath correct`: move targets by what a measured run misses.
+
+
+def correct_by_logs(
+    logs: Sequence[Path], job_file: Path, plan: Path, gain: float, output: Path
+) -> None:
+    """Correct the targets of a plan's program by logs of its run, and write the file of that."""
+    require_output(output, "-o")
+    if not 0 < gain <= 1:
+        raise InputError(f"--gain: expected a share above 0 and at most 1, got {gain:g}")
+    job, file = read_job(job_file), read_plan_file(plan)
+    made = programmed_plans(job, file)
+    runs = runs_of(job, made, f"{plan}")
+    names = [run.section for run in runs]
+    cuts = [(p, now.contour.points - p.contour.points)
+            for p, now in zip(file.plans, made, strict=True) if p.name in names]  # fmt: skip
+    before = job.compensation if isinstance(job.compensation, Correction) else Correction()
+    read = [read_log(log, job.robot, job.tool) for log in logs]
+    with busy("comparing the logs with the drawing"):
+        done = correct(
+            cuts, [CommandedRun.of(run) for run in runs], read, before, gain=gain,
+            width=smoothing(job.response),
+        )  # fmt: skip
+    print_json(
+        {
+            "contours": [
+                {
+                    "name": each.name,
+                    "rounds": [one._asdict() for one in each.rounds],
+                    "settled": each.settled,
+                    "largest_displacement_m": each.largest,
+                }
+                for each in done.contours.values()
+            ],
+            "files": [str(output)],
+        }
+    )
+    rows = []
+    for each in done.contours.values():
+        last = each.rounds[-1]
+        numbers = (last.largest, last.mean, last.noise, each.largest)
+        shown = [f"{value * 1e3:.3f}" for value in numbers]
+        rows.append([escape(each.name), str(len(each.rounds)), *shown, each.words])
+    columns = ["contour", "round", "off mm", "mean mm", "noise mm", "moved mm", "next"]
+    table(columns, rows, numbers=columns[1:-1])
+    out.print(
+        "off: largest distance of the drawn nodes from the measured path, averaged as the "
+        "correction is; noise: how far logs of it, or their points, scatter; moved: largest "
+        "displacement of a target in the next program"
+    )
+    for name in names:
+        if name not in done.contours:
+            out.print(f"note: no log follows {escape(name)}, which stays as it was")
+    write_text(output, correction_text(done), "-o")
+    out.print(f'write compensate = "{escape(str(output))}" in [program] for the next program')
+
+
+# -----------------------------------------------------------------------------
+# `kerfpath touch-up`: plan a job again around targets that a person has moved.
 
 
 def touch_up_program(program: Path, job: Path, plan: Path, folder: Path, ease_mm: float) -> None:

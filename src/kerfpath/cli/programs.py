@@ -166,6 +166,40 @@ def fit(
 
 
 @app.command()
+def correct(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="MEASURED.csv...", help="Logs of the program's last run."),
+    ],
+    job: Annotated[Path, typer.Option(metavar="JOB.toml", help="The job of the program.")],
+    plan: Annotated[
+        Path | None,
+        typer.Option(metavar="PLAN.json", help="Its plan; default: JOB-plan/plan.json."),
+    ] = None,
+    gain: Annotated[
+        float, typer.Option(help="Share of what is missing by which targets are moved, up to 1.")
+    ] = 0.8,
+    output: Annotated[Path, typer.Option("-o", "--output", help="File to write.")] = Path(
+        "correction.json"
+    ),
+    as_json: Json = False,
+) -> None:
+    """Correct the targets of a program by what its measured run misses, round by round.
+
+    A log is a table as for kerfpath fit. Run the program as it was written, correct it, write it
+    again with the file named by compensate in [program], and measure that run, until what is left
+    is noise, or no longer falls: then the best run is kept. Several logs of the same run are
+    averaged, and show its noise.
+
+    Example: kerfpath correct run1.csv run2.csv --job door.toml -o correction.json
+    """
+    from kerfpath.cli.program_output import correct_by_logs
+
+    plan = plan or Path(f"{job.stem}-plan") / "plan.json"
+    correct_by_logs(logs, job, plan, gain, output)
+
+
+@app.command()
 def touch_up(
     program: Annotated[
         Path, typer.Argument(metavar="PROGRAM", help="A program with moved targets.")

@@ -1,5 +1,17 @@
 """The motion as a controller runs it: straight and circular moves, with rounded corners."""
 
+from kerfpath.execution.compensation import Compensation as Compensation
+from kerfpath.execution.compensation import Compensator as Compensator
+from kerfpath.execution.compensation import lengths_of as lengths_of
+from kerfpath.execution.compensation import moved as moved
+from kerfpath.execution.compensation import smoothing as smoothing
+from kerfpath.execution.compensation import speed_of as speed_of
+from kerfpath.execution.correction import CorrectedContour as CorrectedContour
+from kerfpath.execution.correction import Correction as Correction
+from kerfpath.execution.correction import Round as Round
+from kerfpath.execution.correction import correct as correct
+from kerfpath.execution.correction import correction_text as correction_text
+from kerfpath.execution.correction import read_correction as read_correction
 from kerfpath.execution.executed import AT_SPEED as AT_SPEED
 from kerfpath.execution.executed import Executed as Executed
 from kerfpath.execution.executed import Peak as Peak

@@ -182,7 +182,9 @@ class Executed:
         return Peak(float(size[m, joint]), joint, float(self.time[m]))
 
 
-def executed(program: Program, *, controller: Controller = PLAIN) -> tuple[Executed, ...]:
+def executed(
+    program: Program, *, controller: Controller = PLAIN, bounded: bool = True
+) -> tuple[Executed, ...]:
     """Return every run of straight and circular moves of a program, as it is executed.
 
     The motion is that of `ToolMotion`, at the programmed speeds throughout: neither speeding up
@@ -196,6 +198,8 @@ def executed(program: Program, *, controller: Controller = PLAIN) -> tuple[Execu
     program : Program
     controller : Controller
         For a language it is `language(name).controller(settings)`.
+    bounded : bool
+        Whether bounds are proved, which takes most of the time.
 
     Raises
     ------
@@ -211,6 +215,7 @@ def executed(program: Program, *, controller: Controller = PLAIN) -> tuple[Execu
             T_flange_tip=program.T_flange_tip,
             controller=controller,
             section=section.name,
+            bounded=bounded,
         )
         for section in program.sections
         for moves in from_stop_to_stop(section.moves)
@@ -240,6 +245,7 @@ def run_along(
     T_flange_tip: Array,
     controller: Controller = PLAIN,
     section: str = "",
+    bounded: bool = True,
 ) -> Executed:
     """Return the run of moves from the target of the first, where the robot is stopped, to a stop.
 
@@ -249,7 +255,7 @@ def run_along(
         Three or more, each with the joints at its target.
     robot : Robot
     T_base_part, T_flange_tip : (4, 4) m
-    controller, section
+    controller, section, bounded
         As in `executed` and `Executed`.
 
     Raises
@@ -301,7 +307,7 @@ def run_along(
         controller=controller,
     )
     fast, sharp = run.peak_velocity.share, run.peak_acceleration.share
-    if run.sampled or not np.isfinite(max(fast, sharp)):
+    if not bounded or run.sampled or not np.isfinite(max(fast, sharp)):
         return run
     middles = (borders[1:] + borders[:-1]) / 2
     bounds = rates_along(

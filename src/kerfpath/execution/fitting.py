@@ -156,11 +156,14 @@ class Stretch:
         Number of the run.
     points : (k, 3) m
         Points of the log, evenly spread along it.
+    part : slice
+        The rows of the log.
     """
 
     log: Log
     run: int
     points: Array
+    part: slice
 
     __repr__ = short_repr
 
@@ -230,7 +233,8 @@ def stretches(log: Log, runs: Sequence[CommandedRun]) -> list[Stretch]:
         points = log.tip[part]
         way = _length(points)
         some = np.unique(np.searchsorted(way, np.linspace(0, way[-1], MOST)))
-        kept.append(Stretch(log=log, run=number, points=points[some.clip(max=len(points) - 1)]))
+        some = some.clip(max=len(points) - 1)
+        kept.append(Stretch(log=log, run=number, points=points[some], part=part))
     return kept
 
 
@@ -449,13 +453,13 @@ def _beside(path: Polyline, stretch: Stretch) -> Array:
     """Return the vectors (k, 3) m from the path to the points of a stretch."""
     points = stretch.points
     if stretch.log.tracked:
-        points = _registered(path, points)
+        points = registered(path, points)
     start, along, _ = path.nearest(points)
     chord = path.points[start + 1] - path.points[start]
     return np.asarray(points - path.points[start] - along[:, None] * chord)
 
 
-def _registered(path: Polyline, points: Array, rounds: int = 3) -> Array:
+def registered(path: Polyline, points: Array, rounds: int = 3) -> Array:
     """Return points (k, 3) m turned and shifted as a whole to be closest to a path."""
     for _ in range(rounds):
         start, along, _ = path.nearest(points)

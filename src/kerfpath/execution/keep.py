@@ -113,9 +113,14 @@ def keep_limits(
     return Kept(plan=plan, done=False, rounds=count, run=first, statement=statement)
 
 
-def longest_run(program: Program, controller: Controller = PLAIN) -> Executed | None:
-    """Return the run with the most targets in a program of one plan, its cut; None without one."""
-    runs = executed(program, controller=controller)
+def longest_run(
+    program: Program, controller: Controller = PLAIN, *, bounded: bool = True
+) -> Executed | None:
+    """Return the run with the most targets in a program of one plan, its cut; None without one.
+
+    It has proved bounds if `bounded`, see `executed`.
+    """
+    runs = executed(program, controller=controller, bounded=bounded)
     return max(runs, key=lambda each: len(each.tool_motion.T), default=None)
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial import cKDTree
 
-from kerfpath.arrays import Array, Ints, short_repr
-from kerfpath.contour import Contour
+from kerfpath.arrays import Array, Bools, Ints, short_repr
+from kerfpath.contour import KINDS, Contour
 from kerfpath.execution.executed import Executed, Timing, timing_of
 from kerfpath.execution.response import IDEAL, PLACING, STILL, Response
 
@@ -20,6 +20,8 @@ SAMPLES = 8
 """Number of samples of the path for each of its nodes, or each target."""
 
 
+LEADS = [KINDS.index(kind) for kind in ("pierce", "lead-in", "lead-out")]
+"""Kinds of stretches in the waste."""
 SLOWEST = 0.1
 """Smallest share of the speed at which a tolerance is looked for."""
 
@@ -43,6 +45,8 @@ class PathError:
         Samples, from the start of the run.
     s : (m,) m
         Arc length of the point of the path that is nearest to the tip.
+    waste : (m,) bool
+        Whether that is where the beam leads in or out, in the waste: no error there is judged.
     T : (m, 4, 4) m
         Executed poses of the tip, in the part.
     tip : (m,) m
@@ -62,6 +66,7 @@ class PathError:
     response: Response
     time: Array
     s: Array
+    waste: Bools
     T: Array
     tip: Array
     axis: Array
@@ -75,23 +80,24 @@ class PathError:
 
     @property
     def worst(self) -> int:
-        """The sample with the largest distance of the tip."""
-        return int(np.argmax(self.tip))
+        """The sample with the largest distance of the tip, leads left out."""
+        return int(np.argmax(np.where(self.waste, -1.0, self.tip)))
 
     @property
     def worst_axis(self) -> int:
-        """The sample with the largest angle of the tool axis."""
-        return int(np.argmax(self.axis))
+        """The sample with the largest angle of the tool axis, leads left out."""
+        return int(np.argmax(np.where(self.waste, -1.0, self.axis)))
 
     @property
     def largest(self) -> float:
-        """The largest distance of the tip, m."""
+        """The largest distance of the tip, m, leads left out."""
         return float(self.tip[self.worst])
 
     @property
     def usual(self) -> float:
-        """The distance of the tip, m, that 95 % of its way keeps."""
+        """The distance of the tip, m, that 95 % of its way keeps, leads left out."""
         way = np.linalg.norm(np.gradient(self.T[:, :3, 3], axis=0), axis=1)
+        way[self.waste] = 0.0
         order = np.argsort(self.tip)
         gone = np.cumsum(way[order])
         return float(self.tip[order][np.searchsorted(gone, 0.95 * gone[-1])])
@@ -147,8 +153,8 @@ def path_error(
         s, tip, axis = drawn.nearest(run.T)
         none = np.zeros(len(tip))
         return PathError(
-            response=IDEAL, time=run.time, s=s, T=run.T, tip=tip, axis=axis, rounding=tip,
-            lag=none, friction=none, ends=(), reversals=(),
+            response=IDEAL, time=run.time, s=s, waste=drawn.waste(s), T=run.T, tip=tip, axis=axis,
+            rounding=tip, lag=none, friction=none, ends=(), reversals=(),
         )  # fmt: skip
     q = response.standing_around(commanded(run, timing), STEP)
 
@@ -164,13 +170,14 @@ def path_error(
         response=response,
         time=np.linspace(0.0, STEP * (len(q) - 1), len(q)),
         s=s,
+        waste=drawn.waste(s),
         T=executed,
         tip=tip,
         axis=axis,
         rounding=drawn.nearest(asked)[1],
         lag=_apart(free, asked),
         friction=_apart(executed, free),
-        ends=tuple(float(drawn.nearest(poses(end))[1].max()) for end in response.ends()),
+        ends=tuple(drawn.largest(poses(end)) for end in response.ends()),
         reversals=reversals(q, STEP),
     )
 
@@ -258,7 +265,7 @@ def share_within(
     full = at(1.0)
     if full.largest <= tolerance:
         return 1.0
-    corners = float(full.rounding.max())
+    corners = float(full.rounding[~full.waste].max())
     if corners >= tolerance:
         return None
     # The lag moves the tip about as the square of the speed.
@@ -329,6 +336,17 @@ class _Drawn:
         even = np.linspace(path.s[0], path.s[-1], SAMPLES * max(len(path), targets))
         at = np.unique(np.concatenate([path.s, even]))
         return cls(path=path, at=at, line=Polyline.of(path.at(at)[0]))
+
+    def waste(self, s: Array) -> Bools:
+        """Return whether the beam leads in or out at arc lengths (m,) m; never if it only does."""
+        of = np.clip(np.searchsorted(self.path.s, s, side="right") - 1, 0, len(self.path) - 2)
+        found = np.isin(self.path.kind, LEADS)[of]
+        return np.zeros_like(found) if found.all() else found
+
+    def largest(self, T: Array) -> float:
+        """Return the largest distance of poses (m, 4, 4) from the path, leads left out."""
+        s, off, _ = self.nearest(T)
+        return float(off[~self.waste(s)].max())
 
     def nearest(self, T: Array) -> tuple[Array, Array, Array]:
         """Return for poses (m, 4, 4) the nearest arc lengths, distances and angles, (m,) each."""

@@ -65,6 +65,7 @@ from kerfpath.job.program_file import compare_programs as compare_programs
 from kerfpath.job.programs import program_from_file as program_from_file
 from kerfpath.job.programs import program_language as program_language
 from kerfpath.job.programs import program_of as program_of
+from kerfpath.job.programs import programmed_plans as programmed_plans
 from kerfpath.job.run import ContourSpeed as ContourSpeed
 from kerfpath.job.run import CutResult as CutResult
 from kerfpath.job.run import JobPreview as JobPreview

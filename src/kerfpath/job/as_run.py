@@ -13,6 +13,7 @@ from kerfpath.contour import Contour
 from kerfpath.errors import InputError, about
 from kerfpath.execution import (
     AT_SPEED,
+    Compensation,
     Executed,
     Kept,
     PathError,
@@ -60,12 +61,15 @@ class AsRun:
         How far the executed motion is from the path; None if it stops at every node.
     hole : Roundness or None
         Size and roundness of the cut, if a circle is drawn.
+    compensation : Compensation or None
+        The plan with its targets moved, which runs as said above; None without compensation.
     """
 
     checks: tuple[Check, ...] = ()
     timing: Timing | None = None
     path_error: PathError | None = None
     hole: Roundness | None = None
+    compensation: Compensation | None = None
 
     __repr__ = short_repr
 
@@ -87,8 +91,10 @@ def as_run(job: Job, plan: Plan, path: Contour, kept: Kept | None = None) -> AsR
     return AsRun() if run is None else run_judged(job, run, plan, path)
 
 
-def run_of(job: Job, plan: Plan) -> Executed | None:
+def run_of(job: Job, plan: Plan, *, bounded: bool = True) -> Executed | None:
     """Return a plan as its program is run; None if the robot stops at every node.
+
+    It has proved bounds if `bounded`.
 
     Raises
     ------
@@ -97,7 +103,7 @@ def run_of(job: Job, plan: Plan) -> Executed | None:
     """
     if unknown := _not_modelled(job):
         raise InputError(unknown)
-    return longest_run(_program(job)(plan), job.program.rules.controller)
+    return longest_run(_program(job)(plan), job.program.rules.controller, bounded=bounded)
 
 
 def allowed_off(job: Job) -> float:
@@ -204,7 +210,14 @@ def _deviations(
     """Yield the checks of tip and tool axis against the path, as the joints execute the run."""
     allowed = job.tolerances
     cone = 0.0 if job.options.tilt is None else job.options.tilt.cone
-    tip = allowed_off(job)
+    tip, by_model = allowed_off(job), job.compensation == "model"
+    strict = by_model or (job.compensation is None and job.path_tolerance is not None)
+    if job.compensation is None:
+        advice = _closer(run, off, plan, path, tip)
+    elif by_model:
+        advice = "targets are not where compensation moves them: write the program again"
+    else:
+        advice = "by the model of the response; the measured runs say what is really left"
     # Of corners alone unless the joints lag; then by a model, which no program is refused for.
     yield Check(
         code="tip-as-run",
@@ -213,8 +226,8 @@ def _deviations(
         limit=tip,
         unit="m",
         node=_nearest(plan, off.T[off.worst]),
-        level="warning" if job.path_tolerance is None else "error",
-        advice=_closer(run, off, plan, path, tip),
+        level="error" if strict else "warning",
+        advice=advice,
     )
     yield Check(
         code="axis-as-run",

@@ -23,10 +23,10 @@ from kerfpath.auditor import (
     worst_of,
 )
 from kerfpath.cell import Cell
-from kerfpath.contour import KINDS, Contour
+from kerfpath.contour import KINDS, Contour, angle_between
 from kerfpath.errors import InputError
-from kerfpath.execution import from_stop_to_stop, run_along
-from kerfpath.job.as_run import as_run, checks_of_unknown, run_judged
+from kerfpath.execution import Correction, from_stop_to_stop, lengths_of, run_along
+from kerfpath.job.as_run import checks_of_unknown, run_judged
 from kerfpath.job.audit_report import (
     AuditReport,
     check,
@@ -36,6 +36,7 @@ from kerfpath.job.audit_report import (
     count_at,
 )
 from kerfpath.job.comparison import compare, compare_jobs
+from kerfpath.job.compensated import as_programmed
 from kerfpath.job.expected import (
     SAME_VALUE,
     Expected,
@@ -53,6 +54,7 @@ from kerfpath.job.expected import (
 from kerfpath.job.format import (
     Candidate,
     Job,
+    Tolerances,
     prepare,
     read_job,
 )
@@ -328,23 +330,50 @@ def check_cut(
         node = int(np.flatnonzero(np.diff(s) <= 0)[0])
         said = "stretches that go back along the contour"
         return [*rows, count("order", said, (np.diff(s) <= 0).sum(), node)], None
-    took = np.where(np.isnan(cut.speed), cut.took, np.diff(s) / cut.speed)
+    found, moved = nodes_at_targets(job, candidate, cut, s), job.compensation is not None
+    way = np.diff(s)
+    if moved and (np.diff(found.at) > 0).all():
+        s = s.copy()
+        s[cut.ends] = found.nodes.s[found.at]
+        way = np.diff(lengths_of(reference.at_nodes(s), cut.T_part_tip[:, :3, 3]))
+    took = np.where(np.isnan(cut.speed), cut.took, way / cut.speed)
     made = _plan(job, candidate.nodes.name, cut, s, np.append(0.0, np.cumsum(took)))
     allowed, tilt = job.tolerances, job.options.tilt
     if tilt is not None:
         allowed = replace(allowed, axis=allowed.axis + tilt.cone)
     digits = _rounding(cut, made, job.program.rules)
-    rows += allowed.checks(made, reference=reference, cell=cell, rounding=digits)
+    # Moved targets are judged by what they execute, and by their distance from the drawing.
+    between = None if moved else reference
+    rows += allowed.checks(made, reference=between, cell=cell, rounding=digits)
     rows += _process_checks(job, candidate, cut, made, digits.time)
     rows += _postures(job, cut, digits.q)
     rows += check_run(job, cut, made, reference, digits)
-    found = nodes_at_targets(job, candidate, cut, s)
-    off, alone = int(np.argmax(found.off)), int(np.argmax(found.alone))
-    said = "distance of the targets from the nodes of the job"
-    rows.append(check("nodes", said, found.off[off], allowed.path, "m", int(cut.ends[off])))
+    rows += _at_targets(job, cut, found, allowed)
+    alone = int(np.argmax(found.alone))
     said = "targets that skip a node of the job, or are not at a new one"
     rows.append(count("every-node", said, found.alone.sum(), int(cut.ends[alone])))
     return rows, (found, made) if found.complete else None
+
+
+def _at_targets(job: Job, cut: ReadCut, found: TargetNodes, allowed: Tolerances) -> Iterator[Check]:
+    """Yield the checks of the places of targets: at their nodes, or how far moved from them."""
+    nodes, targets = found.nodes, cut.T_part_tip[cut.ends]
+    points, most, of = nodes.points[found.at], allowed.path, "nodes of the job"
+    if job.compensation is not None:
+        turned = angle_between(nodes.axes[found.at], targets[:, :3, 2])
+        k = int(np.argmax(turned))
+        said = "angle of the tool axis at the targets to that of the nodes of the job"
+        yield check("target-axis", said, turned[k], allowed.axis, "rad", int(cut.ends[k]))
+        of += ", with the compensation of the job"
+    if isinstance(job.compensation, Correction):
+        points = points + job.compensation.displacement_at(nodes)[found.at]
+    elif job.compensation is not None:
+        most, of = job.most_moved, "nodes of the job, moved by compensation"
+    off = np.linalg.norm(targets[:, :3, 3] - points, axis=1)
+    k = int(np.argmax(off))
+    yield check(
+        "nodes", f"distance of the targets from the {of}", off[k], most, "m", int(cut.ends[k])
+    )
 
 
 def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
@@ -379,6 +408,9 @@ def _along(cut: ReadCut, reference: Contour) -> tuple[Array, Array]:
 def _plan(job: Job, name: str, cut: ReadCut, s: Array, time: Array) -> Plan:
     """Return the cut in the text as a plan, so that it can be audited as one."""
     K = len(cut.q)
+    settings = replace(job.options, tilt=None, closure="free")
+    if job.compensation is not None:  # moved targets may use the limits in full
+        settings = replace(settings, eta_v=1.0, eta_a=1.0)
     return Plan(
         contour=Contour(cut.T_part_tip[:, :3, 3], cut.T_part_tip[:, :3, 2], s=s, name=name),
         robot=job.robot,
@@ -389,7 +421,7 @@ def _plan(job: Job, name: str, cut: ReadCut, s: Array, time: Array) -> Plan:
         posture=np.zeros(K, dtype=np.int64),
         turn=np.zeros(cut.q.shape, dtype=np.int64),
         time=time,
-        settings=replace(job.options, tilt=None, closure="free"),
+        settings=settings,
         cost=0.0,
         proof=Proof(optimal=False, statement="read from a program"),
         counts={},
@@ -563,7 +595,8 @@ class Audit:
                 continue
             made = job.tolerances.checks(each.plan, reference=each.path, cell=cell)
             made += each.drawing
-            table += as_run(job, each.plan, each.path or each.plan.contour).checks
+            drawn = each.path or each.plan.contour
+            table += as_programmed(job, each.plan, drawn, cell).checks
             entry = _entry(each.plan, entries[each.name], made, file)
             judged.append(entry)
             table += made

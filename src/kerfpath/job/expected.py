@@ -11,7 +11,7 @@ from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.auditor import Check, chain_of, retract_checks, window_checks
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
-from kerfpath.execution import ToolMotion
+from kerfpath.execution import ToolMotion, lengths_of
 from kerfpath.job.audit_report import check, count
 from kerfpath.job.format import Candidate, Job, PreparedJob, divide_nodes
 from kerfpath.job.plan_file import PlanFile
@@ -589,6 +589,8 @@ def expect_program(
         ]
         if options.zone == "auto":
             steps = _with_zones(steps, cut, requested)
+        if job.compensation is not None:
+            steps = _with_speeds(steps, cut, requested)
         if options.arc_tolerance is not None:
             steps = _with_arcs(steps, cut, requested)
         sections.append(replace(section, steps=tuple(steps)))
@@ -611,14 +613,14 @@ def whole_cut(job: Job, cut: ReadCut, requested: TargetNodes, plan: Plan) -> Pla
             parts = ((s - s[0]) / (s[-1] - s[0]))[1:-1]
             T[inner] = ToolMotion.through(T[[first, last]], [move.T_part_via]).poses(parts)
             q[inner] = follow_poses(plan.robot, plan.T_base_part @ T[inner] @ flange, q[first])
-    time = requested.time
+    time, s = requested.time, requested.nodes.s
+    if job.compensation is not None:
+        s = lengths_of(requested.nodes, T[:, :3, 3])
     if job.options.feed != "constant":  # it may be slower, which is checked separately
-        time = np.interp(np.arange(K), at, _as_fast(cut, requested.nodes.s[at]))
+        time = np.interp(np.arange(K), at, _as_fast(cut, s[at]))
     return replace(
         plan,
-        contour=Contour(
-            T[:, :3, 3], T[:, :3, 2], s=requested.nodes.s, kind=requested.nodes.kind, name=plan.name
-        ),
+        contour=Contour(T[:, :3, 3], T[:, :3, 2], s=s, kind=requested.nodes.kind, name=plan.name),
         q=q,
         gamma=np.zeros(K),
         time=time,
@@ -688,6 +690,21 @@ def _with_zones(steps: Sequence[Step], cut: ReadCut, requested: TargetNodes) -> 
         assert isinstance(step, LinearMove)
         if move.zone and abs(move.zone - step.zone) <= ZONE_STEP * step.zone + POINT:
             found[k] = replace(step, zone=move.zone)
+    return found
+
+
+def _with_speeds(steps: Sequence[Step], cut: ReadCut, requested: TargetNodes) -> list[Step]:
+    """Return the steps of a cut with the speeds that were read, if they are nearly the same.
+
+    Between moved targets, speeds depend on the places of nodes that were left out.
+    """
+    path = [k for k, step in enumerate(steps) if isinstance(step, LinearMove)]
+    found = list(steps)
+    for k, move in zip((path[node] for node in requested.at), cut.targets, strict=True):
+        step = found[k]
+        assert isinstance(step, LinearMove)
+        if move.speed and abs(move.speed - step.speed) <= SAME_SPEED * step.speed:
+            found[k] = replace(step, speed=move.speed)
     return found
 
 

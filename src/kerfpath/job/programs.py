@@ -15,7 +15,8 @@ from kerfpath.cell import Cell
 from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.job.audit import Audit
 from kerfpath.job.audit_report import AuditReport
-from kerfpath.job.expected import Expected, ExpectedContour
+from kerfpath.job.compensated import as_programmed, programmed
+from kerfpath.job.expected import Expected, ExpectedContour, expect_plans
 from kerfpath.job.format import (
     Candidate,
     Drawing,
@@ -214,7 +215,13 @@ def program_from_file(
             "was planned; correct the job and plan it again"
         )
     notes: list[str] = []
-    by_job = None
+    by_job: Expected | None = None
+    required: Expected | None = None
+    if current is None and file.table("program", ProgramTable).compensate is not None:
+        raise InputError(
+            f"{plan_file}: expected the job, by whose drawing targets are moved (compensate), got "
+            "none; give it with --job"
+        )
     if current is not None:
         if frame is not None:
             raise InputError(
@@ -241,8 +248,12 @@ def program_from_file(
             raise AuditFailed(
                 f"no program: contour {p.name!r} fails its audit{there}: {failed.issue()}"
             )
+    plans = file.plans
+    if required is not None:
+        job = replace(required.job, program=options)
+        plans = programmed_plans(replace(required, job=job), file)
     files, warnings = program_of(
-        file.plans,
+        plans,
         options,
         file.moves,
         missing=file.missing,
@@ -251,6 +262,30 @@ def program_from_file(
         dry_share=dry_share,
     )
     return files, [*notes, *map(str, warnings)]
+
+
+def programmed_plans(expected: Expected | Job, file: PlanFile) -> tuple[Plan, ...]:
+    """Return the plans of a plan.json as its job's program cuts them, see `as_programmed`.
+
+    The drawing of a job is read if its targets are moved.
+
+    Raises
+    ------
+    InputError
+        The job is not that of the plans, or the targets of one cannot be moved.
+    """
+    job = expected if isinstance(expected, Job) else expected.job
+    if job.compensation is None:
+        return file.plans
+    if isinstance(expected, Job):
+        expected = Expected.of(prepare(job))
+    made = []
+    for each in expect_plans(expected, file)[0]:
+        if each.plan is None or each.path is None:
+            raise InputError(f"{file.path}: contour {each.name!r} is not as in {job.path}")
+        run = as_programmed(job, each.plan, each.path, expected.cell)
+        made.append(programmed(job, each.plan, run))
+    return tuple(made)
 
 
 def _accepts_incomplete(file: PlanFile, current: Job | None) -> bool:

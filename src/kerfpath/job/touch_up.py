@@ -154,6 +154,7 @@ def _require_kind(job: Job, file: PlanFile) -> None:
         (options.tilt is not None, "a tilt of the tool axis"),
         (options.refine_parts > 1, "refine_parts"),
         (job.program.arc_tolerance is not None, "arcs_mm"),
+        (job.compensation is not None, "compensate"),
     )
     for found, words in kinds:
         if found:

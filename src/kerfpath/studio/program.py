@@ -286,7 +286,7 @@ def cycle_of(message: ProgramMessage) -> Cycle | None:
 def _clock(result: JobResult, revision: int) -> ProgramMessage:
     # Arcs and merged moves pass the same points at the same times: show the nodes of the plans.
     options = replace(result.job.program, arc_tolerance=None, thin_tolerance=0.0)
-    program = build_program(result.plans, options, moves=result.moves)
+    program = build_program(result.programmed, options, moves=result.moves)
     segments = list(_segments(program, [cut for cut in result.cuts if cut.plan is not None]))
     notes = []
     if result.part is None:

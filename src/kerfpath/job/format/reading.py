@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import ValidationError
@@ -19,7 +19,7 @@ from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour
 from kerfpath.dynamics import STANDARD_GRAVITY
 from kerfpath.errors import InputError
-from kerfpath.execution import IDEAL, Response
+from kerfpath.execution import IDEAL, Correction, Response, read_correction
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format.contour import ContourSpec, contour_request, keys_of_closed_loops
 from kerfpath.job.format.drawing import Drawing
@@ -88,6 +88,11 @@ class Job:
         How the joints of the robot follow what its controller commands.
     path_tolerance : float m, optional
         Largest distance of the executed tip from the path; None: it is only reported.
+    compensation : "model", Correction or None
+        How targets are moved so that the executed path is as drawn: by the response, or as
+        measured runs have shown; None: they are not.
+    most_moved : float m
+        Largest displacement of a target by it.
     text : str
         The text of the file, with its comments.
     accepts_incomplete : bool
@@ -112,6 +117,8 @@ class Job:
     source: Mapping[str, Any]
     response: Response = IDEAL
     path_tolerance: float | None = None
+    compensation: Literal["model"] | Correction | None = None
+    most_moved: float = 2e-3
     text: str = ""
     accepts_incomplete: bool = False
     switched_off: tuple[str, ...] = ()
@@ -283,12 +290,36 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         tolerances=file.audit.resolve(),
         response=file.robot.response_in(path.parent),
         path_tolerance=file.plan.executed_tolerance,
+        compensation=_compensation(path, file),
+        most_moved=file.program.compensate_most_mm / 1000,
         program=file.program.resolve((copy_of or path).stem, file.audit.resolve().path),
         source=source,
         text=text,
         accepts_incomplete=file.program.incomplete == "accept",
         switched_off=file.part.switched_off,
     )
+
+
+def _compensation(path: Path, file: JobFile) -> Literal["model"] | Correction | None:
+    """Return how targets are moved, or raise InputError at the key if they cannot be."""
+    said, at = file.program.compensate, ("program", "compensate")
+    if said is None:
+        return None
+    if file.program.language == "none":
+        raise refusal_at(path, at, "expected a program to compensate, got none; name a language")
+    if said != "model":
+        try:
+            return read_correction(path.parent / said)
+        except InputError as error:
+            raise refusal_at(path, at, f"{error}") from None
+    if file.robot.response_in(path.parent).model == "ideal":
+        raise refusal_at(
+            path,
+            at,
+            "expected joints that lag, got an ideal response in [robot.response], with which there "
+            "is nothing to compensate; name another source, or remove compensate",
+        )
+    return "model"
 
 
 def places_of(job: Job, nodes: Contour) -> Array | None:

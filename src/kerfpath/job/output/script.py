@@ -233,6 +233,7 @@ def script_refusal(job: Job, requests: Sequence[CutRequest]) -> str:
         "interruptions": job.options.interruptions != "none",
         "refine with parts": job.options.refine_parts > 1,
         "handshakes": bool(job.program.handshakes),
+        "compensate": job.compensation is not None,
     }
     found = ", ".join(name for name, asked in beyond.items() if asked)
     return f"a script cannot express {found}" if found else ""

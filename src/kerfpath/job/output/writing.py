@@ -17,6 +17,7 @@ from kerfpath.errors import AuditFailed, InputError, NoFeasiblePath
 from kerfpath.files import require_replaceable
 from kerfpath.job.as_run import allowed_off
 from kerfpath.job.audit_report import collision_note
+from kerfpath.job.compensated import compensation_notes
 from kerfpath.job.format import Job, refusal_at
 from kerfpath.job.plan_file import (
     ContourData,
@@ -82,7 +83,7 @@ def program_places(outcome: JobResult, files: Mapping[str, str]) -> ProgramPlace
     if not outcome.plans or outcome.stuck is not None or options.language == "none":
         return ProgramPlaces()
     try:
-        program = build_program(outcome.plans, options, moves=outcome.moves)
+        program = build_program(outcome.programmed, options, moves=outcome.moves)
         issues = preflight(program, options.language, options.settings)
     except InputError:  # reported when the program is written
         return ProgramPlaces()
@@ -165,13 +166,18 @@ def _executed(job: Job, cut: CutResult) -> ExecutedPath | None:
         return None
     facts = [
         ("Largest distance", f"{off.largest * 1e3:.3g} mm at {off.s[off.worst] * 1e3:.1f} mm"),
-        ("It consists of", off.cause),
         ("On 95 % of the way", f"at most {off.usual * 1e3:.3g} mm"),
         ("Joints", off.response.words),
         ("Reversals of joints 1 to 3", str(len(off.reversals))),
     ]
     if off.range_words:
         facts.insert(4, ("Largest, by sigma", off.range_words))
+    made = cut.as_run.compensation
+    if made is None or made.failure:
+        facts.insert(1, ("It consists of", off.cause))
+    else:
+        facts.append(("With targets as drawn", f"{made.before * 1e3:.3g} mm"))
+        facts.append(("Targets moved by", f"at most {made.largest * 1e3:.3g} mm"))
     if hole is not None:
         facts.append(("Diameter", f"{hole.executed * 1e3:.2f} mm, drawn {hole.drawn * 1e3:.2f} mm"))
         facts.append(("Out of round by", f"{hole.out_of_round * 1e3:.2f} mm"))
@@ -363,6 +369,7 @@ def program_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     contours = {cut.contour: cut.candidate.nodes for cut in outcome.cuts}
     notes += sides_in_doubt(job, contours.items(), outcome.mesh)
     notes += closer_sampling(outcome) + short_pieces(outcome)
+    notes += compensation_notes(job, [(cut.name, cut.as_run) for cut in outcome.cuts])
     faults = [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
     faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]
     if job.program.language != "none":
@@ -371,7 +378,7 @@ def program_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
         try:
             expected = expected_of_cuts(job, outcome.cuts, outcome.cell)
             program, warnings = program_of(
-                outcome.plans, job.program, moves,
+                outcome.programmed, job.program, moves,
                 missing=outcome.missing, expected=expected, strict=strict,
             )  # fmt: skip
             # What the tables of the cuts say already is not said again.

@@ -15,7 +15,8 @@ from kerfpath.contour import Contour
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.front import Subproblem, follows_courses, graph_of_runs, plan_run
 from kerfpath.graph import LayeredGraph
-from kerfpath.job.as_run import as_run, kept_between_nodes
+from kerfpath.job.as_run import kept_between_nodes
+from kerfpath.job.compensated import as_programmed
 from kerfpath.job.format import Candidate, CutRequest, Job, PreparedJob, divide_nodes
 from kerfpath.job.run.reach import move_into_reach
 from kerfpath.job.run.remedy import Remedy, find_remedy, opens_without_windows
@@ -307,7 +308,7 @@ def _audited(prepared: PreparedJob, whole: CutResult, made: Plan) -> CutResult:
     kept = None if whole.picked else kept_between_nodes(job, made)
     made = made if kept is None else kept.plan
     cut = with_checks(prepared, replace(whole, candidate=candidate, graph=graph), made)
-    return replace(cut, as_run=as_run(job, made, candidate.path, kept))
+    return replace(cut, as_run=as_programmed(job, made, candidate.path, prepared.cell, kept))
 
 
 def with_checks(prepared: PreparedJob, cut: CutResult, made: Plan) -> CutResult:

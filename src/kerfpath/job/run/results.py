@@ -11,6 +11,7 @@ from kerfpath.cell import Cell
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.as_run import AsRun
+from kerfpath.job.compensated import programmed
 from kerfpath.job.format import Candidate, CutRequest, Job
 from kerfpath.job.run.remedy import Remedy
 from kerfpath.planner import (
@@ -194,3 +195,15 @@ class JobResult:
     def plans(self) -> tuple[Plan, ...]:
         """The plans, in the order of cutting."""
         return tuple(cut.plan for cut in self.cuts if cut.plan is not None)
+
+    @property
+    def programmed(self) -> tuple[Plan, ...]:
+        """The plans as the program cuts them, with targets moved if the job asks for it.
+
+        Raises
+        ------
+        InputError
+            The targets of one cannot be moved.
+        """
+        made = ((cut.plan, cut.as_run) for cut in self.cuts)
+        return tuple(programmed(self.job, plan, run) for plan, run in made if plan is not None)

@@ -231,6 +231,13 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
         Literal["refuse", "accept"],
         key("what to do if contours have no path: write no program, or one without", '"accept"'),
     ] = "refuse"
+    compensate: Annotated[
+        Text | None,
+        key('"model", or the path of a file that kerfpath correct wrote', '"model"'),
+    ] = None
+    compensate_most_mm: Annotated[
+        Positive, key("a number above 0, at most 4, in mm", "2", le=4)
+    ] = 2.0
 
     @field_validator("request", "wait_for")
     @classmethod
