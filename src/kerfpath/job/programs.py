@@ -265,7 +265,7 @@ def program_from_file(
 
 
 def programmed_plans(expected: Expected | Job, file: PlanFile) -> tuple[Plan, ...]:
-    """Return the plans of a plan.json as its job's program cuts them, see `as_programmed`.
+    """Return the plans of a plan.json as its job's program cuts them, with moved targets.
 
     The drawing of a job is read if its targets are moved.
 
