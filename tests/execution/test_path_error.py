@@ -138,6 +138,13 @@ def test_a_lower_speed_keeps_the_tolerance_and_hardly_a_higher_one(cut, hole):
     assert share_within(cut, hole, 1e-9, response) is None
 
 
+def test_a_tolerance_that_hardly_leaves_more_than_the_corners_is_not_sought_for_ever(cut, hole):
+    """A speed so low that its samples take all memory was tried first."""
+    response = Response(sigma=[SIGMA])
+    corners = off_of(cut, hole, response).rounding.max()
+    assert share_within(cut, hole, corners * (1 + 1e-9), response) is None
+
+
 def test_a_line_and_half_a_circle_are_no_holes(cut, hole):
     line = Contour(np.c_[np.linspace(0, 1, 20), np.zeros((20, 2))], np.tile([0.0, 0, 1], (20, 1)))
     half = Contour(hole.points[:121], hole.axes[:121])

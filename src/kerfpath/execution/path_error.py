@@ -270,10 +270,10 @@ def share_within(
         return None
     # The lag moves the tip about as the square of the speed.
     high, low = 1.0, float(np.sqrt((tolerance - corners) / (full.largest - corners)))
-    while at(low).largest > tolerance:
-        high, low = low, 0.8 * low
-        if low < SLOWEST:
+    while at(low := max(low, SLOWEST)).largest > tolerance:
+        if low == SLOWEST:
             return None
+        high, low = low, 0.8 * low
     while high - low > 0.03 * high:
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if at(middle).largest <= tolerance else (low, middle)
