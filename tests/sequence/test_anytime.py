@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.sequence.order import best_order
+from kerfpath.sequence.order import best_order, shortened
 
 
 def nest(parts: int, seed: int) -> tuple[np.ndarray, list[tuple[int, int]]]:
@@ -73,3 +73,44 @@ def test_rules_that_contradict_each_other_are_told_from_too_little_time() -> Non
     with pytest.raises(NoFeasiblePath, match="contradict") as refused:
         best_order(range(3), np.ones(3), apart, before=[(0, 1), (1, 2), (2, 0)], seconds=5)
     assert refused.value.proved
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_order_is_shortened_within_its_rules(seed: int) -> None:
+    """Nests of plates with a hole each, in rows; some groups may not follow each other."""
+    rng = np.random.default_rng(seed)
+    plates, each = 12, 3
+    group = np.repeat(np.arange(2 * plates), each)
+    place = np.stack([group // 2 % 4 * 45.0, group // 2 // 4 * 45.0], axis=1)
+    start, end = (place + rng.uniform(0, 40, place.shape) for _ in range(2))
+    time = np.full((len(group) + 1,) * 2, np.inf)
+    time[0], time[:, 0] = 0.0, 0.0
+    time[1:, 1:] = np.linalg.norm(end[:, None] - start, axis=2) ** 0.5
+    barred = rng.random((2 * plates,) * 2) < 0.05
+    time[1:, 1:][(group[:, None] == group) | barred[np.ix_(group, group)]] = np.inf
+    earlier = np.zeros((2 * plates,) * 2, bool)
+    earlier[np.arange(0, 2 * plates, 2), np.arange(1, 2 * plates, 2)] = True
+
+    def length(order: np.ndarray) -> float:
+        around = np.concatenate([[0], order + 1, [0]])
+        return float(time[around[:-1], around[1:]].sum())
+
+    while True:  # any order within the rules
+        holes, outlines = rng.permutation(plates) * 2, rng.permutation(plates) * 2 + 1
+        first = np.concatenate([holes, outlines]) * each
+        if np.isfinite(length(first)):
+            break
+    found = shortened(first, group, time, earlier)
+    assert sorted(group[found].tolist()) == list(range(2 * plates))
+    at = np.argsort(group[found])
+    assert (at[::2] < at[1::2]).all()
+    assert length(found) < 0.8 * length(first)
+    # No group is better elsewhere, in any of its candidates.
+    for k, one in enumerate(found):
+        rest = np.delete(found, k)
+        for p in range(len(found)):
+            for other in np.flatnonzero(group == group[one]):
+                tried = np.insert(rest, p, other)
+                at = np.argsort(group[tried])
+                if (at[::2] < at[1::2]).all():
+                    assert length(tried) >= length(found) - 1.01e-4
