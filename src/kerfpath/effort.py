@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +12,14 @@ from typing import Any
 from kerfpath.arrays import short_repr
 from kerfpath.errors import InputError
 
-__all__ = ["Effort", "changed_effort", "current_effort", "set_effort", "thread_count"]
+__all__ = [
+    "Effort",
+    "changed_effort",
+    "current_effort",
+    "set_effort",
+    "thread_count",
+    "uncollected",
+]
 
 MOST_THREADS = 1024
 """Largest number of threads that may be asked for."""
@@ -93,6 +101,18 @@ def changed_effort(**limits: Any) -> Iterator[None]:
         yield
     finally:
         set_effort(before)
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Pause garbage collection while very many objects without cycles are created."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def thread_count() -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import tracemalloc
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from ezdxf.layouts import Modelspace
 from tests.cad.test_dxf import drawn
 
 from kerfpath.cad import read
+from kerfpath.cad.chains import boxes_around
+from kerfpath.cad.curves import Arc, Line, measure
 from kerfpath.errors import InputError
 
 HEAD = "0\nSECTION\n2\nENTITIES\n"
@@ -124,3 +127,47 @@ def test_lines_drawn_a_hundred_times_over_are_refused(tmp_path: Path) -> None:
 
     with pytest.raises(InputError, match="more than 10000 pairs of lines lie on each other"):
         drawn(tmp_path, draw)
+
+
+def test_curves_measured_together_are_as_each_alone() -> None:
+    rng = np.random.default_rng(5)
+    curves: list[Line | Arc] = [Line(*rng.uniform(-1e3, 1e3, (2, 3))) for _ in range(50)]
+    for _ in range(200):
+        start, turn = rng.uniform(-20, 20), rng.uniform(-2, 2) * np.pi
+        curves.append(Arc(*rng.uniform(-1e3, 1e3, (3, 3)), start, start + turn))
+    alone = [replace(curve) for curve in curves]
+    measure(curves)
+    for one, other in zip(curves, alone, strict=True):
+        assert {"ends", "around", "mark", "_box"} <= vars(one).keys()
+        assert not vars(other).keys() & {"ends", "around", "mark", "_box"}
+        assert one.mark == other.mark
+        # Sines of many angles at once may differ from those of one in their last bits.
+        for found, expected in (
+            (one.ends, other.ends), (one.around, other.around), (one.bounds(), other.bounds())
+        ):  # fmt: skip
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11)
+        points = other.at(np.linspace(other.start, other.end, 10_001))
+        low, high = one.bounds()
+        assert (low - 1e-9 <= points).all()
+        assert (points <= high + 1e-9).all()
+        near = 1e3 * (4 * np.pi / 10_000) ** 2 if isinstance(one, Arc) else 1e-9
+        np.testing.assert_allclose([low, high], [points.min(0), points.max(0)], atol=near)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_boxes_around_boxes_are_found_at_all_sizes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-3, 3, (400, 2)) * (rng.random((400, 2)) > 0.1)
+    low = np.round(rng.uniform(0, 1000, (400, 2)), seed)
+    boxes = np.stack([low, low + size], axis=1)
+    boxes[300:] = boxes[:100] + rng.uniform(-2e-3, 2e-3, (100, 2, 2))
+    within = 1e-3
+    larger = np.concatenate(
+        [boxes[:, None, 0] - boxes[:, 0], boxes[:, 1] - boxes[:, None, 1]], axis=2
+    )
+    expected = (larger > -within).all(axis=2) & ~np.eye(400, dtype=bool)
+    assert expected.sum() > 200
+    found = np.zeros_like(expected, dtype=int)
+    for inside, around in boxes_around(boxes, within):
+        np.add.at(found, (inside, around), 1)
+    assert np.array_equal(found, expected)

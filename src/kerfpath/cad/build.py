@@ -200,9 +200,10 @@ def named_loops(
     loops = []
     for kind, stem in stems.items():
         alike = [(trace, colour) for k, trace, colour in found if k == kind]
+        middles = np.array([trace.around.mean(axis=0) for trace, _ in alike]).reshape(-1, 3)
         # Middles are rounded, so that last bits do not decide an order.
-        alike.sort(key=lambda one: tuple((one[0].around.mean(axis=0).round(3) + 0.0).tolist()))
-        for number, (trace, colour) in enumerate(alike, start=1):
+        order = np.lexsort(middles.round(3).T[::-1]).tolist()
+        for number, (trace, colour) in enumerate((alike[k] for k in order), start=1):
             last = stem if kind == "outer" and len(alike) == 1 else f"{stem}{number}"
             loops.append(
                 loop_of(

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
+from math import dist
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from kerfpath.cad.curves import (
     Trace,
     backwards,
     label_connected,
+    measure,
     off_chord,
     sample_curve,
     turned,
@@ -115,6 +117,8 @@ MOST_CROSSED = 400_000_000
 """Largest number of pairs of a point and a chord at its height; they take about 20 s."""
 AT_ONCE = 1_000_000
 """Number of these pairs that are looked at together."""
+SMALLEST = 2.0**-30
+"""Size of the smallest cells in which boxes are looked for, as a share of all."""
 
 
 def continuations(
@@ -146,7 +150,8 @@ def continuations(
         points = np.array([crowd.point for crowd in crowds])
         p, q = _chords(strokes)
         crossed = np.zeros(len(crowds), dtype=np.int64)
-        for k, _ in ray_crossings(points, p, q):
+        one = np.zeros(len(crowds), dtype=np.int64), np.zeros(len(p), dtype=np.int64)
+        for k, _ in ray_crossings(points, p, q, *one):
             crossed += np.bincount(k, minlength=len(crowds))
         for crowd, is_filled in zip(crowds, (crossed % 2).tolist(), strict=True):
             pairs += crowd.pairs(bool(is_filled))
@@ -228,23 +233,90 @@ def _departure_angle(curve: Curve, is_end: int, at: Array, near: float) -> float
     return float(np.arctan2(y, x))
 
 
-def interior_point(polygon: Array) -> Array:
-    """Return a point (3,) well inside a polygon (K, 3), seen from above."""
-    levels = np.unique(polygon[:, 1])
-    if len(levels) < 2:
-        return np.asarray(polygon[0])
-    widest = int(np.argmax(np.diff(levels)))
-    level = (levels[widest] + levels[widest + 1]) / 2
-    p, q = polygon, np.roll(polygon, -1, axis=0)
-    crosses = (p[:, 1] > level) != (q[:, 1] > level)
-    part = (level - p[crosses, 1]) / (q[crosses, 1] - p[crosses, 1])
-    x = np.sort(p[crosses, 0] + part * (q[crosses, 0] - p[crosses, 0]))
-    k = 2 * int(np.argmax(x[1::2] - x[::2]))
-    return np.array([(x[k] + x[k + 1]) / 2, level, polygon[0, 2]])
+def interior_points(polygons: Sequence[Array]) -> Array:
+    """Return a point (N, 3) well inside each polygon (K, 3), seen from above."""
+    inside = np.empty((len(polygons), 3))
+    sizes = np.array([len(polygon) for polygon in polygons])
+    for size in np.unique(sizes).tolist():
+        own = np.flatnonzero(sizes == size)
+        for some in np.array_split(own, -(-len(own) * size // AT_ONCE)):
+            inside[some] = _interior_points(np.array([polygons[k] for k in some.tolist()]))
+    return inside
 
 
-def ray_crossings(points: Array, p: Array, q: Array) -> Iterator[tuple[Ints, Ints]]:
-    """Yield which rays from `points` (N, 3) along x cross which segments p q (K, 3), from above.
+def _interior_points(polygons: Array) -> Array:
+    """Return a point (N, 3) in each of the polygons (N, K, 3), on the widest part of a level."""
+    each = np.arange(len(polygons))
+    levels = np.sort(polygons[..., 1], axis=1)
+    widest = np.argmax(np.diff(levels, axis=1), axis=1)
+    level = (levels[each, widest] + levels[each, widest + 1])[:, None] / 2
+    (x, y), (x1, y1) = ((p[..., 0], p[..., 1]) for p in (polygons, np.roll(polygons, -1, axis=1)))
+    crosses = (y > level) != (y1 > level)
+    part = (level - y) / np.where(crosses, y1 - y, 1.0)
+    at = np.sort(np.where(crosses, x + part * (x1 - x), np.inf), axis=1)
+    entered, left = at[:, :-1:2], at[:, 1::2]
+    wide = np.subtract(left, entered, out=np.full_like(left, -1.0), where=np.isfinite(left))
+    k = np.argmax(wide, axis=1)
+    found = np.stack([(entered[each, k] + left[each, k]) / 2, level[:, 0], polygons[:, 0, 2]], 1)
+    # A polygon of one level has no inside.
+    return np.where(crosses.any(axis=1)[:, None], found, polygons[:, 0])
+
+
+def boxes_around(boxes: Array, within: float) -> Iterator[tuple[Ints, Ints]]:
+    """Yield which of the boxes (N, 2, 2) are in which others, or reach out of them `within`.
+
+    Boxes of about one size are looked for in cells of that size, of which each touches four.
+
+    Yields
+    ------
+    inside, around : (M,) int
+        Their numbers; many at a time.
+
+    Raises
+    ------
+    InputError
+        Far too many boxes are in one place.
+    """
+    low, high = boxes[:, 0] - within, boxes[:, 1] + within
+    extent = np.stack([low.min(axis=0), high.max(axis=0)])
+    powers = np.ceil(np.log2(np.maximum(high - low, SMALLEST * np.ptp(extent, axis=0))))
+    found, count = list[tuple[Ints, Ints]](), 0
+    for power in np.unique(powers, axis=0):
+        places, first, last, end = (
+            np.floor((p - extent[0]) / 2.0**power).astype(np.int64)
+            for p in (boxes[:, 0], low, high, extent[1])
+        )
+        cells = places @ (end[1] + 1, 1)
+        order = np.argsort(cells)
+        alike = (powers == power).all(axis=1)
+        for step in product((0, 1), (0, 1)):
+            around = np.flatnonzero(alike & (first + step <= last).all(axis=1))
+            cell = (first[around] + step) @ (end[1] + 1, 1)
+            there, end_of = (
+                np.searchsorted(cells, cell, side, order) for side in ("left", "right")
+            )
+            for which, at in _ranges(there, end_of - there):
+                i, j = order[at], around[which]
+                inside = ((low[j] < boxes[i, 0]) & (boxes[i, 1] < high[j])).all(axis=1) & (i != j)
+                found.append((i[inside], j[inside]))
+                count += len(found[-1][0])
+                if count > AT_ONCE:
+                    yield _joined(found)
+                    found, count = [], 0
+    yield _joined(found)
+
+
+def ray_crossings(
+    points: Array, p: Array, q: Array, of_point: Ints, of_segment: Ints
+) -> Iterator[tuple[Ints, Ints]]:
+    """Yield which rays from points along x cross which segments p q, seen from above.
+
+    Parameters
+    ----------
+    points : (N, 3)
+    p, q : (K, 3)
+    of_point, of_segment : (N,), (K,) int
+        Numbers of groups: a ray crosses only segments of the group of its point.
 
     Yields
     ------
@@ -256,24 +328,49 @@ def ray_crossings(points: Array, p: Array, q: Array) -> Iterator[tuple[Ints, Int
     InputError
         Far too many points lie at the height of segments.
     """
-    order = np.argsort(points[:, 1])
-    levels = points[order, 1]
-    first = np.searchsorted(levels, np.minimum(p[:, 1], q[:, 1]))
-    count = np.searchsorted(levels, np.maximum(p[:, 1], q[:, 1])) - first
-    upto = np.cumsum(count)
-    if upto[-1] > MOST_CROSSED:
-        raise InputError(
-            "holds too many lines beside and around each other; leave out what is not to be cut"
+    levels, rank = np.unique(points[:, 1], return_inverse=True)
+    places = of_point * (len(levels) + 1) + rank  # by group, then by level
+    order = np.argsort(places)
+    first, upto = (
+        np.searchsorted(
+            places, of_segment * (len(levels) + 1) + np.searchsorted(levels, y), sorter=order
         )
-    bounds = np.searchsorted(upto, np.arange(0, upto[-1] + AT_ONCE, AT_ONCE), side="right")
-    for low, high in pairwise(np.unique([*bounds, len(p)]).tolist()):
-        segment = np.repeat(np.arange(low, high), count[low:high])
-        before = upto[low:high] - count[low:high]
-        within = np.arange(len(segment)) - np.repeat(before - before[0], count[low:high])
-        point = order[first[segment] + within]
+        for y in (np.minimum(p[:, 1], q[:, 1]), np.maximum(p[:, 1], q[:, 1]))
+    )
+    for segment, at in _ranges(first, upto - first):
+        point = order[at]
         (x, y), (x1, y1) = ((end[segment, :2] - points[point, :2]).T for end in (p, q))
         crosses = x - y * (x1 - x) / (y1 - y) > 0
         yield point[crosses], segment[crosses]
+
+
+def _ranges(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """Yield the numbers of ranges and what is in them: `count` (R,) integers from `first` (R,) on.
+
+    Raises
+    ------
+    InputError
+        Far too many.
+    """
+    upto = np.cumsum(count)
+    total = int(upto[-1]) if len(upto) else 0
+    if total > MOST_CROSSED:
+        raise InputError(
+            "holds too many lines beside and around each other; leave out what is not to be cut"
+        )
+    bounds = np.searchsorted(upto, np.arange(0, total + AT_ONCE, AT_ONCE), side="right")
+    for low, high in pairwise(np.unique([*bounds, len(first)]).tolist()):
+        which = np.repeat(np.arange(low, high), count[low:high])
+        before = upto[low:high] - count[low:high]
+        within = np.arange(len(which)) - np.repeat(before - before[0], count[low:high])
+        yield which, first[which] + within
+
+
+def _joined(pairs: Sequence[tuple[Ints, Ints]]) -> tuple[Ints, Ints]:
+    one, other = (
+        np.concatenate([np.zeros(0, np.int64), *each]) for each in zip(*pairs, strict=True)
+    )
+    return one, other
 
 
 # -----------------------------------------------------------------------------
@@ -362,6 +459,7 @@ def chains_against(
 
 def _nested(chains: Sequence[Chain], gap: float) -> list[tuple[Kind, Chain]]:
     """Return the kind of each chain, and the chain in the direction of that; `gap` is in mm."""
+    measure(curve for chain in chains for curve in chain.edges)  # those that were reversed
     holes = iter(_are_holes([chain for chain in chains if chain.is_closed], gap))
     told = list[tuple[Kind, Chain]]()
     for chain in chains:
@@ -372,6 +470,7 @@ def _nested(chains: Sequence[Chain], gap: float) -> list[tuple[Kind, Chain]]:
                 other_way = tuple(backwards(curve) for curve in chain.edges[::-1])
                 chain = EdgeChain(edges=other_way)
         told.append((kind, chain))
+    measure(curve for _, chain in told for curve in chain.edges)
     return told
 
 
@@ -425,6 +524,7 @@ def _chained(strokes: Sequence[Stroke], gap: float, R: Array) -> tuple[list[Chai
 
     A stroke that lies on another is left out, unless it is a side that two loops share.
     """
+    measure(curve for stroke in strokes for curve in stroke)
     drawn = [stroke for given in strokes if (stroke := _head_to_tail(given))]
     same = _same_marks(drawn, gap)
     kept, spare, left = _split_duplicates(drawn, same)
@@ -498,7 +598,7 @@ def _distance_to_end(point: Array, curve: Curve) -> float:
 
 
 def _is_closed(stroke: Stroke) -> bool:
-    return bool(np.linalg.norm(stroke[0].ends[0] - stroke[-1].ends[1]) <= NOTHING)
+    return dist(stroke[0].ends[0], stroke[-1].ends[1]) <= NOTHING
 
 
 def _same_marks(strokes: Sequence[Stroke], gap: float) -> dict[Mark, Mark]:
@@ -555,6 +655,8 @@ def _connected_groups(
 
     Between the two are the numbers of the junctions (2 K,) at the ends of the K strokes.
     """
+    if not (loose or spare):
+        return
     places = [_junctions(_ends(strokes), gap) for strokes in (loose, spare)]
     first = len(loose) + len(spare)  # the first number of a place
     links = [[end // 2, first + at] for end, at in enumerate(places[0].tolist())]
@@ -731,17 +833,18 @@ def _are_holes(chains: Sequence[Chain], gap: float) -> list[bool]:
         return []
     boxes = np.array([chain.bounds()[:, :2] for chain in chains])
     areas = np.array([abs(chain.area[2]) for chain in chains])
-    points = np.array([interior_point(chain.around) for chain in chains])
-    owner = np.repeat(np.arange(len(chains)), [len(chain.around) for chain in chains])
-    p = np.vstack([chain.around for chain in chains])
-    q = np.vstack([np.roll(chain.around, -1, axis=0) for chain in chains])
+    points = interior_points([chain.around for chain in chains])
     crossed = np.zeros(len(chains), dtype=np.int64)
-    within = max(gap, COINCIDENT)
-    for k, segment in ray_crossings(points, p, q):
-        j = owner[segment]
-        larger = np.concatenate([boxes[k, 0] - boxes[j, 0], boxes[j, 1] - boxes[k, 1]], axis=1)
+    for k, j in boxes_around(boxes, COINCIDENT):
         # Of two chains in one box, such as a circle and an inscribed one, the larger is around.
-        is_around = (larger > -COINCIDENT).all(axis=1) & (j != k)
-        is_around &= (larger > within).any(axis=1) | (areas[j] > LARGER * areas[k])
-        crossed += np.bincount(k[is_around], minlength=len(chains))
+        wider = np.abs(boxes[k] - boxes[j]).max(axis=(1, 2)) > max(gap, COINCIDENT)
+        wider |= areas[j] > LARGER * areas[k]
+        k, j = k[wider], j[wider]
+        around, group = np.unique(j, return_inverse=True)
+        polygons = [chains[one].around for one in around.tolist()]
+        p = np.concatenate([np.zeros((0, 3)), *polygons])
+        q = np.concatenate([np.zeros((0, 3)), *(np.roll(p, -1, axis=0) for p in polygons)])
+        owner = np.repeat(np.arange(len(polygons)), [len(polygon) for polygon in polygons])
+        for pair, _ in ray_crossings(points[k], p, q, group, owner):
+            crossed += np.bincount(k[pair], minlength=len(chains))
     return [bool(count % 2) for count in crossed]

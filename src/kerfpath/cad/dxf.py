@@ -13,8 +13,10 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from io import BytesIO
 from itertools import islice, product
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +42,7 @@ from scipy.interpolate import BSpline
 
 from kerfpath.arrays import Array, freeze
 from kerfpath.cad.chains import Stroke, Style, part_of_strokes
-from kerfpath.cad.curves import Arc, Curve, Line, Spline
+from kerfpath.cad.curves import Arc, Curve, Line, Spline, measure
 from kerfpath.cad.drawing_frame import ASK, NAMED, Choice, drawing_frame, is_around_islands
 from kerfpath.cad.left_out import LeftOut
 from kerfpath.cad.part import Part
@@ -351,11 +353,12 @@ def read_dxf(
         notes.append(f"unit {unit} as given; $INSUNITS says {declared}")
     if repairs:
         notes.append(f"{len(repairs)} faults of the file repaired, the first: {repairs[0]}")
-    sheet = _Sheet(document, is_flat=axis is None, cuts_frame=frame == "cut")
     scale = UNITS_MM[unit or declared]
     try:
+        sheet = _Sheet(document, is_flat=axis is None, cuts_frame=frame == "cut")
         with np.errstate(all="ignore"):  # ezdxf divides by lengths that may be 0
             sheet.add(document.modelspace(), np.diag([scale, scale, scale, 1.0]))
+            sheet.require_flat()
             sheet.look_on_paper()
     except InputError:
         raise
@@ -398,6 +401,21 @@ def _reason(error: Exception) -> str:
     return " ".join(str(error).split())[:80] or type(error).__name__
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Layer:
+    """A layer: its name, its colour by the index of AutoCAD, and whether it is shown."""
+
+    name: str
+    colour: int = 7
+    is_frozen: bool = False
+    is_off: bool = False
+
+    @cached_property
+    def is_frame(self) -> bool:
+        """Whether its name is that of a drawing frame."""
+        return NAMED.search(self.name) is not None
+
+
 @dataclass
 class _Sheet:
     """Strokes gathered from the entities of a drawing, in mm, by (layer, colour)."""
@@ -409,12 +427,19 @@ class _Sheet:
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
     put_aside: Counter[tuple[str, str]] = field(default_factory=Counter)
     count: int = 0
+    drawn: list[tuple[Curve, str, str]] = field(default_factory=list)
     texts: list[Array] = field(default_factory=list)
-    layers: dict[str, str] = field(init=False)
+    layers: dict[str, _Layer] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        named = [str(layer.dxf.name) for layer in self.document.layers]
-        self.layers = {name.casefold(): printable(name) for name in named}
+        for layer in self.document.layers:
+            name = str(layer.dxf.name)
+            self.layers[name.casefold()] = _Layer(
+                name=printable(name),
+                colour=abs(int(layer.dxf.color)),
+                is_frozen=layer.is_frozen(),
+                is_off=layer.is_off(),
+            )
 
     def summed(self) -> tuple[LeftOut, ...]:
         """Return what was left out by kind and reason, first what may have been a line to cut."""
@@ -464,6 +489,25 @@ class _Sheet:
             ]
         return True
 
+    def require_flat(self) -> None:
+        """Raise InputError if a curve reaches too far, or leaves the plane of a flat drawing."""
+        measure(curve for curve, _, _ in self.drawn)
+        boxes = np.array([curve.bounds() for curve, _, _ in self.drawn]).reshape(-1, 2, 3)
+        within = (np.abs(boxes) <= LARGEST).all(axis=(1, 2))
+        flat = (boxes[:, 1, 2] - boxes[:, 0, 2] <= FLAT) | (not self.is_flat)
+        if (wrong := np.flatnonzero(~(within & flat))).size:
+            (_, kind, layer), box = self.drawn[wrong[0]], boxes[wrong[0]]
+            if not within[wrong[0]]:
+                raise InputError(
+                    f"a {kind} on layer {layer} reaches further than {LARGEST / 1e6:g} km; its "
+                    "numbers are damaged, or the unit is wrong"
+                )
+            raise InputError(
+                f"a {kind} on layer {layer} leaves the drawing plane, z from {box[0, 2]:g} to "
+                f"{box[1, 2]:g} mm; expected a flat drawing: project it to one plane, or "
+                f"{GIVE_AXIS}"
+            )
+
     def add(
         self, entities: Iterable[DXFGraphic], T: Array, inside: Style = LOOSE, depth: int = 0
     ) -> None:
@@ -488,15 +532,15 @@ class _Sheet:
         if entity.dxf.get("invisible", 0):
             self.put_aside[kind, "invisible"] += 1
             return
-        if self.document.layers.has_entry(look[0]):
-            drawn = self.document.layers.get(look[0])
-            # A block on a layer that is off shows what it has on other layers.
-            if drawn.is_frozen() or (drawn.is_off() and not isinstance(entity, Insert)):
-                self.put_aside[kind, f"on hidden layer {look[0]}"] += 1
-                return
-        names = [look[0], *([str(entity.dxf.name)] if isinstance(entity, Insert) else [])]
-        if not self.cuts_frame and (named := [name for name in names if NAMED.search(name)]):
-            self.put_aside[kind, f"{NAMES_FRAME}, {printable(named[-1])}"] += 1
+        layer = self._layer(look[0])
+        # A block on a layer that is off shows what it has on other layers.
+        if layer.is_frozen or (layer.is_off and not isinstance(entity, Insert)):
+            self.put_aside[kind, f"on hidden layer {look[0]}"] += 1
+            return
+        name = str(entity.dxf.name) if isinstance(entity, Insert) else ""
+        if not self.cuts_frame and (layer.is_frame or NAMED.search(name)):
+            of = name if NAMED.search(name) else look[0]
+            self.put_aside[kind, f"{NAMES_FRAME}, {printable(of)}"] += 1
             return
         if isinstance(entity, Insert):
             self.texts += [T[:3, :3] @ [*each.dxf.insert] + T[:3, 3] for each in entity.attribs]
@@ -514,9 +558,13 @@ class _Sheet:
         if curves and _is_wide(entity):
             self.left_out[kind, "only its width: its middle line is read"] += 1
         for curve in curves:
-            self._require_flat(curve, kind, look[0])
+            if isinstance(curve, Spline):
+                curve.bounds()  # fails for a damaged one
+            elif not isfinite(curve.end):
+                raise DXFError("an angle is not a number")
         if curves:
             self.strokes.setdefault(look, []).append(tuple(curves))
+            self.drawn += [(curve, kind, look[0]) for curve in curves]
 
     def _insert(self, insert: Insert, T: Array, look: Style, depth: int) -> None:
         """Add a block wherever it is inserted, once or in rows and columns."""
@@ -550,31 +598,19 @@ class _Sheet:
             raise InputError(f"holds more than {MOST} curves and blocks, {TOO_MUCH}")
 
     def _look(self, entity: DXFGraphic, inside: Style) -> Style:
-        layer = inside[0] if entity.dxf.layer == "0" else self._layer(str(entity.dxf.layer))
+        own = str(entity.dxf.layer)
+        layer = inside[0] if own == "0" else self._layer(own).name
         if entity.dxf.hasattr("true_color"):
             return layer, "#{:02x}{:02x}{:02x}".format(*int2rgb(entity.dxf.true_color))
         index = int(entity.dxf.color)
         if index == BYBLOCK:
             return layer, inside[1]
         if index == BYLAYER:
-            known = self.document.layers.has_entry(layer)
-            index = abs(int(self.document.layers.get(layer).dxf.color)) if known else 7
+            index = self._layer(layer).colour
         return layer, COLOURS.get(index, f"aci{index}")
 
-    def _layer(self, name: str) -> str:
-        """Return a layer as its table spells it, or as it is first used: case does not matter."""
-        return self.layers.setdefault(name.casefold(), printable(name))
-
-    def _require_flat(self, curve: Curve, kind: str, layer: str) -> None:
-        box = curve.bounds()
-        if not (np.abs(box) <= LARGEST).all():
-            raise InputError(
-                f"a {kind} on layer {layer} reaches further than {LARGEST / 1e6:g} km; its numbers "
-                "are damaged, or the unit is wrong"
-            )
-        if self.is_flat and box[1, 2] - box[0, 2] > FLAT:
-            raise InputError(
-                f"a {kind} on layer {layer} leaves the drawing plane, z from {box[0, 2]:g} to "
-                f"{box[1, 2]:g} mm; expected a flat drawing: project it to one plane, or "
-                f"{GIVE_AXIS}"
-            )
+    def _layer(self, name: str) -> _Layer:
+        """Return a layer as its table has it, or as it is first used: case does not matter."""
+        if (found := self.layers.get(name.casefold())) is None:
+            found = self.layers[name.casefold()] = _Layer(name=printable(name))
+        return found

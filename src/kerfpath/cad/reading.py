@@ -19,6 +19,7 @@ from kerfpath.cad.machine import Machine
 from kerfpath.cad.part import Part
 from kerfpath.cad.table import Ends, TableCells, cells_of
 from kerfpath.cad.units import GAP, MM, SUFFIXES, UNITS_MM, require_unit, unit_question
+from kerfpath.effort import uncollected
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
 from kerfpath.isolated import call_apart, seconds_for, stand_by, too_slow
@@ -265,7 +266,8 @@ def _read_file(
         if kind == "DXF":
             from kerfpath.cad.dxf import read_dxf
 
-            return read_dxf(path, content, unit, gap, axis, options.drawing_frame)
+            with uncollected():
+                return read_dxf(path, content, unit, gap, axis, options.drawing_frame)
         return _translated(kind, path, content, options, progress)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -277,7 +279,7 @@ def _translated(
     """Return the part in a STEP or IGES file, translated in another process: OCCT may crash."""
     stand_by()
     from kerfpath.cad.iges import read_iges
-    from kerfpath.cad.shape import occt, uncollected
+    from kerfpath.cad.shape import occt
     from kerfpath.cad.step import read_step, require_grammar
 
     unit, gap = options.unit, options.gap
@@ -305,7 +307,7 @@ def _read_shape(shape: object, options: _ReadOptions, progress: Progress) -> Par
     """Return the part in a shape in memory."""
     require_extra("cad", "shape: reading it")
     from kerfpath.cad.in_memory import shape_in_memory
-    from kerfpath.cad.shape import occt, uncollected
+    from kerfpath.cad.shape import occt
 
     try:
         with occt(), uncollected():

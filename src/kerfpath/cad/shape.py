@@ -6,7 +6,6 @@ which returns OCCT's binary format. That process imports only this module and th
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -135,18 +134,6 @@ def _copy_with_names(
 def children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
     """Return the direct sub-shapes of a shape."""
     return list(_each(TopoDS_Iterator(shape)))
-
-
-@contextmanager
-def uncollected() -> Iterator[None]:
-    """Pause garbage collection while very many objects without cycles are created."""
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 @contextmanager

@@ -32,7 +32,6 @@ from kerfpath.cad.shape import (
     children,
     occt,
     require_few_faces,
-    uncollected,
     unique,
 )
 from kerfpath.cad.step_model import (
@@ -45,6 +44,7 @@ from kerfpath.cad.step_model import (
     step_frames,
 )
 from kerfpath.cad.units import GIVE_UNIT, UNITS_MM
+from kerfpath.effort import uncollected
 from kerfpath.errors import InputError, printable
 
 # -----------------------------------------------------------------------------
