@@ -144,6 +144,49 @@ def test_a_refusal_says_with_what_a_motion_was_found(seed, share, arm, space):
     assert errors(plan(nodes, arm, speed=needed.speed * speed, **space)) == []
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("explored")
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("share", [1.02, 1.15, 1.6])
+def test_with_all_valleys_the_lower_speed_that_a_refusal_states_is_planned(seed, share, arm, space):
+    nodes = drawn(seed)
+    fastest = fastest_speed(nodes, arm, refine=True, **space)
+    speed = share * fastest.speed
+    phases = []
+    with pytest.raises(NoFeasiblePath) as caught:
+        plan(nodes, arm, speed=speed, phase=phases.append, **space)
+    none = caught.value
+    assert "on this grid" not in str(none)
+    needed = none.relaxation.speed * share
+    assert needed == pytest.approx(1, rel=2e-3) if share < 1.1 else needed <= 1 + 1e-9
+    assert errors(plan(nodes, arm, speed=none.relaxation.speed * speed, **space)) == []
+    if none.closed is not None:  # an independent search, from other samples, is no quicker
+        other = fastest_speed(nodes, arm, refine=True, **space | {"gamma_step": np.radians(5)})
+        assert other.speed < speed
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("explored")
+def test_an_interval_that_is_wanted_ends_the_search_and_changes_nothing_before(
+    arm, tool, placement, monkeypatch
+):
+    """So that a plan at the speed of a motion found finds that motion, too."""
+    posed = task(drawn(0), arm, tool, placement)
+
+    def found(**wanted):
+        return [each.dt for each in quick_motions(posed, CollisionFreeSearch(posed), **wanted)]
+
+    for many in (1, 1000):
+        monkeypatch.setattr(quickest_module, "MANY", many)
+        every, before = found(), 0
+        for share in (0.7, 0.85, 0.93, 0.97, 1.01):
+            some = found(wanted=share * every[-1])
+            assert some == every[: len(some)]
+            assert len(some) >= max(before, 2)
+            before = len(some)
+        assert some == every
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_of_a_hopeless_speed_a_motion_is_found_without_the_exact_search(
     seed, arm, space, monkeypatch, change_effort

@@ -15,8 +15,8 @@ from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.courses import can_explore
 from kerfpath.planner.exploration import Exploration
 from kerfpath.planner.feed_reduction import may_keep_speed, slowed_motion
-from kerfpath.planner.impossible import interval_of, refuse_impossible, speed_at
-from kerfpath.planner.on_grid import plan_on_grid
+from kerfpath.planner.impossible import can_be_slower, interval_of, refuse_impossible, speed_at
+from kerfpath.planner.on_grid import from_quickest, plan_on_grid
 from kerfpath.planner.quickest import clear_paths, wide
 from kerfpath.planner.refinements import refine_from_random_starts
 from kerfpath.planner.starts import Starts
@@ -248,18 +248,23 @@ def _clear_motion(
     search, paths = searched
     if starts.best is not None and starts.above(search.value, ENOUGH):
         paths = [path for beam in QUICK for path in search.paths(beam)]
-    if starts.best is None and task.settings.feed == "constant":
+    constant = task.settings.feed == "constant"
+    if starts.best is None and constant:
         refuse_impossible(task, finder, paths)
     if starts.best is None:
         _begin("refinement", begin, task, finder, paths)
     else:
         begin("refinement")
+    judged = explored and constant and can_explore(task) and can_be_slower(task)
+    wide_search = _explore if explored and finder.is_free and can_explore(task) else _search_wider
     try:
+        if starts.best is None and judged and task.dt < NEARLY * _interval_of(task, paths):
+            starts.begin_with(_quick_enough(task, finder, paths, begin))
         starts.refine(paths)
-        if thorough and explored and finder.is_free and can_explore(task):
-            _explore(task, starts, search)
-        elif thorough:
-            _search_wider(task, starts, search, paths)
+        if starts.best is None and judged:
+            starts.begin_with(_quick_enough(task, finder, paths, begin))
+        if thorough:
+            wide_search(task, starts, search, paths)
     except StopEarly:
         if starts.best is None:
             raise
@@ -287,15 +292,43 @@ def _begin(
         free = task.with_problem(replace(task.problem, limits=without))
         searched = clear_paths(free, finder, QUICK[:1])
         paths = [] if searched is None else searched[1]
-    claim = Proof(optimal=False, statement="")
-    plans = [refiner.reduce_excess(task.plan_between(path, claim), most=0) for path in paths]
-    dt = min((interval_of(task, plan) for plan in plans), default=np.inf)
+    dt = _interval_of(task, paths)
     if task.dt < NEARLY * dt < np.inf:
         what = f"{what}, first estimate of a possible speed {speed_at(task, dt)}"
     begin(what)
 
 
-def _explore(task: Task, starts: Starts, search: ContinuousSearch) -> None:
+def _interval_of(task: Task, paths: list[ContinuousPath]) -> float:
+    """Return the interval, s, in which the best of some paths keeps the limits, as it is."""
+    claim = Proof(optimal=False, statement="")
+    plans = [refiner.reduce_excess(task.plan_between(path, claim), most=0) for path in paths]
+    return min((interval_of(task, plan) for plan in plans), default=np.inf)
+
+
+def _quick_enough(
+    task: Task,
+    finder: CollisionFreeSearch,
+    paths: list[ContinuousPath],
+    begin: Callable[[str], None],
+) -> Plan:
+    """Return the plan of one of the quickest motions, where `paths` lead to none.
+
+    Raises
+    ------
+    NoFeasiblePath
+        There is none among them.
+    """
+    claim = Proof(optimal=False, statement="")
+    sharp = np.abs(task.plan_between(paths[0], claim).acceleration_share) if paths else np.zeros(1)
+    none = NoFeasiblePath(
+        f"contour {task.contour.name!r}: no motion over continuous rotation was found",
+        proved=False,
+        node=int(sharp.max(axis=-1, initial=0.0).argmax()),
+    )
+    return from_quickest(task, finder, none, begin)
+
+
+def _explore(task: Task, starts: Starts, search: ContinuousSearch, _: list[ContinuousPath]) -> None:
     """Refine courses through the cheapest valleys; explore all if there may be a better motion.
 
     The samples of these valleys follow the joints, whatever the step of gamma, so that what is

@@ -177,7 +177,7 @@ def _fastest(
         return found, [found.node]
     motions, step = list[QuickMotion](), longest_step(task.contour)
     fixed = task.placed or not task.robot.free.size or task.settings.method != "continuous"
-    ways = quick_motions(along, there, explore=np.inf if explore else 0.0)
+    ways = quick_motions(along, there, explore=explore)
     for quick in ways if fixed else _over_courses(task, finder, ways):
         motions.append(quick)
         if enough is not None and step / quick.dt >= enough:

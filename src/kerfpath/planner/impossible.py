@@ -14,7 +14,7 @@ from kerfpath.errors import Closed, NoFeasiblePath, Relaxation
 from kerfpath.limits import rates_of
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.layers import longest_step
-from kerfpath.planner.quickest import QuickMotion, quickest_along
+from kerfpath.planner.quickest import QuickMotion, quick_motions, quickest_along
 from kerfpath.planner.statements import at_least, at_most
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan, Proof
@@ -26,6 +26,11 @@ FAR_OUTSIDE = 4.0
 BINDS, APART = 0.9, 3
 """Share of the limits, in speed, from which they bind at a node; and distance in nodes that further
 binding nodes keep."""
+MUCH = 2.0
+"""Multiple of the node interval up to which a quicker motion is looked for where it is proved that
+none is quick enough: what is slower is advice enough."""
+MOST_PLACES = 4
+"""Most binding nodes around which a proof is tried for one speed."""
 FAR, CLOSE = 300.0, 1.02
 """Largest factor on the speed that is tried to find an impossible speed; and the factor to which
 the impossible speed is then narrowed down."""
@@ -44,15 +49,26 @@ def motion_test(task: Task) -> MotionTest | None:
     return MotionTest(task.robot, frames, task.setup.tool, asked.postures)
 
 
-def at_any_gamma(broken: NoFeasiblePath, task: Task) -> NoFeasiblePath:
-    """Return the answer of a search without a path, with whether it is proved at every gamma."""
+def at_any_gamma(
+    broken: NoFeasiblePath, task: Task, motions: Sequence[QuickMotion] = ()
+) -> NoFeasiblePath:
+    """Return the answer of a search without a path, with whether it is proved at every gamma.
+
+    It is tried first around the nodes that bind `motions`, each quicker than the one before, where
+    it takes least work.
+    """
     test = motion_test(task)
     if test is None or task.settings.feed == "dip":
         return broken
     limits = task.problem.limits
-    closed = test.closed(limits, task.dt, broken.node + 1) or test.closed(limits, task.dt)
+    nodes = binding_nodes(motions)[:MOST_PLACES] if motions else [broken.node + 1]
+    places = (*nodes, None)
+    each = (test.closed(limits, task.dt, around) for around in places)
+    closed = next((found for found in each if found is not None), None)
     if closed is None:
         return broken.with_message(f"{broken}; whether there is a motion off the grid is undecided")
+    if not broken.proved:
+        return proved_impossible(task, closed)
     return broken.with_message(f"{broken}; proved for every rotation: {closed}", closed=closed)
 
 
@@ -82,6 +98,9 @@ def refuse_impossible(
     for i in gentlest if can_be_slower(task) else ():
         slower = quickest_along(task, finder, paths[i])
         if slower is not None:
+            if slower.dt < MUCH * task.dt:
+                *_, quickest = quick_motions(task, finder, wanted=task.dt)
+                slower = quickest.plan
             raise with_relaxation(broken, task, slower)
     raise broken
 

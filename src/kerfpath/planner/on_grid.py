@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 from kerfpath.errors import NoFeasiblePath
 from kerfpath.planner.attempt import Attempt, Strategy, first_plan
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.feed_reduction import plan_slowed
-from kerfpath.planner.impossible import at_any_gamma, can_be_slower, speed_at, with_relaxation
-from kerfpath.planner.quickest import quick_motions, velocity_limited_motions
+from kerfpath.planner.impossible import MUCH, at_any_gamma, can_be_slower, speed_at, with_relaxation
+from kerfpath.planner.quickest import QuickMotion, quick_motions, velocity_limited_motions
 from kerfpath.planner.refinements import plan_from_faster, plan_off_grid, refine_plan
 from kerfpath.planner.statements import ON_THIS_GRID, limits_named
 from kerfpath.planner.task import Task
@@ -20,12 +21,9 @@ from kerfpath.search import SearchProblem, find_shortest, velocity_allows
 HOPELESS = 4.0
 """If no path on the grid keeps the velocities in this multiple of the node interval, no motion is
 as quick as asked for, and the exact fastest path is not worth minutes."""
-NEAR = 1.25
-"""Multiple of the node interval up to which all valleys are explored for a quicker motion; that
-gains 20 % at most."""
-TOO_SLOW, NEARLY = 2.0, 1.15
-"""Multiples of the node interval above which a proof that there is no motion is tried before the
-next search: for the fastest path on the grid, and for faster motions."""
+FIRST, NEARLY = 2, 1.15
+"""Motions found before a proof that there is no quicker one is tried: the fastest path on the grid,
+moved off it; and the multiple of the node interval above which it is tried then."""
 
 
 def plan_on_grid(
@@ -90,7 +88,7 @@ def quickest_motion(attempt: Attempt) -> Plan | None:
     if attempt.task.settings.feed == "dip" or not attempt.refine:
         return None
     assert attempt.failure is not None, "the search of the grid found no path"
-    return _from_quickest(attempt.task, attempt.finder, attempt.failure, attempt.begin)
+    return from_quickest(attempt.task, attempt.finder, attempt.failure, attempt.begin)
 
 
 ON_GRID: tuple[Strategy, ...] = (best_path, slowed_path, path_off_grid, quickest_motion)
@@ -103,7 +101,7 @@ def _said_of_grid(none: NoFeasiblePath, task: Task) -> NoFeasiblePath:
     return none.with_message(f"contour {task.contour.name!r}: {where}{none}{_bracket(none, task)}")
 
 
-def _from_quickest(
+def from_quickest(
     task: Task, finder: CollisionFreeSearch, broken: NoFeasiblePath, begin: Callable[[str], None]
 ) -> Plan:
     """Return the refinement of a motion that is at least as quick as asked for.
@@ -122,35 +120,35 @@ def _from_quickest(
     on_a_grid = task.robot.free.size and task.external is None
     if on_a_grid or not can_be_slower(task):
         raise _judged(broken, task, begin) from None
-    judged, best = None, None
     begin("search for the quickest motion")
     hopeless = not velocity_allows(task.problem, HOPELESS * task.dt)
-    near = NEAR * task.dt
-    motions = (velocity_limited_motions if hopeless else quick_motions)(task, finder, explore=near)
-    try:
-        for tried, best in enumerate(motions):
+    search = velocity_limited_motions if hopeless else quick_motions
+    motions, judged = list[QuickMotion](), None
+    with suppress(NoFeasiblePath):  # not at any speed
+        for best in search(task, finder, wanted=task.dt):
+            motions.append(best)
             begin(f"search for the quickest motion, {speed_at(task, best.dt)} so far")
             made = plan_from_faster(task, best, finder) if best.is_enough(task.dt) else None
             if made is not None:
                 return made
-            far = best.dt > (TOO_SLOW, NEARLY)[tried > 0] * task.dt
-            if judged is None and far:
-                judged = _judged(broken, task, begin)
-                if judged.closed is not None:
+            if len(motions) == FIRST and best.dt > NEARLY * task.dt:
+                judged = _judged(broken, task, begin, motions)
+                if judged.closed is not None and best.dt > MUCH * task.dt:
                     break
-    except NoFeasiblePath:  # not at any speed
-        best = None
-    if judged is None:
-        judged = _judged(broken, task, begin)
-    if best is None:
-        raise judged
-    raise with_relaxation(judged, task, best.plan)
+    if judged is None or judged.closed is None:
+        judged = _judged(broken, task, begin, motions)
+    raise with_relaxation(judged, task, motions[-1].plan) if motions else judged
 
 
-def _judged(broken: NoFeasiblePath, task: Task, begin: Callable[[str], None]) -> NoFeasiblePath:
+def _judged(
+    broken: NoFeasiblePath,
+    task: Task,
+    begin: Callable[[str], None],
+    motions: Sequence[QuickMotion] = (),
+) -> NoFeasiblePath:
     """Return the answer without a path, with whether it is proved at every gamma."""
     begin("search for a proof that no motion exists")
-    return at_any_gamma(broken, task)
+    return at_any_gamma(broken, task, motions)
 
 
 def _bracket(broken: NoFeasiblePath, task: Task) -> str:

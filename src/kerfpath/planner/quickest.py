@@ -44,6 +44,12 @@ HOPELESS = 1.5
 """A screened motion that needs this many times the best interval is left."""
 ROUNDS = 2
 """Times that the best motion is shaken."""
+NEAR, CLOSE = 1.25, 1.05
+"""Multiples of a wanted interval: from the first on, valleys are not explored, which gains 20 % at
+most; from the second on, only the first search of each kind is made over many nodes, which gains
+most of it."""
+MANY = 200
+"""Nodes from which on a search of each kind takes several seconds."""
 MOST_SEARCHES = 40
 """Most searches for paths that are clear."""
 
@@ -78,16 +84,16 @@ class QuickMotion:
 
 
 def quick_motions(
-    task: Task, finder: CollisionFreeSearch, *, explore: float = np.inf
+    task: Task, finder: CollisionFreeSearch, *, wanted: float = np.inf, explore: bool = True
 ) -> Iterator[QuickMotion]:
     """Yield successively faster motions along the contour of a task, clear and within its margins.
 
     The first is the fastest path on the grid. The second, if the robot leaves a rotation free, is
     that path with gamma moved off the grid, or the same again. Beam searches over continuous gamma
     at the speed reached and above give the others, whatever they cost, until the speed no longer
-    grows. The speed, closure and costs of the task do not matter: tasks that differ only in them
-    have the same motions, in the same order. At last all valleys are explored, if the motion found
-    by then has at most `explore` s between its nodes.
+    grows, and, if `explore`, courses through all valleys. The speed, closure and costs of the task
+    do not matter: tasks that differ only in them have the same motions, in the same order. Where
+    the motions stay far from the `wanted` interval, s, the last of them are not looked for.
 
     Raises
     ------
@@ -102,36 +108,68 @@ def quick_motions(
         return
     best = faster_motion(task, finder, path, best)
     yield best
-    factors = current_effort().speed_factors
-    without_gain, tried = 0, [path]
-    while without_gain < len(factors):
-        before, ahead = best.dt, _at(task, best.dt / factors[without_gain])
-        found = clear_paths(ahead, finder, (wide(task),))
-        for between in () if found is None else found[1]:
-            made = ahead.plan_between(between, _claim())
-            if not any(alike(made, other) for other in tried):
-                tried.append(made)
-                faster = faster_motion(task, finder, made, best)
-                if faster is not best:
-                    best = faster
-                    yield best
-        without_gain = 0 if best.dt < (1 - GAIN) * before else without_gain + 1
-    if best.dt <= explore and can_explore(task):
-        yield from _explored(task, finder, best)
-
-
-def _explored(task: Task, finder: CollisionFreeSearch, best: QuickMotion) -> Iterator[QuickMotion]:
-    """Yield ever faster motions through all valleys, then from the best one changed at random.
-
-    Valleys are looked for at speeds about the best one.
-    """
-    known: list[Course] = []
-    for factor in FACTORS:
-        ahead = _at(task, best.dt / factor)
-        courses = Courses(ahead, quickest=True)
-        for found in _quickened(ahead, finder, courses.screened(courses.all(), QUICK), best, known):
+    explore = explore and can_explore(task)
+    tried, known = [path], list[Course]()
+    factors, begun = current_effort().speed_factors, best.dt
+    for factor in factors[:1]:
+        for found in _by_beam(task, finder, best, factor, tried):
             best = found
             yield best
+    if explore and best.dt <= NEAR * wanted:
+        for found in _through_valleys(task, finder, best, FACTORS[0], known):
+            best = found
+            yield best
+    enough = CLOSE if len(task.contour) >= MANY else NEAR
+    if can_explore(task) and best.dt > enough * wanted:
+        return
+    without_gain = int(best.dt >= (1 - GAIN) * begun)
+    while without_gain < len(factors):
+        before = best.dt
+        for found in _by_beam(task, finder, best, factors[without_gain], tried):
+            best = found
+            yield best
+        without_gain = 0 if best.dt < (1 - GAIN) * before else without_gain + 1
+    if not explore:
+        return
+    for factor in FACTORS[1:]:
+        for found in _through_valleys(task, finder, best, factor, known):
+            best = found
+            yield best
+    yield from _shaken(task, finder, best, known)
+
+
+def _by_beam(
+    task: Task, finder: CollisionFreeSearch, best: QuickMotion, factor: float, tried: list[Plan]
+) -> Iterator[QuickMotion]:
+    """Yield ever faster motions by a beam search at some times the speed of the best one.
+
+    Paths like those `tried`, to which its own are added, are left out.
+    """
+    ahead = _at(task, best.dt / factor)
+    found = clear_paths(ahead, finder, (wide(task),))
+    for between in () if found is None else found[1]:
+        made = ahead.plan_between(between, _claim())
+        if not any(alike(made, other) for other in tried):
+            tried.append(made)
+            faster = faster_motion(task, finder, made, best)
+            if faster is not best:
+                best = faster
+                yield best
+
+
+def _through_valleys(
+    task: Task, finder: CollisionFreeSearch, best: QuickMotion, factor: float, known: list[Course]
+) -> Iterator[QuickMotion]:
+    """Yield ever faster motions through all valleys at some times the speed of the best one."""
+    ahead = _at(task, best.dt / factor)
+    courses = Courses(ahead, quickest=True)
+    yield from _quickened(ahead, finder, courses.screened(courses.all(), QUICK), best, known)
+
+
+def _shaken(
+    task: Task, finder: CollisionFreeSearch, best: QuickMotion, known: list[Course]
+) -> Iterator[QuickMotion]:
+    """Yield ever faster motions from the best one, changed at random."""
     shaken, screened = None, list[tuple[float, Course]]()
     for _ in range(ROUNDS):
         if best is not shaken:  # else the changes are the same, and the next of them are tried
@@ -166,7 +204,7 @@ def _quickened(
 
 
 def velocity_limited_motions(
-    task: Task, finder: CollisionFreeSearch, *, explore: float = np.inf
+    task: Task, finder: CollisionFreeSearch, *, wanted: float = np.inf
 ) -> Iterator[QuickMotion]:
     """Yield motions of a task whose speed is much too high: the quickest if these take little time.
 
@@ -177,7 +215,7 @@ def velocity_limited_motions(
     slow = _without_aim(task)
     path = finder.find(find_slow_path, slow.problem)
     if edges_allowed(slow.problem, path.dt) <= current_effort().exact_edges:
-        yield from quick_motions(task, finder, explore=explore)
+        yield from quick_motions(task, finder, wanted=wanted)
         return
     task, best = slow, _along(slow, path)
     yield best

@@ -48,7 +48,7 @@ class Remedy:
     speed : str or None
         Feasible speed below the requested one, m/min; None: the requested speed is feasible.
     fastest : bool
-        Whether that is the fastest speed found on the grid, and not just one with a plan.
+        Whether that is the fastest speed of the grid, and not just one with a plan.
     binds : str
         The limit that binds at the higher of both speeds, and where; "" if that is not known.
     refined : str or None
@@ -91,7 +91,7 @@ class Remedy:
         if self.speed is None:
             return f"{ON_THIS_GRID} a path exists at the speed asked for{how}"
         if not self.fastest:
-            return f"a path exists at {self.speed} m/min{how}; `kerfpath speed` finds the fastest"
+            return f"{self.speed} m/min cuts it in one piece; `kerfpath speed` finds the fastest"
         said = f"{ON_THIS_GRID} a path exists up to {self.speed} m/min{how}"
         if self.refined is not None:
             said += f", refined up to {self.refined} m/min"
@@ -193,8 +193,7 @@ def find_remedy(
     """Return what makes a cut without a plan feasible, and its fastest speed; None if unknown.
 
     The graph must have poses at every node, and the cut a constant speed. `relaxation` is what
-    `NoFeasiblePath` states about a motion off the grid; where that is slower by far, its speed is
-    the advice.
+    `NoFeasiblePath` states about a motion off the grid, whose speed is the advice.
     """
     trial = _Trial(job=job, request=request, candidate=candidate, graph=graph, cell=cell)
     continuous = job.options.method == "continuous"
@@ -202,8 +201,8 @@ def find_remedy(
     other = not continuous and job.options.method != "exact"
     if other and trial.opens(trial.on_grid, trial.asked):
         return Remedy(other_method=True), None
-    if continuous and relaxation is not None and relaxation.speed <= FAR:
-        slow = trial.speed(trial.on_grid, relaxation.speed * trial.asked, give=MUCH)
+    if continuous and relaxation is not None:
+        slow = _slower(trial, relaxation)
         if slow is not None:
             return Remedy(other_method=False, speed=slow, fastest=False), None
     # With a time step, another speed has other nodes, about which nothing would be proved.
@@ -237,6 +236,23 @@ def find_remedy(
         never=None if fastest.ceiling is None else at_least(fastest.ceiling * 60),
     )
     return made, fastest
+
+
+def _slower(trial: _Trial, found: Relaxation) -> str | None:
+    """Return a speed, m/min, at which a motion off the grid leads to a plan; None if none is known.
+
+    The search for the quickest motion does not depend on the speed, so that a plan at the speed of
+    the motion that it found needs no trial. It needs one where the nodes follow from the speed, in
+    a cell, and where joints were folded. The speed of a motion that is slower by far, which is not
+    of that search, is tried on the grid.
+    """
+    speed, graph = found.speed * trial.asked, trial.graph
+    if found.speed <= FAR:
+        return trial.speed(trial.on_grid, speed, give=MUCH)
+    same_nodes = trial.request.task.time_step is None
+    if same_nodes and trial.cell is None and not graph.is_folded.any():
+        return at_most(speed * 60)
+    return trial.speed(trial.job.options, speed)
 
 
 def opens_without_windows(
