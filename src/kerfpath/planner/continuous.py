@@ -17,7 +17,7 @@ from kerfpath.planner.exploration import Exploration
 from kerfpath.planner.feed_reduction import may_keep_speed, slowed_motion
 from kerfpath.planner.impossible import can_be_slower, interval_of, refuse_impossible, speed_at
 from kerfpath.planner.on_grid import from_quickest, plan_on_grid
-from kerfpath.planner.quickest import clear_paths, wide
+from kerfpath.planner.quickest import MANY, clear_paths, wide
 from kerfpath.planner.refinements import refine_from_random_starts
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.statements import STOPPED
@@ -257,14 +257,21 @@ def _clear_motion(
         begin("refinement")
     judged = explored and constant and can_explore(task) and can_be_slower(task)
     wide_search = _explore if explored and finder.is_free and can_explore(task) else _search_wider
+    # Over many nodes refinements that cannot end inside the limits take minutes.
+    first = judged and starts.best is None and len(task.contour) >= MANY
+    quick: Plan | None = None
     try:
-        if starts.best is None and judged and task.dt < NEARLY * _interval_of(task, paths):
-            starts.begin_with(_quick_enough(task, finder, paths, begin))
+        if first and task.dt < NEARLY * _interval_of(task, paths):
+            quick = _quick_enough(task, finder, paths, begin)
         starts.refine(paths)
-        if starts.best is None and judged:
-            starts.begin_with(_quick_enough(task, finder, paths, begin))
         if thorough:
             wide_search(task, starts, search, paths)
+        if judged and starts.best is None:
+            starts.begin_with(quick or _quick_enough(task, finder, paths, begin))
+            if thorough and finder.is_free:
+                Exploration(task, starts).run()
+        elif quick is not None:
+            starts.begin_with(quick)
     except StopEarly:
         if starts.best is None:
             raise

@@ -38,8 +38,9 @@ SAME_VALLEY = 0.05
 """rad: paths whose gamma differs by less are refined to the same motion."""
 FACTORS = (1.05, 1.0, 1.15)
 """Multiples of the speed reached at which valleys are explored."""
-QUICKENED = 5
-"""Motions that are moved to their least interval after each screening."""
+QUICKENED, FEW = 5, 2
+"""Motions that are moved to their least interval after each screening; and where these are far from
+an interval that is wanted."""
 HOPELESS = 1.5
 """A screened motion that needs this many times the best interval is left."""
 ROUNDS = 2
@@ -111,16 +112,16 @@ def quick_motions(
     explore = explore and can_explore(task)
     tried, known = [path], list[Course]()
     factors, begun = current_effort().speed_factors, best.dt
+    enough = (CLOSE if len(task.contour) >= MANY else NEAR) * wanted
     for factor in factors[:1]:
         for found in _by_beam(task, finder, best, factor, tried):
             best = found
             yield best
     if explore and best.dt <= NEAR * wanted:
-        for found in _through_valleys(task, finder, best, FACTORS[0], known):
+        for found in _through_valleys(task, finder, best, FACTORS[0], known, enough):
             best = found
             yield best
-    enough = CLOSE if len(task.contour) >= MANY else NEAR
-    if can_explore(task) and best.dt > enough * wanted:
+    if can_explore(task) and best.dt > enough:
         return
     without_gain = int(best.dt >= (1 - GAIN) * begun)
     while without_gain < len(factors):
@@ -158,12 +159,21 @@ def _by_beam(
 
 
 def _through_valleys(
-    task: Task, finder: CollisionFreeSearch, best: QuickMotion, factor: float, known: list[Course]
+    task: Task,
+    finder: CollisionFreeSearch,
+    best: QuickMotion,
+    factor: float,
+    known: list[Course],
+    enough: float = np.inf,
 ) -> Iterator[QuickMotion]:
-    """Yield ever faster motions through all valleys at some times the speed of the best one."""
+    """Yield ever faster motions through all valleys at some times the speed of the best one.
+
+    There are fewer while the best one takes longer than `enough`, s.
+    """
     ahead = _at(task, best.dt / factor)
     courses = Courses(ahead, quickest=True)
-    yield from _quickened(ahead, finder, courses.screened(courses.all(), QUICK), best, known)
+    screened = courses.screened(courses.all(), QUICK)
+    yield from _quickened(ahead, finder, screened, best, known, enough)
 
 
 def _shaken(
@@ -187,11 +197,13 @@ def _quickened(
     screened: list[tuple[float, Course]],
     best: QuickMotion,
     known: list[Course],
+    enough: float = np.inf,
 ) -> Iterator[QuickMotion]:
     """Yield ever faster motions from the best screened ones that are not known."""
     tried = 0
     for needed, course in screened:
-        if tried == QUICKENED or needed * ahead.dt > HOPELESS * best.dt:
+        most = QUICKENED if best.dt <= enough else FEW
+        if tried >= most or needed * ahead.dt > HOPELESS * best.dt:
             break
         if any(course.like(other, SAME_VALLEY) for other in known):
             continue

@@ -62,8 +62,8 @@ class Starts:
             self.best = found if found.done and self.finder.is_clear(found.plan) else None
 
     def begin_with(self, made: Plan) -> None:
-        """Take a motion that keeps every limit, and is clear, as the best one."""
-        self.best = Refinement(
+        """Take a motion that keeps every limit, and is clear, if it is the best one."""
+        found = Refinement(
             plan=made,
             done=True,
             cost_before=made.cost,
@@ -71,6 +71,7 @@ class Starts:
             programs=0,
             statement=made.proof.statement,
         )
+        self.best = _better(self.best, found)
 
     def refine(self, paths: list[ContinuousPath], *, unpromising: bool = False) -> None:
         """Refine paths, the most promising first, and of similar paths only one.
