@@ -124,8 +124,8 @@ def motion_from_grid(attempt: Attempt) -> Plan | None:
 
 def motion_from_finer_grid(attempt: Attempt) -> Plan | None:
     """Plan with twice as many samples of gamma, if a motion nearly as fast was found."""
-    if grid_reason(attempt.task):
-        return None
+    if grid_reason(attempt.task) or can_explore(attempt.task):
+        return None  # the samples of valleys do not depend on the step of the grid
     assert attempt.failure is not None, "the grid has no plan"
     made = _from_more_samples(attempt.task, attempt.finder, attempt.begin, attempt.failure)
     return None if made is None else _improved(made, attempt.finder)
@@ -259,19 +259,12 @@ def _clear_motion(
     wide_search = _explore if explored and finder.is_free and can_explore(task) else _search_wider
     # Over many nodes refinements that cannot end inside the limits take minutes.
     first = judged and starts.best is None and len(task.contour) >= MANY
-    quick: Plan | None = None
     try:
         if first and task.dt < NEARLY * _interval_of(task, paths):
-            quick = _quick_enough(task, finder, paths, begin)
+            _require_quick_enough(task, finder, paths, begin)
         starts.refine(paths)
         if thorough:
             wide_search(task, starts, search, paths)
-        if judged and starts.best is None:
-            starts.begin_with(quick or _quick_enough(task, finder, paths, begin))
-            if thorough and finder.is_free:
-                Exploration(task, starts).run()
-        elif quick is not None:
-            starts.begin_with(quick)
     except StopEarly:
         if starts.best is None:
             raise
@@ -312,13 +305,13 @@ def _interval_of(task: Task, paths: list[ContinuousPath]) -> float:
     return min((interval_of(task, plan) for plan in plans), default=np.inf)
 
 
-def _quick_enough(
+def _require_quick_enough(
     task: Task,
     finder: CollisionFreeSearch,
     paths: list[ContinuousPath],
     begin: Callable[[str], None],
-) -> Plan:
-    """Return the plan of one of the quickest motions, where `paths` lead to none.
+) -> None:
+    """Require that one of the quickest motions is quick enough, where `paths` are not.
 
     Raises
     ------
@@ -332,7 +325,7 @@ def _quick_enough(
         proved=False,
         node=int(sharp.max(axis=-1, initial=0.0).argmax()),
     )
-    return from_quickest(task, finder, none, begin)
+    from_quickest(task, finder, none, begin)
 
 
 def _explore(task: Task, starts: Starts, search: ContinuousSearch, _: list[ContinuousPath]) -> None:

@@ -61,18 +61,6 @@ class Starts:
             found = refiner.refine(made, first=FIRST_STEP, least=least)
             self.best = found if found.done and self.finder.is_clear(found.plan) else None
 
-    def begin_with(self, made: Plan) -> None:
-        """Take a motion that keeps every limit, and is clear, if it is the best one."""
-        found = Refinement(
-            plan=made,
-            done=True,
-            cost_before=made.cost,
-            cost_after=made.cost,
-            programs=0,
-            statement=made.proof.statement,
-        )
-        self.best = _better(self.best, found)
-
     def refine(self, paths: list[ContinuousPath], *, unpromising: bool = False) -> None:
         """Refine paths, the most promising first, and of similar paths only one.
 
