@@ -152,11 +152,9 @@ def test_with_all_valleys_the_lower_speed_that_a_refusal_states_is_planned(seed,
     nodes = drawn(seed)
     fastest = fastest_speed(nodes, arm, refine=True, **space)
     speed = share * fastest.speed
-    phases = []
     with pytest.raises(NoFeasiblePath) as caught:
-        plan(nodes, arm, speed=speed, phase=phases.append, **space)
+        plan(nodes, arm, speed=speed, **space)
     none = caught.value
-    assert "on this grid" not in str(none)
     needed = none.relaxation.speed * share
     assert needed == pytest.approx(1, rel=2e-3) if share < 1.1 else needed <= 1 + 1e-9
     assert errors(plan(nodes, arm, speed=none.relaxation.speed * speed, **space)) == []

@@ -255,16 +255,17 @@ def _clear_motion(
         _begin("refinement", begin, task, finder, paths)
     else:
         begin("refinement")
-    judged = explored and constant and can_explore(task) and can_be_slower(task)
-    wide_search = _explore if explored and finder.is_free and can_explore(task) else _search_wider
     # Over many nodes refinements that cannot end inside the limits take minutes.
-    first = judged and starts.best is None and len(task.contour) >= MANY
+    many = explored and can_explore(task) and len(task.contour) >= MANY
+    judged = many and starts.best is None and constant and can_be_slower(task)
     try:
-        if first and task.dt < NEARLY * _interval_of(task, paths):
+        if judged and task.dt < NEARLY * _interval_of(task, paths):
             _require_quick_enough(task, finder, paths, begin)
         starts.refine(paths)
-        if thorough:
-            wide_search(task, starts, search, paths)
+        if thorough and explored and finder.is_free and can_explore(task):
+            _explore(task, starts, search)
+        elif thorough:
+            _search_wider(task, starts, search, paths)
     except StopEarly:
         if starts.best is None:
             raise
@@ -328,7 +329,7 @@ def _require_quick_enough(
     from_quickest(task, finder, none, begin)
 
 
-def _explore(task: Task, starts: Starts, search: ContinuousSearch, _: list[ContinuousPath]) -> None:
+def _explore(task: Task, starts: Starts, search: ContinuousSearch) -> None:
     """Refine courses through the cheapest valleys; explore all if there may be a better motion.
 
     The samples of these valleys follow the joints, whatever the step of gamma, so that what is
