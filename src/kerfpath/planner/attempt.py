@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 from kerfpath.arrays import short_repr
 from kerfpath.errors import NoFeasiblePath
-from kerfpath.options import EXACT_OR_BETTER
 from kerfpath.planner.collision_free import CollisionFreeSearch
 from kerfpath.planner.starts import Starts
-from kerfpath.planner.straight_moves import not_followed
 from kerfpath.planner.task import Task
 from kerfpath.plans import Plan
 
@@ -55,7 +53,7 @@ It raises NoFeasiblePath if no later strategy can have a plan either."""
 
 
 def first_plan(attempt: Attempt, strategies: tuple[Strategy, ...]) -> Plan:
-    """Return the plan of the first strategy that has one whose straight moves the arm can follow.
+    """Return the plan of the first strategy that has one.
 
     Raises
     ------
@@ -64,13 +62,7 @@ def first_plan(attempt: Attempt, strategies: tuple[Strategy, ...]) -> Plan:
     """
     for strategy in strategies:
         made = strategy(attempt)
-        if made is None:
-            continue
-        if attempt.task.settings.method not in EXACT_OR_BETTER:
+        if made is not None:
             return made
-        attempt.failure = not_followed(made)
-        if attempt.failure is None:
-            return made
-        break
     assert attempt.failure is not None, "a strategy without a plan says why"
     raise attempt.failure from None

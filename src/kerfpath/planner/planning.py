@@ -38,7 +38,7 @@ from kerfpath.planner.refinements import refine_plan
 from kerfpath.planner.screening import within
 from kerfpath.planner.starts import Starts
 from kerfpath.planner.statements import add_window_note, limits_named
-from kerfpath.planner.straight_moves import remedy
+from kerfpath.planner.straight_moves import not_followed, remedy
 from kerfpath.planner.task import Task, planning_task
 from kerfpath.plans import Plan, Proof
 from kerfpath.progress import Progress, StopEarly, no_progress
@@ -336,7 +336,8 @@ def _planned(task: Task, asked: PlanOptions, begin: Callable[[str], None]) -> tu
     """Return the plan of a task, and the attempt that found it.
 
     Where the motion found changes its posture between two nodes, it is the quickest and then the
-    cheapest motion found in one posture.
+    cheapest motion found in one posture. If there is none, a motion at constant speed stays as it
+    is, for its audit to judge.
 
     Raises
     ------
@@ -349,24 +350,34 @@ def _planned(task: Task, asked: PlanOptions, begin: Callable[[str], None]) -> tu
             task=task, finder=CollisionFreeSearch(task), begin=begin, refine=asked.refine
         )
 
-    attempt = attempt_of(task)
+    attempt, leaping = attempt_of(task), None
     try:
-        return first_plan(attempt, strategies(task)), attempt
+        leaping = first_plan(attempt, strategies(task))
+        leap = not_followed(leaping) if task.settings.method == "continuous" else None
+        if leap is None:
+            return leaping, attempt
     except NoFeasiblePath as none:
         if not none.lost_by(Loss.LEAP):
             raise
-        found = []
-        for posture in () if none.proved else task.graph.postures_throughout.tolist():
-            one = replace(task.settings, postures=(posture,))
-            attempt = replace(attempt_of(task.with_settings(one)), failure=none)
-            quick = [each for each in strategies(task) if each not in FROM_GRID]
-            with suppress(NoFeasiblePath):
-                found.append((first_plan(attempt, tuple(quick)), attempt))
-        if not found:
-            raise none.with_message(f"{none}; {remedy(task.contour)}") from None
-    made, attempt = min(found, key=lambda each: (round(float(each[0].time[-1]), 9), each[0].cost))
-    said = made.proof.also("in one posture, as straight moves cannot change it")
-    return replace(made, settings=task.settings, proof=said), attempt
+        leap = none
+    found = []
+    has_grid = task.external is not None or not task.robot.free.size
+    alone = task.graph.postures_throughout.tolist() if has_grid and not leap.proved else []
+    for posture in alone:
+        one = replace(task.settings, postures=(posture,))
+        each = replace(attempt_of(task.with_settings(one)), failure=leap)
+        quick = [way for way in strategies(task) if way not in FROM_GRID]
+        with suppress(NoFeasiblePath):
+            made = first_plan(each, tuple(quick))
+            if not_followed(made) is None:
+                found.append((made, each))
+    if found:
+        made, attempt = min(found, key=lambda way: (round(float(way[0].time[-1]), 9), way[0].cost))
+        said = made.proof.also("in one posture, as straight moves cannot change it")
+        return replace(made, settings=task.settings, proof=said), attempt
+    if leaping is not None and task.settings.feed == "constant":
+        return leaping, attempt
+    raise leap.with_message(f"{leap}; {remedy(task.contour)}") from None
 
 
 def strategies(task: Task) -> tuple[Strategy, ...]:

@@ -95,6 +95,8 @@ def follows(made: Plan) -> bool:
 def not_followed(made: Plan) -> NoFeasiblePath | None:
     """Return the answer that the arm cannot follow a straight move of a plan; None if it can."""
     leaps = np.flatnonzero(np.isinf(least_times(made)))
+    if made.settings.feed == "constant" and leaps.size:  # a singularity is no matter of time there
+        leaps = leaps[np.isinf(_times_in_parts(made, leaps, FINE))]
     if not leaps.size:
         return None
     k = int(leaps[0])

@@ -347,7 +347,7 @@ def _layers(
         objective=options.objective,
         closure=options.closure,
         rotation=options.rotation,
-        most=largest_steps(contour, robot),
+        most=largest_steps(contour, robot) if options.feed == "dip" else None,
         method="exact" if options.method == "continuous" else options.method,
         posture=graph.posture if options.method == "known" else None,
     )
