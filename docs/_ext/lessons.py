@@ -105,8 +105,9 @@ def _photograph(folder: Path) -> None:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=switches)
         for name, (page, heading, height) in SHOTS.items():
-            size = {"width": 1100, "height": height}
-            view = browser.new_page(viewport=size, color_scheme="light")
+            view = browser.new_page(
+                viewport={"width": 1100, "height": height}, color_scheme="light"
+            )
             view.goto((folder / page).as_uri())
             top = view.get_by_text(heading, exact=True).first
             top.evaluate("at => scrollTo(0, scrollY + at.getBoundingClientRect().top - 24)")

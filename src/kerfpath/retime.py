@@ -15,12 +15,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import clarabel
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
 from kerfpath.arrays import Array, Ints, floats, freeze, positive
+from kerfpath.conic import NonnegativeConeT, SecondOrderConeT, minimise
 from kerfpath.errors import InputError
 from kerfpath.limits import Limits, meetings, rates_of
 from kerfpath.plans import Feed
@@ -223,18 +223,14 @@ def _improve_times(rows: _LimitRows, least: Array, tau: Array) -> Array:
         sparse.csc_array((len(y), m)),
         sparse.kron(sparse.eye_array(m), np.array([[-1.0], [-1.0], [0.0]])),
     ]
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.max_threads = 1
-    solution = clarabel.DefaultSolver(
-        sparse.csc_matrix((len(y) + m, len(y) + m)),
+    solution = minimise(
         np.repeat([1.0, 0.0], [len(y), m]),
-        sparse.csc_matrix(sparse.hstack([sparse.vstack(of_y), sparse.vstack(of_x)])),
+        sparse.hstack([sparse.vstack(of_y), sparse.vstack(of_x)]),
         np.concatenate([most + most2, -least / unit, np.tile([0.0, 0.0, 2.0], m)]),
-        [clarabel.NonnegativeConeT(len(a) + len(y)), *[clarabel.SecondOrderConeT(3)] * m],
-        settings,
-    ).solve()
-    found = np.array(solution.x)[: len(y)] * unit
+        [NonnegativeConeT(len(a) + len(y)), *[SecondOrderConeT(3)] * m],
+        threads=1,
+    )
+    found = solution.x[: len(y)] * unit
     return found if np.isfinite(found).all() else tau
 
 

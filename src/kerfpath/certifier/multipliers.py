@@ -8,19 +8,18 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import clarabel
 import numpy as np
 from scipy import sparse
 
 from kerfpath.arrays import Array, Ints
 from kerfpath.certifier.stages import Steps
+from kerfpath.conic import NonnegativeConeT, SecondOrderConeT, minimise
 from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
 
 FAST = 10.0
 """Price of an increment beyond (5), in largest prices of (6)."""
 NOTHING = 1e-4
 """Share of a weight below which a price counts as zero."""
-SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
 _Rows = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
 
 
@@ -123,7 +122,7 @@ class _Lengths(NamedTuple):
                 (ones, (np.arange(len(each)), first + each)), shape=(len(each), unknowns)
             )
             right = np.concatenate([-self.value, self.value])
-            cones = [clarabel.NonnegativeConeT(len(right))]
+            cones = [NonnegativeConeT(len(right))]
             return sparse.vstack([slope - own, -slope - own]), right, cones
         edge = np.arange(edges)
         size = (edges, unknowns)
@@ -131,7 +130,7 @@ class _Lengths(NamedTuple):
         order = np.argsort(np.append(edge, each), kind="stable")  # the length, then its joints
         rows = sparse.csr_array(sparse.vstack([-own, -slope]))[order]
         right = np.append(np.zeros(edges), self.value)[order]
-        return rows, right, [clarabel.SecondOrderConeT(self.n + 1)] * edges
+        return rows, right, [SecondOrderConeT(self.n + 1)] * edges
 
 
 def _dual(
@@ -152,7 +151,7 @@ def _dual(
         return sparse.csr_array((np.ones(size), place), shape=(size, unknowns))
 
     rows, bounds = [own(0, boxed), -own(0, boxed)], [np.ones(2 * boxed)]
-    cones = [clarabel.NonnegativeConeT(2 * boxed)]
+    cones = [NonnegativeConeT(2 * boxed)]
     if lengths is not None:
         longer, right, kinds = lengths.cones(int(first[-1]), unknowns)
         rows, bounds, cones = [*rows, longer], [*bounds, right], cones + kinds
@@ -161,20 +160,10 @@ def _dual(
         wide = sparse.hstack([slope, sparse.csr_array((size, unknowns - boxed))])
         rows += [-slack, wide - slack, -wide - slack]
         bounds += [np.zeros(size), bound - value, bound + value]
-    cones.append(clarabel.NonnegativeConeT(3 * sum(sizes)))
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    solver = clarabel.DefaultSolver(
-        sparse.csc_matrix((unknowns, unknowns)),
-        cost,
-        sparse.csc_matrix(sparse.vstack(rows)),
-        np.concatenate(bounds),
-        cones,
-        settings,
-    )
-    found = solver.solve()
-    if found.status not in SOLVED:
+    cones.append(NonnegativeConeT(3 * sum(sizes)))
+    found = minimise(cost, sparse.vstack(rows), np.concatenate(bounds), cones)
+    if not found.solved:
         return None
     size = sizes[-1]
-    above, below = np.array(found.z)[-2 * size :].reshape(2, size)
+    above, below = found.dual[-2 * size :].reshape(2, size)
     return above - below

@@ -29,7 +29,15 @@ def main() -> None:
         print(f"kerfpath: error: {error}", file=sys.stderr)
         sys.exit(2)
     except (MemoryError, ImportError, OSError, RuntimeError) as error:
-        if not isinstance(error, MemoryError) and not any(w in str(error) for w in SAID_OF_MEMORY):
+        if not _says_memory(error):
             raise
         print(f"kerfpath: error: {NO_MEMORY}", file=sys.stderr)
         sys.exit(2)
+
+
+def _says_memory(error: BaseException | None) -> bool:
+    """Return whether an error, or one that it arose from, says that there is no memory."""
+    if error is None or isinstance(error, MemoryError):
+        return error is not None
+    said = any(words in str(error) for words in SAID_OF_MEMORY)
+    return said or _says_memory(error.__cause__ or error.__context__)

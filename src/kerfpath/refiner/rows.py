@@ -1,17 +1,16 @@
-"""Rows and cones of a convex program, collected block by block and handed to Clarabel."""
+"""Rows and cones of a convex program, collected block by block and handed to the solver."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import clarabel
 import numpy as np
 from scipy import sparse
 
 from kerfpath.arrays import Array
+from kerfpath.conic import NonnegativeConeT, SecondOrderConeT, ZeroConeT, minimise
 
 Sparse = Any  # scipy's stubs tell csr from csc and array from matrix, which nothing here needs
-SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
 
 
 class ConstraintRows:
@@ -51,22 +50,17 @@ class ConstraintRows:
         zero = [] if equal is None else [(equal, np.zeros(equal.shape[0]))]
         cones = [(-slope, value) for slope, value, _ in self._cones]
         blocks = [(wide(a, self.variables), b) for a, b in zero + self._flat + cones]
-        kinds: list[Any] = [clarabel.ZeroConeT(len(b)) for _, b in zero]
-        kinds.append(clarabel.NonnegativeConeT(sum(len(b) for _, b in self._flat)))
+        kinds: list[Any] = [ZeroConeT(len(b)) for _, b in zero]
+        kinds.append(NonnegativeConeT(sum(len(b) for _, b in self._flat)))
         for _, value, size in self._cones:
-            kinds += [clarabel.SecondOrderConeT(size)] * (len(value) // size)
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        solver = clarabel.DefaultSolver(
-            sparse.csc_matrix((self.variables, self.variables)),
+            kinds += [SecondOrderConeT(size)] * (len(value) // size)
+        found = minimise(
             np.pad(cost, (0, self.variables - len(cost))),
-            sparse.csc_matrix(sparse.vstack([a for a, _ in blocks])),
+            sparse.vstack([a for a, _ in blocks]),
             np.concatenate([b for _, b in blocks]),
             kinds,
-            settings,
         )
-        found = solver.solve()
-        return np.array(found.x) if found.status in SOLVED else None
+        return found.x if found.solved else None
 
 
 def span_of(rows: Sparse) -> Array:
