@@ -233,6 +233,11 @@ def spread(count: int, most: int) -> Ints:
     return np.unique(np.linspace(0, count - 1, most).astype(np.int64))
 
 
+def places_within(count: Ints) -> Ints:
+    """Return the numbers from 0 to each count (R,) less one, ranges of that length in a row."""
+    return np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+
+
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun in singular or plural: "1 face", "2 faces"."""
     return f"{number} {noun}{'' if number == 1 else 's'}"

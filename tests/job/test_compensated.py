@@ -185,6 +185,8 @@ def test_measured_runs_correct_the_program_round_by_round(planned, folder):
         assert set(found) == {"hole 10", "slot"}
         rests.append(max(each["rounds"][-1]["largest"] for each in found.values()))
         job = "by.toml"
+    said = run(*asked[:-1], "-o", "other.json", cwd=folder).stdout
+    assert 'write compensate = "other.json" in [program] for the next program' in said
     assert rests[1] < 0.6 * rests[0]
     assert rests[2] <= rests[1]
     result = run("plan", "by.toml", "--out", "by", "--json", cwd=folder)

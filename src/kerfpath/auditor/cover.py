@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from kerfpath.arrays import Array, Bools, Ints, short_repr
+from kerfpath.arrays import Array, Bools, Ints, places_within, short_repr
 from kerfpath.auditor.enclosure import POSTURES, Enclosure, Status, enclose, linear_minimum
 from kerfpath.certificate import BASE, LIFTS, Stage
 from kerfpath.errors import CertificateRefused
@@ -330,7 +330,7 @@ def _turns(near: Array, room: Array, center: Array, endless: Bools) -> tuple[Int
         raise CertificateRefused(f"it leaves more than {MOST_PLACES} places to check")
     total = total.astype(np.int64)
     row = np.repeat(np.arange(len(total)), total)
-    place = np.arange(len(row)) - np.repeat(np.cumsum(total) - total, total)
+    place = places_within(total)
     turns = low[row].astype(np.int64)
     for i in range(turns.shape[1]):
         size = count[row, i].astype(np.int64)

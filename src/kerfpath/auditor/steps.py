@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from kerfpath.arrays import Array, Bools, Ints, short_repr
+from kerfpath.arrays import Array, Bools, Ints, places_within, short_repr
 from kerfpath.auditor.cover import TURN, Places
 from kerfpath.auditor.enclosure import linear_minimum
 
@@ -174,8 +174,7 @@ def _inside(starts: Array, low: Array, high: Array, side: str) -> Iterator[tuple
         end = max(row + 1, int(np.searchsorted(total, done + FOUND_AT_ONCE, "right")))
         part = number[row:end]
         rows = np.repeat(np.arange(row, end), part)
-        place = np.arange(len(rows)) - np.repeat(np.cumsum(part) - part, part)
-        yield rows, begin[rows] + place
+        yield rows, begin[rows] + places_within(part)
         row = end
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from kerfpath.arrays import Array, Ints
+from kerfpath.arrays import Array, Ints, places_within
 from kerfpath.cad.build import named_loops, part_without_faces
 from kerfpath.cad.curves import (
     NOTHING,
@@ -361,9 +361,7 @@ def _ranges(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
     bounds = np.searchsorted(upto, np.arange(0, total + AT_ONCE, AT_ONCE), side="right")
     for low, high in pairwise(np.unique([*bounds, len(first)]).tolist()):
         which = np.repeat(np.arange(low, high), count[low:high])
-        before = upto[low:high] - count[low:high]
-        within = np.arange(len(which)) - np.repeat(before - before[0], count[low:high])
-        yield which, first[which] + within
+        yield which, first[which] + places_within(count[low:high])
 
 
 def _joined(pairs: Sequence[tuple[Ints, Ints]]) -> tuple[Ints, Ints]:

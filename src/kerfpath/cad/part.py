@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from kerfpath.arrays import Array, Ints, floats, freeze, scalar, short_repr
+from kerfpath.arrays import Array, Ints, floats, freeze, places_within, scalar, short_repr
 from kerfpath.cad.curves import EdgeChain, Trace, distance
 from kerfpath.cad.departure import ON_CURVE, Departure, departure
 from kerfpath.cad.laid import LaidEdge
@@ -73,7 +73,7 @@ def _near(points: Array, s: Array, tolerance: float) -> tuple[Ints, Ints]:
     sizes = last - first
     n, m = sizes[pairs[:, 0]], sizes[pairs[:, 1]]
     which = np.repeat(np.arange(len(pairs)), n * m)
-    inside = np.arange(len(which)) - np.repeat(np.cumsum(n * m) - n * m, n * m)
+    inside = places_within(n * m)
     i = first[pairs[which, 0]] + inside // m[which]
     j = first[pairs[which, 1]] + inside % m[which]
     return np.minimum(i, j), np.maximum(i, j)

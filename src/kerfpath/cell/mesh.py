@@ -22,6 +22,7 @@ from kerfpath.arrays import (
     freeze,
     integers,
     not_negative,
+    places_within,
     require_one_of,
     scalar,
     short_repr,
@@ -63,7 +64,7 @@ class TriangleColumns:
                 break
             n //= 2
         triangle = np.repeat(np.arange(len(corners)), count)
-        place = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
+        place = places_within(count)
         x, y = first[triangle].T + np.divmod(place, wide[triangle, 1])
         key = x * n + y
         order = np.argsort(key, kind="stable")

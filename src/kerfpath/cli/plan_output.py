@@ -377,7 +377,7 @@ def _show_holes(cuts: Sequence[CutResult]) -> None:
             escape(cut.name),
             f"{hole.drawn * 1e3:.2f}",
             f"{hole.executed * 1e3:.2f}",
-            f"{(hole.executed - hole.drawn) * 1e3:+.2f}",
+            f"{round((hole.executed - hole.drawn) * 1e3, 2) + 0.0:+.2f}",
             f"{hole.out_of_round * 1e3:.2f}",
         ]
         for cut in cuts

@@ -571,7 +571,7 @@ def correct_by_logs(
         if name not in done.contours:
             out.print(f"note: no log follows {escape(name)}, which stays as it was")
     write_text(output, correction_text(done), "-o")
-    out.print(f'write compensate = "{escape(str(output))}" in [program] for the next program')
+    out.print(escape(f'write compensate = "{output}" in [program] for the next program'))
 
 
 # -----------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from kerfpath.arrays import Array, Ints, short_repr
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 from kerfpath.execution.executed import Executed, timing_of
-from kerfpath.execution.path_error import on_chords, path_error
+from kerfpath.execution.path_error import largest_share, on_chords, path_error
 from kerfpath.execution.response import ASSUMED, Response
 from kerfpath.plans import Plan, Proof
 from kerfpath.robots import base_in_part
@@ -152,8 +153,6 @@ FALLS = 0.97
 """Factor on the rest below which a round is worth it."""
 HOLDS = 0.4
 """m/s: speed up to which responses hold that name none. No model was good enough above."""
-SLOWEST = 0.1
-"""Smallest share of the speed at which a compensation is looked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -272,20 +271,12 @@ class Compensator:
     def share(self, plan: Plan) -> float | None:
         """Return the largest share of its speed, to 3 %, at which a plan can be compensated.
 
-        The joints keep their way; None if `SLOWEST` of the speed is too fast.
+        The joints keep their way; None if a tenth of the speed is too fast.
         """
         high = min(1.0, self.fastest / speed_of(plan))
         if self.keeps_at(plan, high):
             return high
-        low = high
-        while not self.keeps_at(plan, low := 0.8 * low):
-            high = low
-            if low < SLOWEST:
-                return None
-        while high - low > 0.03 * high:
-            middle = float(np.sqrt(low * high))
-            low, high = (middle, high) if self.keeps_at(plan, middle) else (low, middle)
-        return low
+        return largest_share(partial(self.keeps_at, plan), 0.8 * high, high)
 
     def keeps_at(self, plan: Plan, share: float) -> bool:
         """Return whether a plan can be compensated at a share of its speed."""

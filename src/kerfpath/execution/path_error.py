@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -269,14 +270,26 @@ def share_within(
     if corners >= tolerance:
         return None
     # The lag moves the tip about as the square of the speed.
-    high, low = 1.0, float(np.sqrt((tolerance - corners) / (full.largest - corners)))
-    while at(low := max(low, SLOWEST)).largest > tolerance:
+    first = float(np.sqrt((tolerance - corners) / (full.largest - corners)))
+    return largest_share(lambda share: at(share).largest <= tolerance, first)
+
+
+def largest_share(
+    holds: Callable[[float], bool], first: float, too_fast: float = 1.0
+) -> float | None:
+    """Return the largest share of a speed, to 3 %, at which something holds.
+
+    It is looked for from `first` down, and then up to `too_fast`; None if it does not hold at
+    `SLOWEST` of the speed.
+    """
+    low = first
+    while not holds(low := max(low, SLOWEST)):
         if low == SLOWEST:
             return None
-        high, low = low, 0.8 * low
-    while high - low > 0.03 * high:
-        middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if at(middle).largest <= tolerance else (low, middle)
+        too_fast, low = low, 0.8 * low
+    while too_fast - low > 0.03 * too_fast:
+        middle = float(np.sqrt(low * too_fast))
+        low, too_fast = (middle, too_fast) if holds(middle) else (low, middle)
     return low
 
 

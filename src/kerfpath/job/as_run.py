@@ -25,9 +25,11 @@ from kerfpath.execution import (
     path_error,
     roundness,
     share_within,
+    speed_of,
     timing_of,
 )
 from kerfpath.job.format import Job
+from kerfpath.planner import at_most
 from kerfpath.plans import Plan
 from kerfpath.post import REMEDY_SHORT, STRETCHED, Controller, Program, build_program
 
@@ -255,9 +257,7 @@ def _closer(run: Executed, off: PathError, plan: Plan, path: Contour, tip: float
     share = share_within(run, path, tip, response)
     if share is None:
         return f"{said}; a lower speed alone does not keep it: {_narrower(run.controller)}"
-    speed = 60 * share * (np.diff(plan.contour.s) / np.diff(plan.time)).max()
-    step = 10.0 ** (np.floor(np.log10(speed)) - 1)
-    return f"{said}; this motion keeps it at {np.floor(speed / step) * step:.2g} m/min"
+    return f"{said}; this motion keeps it at {at_most(60 * share * speed_of(plan), 2)} m/min"
 
 
 def _narrower(controller: Controller) -> str:

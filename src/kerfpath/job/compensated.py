@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from kerfpath.auditor import Check
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
@@ -22,6 +20,7 @@ from kerfpath.execution import (
 from kerfpath.job.as_run import ZONE_SLACK, AsRun, allowed_off, as_run, run_judged, run_of
 from kerfpath.job.audit_report import check
 from kerfpath.job.format import Job
+from kerfpath.planner import at_most
 from kerfpath.plans import Plan
 
 __all__ = ["as_programmed", "compensation_notes", "programmed"]
@@ -92,9 +91,8 @@ def _compensated(
     share = compensator.share(plan)
     if share is None:
         return found, "; a lower speed alone does not help: sample the contour more finely"
-    speed = 60 * share * speed_of(plan)
-    step = 10.0 ** (np.floor(np.log10(speed)) - 2)
-    return found, f"; this motion can be compensated at {np.floor(speed / step) * step:.3g} m/min"
+    speed = at_most(60 * share * speed_of(plan), 3)
+    return found, f"; this motion can be compensated at {speed} m/min"
 
 
 def _broken(job: Job, plan: Plan, run: Executed, cell: Cell | None) -> str:

@@ -160,9 +160,9 @@ def plan_slowed(task: Task, finder: CollisionFreeSearch, *, refine: bool) -> Pla
     on_grid = min((_with_least_times(task, start) for start in starts), key=_quickest_followed)
     if not (refine and task.robot.family.free_rotation):
         return on_grid
-    why = "take longer"
+    why, followed = "take longer", _quickest_followed(on_grid)
     for made in sorted((_off_grid(task, start) for start in starts), key=_quickest_followed):
-        if _quickest_followed(made) > _quickest_followed(on_grid):
+        if _quickest_followed(made) > followed:
             break
         broken = _broken(task, finder, made)
         if not broken:

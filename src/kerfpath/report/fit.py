@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from kerfpath.arrays import Array
-from kerfpath.report.page import PASS, WARN, render_page
+from kerfpath.report.page import render_page
 from kerfpath.report.style import CHOSEN, FAINT, axis, axis_title, base_layout, short
 
 ROW = 170
@@ -58,7 +58,6 @@ def render_fit(
         "fit.html",
         title=title,
         kind="Response of the joints, fitted to logs",
-        state=WARN if notes else PASS,
         heads=heads,
         rows=rows,
         caption=caption,
