@@ -157,6 +157,22 @@ def test_where_there_is_one_criterion_more_runs_change_nothing(task):
     assert len(several.plans) == 1
 
 
+def test_reversals_are_those_of_joints_1_to_3_one_by_one(task):
+    found = pareto(**task, criteria=["displacement", "reversals"], runs=20)
+    values = found.values[:, found.criteria.index("reversals")]
+    counts = set()
+    for made, value in zip(found.plans, values, strict=True):
+        turned = 0
+        for joint in range(3):
+            ways = [way for way in made.increments[:, joint] / made.dt if abs(way) > 1e-4]
+            turned += sum(a * b < 0 for a, b in itertools.pairwise(ways))
+        assert value == turned == made.criteria.reversals.sum()
+        counts.add(turned)
+    assert len(counts) > 1
+    usual = plan(**task).criteria.reversals.sum()
+    assert min(counts) < usual
+
+
 def test_one_run_alone_has_its_plan(task):
     only = pareto(**task, criteria=["displacement", "acceleration"], runs=1)
     assert only.numbers == (0,)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,8 @@ from scipy.spatial import cKDTree
 from kerfpath.arrays import Array, Bools, Ints, short_repr
 from kerfpath.contour import KINDS, Contour
 from kerfpath.execution.executed import Executed, Timing, timing_of
-from kerfpath.execution.response import IDEAL, PLACING, STILL, Response
+from kerfpath.execution.response import IDEAL, Response
+from kerfpath.plans import reversals
 
 STEP = 0.002
 """Time, s, between two samples of an executed motion."""
@@ -179,7 +181,7 @@ def path_error(
         lag=_apart(free, asked),
         friction=_apart(executed, free),
         ends=tuple(drawn.largest(poses(end)) for end in response.ends()),
-        reversals=reversals(q, STEP),
+        reversals=_reversals(q, STEP),
     )
 
 
@@ -325,15 +327,10 @@ def even_joints(
     return np.asarray(CubicHermiteSpline(time, q, first)(np.clip(within, time[0], time[-1])))
 
 
-def reversals(q: Array, step: float) -> tuple[Reversal, ...]:
+def _reversals(q: Array, step: float) -> tuple[Reversal, ...]:
     """Return where the first three joints of q (m, n) reverse, m samples every `step` s."""
-    rate = np.diff(q[:, :PLACING], axis=0) / step
-    found = []
-    for joint, moves in enumerate(rate.T):
-        at = np.flatnonzero(np.abs(moves) > STILL)
-        turned = at[1:][np.diff(np.sign(moves[at])) != 0]
-        found += [Reversal(joint, float(k * step)) for k in turned]
-    return tuple(sorted(found, key=lambda each: each.time))
+    turned = reversals(np.diff(q, axis=0) / step)
+    return tuple(sorted((Reversal(joint, k * step) for joint, k in turned), key=itemgetter(1)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

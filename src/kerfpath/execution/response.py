@@ -20,16 +20,13 @@ import numpy as np
 from kerfpath.arrays import Array, counted, floats, freeze, short_repr
 from kerfpath.comfort import jacobian
 from kerfpath.errors import InputError, about
+from kerfpath.plans import PLACING, STILL
 from kerfpath.robots import Robot, responses_of
 from kerfpath.setting import check, documented, setting, settings
 
 Standing = Literal["assumed", "fitted", "measured"]
 """Where parameters come from: a guess, runs of another arm of the model, or of the user's own."""
 
-PLACING = 3
-"""Joints that place the wrist centre, and give way to its inertia."""
-STILL = 1e-4
-"""rad/s: a joint that moves more slowly has no direction; its last one holds."""
 SETTLED = 3.0
 """Time constants of recovery after which 5 % of the lag by friction is left."""
 WIDTH = 4.0

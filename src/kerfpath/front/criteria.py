@@ -24,7 +24,7 @@ from kerfpath.front.problem import (
 from kerfpath.kernels.metric import increments
 from kerfpath.options import PlanOptions
 from kerfpath.planner import longest_step
-from kerfpath.plans import Plan
+from kerfpath.plans import PLACING, Plan
 from kerfpath.robots import Robot
 from kerfpath.transfer import least_time
 
@@ -269,6 +269,19 @@ class Rotation(Criterion):
         return float(np.ptp(np.unwrap(plan.gamma)))
 
 
+class Reversals(Criterion):
+    """How often joints 1 to 3 turn back: a joint lags by its friction where it does."""
+
+    def value(self, plan: Plan, problem: ParetoProblem) -> float:
+        return float(plan.criteria.reversals.sum())
+
+    def anchor(self, problem: ParetoProblem) -> Subproblem:
+        """Return the search for the least way of joints 1 to 3, which turn back less on it."""
+        weights = problem.unbounded.weights.copy()
+        weights[PLACING:] *= FAINT
+        return replace(problem.unbounded, weights=freeze(weights))
+
+
 class LeastMeasure(Criterion):
     """Least value at the nodes of the measure of `kerfpath.comfort` with the same name."""
 
@@ -294,6 +307,7 @@ CRITERIA: dict[str, Criterion] = {
         Speed(name="speed", words="fastest speed of the path", unit="m/s"),
         Time(name="time", words="time from home and back", unit="s"),
         Rotation(name="rotation", words="rotation about the beam", unit="rad"),
+        Reversals(name="reversals", words="reversals of joints 1 to 3", unit="times"),
         Clearance(name="clearance", words="clearance in the cell", unit="m"),
         *(LeastMeasure(name=name, words=name, unit=m.unit) for name, m in MEASURES.items()),
     )

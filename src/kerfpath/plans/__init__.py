@@ -2,6 +2,8 @@
 
 import warnings
 
+from kerfpath.plans.plan import PLACING as PLACING
+from kerfpath.plans.plan import STILL as STILL
 from kerfpath.plans.plan import Criteria as Criteria
 from kerfpath.plans.plan import Feed as Feed
 from kerfpath.plans.plan import JointMotion as JointMotion
@@ -12,6 +14,7 @@ from kerfpath.plans.plan import joint_columns as joint_columns
 from kerfpath.plans.plan import node_rates as node_rates
 from kerfpath.plans.plan import on_turns as on_turns
 from kerfpath.plans.plan import path_cost as path_cost
+from kerfpath.plans.plan import reversals as reversals
 
 
 def __getattr__(name: str) -> object:

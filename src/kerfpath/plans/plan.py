@@ -243,6 +243,8 @@ class Criteria:
         Coordinate range (9).
     peak_velocity, peak_acceleration : (n,) share of the limit
         Largest finite difference over the joint's limit, before eta.
+    reversals : (n,) of int
+        How often each joint turns back; only joints 1 to 3 are counted, the others have 0.
     nearest : mapping of str to (float, int)
         The least value of each measure of `kerfpath.comfort`, in its unit, and its node.
     """
@@ -252,9 +254,29 @@ class Criteria:
     range: Array
     peak_velocity: Array
     peak_acceleration: Array
+    reversals: Ints
     nearest: Mapping[str, tuple[float, int]]
 
     __repr__ = short_repr
+
+
+PLACING = 3
+"""Joints that place the wrist centre: they carry most, and stick where they turn back."""
+STILL = 1e-4
+"""rad/s: a joint that moves more slowly has no direction; its last one holds."""
+
+
+def reversals(rate: Array) -> list[tuple[int, int]]:
+    """Return where joints 1 to 3 turn back: joint, from 0, and the row from which it moves back.
+
+    ``rate`` is (m, n) rad/s, joint velocities one after another.
+    """
+    found = []
+    for joint, moves in enumerate(rate.T[:PLACING]):
+        at = np.flatnonzero(np.abs(moves) > STILL)
+        turned = at[1:][np.diff(np.sign(moves[at])) != 0]
+        found += [(joint, int(k)) for k in turned]
+    return found
 
 
 def path_cost(
@@ -465,6 +487,7 @@ class Plan:
     def criteria(self) -> Criteria:
         """The criteria (7) to (9), peak shares of the limits, and least measures of comfort."""
         dq = self.increments
+        turned = [joint for joint, _ in reversals(dq / np.diff(self.time)[:, None])]
         measured = measures(self.robot, self.q, tool=self.T_flange_tip)
         return Criteria(
             displacement=metric.total_displacement(dq),
@@ -472,6 +495,7 @@ class Plan:
             range=metric.coordinate_range(dq),
             peak_velocity=np.abs(self.velocity_share).max(axis=0),
             peak_acceleration=np.abs(self.acceleration_share).max(axis=0, initial=0.0),
+            reversals=np.bincount(turned, minlength=dq.shape[1]),
             nearest={name: (float(of.min()), int(of.argmin())) for name, of in measured.items()},
         )
 
