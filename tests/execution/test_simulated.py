@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 
 import kerfpath
 from kerfpath import InputError, Response, Target, simulate
 from kerfpath.execution import IDEAL
+from kerfpath.execution.path_error import Polyline
 
 TOOL = np.eye(4)
 TOOL[:3, 3] = [0.1, 0.0, 0.4]
@@ -70,6 +72,28 @@ def test_a_zone_leaves_a_corner_by_a_quarter_of_its_length(robot, first):
     away = np.linalg.norm(points - shifted(first, 0.1, 0, 0)[:3, 3], axis=1).min()
     # The vertex of the parabola lies a quarter of the zone inwards along both sides.
     assert away == pytest.approx(0.02 / 4 * np.sqrt(2), rel=0.01)
+
+
+def test_corners_of_cnt100_follow_the_cubic_b_spline_over_even_targets(robot, first):
+    """A circle in 24 moves of 50 ms; the ends, where the robot starts and stops, are left out."""
+    radius, turn = 0.04, np.radians(15)
+    length = 2 * radius * np.sin(turn / 2)
+    ways = [(radius * np.sin(k * turn), radius * (1 - np.cos(k * turn)), 0) for k in range(25)]
+    targets = [Target(kind="start", pose=first)]
+    for way in ways[1:]:
+        at = shifted(first, *way)
+        targets.append(Target(kind="linear", pose=at, speed=length / 0.05, zone=0.01))
+    points = tips(robot, run(targets, robot, language="fanuc").q) - first[:3, 3]
+    spline = BSpline(np.arange(-2.0, 27.0), np.array(ways), 3)  # target k at k
+    at_targets, between = spline(np.arange(6.0, 19.0)), spline(np.arange(6.0, 19.0, 0.01))
+    inside = np.linalg.norm(np.array(ways)[6:19] - at_targets, axis=1)
+    # A target is passed at a sixth of the second difference of the targets beside it.
+    assert inside == pytest.approx(2 * radius * (1 - np.cos(turn)) / 6, rel=1e-6)
+    way = Polyline.of(points)
+    # The joints are averaged and not the tip: a hundredth of how far targets are passed, 0.45 mm.
+    assert way.nearest(between)[2].max() < 5e-6
+    plain = Polyline.of(tips(robot, run(targets, robot).q) - first[:3, 3])
+    assert plain.nearest(between)[2].max() > 5e-5
 
 
 def test_no_joint_exceeds_a_limit(robot, first):

@@ -299,13 +299,15 @@ def commanded(run: Executed, timing: Timing) -> Array:
     """Return the joints (m, n) rad that are commanded every `STEP` s, from standing to standing."""
     velocity, _ = run.robot.speed_limits()
     return even_joints(
-        timing.clock, run.time, timing.share, run.q, run.velocity_share * velocity, STEP
-    )
+        timing.clock, run.time, timing.share, run.q, run.velocity_share * velocity, STEP,
+        again=run.tool_motion.again,
+    )  # fmt: skip
 
 
 def even_joints(
-    clock: Array, time: Array, rate: Array, q: Array, first: Array, step: float
-) -> Array:
+    clock: Array, time: Array, rate: Array, q: Array, first: Array, step: float, *,
+    again: float = 0.0,
+) -> Array:  # fmt: skip
     """Return joints (k, n) at even times from samples of a motion.
 
     Between samples, programmed time passes at constant acceleration, and joints follow the cubics
@@ -321,10 +323,18 @@ def even_joints(
         Joints, and their velocities by programmed time.
     step : float s
         Time between two samples that are returned.
+    again : float s
+        Programmed time over which the joints are averaged, less than that near both ends.
     """
     even = np.append(np.arange(0.0, clock[-1], step), clock[-1])
-    within = CubicHermiteSpline(clock, time, rate)(even)
-    return np.asarray(CubicHermiteSpline(time, q, first)(np.clip(within, time[0], time[-1])))
+    within = np.clip(CubicHermiteSpline(clock, time, rate)(even), time[0], time[-1])
+    way = CubicHermiteSpline(time, q, first)
+    joints = np.asarray(way(within))
+    half = np.minimum(again / 2, np.minimum(within - time[0], time[-1] - within))
+    some = half > step  # over less than two steps, nothing changes
+    gone, at, half = way.antiderivative(), within[some], half[some]
+    joints[some] = (gone(at + half) - gone(at - half)) / (2 * half[:, None])
+    return joints
 
 
 def _reversals(q: Array, step: float) -> tuple[Reversal, ...]:

@@ -202,6 +202,7 @@ class _Piece:
     second: Array
     last: int
     end: float
+    again: float = 0.0
 
 
 def _commanded(
@@ -230,7 +231,8 @@ def _commanded(
     )
     time = time[once]
     rate = fastest_rates(time, v, a, robot.speed_limits())
-    return even_joints(clock_of(time, rate), time, rate, q, v, STEP)
+    again = max(piece.again for piece in pieces)
+    return even_joints(clock_of(time, rate), time, rate, q, v, STEP, again=again)
 
 
 def _along_path(
@@ -273,6 +275,7 @@ def _along_path(
         second=a[[0, *range(len(a)), -1]],
         last=last,
         end=end,
+        again=run.tool_motion.again,
     )
 
 

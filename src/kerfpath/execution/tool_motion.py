@@ -46,6 +46,9 @@ class ToolMotion:
         How the tool turns between two targets, see `Controller`.
     stretch : (K-1,), optional
         Share by which each move takes longer because of the controller's cycle, in `duration`.
+    again : float s
+        Time over which the joints are averaged once more, see `Controller.rounds_twice`. The poses
+        here are those before that.
 
     Attributes
     ----------
@@ -62,6 +65,7 @@ class ToolMotion:
     normal: Array
     orientation: Orientation = "slerp"
     stretch: Array | None = None
+    again: float = 0.0
     time: Array = field(init=False)
     sweep: Array = field(init=False)
     _along: Array = field(init=False, repr=False)
@@ -115,7 +119,9 @@ class ToolMotion:
         half = zone / np.maximum(np.maximum(fastest[:-1], fastest[1:]), 1e-12)
         room = np.minimum(duration[:-1], duration[1:]) / 2
         half = np.append(0.0, np.append(np.minimum(half, room), 0.0))
-        return replace(even, duration=duration, half=half, stretch=stretch)
+        twice = controller.rounds_twice and len(moves) > 1
+        again = float(2 * np.median(half[1:-1])) if twice else 0.0
+        return replace(even, duration=duration, half=half, stretch=stretch, again=again)
 
     @classmethod
     def through(

@@ -102,6 +102,9 @@ class Controller:
         program contains.
     corner_time : float s, optional
         The same as a time at the programmed speed.
+    rounds_twice : bool
+        Whether the rounded path is rounded once more, over the time of a corner. With moves of one
+        duration it is then the cubic B-spline over the targets instead of the quadratic one.
     assumed : str
         What is assumed of its corners, because the settings do not give it; empty if nothing is.
     shortest : float s
@@ -116,6 +119,7 @@ class Controller:
     orientation: Orientation = "slerp"
     corner: float | None = None
     corner_time: float | None = None
+    rounds_twice: bool = False
     assumed: str = ""
     shortest: float = 0.0
     cycle: float = 0.0

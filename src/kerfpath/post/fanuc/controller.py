@@ -41,8 +41,11 @@ from kerfpath.robots import Robot
 
 UNITS = {"cm/min": 0.01 / 60, "mm/sec": 1e-3}
 """Units of speeds in m/s; controllers count both in whole numbers."""
-CORNER_MS = 100.0
-"""Time before and after a corner in which CNT100 is assumed to round it, if not given."""
+CORNER_MS = 120.0
+"""Time before and after a corner in which CNT100 is assumed to round it, if not given. In three
+published runs of FANUC's simulator, targets 117 and 234 ms apart are the control points of a cubic
+B-spline (rpiRobotics/ARM-21-02-F-19-Robot-Motion-Program, M-10iA); longer moves are not on
+record."""
 SHORTEST_MS = 16.0
 """Shortest time (ms) of a move of the path, if the settings give none."""
 LONGEST_LEAD = 30.0
@@ -158,11 +161,12 @@ def _controller(settings: FanucSettings) -> Controller:
     full = CORNER_MS if settings.corner_ms is None else settings.corner_ms
     assumed = (
         f"CNT100 is assumed to round from {CORNER_MS:g} ms before a corner to {CORNER_MS:g} ms "
-        "after it; set corner_ms in [program.fanuc]"
+        "after it, like a cubic B-spline; set corner_ms in [program.fanuc]"
     )
     return replace(
         plain,
         corner_time=full * 1e-3 * max(settings.cnt_percent, 1) / 100,  # CNT0 rounds, but hardly
+        rounds_twice=True,
         assumed=assumed if settings.corner_ms is None else "",
     )
 
