@@ -59,7 +59,7 @@ def nearest(name: str, known: Sequence[str]) -> str:
     return f"nearest: {listed(near, MOST_NEAR)}"
 
 
-def listed(names: Sequence[str], most: int) -> str:
+def listed(names: Sequence[str], most: int, between: str = ", ") -> str:
     """Return the first names in words for messages, and how many there are beyond `most`."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    return between.join(names[:most]) + more

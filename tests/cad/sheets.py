@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeEdge,
     BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakePolygon,
     BRepBuilderAPI_MakeWire,
 )
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeCone, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakePrism
@@ -98,3 +101,49 @@ def sunk(shape: TopoDS_Shape, profile: tuple[float, ...], side: str, count: int)
         cone = BRepPrimAPI_MakeCone(axes, 3.0, 1.5, 1.5).Shape()
         shape = BRepAlgoAPI_Cut(shape, cone).Shape()
     return shape
+
+
+class Folded(NamedTuple):
+    """A sheet folded without radii; the convex sides of its folds are its outer side.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    corners : (K, 2) mm
+        Ends and folds of its outer side, in the plane y = 0 (x, z).
+    normals : (K - 1, 3)
+        Outward normals of the walls between them.
+    """
+
+    shape: TopoDS_Shape
+    corners: np.ndarray
+    normals: np.ndarray
+
+
+def folded(seed: int) -> Folded:
+    """Return a random folded sheet with a round hole across each of its folds."""
+    rng = np.random.default_rng(seed)
+    angles = np.radians(rng.uniform(30, 90, rng.integers(1, 4)))
+    heading = np.concatenate([[0.0], -np.cumsum(angles)])
+    ways = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    lengths = rng.uniform(20, 60, len(ways))
+    corners = np.vstack([np.zeros(2), np.cumsum(lengths[:, None] * ways, axis=0)])
+    across = np.stack([-ways[:, 1], ways[:, 0]], axis=1)  # outward, as it folds to the right
+    mitre = across[1:] + across[:-1]
+    mitre *= (2 / (mitre * mitre).sum(axis=1))[:, None]
+    mitre = np.vstack([across[:1], mitre, across[-1:]])
+    wall = rng.uniform(0.8, 3.0)
+    polygon = BRepBuilderAPI_MakePolygon()
+    for x, z in np.vstack([corners, (corners - wall * mitre)[::-1]]).tolist():
+        polygon.Add(gp_Pnt(x, 0.0, z))
+    polygon.Close()
+    face = BRepBuilderAPI_MakeFace(polygon.Wire()).Face()
+    shape = BRepPrimAPI_MakePrism(face, gp_Vec(0, WIDTH, 0)).Shape()
+    for corner, out in zip(corners[1:-1], mitre[1:-1], strict=True):
+        out = out / np.linalg.norm(out)
+        x, z = (corner + 5 * wall * out).tolist()
+        axes = gp_Ax2(gp_Pnt(x, WIDTH / 2, z), gp_Dir(-out[0], 0.0, -out[1]))
+        drill = BRepPrimAPI_MakeCylinder(axes, float(rng.uniform(3, 8)), 10 * wall).Shape()
+        shape = BRepAlgoAPI_Cut(shape, drill).Shape()
+    normals = np.stack([across[:, 0], 0 * across[:, 0], across[:, 1]], axis=1)
+    return Folded(shape, corners, normals)

@@ -194,7 +194,9 @@ def test_a_section_of_a_box_turns_at_its_edges_alone(tmp_path: Path) -> None:
     flat = contour.points[~near][:, :2] * 1e3
     from_corner = np.linalg.norm(flat[:, None] - np.array(sorted(found))[None], axis=2).min(axis=1)
     assert from_corner.min() == pytest.approx(1.0, abs=1e-9)
-    assert "crosses sharp edges at 4 places" in " ".join(part.notes)
+    (note,) = part.notes
+    assert "within 1 mm before and behind sharp edges: section1/outer by up to 90 deg at" in note
+    assert len(loop.edge_turns) == 4
 
 
 def test_a_plane_may_cut_a_hole_and_an_open_sheet(tmp_path: Path) -> None:

@@ -15,15 +15,21 @@ if TYPE_CHECKING:
     from kerfpath.cad.part import Part as Part
     from kerfpath.cad.reading import read as read
     from kerfpath.cad.reading import read_measured as read_measured
+    from kerfpath.cad.sharp_edges import EdgeTurn as EdgeTurn
     from kerfpath.cad.sides import Triangles as Triangles
+    from kerfpath.cad.units import EDGE_TURN as EDGE_TURN
     from kerfpath.cad.units import GAP as GAP
+    from kerfpath.cad.units import LEAST_EDGE_TURN as LEAST_EDGE_TURN
     from kerfpath.cad.units import SUFFIXES as SUFFIXES
     from kerfpath.cad.units import UNITS_MM as UNITS_MM
     from kerfpath.cad.units import unit_question as unit_question
 
 _HOME = {
     "Departure": "departure",
+    "EDGE_TURN": "units",
+    "EdgeTurn": "sharp_edges",
     "GAP": "units",
+    "LEAST_EDGE_TURN": "units",
     "LeftOut": "left_out",
     "Loop": "part",
     "Machine": "machine",

@@ -88,7 +88,7 @@ def _pair_count(one: cKDTree, other: cKDTree, within: float, p: float = np.inf) 
 
 
 def _lies_on(points: Array, trace: Trace, within: float) -> bool:
-    chords = trace.sample(CHORD, np.pi)[0]
+    chords = trace.sample(CHORD, np.pi).points
     if trace.gaps.size == len(trace.lengths):
         chords = np.vstack([chords, chords[:1]])
     step = -(-len(points) // MOST_COMPARED)

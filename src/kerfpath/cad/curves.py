@@ -15,7 +15,8 @@ from scipy.interpolate import BSpline
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from kerfpath.arrays import Array, Ints, short_repr
+from kerfpath.arrays import Array, Bools, Ints, short_repr
+from kerfpath.cad.sharp_edges import SMOOTH, Sampled, edges_of
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
 
@@ -39,6 +40,8 @@ MARGIN = 0.8
 """Share of the tolerance allowed at the middle of a cell; a curve may deviate more beside it."""
 SHORTEST = 1e-3
 """Cells below this (mm) are not divided, as a crease turns the normal of a surface in no length."""
+AT_CREASE = 4.0
+"""Least turn of the normal in the cell at a crease, in multiples of that in its neighbours."""
 MOST = 500_000
 """Largest number of nodes on one edge; a broken edge would need more without end."""
 AROUND = 24
@@ -118,8 +121,8 @@ class Trace(Protocol):
     def break_at(self) -> str:
         """Return a message on where its largest gap is."""
 
-    def sample(self, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
-        """Return points (K, 3) mm and outward normals (K, 3); the first point is not repeated.
+    def sample(self, chord_tolerance: float, axis_tolerance: float) -> Sampled:
+        """Return nodes along the trace; the first is not repeated.
 
         Parameters
         ----------
@@ -192,22 +195,47 @@ class EdgeChain(Generic[E]):
         place = self.edges[k].ends[1].round(3).tolist()
         return f"has a gap of {self.gaps[k]:.3f} mm after its edge {k + 1}, at {place} mm"
 
-    def sample(self, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
-        """Return points (K, 3) mm and outward normals (K, 3).
+    def sample(self, chord_tolerance: float, axis_tolerance: float) -> Sampled:
+        """Return nodes along the chain.
 
         The end of an edge and the start of the next become one node, halfway.
         """
-        each = [sample_curve(edge, chord_tolerance, axis_tolerance)[1:] for edge in self.edges]
-        points, normals = [], []
-        for (before_p, before_n), (p, n) in zip(each[-1:] + each[:-1], each, strict=True):
-            joint = before_n[-1] + n[0]
-            points += [(before_p[-1:] + p[:1]) / 2, p[1:-1]]
-            normals += [(joint / np.linalg.norm(joint))[None], n[1:-1]]
+        each = [_sample_edge(edge, chord_tolerance, axis_tolerance) for edge in self.edges]
+        points, arriving, leaving = [], [], []
+        for before, after in zip(each[-1:] + each[:-1], each, strict=True):
+            points += [(before.points[-1:] + after.points[:1]) / 2, after.points[1:-1]]
+            arriving += [before.arriving[-1:], after.arriving[1:-1]]
+            leaving += [after.leaving[:1], after.leaving[1:-1]]
         if not self.is_closed:
-            points[0], normals[0] = each[0][0][:1], each[0][1][:1]
-            points.append(each[-1][0][-1:])
-            normals.append(each[-1][1][-1:])
-        return np.vstack(points), np.vstack(normals)
+            first, last = each[0], each[-1]
+            points[0], arriving[0] = first.points[:1], first.leaving[:1]
+            points.append(last.points[-1:])
+            arriving.append(last.arriving[-1:])
+            leaving.append(last.arriving[-1:])
+        return Sampled(np.vstack(points), np.vstack(arriving), np.vstack(leaving))
+
+
+def _sample_edge(edge: DirectedCurve, chord_tolerance: float, axis_tolerance: float) -> Sampled:
+    """Return nodes along one edge, both ends included; at a crease of its surface there is one."""
+    _, points, normals = sample_curve(edge, chord_tolerance, axis_tolerance)
+    crease = creases(points, normals) & (_angle(normals[:-1], normals[1:]) > axis_tolerance)
+    if not crease.any():
+        return Sampled(points, normals, normals)
+    first = np.flatnonzero(np.concatenate([[True], ~crease]))
+    last = np.append(first[1:] - 1, len(points) - 1)
+    return Sampled((points[first] + points[last]) / 2, normals[first], normals[last])
+
+
+def creases(points: Array, normals: Array) -> Bools:
+    """Return which cells (K-1,) between points on an edge are a crease, where the normal jumps.
+
+    Around a tight bend, too, cells are short, but the normal turns in its neighbours as well.
+    """
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    turn = _angle(normals[:-1], normals[1:])
+    beside = np.pad(turn, 1)
+    alone = turn > AT_CREASE * np.maximum(beside[:-2], beside[2:])
+    return np.asarray((length <= SHORTEST) & alone & (turn > SMOOTH))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,11 +263,22 @@ class Polyline:
 
 @dataclass(frozen=True, kw_only=True)
 class Points:
-    """Given points (K, 3) mm and outward normals (K, 3)."""
+    """Given points and their normals.
+
+    Parameters
+    ----------
+    points : (K, 3) mm
+    normals : (K, 3)
+        Outward normals; at a sharp edge, that just behind the point.
+    is_closed : bool
+    arriving : (K, 3), optional
+        Outward normals just before the points; default: `normals`.
+    """
 
     points: Array
     normals: Array
     is_closed: bool
+    arriving: Array | None = None
 
     __repr__ = short_repr
 
@@ -250,8 +289,24 @@ class Points:
 
     @cached_property
     def curves(self) -> Sequence[DirectedCurve]:
-        """The segments between the points."""
-        return [Polyline(line=Contour(self.points, -self.normals, closed=self.is_closed))]
+        """The segments between the points, as one curve from sharp edge to sharp edge."""
+        line = self.sample(0.0, 0.0)
+        edges = edges_of(line)
+        if not edges.size:
+            return [Polyline(line=Contour(self.points, -self.normals, closed=self.is_closed))]
+        count = len(self.points)
+        ends = (
+            np.append(edges, edges[0] + count)
+            if self.is_closed
+            else np.union1d(edges, [0, count - 1])
+        )
+        found = list[DirectedCurve]()
+        for a, b in pairwise(ends.tolist()):
+            nodes = np.arange(a, b + 1) % count
+            normals = line.leaving[nodes].copy()
+            normals[-1] = line.arriving[nodes[-1]]
+            found.append(Polyline(line=Contour(line.points[nodes], -normals)))
+        return found
 
     @property
     def gaps(self) -> Array:
@@ -281,9 +336,10 @@ class Points:
             f"at {last.round(3).tolist()} mm"
         )
 
-    def sample(self, chord_tolerance: float, axis_tolerance: float) -> tuple[Array, Array]:
+    def sample(self, chord_tolerance: float, axis_tolerance: float) -> Sampled:
         """Return the given points and normals, whatever the tolerances."""
-        return self.points, self.normals
+        arriving = self.normals if self.arriving is None else self.arriving
+        return Sampled(self.points, arriving, self.normals)
 
 
 def sample_curve(

@@ -9,8 +9,17 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from kerfpath.arrays import Array, Ints, short_repr
-from kerfpath.cad.curves import DirectedCurve, Points, Polyline, Trace, off_chord, sample_curve
+from kerfpath.arrays import Array, Bools, Ints, short_repr
+from kerfpath.cad.curves import (
+    DirectedCurve,
+    Points,
+    Polyline,
+    Trace,
+    creases,
+    off_chord,
+    sample_curve,
+)
+from kerfpath.cad.sharp_edges import SMOOTH, Walls, half_turns
 from kerfpath.cad.units import MM
 from kerfpath.contour import Contour, angle_between, slerp
 from kerfpath.errors import InputError
@@ -76,7 +85,7 @@ class Departure:
     __repr__ = short_repr
 
 
-def departure(trace: Trace, contour: Contour, tolerance: float) -> Departure:
+def departure(trace: Trace, contour: Contour, tolerance: float, edge_turn: float) -> Departure:
     """Return how far a contour deviates from the trace of a loop, see `Part.departure`.
 
     Parameters
@@ -85,10 +94,12 @@ def departure(trace: Trace, contour: Contour, tolerance: float) -> Departure:
     contour : Contour
     tolerance : float m
         Largest distance of a node from the trace.
+    edge_turn : float m
+        Distance from sharp edges within which the tool axis turns.
     """
     against: Reference = "points of the drawing" if isinstance(trace, Points) else "CAD curve"
     nodes, beside = _cut_nodes(contour), tolerance / MM
-    cells = _cells(trace.curves)
+    cells = _cells(trace.curves, edge_turn / MM, is_closed=trace.is_closed)
     at = _places(cells, contour.points / MM, nodes, beside, contour.name)
     around = cells.s[-1] if trace.is_closed else np.inf
     length = float(np.diff(contour.s)[_chords(contour)].sum()) / MM
@@ -123,7 +134,8 @@ def departure_from(path: Contour, contour: Contour, drawn: Departure) -> Departu
             "this path"
         )
     nodes = _cut_nodes(contour)
-    cells = _cells([Polyline(line=replace(path, points=path.points / MM, time=None, x=None))])
+    line = Polyline(line=replace(path, points=path.points / MM, time=None, x=None))
+    cells = _cells([line], 0.0, is_closed=False)
     at = np.interp(contour.s[nodes], np.append(cells.t[:, 0], cells.t[-1, 1]), cells.s)
     return replace(_measure_chords(cells, at, nodes, contour, "path as cut"), path=drawn)
 
@@ -143,6 +155,11 @@ class _ShortSpans:
         Points there.
     s : (C + 1,) mm
         Length along all cells; gaps between curves count as zero.
+    wall : (C,) int
+        Stretch between sharp edges that each cell is on.
+    walls : Walls
+    crease : (C,) bool
+        Cells in which the normal jumps; there the reference has no axis.
     """
 
     curves: Sequence[DirectedCurve]
@@ -150,6 +167,9 @@ class _ShortSpans:
     t: Array
     ends: Array
     s: Array
+    wall: Ints
+    walls: Walls
+    crease: Bools
 
     def at(self, cell: Ints, share: Array) -> tuple[Array, Array]:
         """Return points (..., 3) mm and tool axes (..., 3) at a share (...,) of each cell's t."""
@@ -158,7 +178,9 @@ class _ShortSpans:
         for k in np.unique(self.of[cell]).tolist():
             here = self.of[cell] == k
             points[here], normals[here] = self.curves[k].evaluate(t[here])
-        return points, -normals
+        s = self.s[cell] + share * (self.s[cell + 1] - self.s[cell])
+        turned = self.walls.turned(self.wall[cell].ravel(), s.ravel(), normals.reshape(-1, 3))
+        return points, -turned.reshape(normals.shape)
 
 
 def _chords(contour: Contour) -> Ints:
@@ -181,7 +203,7 @@ def _measure_chords(
     points, axes, chords = contour.points / MM, contour.axes, _chords(contour)
     a, b, cell, chord = _pieces(cells.s, at)
     chord = nodes[chord]
-    keep = np.isin(chord, chords)
+    keep = np.isin(chord, chords) & ~cells.crease[cell]
     a, b, cell, chord = a[keep], b[keep], cell[keep], chord[keep]
 
     def errors(of: Ints, looks: int) -> Array:
@@ -213,23 +235,59 @@ def _measure_chords(
     )
 
 
-def _cells(curves: Sequence[DirectedCurve]) -> _ShortSpans:
-    """Divide the curves into cells that bend little and are at most 1 / `CELLS` of the length."""
+def _cells(curves: Sequence[DirectedCurve], edge_turn: float, *, is_closed: bool) -> _ShortSpans:
+    """Divide the curves into cells that bend little and are at most 1 / `CELLS` of the length.
+
+    `edge_turn` (mm) is the distance from sharp edges within which the axis turns.
+    """
     fine = [sample_curve(curve, CHORD, ANGLE)[:2] for curve in curves]
     lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1) for _, points in fine]
     longest = sum(float(each.sum()) for each in lengths) / CELLS
-    of, t, ends = [], [], []
+    of, t, ends, sides, crease = [], [], [], [], []
     for k, (curve, (coarse, _), each) in enumerate(zip(curves, fine, lengths, strict=True)):
         parts = np.maximum(1, np.ceil(each / longest)).astype(np.int64)
         at = np.cumsum(np.concatenate([[0.0], np.repeat(1 / parts, parts)]))
         cut = np.interp(at, np.arange(len(coarse)), coarse)
-        points = curve.evaluate(cut)[0]
+        points, normals = curve.evaluate(cut)
         of.append(np.full(len(cut) - 1, k))
         t.append(np.stack([cut[:-1], cut[1:]], axis=1))
         ends.append(np.stack([points[:-1], points[1:]], axis=1))
+        sides.append(np.stack([normals[:-1], normals[1:]], axis=1))
+        crease.append(creases(points, normals))
     whole = np.concatenate(ends)
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(whole[:, 1] - whole[:, 0], axis=1))])
-    return _ShortSpans(curves=curves, of=np.concatenate(of), t=np.concatenate(t), ends=whole, s=s)
+    wall, walls = _walls(s, np.concatenate(sides), np.concatenate(crease), edge_turn, is_closed)
+    return _ShortSpans(
+        curves=curves, of=np.concatenate(of), t=np.concatenate(t), ends=whole, s=s,
+        wall=wall, walls=walls, crease=np.concatenate(crease),
+    )  # fmt: skip
+
+
+def _walls(
+    s: Array, sides: Array, crease: Bools, edge_turn: float, is_closed: bool
+) -> tuple[Ints, Walls]:
+    """Return the stretch between edges that each cell is on, and the stretches.
+
+    `sides` (C, 2, 3) are the normals at both ends of the cells.
+    """
+    # A crease belongs to what is before it: the edge is at its end, from its first normal on.
+    arriving = np.where(crease[:, None], sides[:, 0], sides[:, 1])
+    leaving = np.roll(sides[:, 0], -1, axis=0)
+    jumps = angle_between(arriving, leaving) > SMOOTH
+    if not is_closed:
+        jumps[-1] = False
+    edges = np.flatnonzero(jumps)
+    about = half_turns(arriving[edges], leaving[edges])
+    wall = np.searchsorted(edges, np.arange(len(sides)))  # an edge is at the end of its cell
+    start = np.concatenate([[s[0]], s[edges + 1]])
+    end = np.concatenate([s[edges + 1], [s[-1]]])
+    none = np.zeros((1, 3))
+    first, last = np.vstack([none, -about]), np.vstack([about, none])
+    if is_closed and edges.size:  # the first and the last stretch are one
+        around = s[-1] - s[0]
+        start[0], first[0] = s[edges[-1] + 1] - around, -about[-1]
+        end[-1], last[-1] = s[edges[0] + 1] + around, about[0]
+    return wall, Walls(start=start, end=end, first=first, last=last, reach=edge_turn)
 
 
 def _places(cells: _ShortSpans, points: Array, nodes: Ints, tolerance: float, name: str) -> Array:

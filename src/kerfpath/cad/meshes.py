@@ -31,11 +31,6 @@ WHOLE = "mesh"
 """Name of the whole surface, of which the faces are pieces if it is open."""
 
 
-AT_CORNER = 1.0
-"""mm: so far before and after a sharp edge in a section the axis turns, at most a third of a
-segment."""
-
-
 def read_mesh(
     path: Path,
     length_unit: str | None,
@@ -82,7 +77,7 @@ def read_mesh(
             f"has {count} faces between edges sharper than {np.degrees(SHARP):.0f} deg, at most "
             f"{MOST_FACES} are read; smooth the mesh"
         )
-    loops = []
+    loops: list[Loop] = []
     notes: list[str] = []
     mesh = _Mesh(points, corners, across, face, edges)
     is_open = len(edges.free) > 0
@@ -92,9 +87,7 @@ def read_mesh(
     names = [WHOLE] * count if is_open else [f"face{k + 1}" for k in range(count)]
     if section is not None:
         for k, height in enumerate(heights):
-            named, said = _section(mesh, section, height / MM, f"section{k + 1}", gap)
-            loops += named
-            notes += said
+            loops += _section(mesh, section, height / MM, f"section{k + 1}", gap)
     elif is_open:
         loops = _loops(mesh, WHOLE, np.zeros_like(face), 0, gap)
         for k in range(count if count > 1 else 0):
@@ -104,7 +97,7 @@ def read_mesh(
         sheet = _sheet(mesh, outer_towards)
         notes = sheet.notes
         for name, own in sheet.skins.items():
-            named = _skin_loops(mesh, name, sheet.skin[face], own, gap)
+            named = _loops(mesh, name, sheet.skin[face], own, gap)
             side = sheet.side[sheet.skin.tolist().index(own)]
             loops += [replace(loop, side=side) for loop in named]
         skin_of = {own: name for name, own in sheet.skins.items()}
@@ -128,14 +121,17 @@ def read_mesh(
 
 
 def _loops(mesh: _Mesh, name: str, group: Ints, own: int, gap: float) -> list[Loop]:
-    """Return the loops around the triangles of a group; at a vertex it has one normal."""
-    inside = group == own
-    beside = _normals(mesh.corners[inside], mesh.across[inside], len(mesh.points))
+    """Return the loops around the triangles of a group, with normals smooth within each face."""
     found: list[tuple[Kind, Trace, str]] = []
     for ring in mesh.edges.rings(group, own):
-        at = mesh.edges.tail[ring]
-        normals = unit(beside[at], "normals")
-        trace = Points(points=mesh.points[at], normals=normals, is_closed=True)
+        smooth = _smooth(mesh, ring // 3)
+        each, corner = np.arange(len(ring)), ring % 3
+        trace = Points(
+            points=mesh.points[mesh.edges.tail[ring]],
+            normals=smooth[each, corner],
+            is_closed=True,
+            arriving=np.roll(smooth[each, (corner + 1) % 3], 1, axis=0),
+        )
         found.append((kind_of_points(trace), trace, ""))
     return named_loops(found, face=name, surface="mesh", gap=gap, layer="")
 
@@ -205,22 +201,6 @@ def _sheet(mesh: _Mesh, outer_towards: Array | None) -> _Sheet:
     return _Sheet(skin, skins, side, notes)
 
 
-def _skin_loops(mesh: _Mesh, name: str, group: Ints, own: int, gap: float) -> list[Loop]:
-    """Return the loops around the faces of a skin; at its sharp edges the axis turns nearby."""
-    found: list[tuple[Kind, Trace, str]] = []
-    for ring in mesh.edges.rings(group, own):
-        smooth = _smooth(mesh, ring // 3)
-        each, corner = np.arange(len(ring)), ring % 3
-        start = mesh.points[mesh.edges.tail[ring]]
-        points, normals, _ = _turning(
-            start, np.roll(start, -1, axis=0), smooth[each, corner], smooth[each, (corner + 1) % 3],
-            is_closed=True,
-        )  # fmt: skip
-        trace = Points(points=points, normals=unit(normals, "normals"), is_closed=True)
-        found.append((kind_of_points(trace), trace, ""))
-    return named_loops(found, face=name, surface="mesh", gap=gap, layer="")
-
-
 class _Edges:
     """The half-edges of triangles (F, 3), each with the triangle on its left."""
 
@@ -262,12 +242,6 @@ class _Edges:
                 yield np.array(ring)
 
 
-def _normals(corners: Ints, across: Array, count: int) -> Array:
-    """Return normals (count, 3) of any length at vertices, by the areas of the triangles there."""
-    total = [np.bincount(corners.ravel(), np.repeat(x, 3), count) for x in across.T]
-    return np.stack(total, axis=1)
-
-
 # -----------------------------------------------------------------------------
 # Sections: where planes cut the triangles.
 
@@ -282,10 +256,8 @@ class _Mesh(NamedTuple):
     edges: _Edges
 
 
-def _section(
-    mesh: _Mesh, normal: Array, height: float, name: str, gap: float
-) -> tuple[list[Loop], list[str]]:
-    """Return the loops where a plane cuts a mesh, and notes; `height` in mm."""
+def _section(mesh: _Mesh, normal: Array, height: float, name: str, gap: float) -> list[Loop]:
+    """Return the loops where a plane cuts a mesh; `height` in mm."""
     way = normal / np.linalg.norm(normal)
     off = mesh.points[np.unique(mesh.corners)] @ way - height
     low, high = float(off.min()), float(off.max())
@@ -296,30 +268,15 @@ def _section(
             f"{high + height:.6g} mm along the normal, got {height:.6g} mm"
         )
     found: list[tuple[Kind, Trace, str]] = []
-    turned = 0
-    chains = _chains(mesh, mesh.points @ way >= height)
-    for chain, is_closed in chains:
-        points, normals, sharp = _line(mesh, chain, way, height, is_closed=is_closed)
-        keep = np.linalg.norm(np.diff(points, axis=0), axis=1) > REPEATED
-        keep = np.concatenate([[True], keep])
-        if is_closed and np.linalg.norm(points[keep][-1] - points[0]) <= REPEATED:
-            keep[np.flatnonzero(keep)[-1]] = len(points[keep]) <= 1
-        points, normals = points[keep], normals[keep]
-        if len(points) < (3 if is_closed else 2):
+    for chain, is_closed in _chains(mesh, mesh.points @ way >= height):
+        trace = _line(mesh, chain, way, height, is_closed=is_closed)
+        if len(trace.points) < (3 if is_closed else 2):
             continue
-        turned += sharp
-        trace = Points(points=points, normals=unit(normals, "normals"), is_closed=is_closed)
         kind: Kind = "open"
         if is_closed:
-            kind = "outer" if vector_area(points) @ way > 0 else "inner"
+            kind = "outer" if vector_area(trace.points) @ way > 0 else "inner"
         found.append((kind, trace, ""))
-    notes = []
-    if turned:
-        notes.append(
-            f"{name}: crosses sharp edges at {turned} places, where the axis turns within "
-            f"{AT_CORNER:g} mm on both sides"
-        )
-    return named_loops(found, face=name, surface="mesh", gap=gap, layer=""), notes
+    return named_loops(found, face=name, surface="mesh", gap=gap, layer="")
 
 
 def _chains(mesh: _Mesh, above: Bools) -> Iterator[tuple[list[tuple[int, int, int]], bool]]:
@@ -363,8 +320,8 @@ def _line(
     height: float,
     *,
     is_closed: bool,
-) -> tuple[Array, Array, int]:
-    """Return points (K, 3) mm and normals (K, 3) along a line, and how often it crosses an edge."""
+) -> Points:
+    """Return the trace of a line, without repeated points."""
     k, i, j = np.array(chain).T
     smooth = _smooth(mesh, k)
     ends = []
@@ -375,36 +332,19 @@ def _line(
         at = mesh.points[a] + share * (mesh.points[b] - mesh.points[a])
         one, other = smooth[np.arange(len(k)), here], smooth[np.arange(len(k)), (here + 1) % 3]
         ends.append((at, unit((1 - share) * one + share * other, "normals")))
-    (start, from_normal), (end, to_normal) = ends
-    return _turning(start, end, from_normal, to_normal, is_closed=is_closed)
-
-
-def _turning(
-    start: Array, end: Array, from_normal: Array, to_normal: Array, *, is_closed: bool
-) -> tuple[Array, Array, int]:
-    """Return points and normals (K, 3) along segments, and how often sharp edges are crossed.
-
-    The segments (N, 3) mm follow each other; at a sharp edge the normals of two of them differ.
-    """
-    turns = angle_between(to_normal, np.roll(from_normal, -1, axis=0)) > SHARP
+    (points, leaving), (after, arriving) = ends
     if not is_closed:
-        turns[-1] = False
-    points, normals = [], []
-    for n in range(len(start)):
-        step = end[n] - start[n]
-        length = float(np.linalg.norm(step))
-        near = min(AT_CORNER, length / 3) / length if length > REPEATED else 0.0
-        before = turns[n - 1] if n or is_closed else False
-        mean = from_normal[n] + to_normal[n - 1] if before else from_normal[n]
-        for share, there in ((0.0, True), (near, before), (1 - near, turns[n])):
-            if there and (share == 0 or near > 0):
-                points.append(start[n] + share * step)
-                mixed = (1 - share) * from_normal[n] + share * to_normal[n]
-                normals.append(mixed if share else mean)
+        points, leaving = np.vstack([points, after[-1:]]), np.vstack([leaving, arriving[-1:]])
+        arriving = np.vstack([arriving, leaving[:1]])
+    arriving = np.roll(arriving, 1, axis=0)
+    # Of points at one place, the first arrives and the last leaves.
+    new = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > REPEATED
     if not is_closed:
-        points.append(end[-1])
-        normals.append(to_normal[-1])
-    return np.array(points), np.array(normals), int(turns.sum())
+        new[0] = True
+    last = np.roll(new, -1)
+    return Points(
+        points=points[new], normals=leaving[last], is_closed=is_closed, arriving=arriving[new]
+    )
 
 
 def _smooth(mesh: _Mesh, chosen: Ints) -> Array:

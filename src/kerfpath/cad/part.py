@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -17,9 +17,11 @@ from kerfpath.cad.curves import EdgeChain, Trace, distance
 from kerfpath.cad.departure import ON_CURVE, Departure, departure
 from kerfpath.cad.laid import LaidEdge
 from kerfpath.cad.left_out import LeftOut
-from kerfpath.cad.units import MM
+from kerfpath.cad.sharp_edges import EdgeTurn, edge_turns, turn_at_edges
+from kerfpath.cad.units import EDGE_TURN, MM
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError, about
+from kerfpath.names import listed
 from kerfpath.operations import Ribbon, Surface
 
 # -----------------------------------------------------------------------------
@@ -100,6 +102,9 @@ def _distance(p0: Array, p1: Array, q0: Array, q1: Array) -> tuple[Array, Array]
 # -----------------------------------------------------------------------------
 # Loops, and the part that has them.
 
+COARSE_CHORD, COARSE_ANGLE = 1.0, 0.05
+"""Chord error (mm) and turn of the normal (rad) of samples among which sharp edges are found."""
+
 Kind = Literal["outer", "inner", "open"]
 Side = Literal["outer", "inner", "edge", "blind", "sunk", ""]
 NO_CUT: tuple[Side, ...] = ("edge", "blind", "sunk")
@@ -178,6 +183,11 @@ class Loop:
         """Whether it is picked by default: no piece of a skin, and to be cut as it is."""
         return not self.skin and self.side not in NO_CUT
 
+    @property
+    def edge_turns(self) -> tuple[EdgeTurn, ...]:
+        """The sharp edges that it crosses, at which the beam turns by more than 2 deg."""
+        return edge_turns(self._trace.sample(COARSE_CHORD, COARSE_ANGLE), MM)
+
     def line(self, chord_tolerance: float = 1e-4) -> Array:
         """Return points (K, 3) m along the loop for pictures, even if it cannot be cut.
 
@@ -187,7 +197,7 @@ class Loop:
             Largest distance between the chords and the curve.
         """
         chord = scalar(chord_tolerance, "chord_tolerance", unit="m", above=0.0)
-        points = self._trace.sample(chord / MM, np.pi)[0] * MM
+        points = self._trace.sample(chord / MM, np.pi).points * MM
         return freeze(points if self.kind == "open" else np.vstack([points, points[:1]]))
 
 
@@ -213,6 +223,8 @@ class Part:
         What was left out, by kind and reason; the notes list it, too.
     frames : mapping of str to (4, 4) m
         T_part_frame of the named coordinate systems of a STEP or DXF file.
+    edge_turn : float m
+        Distance before and behind a sharp edge within which the beam turns, see `read`.
     """
 
     path: Path
@@ -223,6 +235,7 @@ class Part:
     notes: tuple[str, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     frames: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    edge_turn: float = EDGE_TURN
     _gap: float = field(repr=False)
     _triangulate: Callable[[float], tuple[Array, Ints, Ints]] | None = field(
         default=None, repr=False
@@ -356,7 +369,10 @@ class Part:
     ) -> Contour:
         """Return the loop called `name` as a contour of dense points and tool axes.
 
-        The tool axis is opposite to the face's outward normal: from the nozzle into the part.
+        The tool axis is opposite to the face's outward normal: from the nozzle into the part. Where
+        the loop crosses a sharp edge, the axis turns within the `edge_turn` of `read` on both
+        sides, at an even rate on each, and is halfway at the edge; where it begins and ends to turn
+        are nodes, see `Contour.bend_ends`.
 
         Parameters
         ----------
@@ -367,8 +383,8 @@ class Part:
         chord_tolerance : float m
             Largest distance between the contour's chords and the curve.
         axis_tolerance : float rad
-            Largest angle between the axes of neighbouring nodes on an edge. Where the faces of a
-            skin meet, the axis may turn by up to 2 deg at once.
+            Largest angle between the axes of neighbouring nodes on an edge. Where faces meet, the
+            axis may turn by up to 0.1 deg at once.
 
         Raises
         ------
@@ -386,7 +402,9 @@ class Part:
                 + (", or ask for an open one" if loop.kind == "open" else "")
             )
         try:
-            points, normals = loop._trace.sample(chord / MM, angle)
+            points, normals = turn_at_edges(
+                loop._trace.sample(chord / MM, angle), self.edge_turn / MM, is_closed=loop.closed
+            )
         except InputError as error:
             raise InputError(f"{self.path}: loop {name!r}: {error}") from None
         contour = Contour(points * MM, -normals, closed=loop.closed, name=name)
@@ -402,8 +420,9 @@ class Part:
     def departure(self, name: str, contour: Contour, *, tolerance: float = ON_CURVE) -> Departure:
         """Return the largest deviation of a contour from the loop called `name`.
 
-        It is measured between the nodes against the CAD curve itself, not against samples of it. A
-        table defines nothing between its points, so the lines through them are the reference.
+        It is measured between the nodes against the CAD curve itself, not against samples of it;
+        at sharp edges against the axis that turns there, as in `contour`. A table defines nothing
+        between its points, so the lines through them are the reference.
 
         Parameters
         ----------
@@ -423,7 +442,7 @@ class Part:
         loop = self.loop(name)
         beside = scalar(tolerance, "tolerance", unit="m", above=0.0) + loop.largest_gap / 2
         try:
-            return departure(loop._trace, contour, beside)
+            return departure(loop._trace, contour, beside, self.edge_turn)
         except InputError as error:
             raise InputError(f"{self.path}: loop {name!r}: {error}") from None
 
@@ -501,3 +520,27 @@ def _range(value: tuple[float, float] | None, name: str) -> tuple[float, float] 
 def _within(value: float | None, bounds: tuple[float, float] | None) -> bool:
     # A nanometre is tolerated: a hole of 10 mm measures 9.9999999996 mm.
     return bounds is None or (value is not None and bounds[0] - 1e-9 <= value <= bounds[1] + 1e-9)
+
+
+# -----------------------------------------------------------------------------
+# Sharp edges, about which the beam turns.
+
+MOST_LISTED, MOST_PLACES = 6, 4
+"""Most loops that the note on sharp edges names, and most places for each."""
+
+
+def turning_at_edges(part: Part, edge_turn: float) -> Part:
+    """Return the part with the beam turned within a distance (m) of sharp edges, and a note."""
+    said = []
+    for loop in part.loops:
+        if loop.is_main and (turns := loop.edge_turns):
+            most = np.degrees(max(turn.angle for turn in turns))
+            where = [" ".join(f"{x:.6g}" for x in (t.at / MM).round(2) + 0.0) for t in turns]
+            said.append(f"{loop.name} by up to {most:.0f} deg at {listed(where, MOST_PLACES)} mm")
+    note = (
+        f"the beam turns within {edge_turn / MM:g} mm before and behind sharp edges: "
+        f"{listed(said, MOST_LISTED, '; ')}; the robot is slow there: a larger edge_turn "
+        "(edge_turn_mm in [part] of a job, --edge-turn-mm) gives the head more room"
+    )
+    notes = (*part.notes, note) if said else part.notes
+    return replace(part, notes=notes, edge_turn=edge_turn)

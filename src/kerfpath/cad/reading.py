@@ -16,9 +16,18 @@ from numpy.typing import ArrayLike
 
 from kerfpath.arrays import Array, floats, freeze, require_one_of, scalar, short_repr
 from kerfpath.cad.machine import Machine
-from kerfpath.cad.part import Part
+from kerfpath.cad.part import Part, turning_at_edges
 from kerfpath.cad.table import Ends, TableCells, cells_of
-from kerfpath.cad.units import GAP, MM, SUFFIXES, UNITS_MM, require_unit, unit_question
+from kerfpath.cad.units import (
+    EDGE_TURN,
+    GAP,
+    LEAST_EDGE_TURN,
+    MM,
+    SUFFIXES,
+    UNITS_MM,
+    require_unit,
+    unit_question,
+)
 from kerfpath.effort import uncollected
 from kerfpath.errors import InputError
 from kerfpath.extras import require_extra
@@ -51,6 +60,7 @@ def read(
     unit: str | None = None,
     *,
     gap: float = GAP,
+    edge_turn: float = EDGE_TURN,
     outer_towards: ArrayLike | None = None,
     axis: ArrayLike | None = None,
     columns: Columns | None = None,
@@ -79,6 +89,9 @@ def read(
     gap : float m
         Largest distance between the ends of two curves that a loop bridges, and over which loose
         faces (IGES) are sewn together.
+    edge_turn : float m
+        For faces and meshes: distance before and behind a sharp edge within which the beam turns
+        from the normal of one wall to that of the other; at least 0.2 mm.
     outer_towards : (3,), optional
         Direction in the part that the outer sides of sheets face on the whole. By default the outer
         side is the one that less of the part hides, or that faces up if the sheet is flat.
@@ -118,6 +131,9 @@ def read(
         require_one_of(sort, "sort", ("open", "closed"))
     if drawing_frame is not None:
         require_one_of(drawing_frame, "drawing_frame", ("leave_out", "cut"))
+    scalar(edge_turn, "edge_turn", unit="m", above=0.0)
+    if edge_turn < LEAST_EDGE_TURN:
+        raise InputError(f"edge_turn: expected at least {LEAST_EDGE_TURN:g} m, got {edge_turn:g} m")
     options = _ReadOptions(
         unit=unit,
         gap=gap,
@@ -135,7 +151,7 @@ def read(
         raise InputError("section and section_at: expected both, or none of them")
     if not isinstance(path, str | PathLike):
         _require_fit(options, "shape", "", "a shape")
-        return _read_shape(path, options, progress)
+        return turning_at_edges(_read_shape(path, options, progress), edge_turn)
     path = Path(path)
     content = content_of(path, _EXPECTED)
     kind = SUFFIXES.get(path.suffix.lower())
@@ -147,8 +163,12 @@ def read(
         raise InputError(f"{path}: the file is empty; expected {_EXPECTED}")
     if outer_towards is not None and kind not in ("STEP", "IGES", "mesh"):
         raise InputError(f"{path}: outer_towards: expected a drawing of sheets, got a {kind}")
+    has_walls = kind in ("STEP", "IGES", "mesh")
+    if edge_turn != EDGE_TURN and not has_walls:
+        raise InputError(f"{path}: edge_turn: expected a drawing of faces, got a {kind}")
     _require_fit(options, path, kind, f"a {kind} file")
     part = _read_file(kind, path, content, options, progress)
+    part = turning_at_edges(part, edge_turn) if has_walls else part
     question = None if unit is not None else unit_question(part.unit, part.bounding_box)
     return part if question is None else replace(part, notes=(*part.notes, question))
 

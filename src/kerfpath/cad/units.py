@@ -10,6 +10,11 @@ MM = 1e-3
 """OCCT and this package work in mm; every length that leaves the package is in m."""
 GAP = 5e-5
 """Distance (m) between the ends of two curves that a loop bridges by default: half a kerf."""
+EDGE_TURN = 1e-3
+"""Distance (m) before and behind a sharp edge within which the beam turns by default: the thickness
+of a thin sheet."""
+LEAST_EDGE_TURN = 2e-4
+"""m: no less, as a kerf is no narrower."""
 LARGEST = 1e7
 """mm: no drawing reaches farther; larger numbers are damaged or have a wrong unit."""
 

@@ -61,6 +61,10 @@ Unit = Annotated[
 Gap = Annotated[
     float, typer.Option(help="Largest gap between two curve ends that a loop bridges, mm.")
 ]
+EdgeTurn = Annotated[
+    float,
+    typer.Option(help="Distance before and behind a sharp edge within which the beam turns, mm."),
+]
 OuterTowards = Annotated[
     tuple[float, float, float] | None,
     typer.Option(
@@ -194,6 +198,7 @@ def new(
     ] = None,
     unit: Unit = None,
     gap_mm: Gap = 0.05,
+    edge_turn_mm: EdgeTurn = 1.0,
     outer_towards: OuterTowards = None,
     axis: Axis = None,
     columns: Columns = None,
@@ -224,6 +229,7 @@ def new(
         drawing,
         unit=unit,
         gap=gap_mm / 1000,
+        edge_turn=edge_turn_mm / 1000,
         outer_towards=outer_towards,
         axis=axis,
         columns=columns,
@@ -327,6 +333,7 @@ def contours(
     ],
     unit: Unit = None,
     gap_mm: Gap = 0.05,
+    edge_turn_mm: EdgeTurn = 1.0,
     outer_towards: OuterTowards = None,
     axis: Axis = None,
     columns: Columns = None,
@@ -361,6 +368,7 @@ def contours(
         file,
         unit=unit,
         gap=gap_mm / 1000,
+        edge_turn=edge_turn_mm / 1000,
         outer_towards=outer_towards,
         axis=axis,
         columns=columns,

@@ -27,6 +27,7 @@ def drawing_by(
     *,
     unit: str | None,
     gap: float,
+    edge_turn: float,
     outer_towards: tuple[float, float, float] | None,
     axis: tuple[float, float, float] | None,
     columns: str | None,
@@ -45,6 +46,7 @@ def drawing_by(
         file=file,
         unit=unit,
         gap=gap,
+        edge_turn=edge_turn,
         outer_towards=None if outer_towards is None else np.array(outer_towards),
         axis=None if axis is None else np.array(axis),
         columns=None if columns is None else _columns(columns),
@@ -217,6 +219,10 @@ def _contours_entry(part: Part, html: Path | None) -> dict[str, object]:
                 "skin": loop.skin,
                 "layer": loop.layer,
                 "colour": loop.colour,
+                "edge_turns": [
+                    {"at_m": turn.at.tolist(), "angle_deg": float(np.degrees(turn.angle))}
+                    for turn in loop.edge_turns
+                ],
             }
             for loop in part.loops
         ],

@@ -371,8 +371,8 @@ class Contour:
             raise InputError("resample: sampling in time needs both dt= (s) and speed= (m/s)")
         step = scalar(dt, "dt", unit="s", above=0.0)
         v = positive(np.broadcast_to(np.asarray(speed), len(self)), "speed", (len(self),))
-        ends = sampling.apart(self.s, ends, bends, step * float(v.max()))
-        s, time = sampling.sample_in_time(self.s, v * self.speed_share, step, ends, self.name)
+        v = v * self.speed_share
+        s, time = sampling.sample_in_time(self.s, v, step, ends, bends, self.name)
         return self.at_nodes(s, freeze(time))
 
 

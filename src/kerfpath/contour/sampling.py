@@ -107,7 +107,7 @@ def corners(points: Array, closed: bool) -> Ints:
 def bend_ends(line: Polyline, closed: bool) -> Ints:
     """Return the nodes, in order, at which the tool axis begins or ceases to turn.
 
-    Of several within twice `NEAR`, the one at which it does so most counts.
+    Of several within `NEAR`, the one at which it does so most counts.
     """
     start, end = line.s[0], line.s[-1]
     before, behind = line.s - NEAR, line.s + NEAR
@@ -119,7 +119,7 @@ def bend_ends(line: Polyline, closed: bool) -> Ints:
     off[[0, -1]] = 0.0  # nodes in any case
     found: list[int] = []
     for k in np.argsort(-off, kind="stable")[: np.count_nonzero(off > BEND)].tolist():
-        if all(abs(line.s[k] - line.s[other]) > 2 * NEAR for other in found):
+        if all(abs(line.s[k] - line.s[other]) > NEAR for other in found):
             found.append(k)
     return np.array(sorted(found), dtype=np.int64)
 
@@ -176,7 +176,9 @@ def divide_evenly(at: Array, ends: Ints, step: float, unit_name: str, name: str)
     return np.concatenate([*pieces, at[-1:]])
 
 
-def sample_in_time(s: Array, speed: Array, dt: float, ends: Ints, name: str) -> tuple[Array, Array]:
+def sample_in_time(
+    s: Array, speed: Array, dt: float, ends: Ints, bends: Ints, name: str
+) -> tuple[Array, Array]:
     """Return arc lengths (M,) m and times (M,) s of nodes evenly spaced in time, at most `dt`.
 
     Parameters
@@ -188,6 +190,8 @@ def sample_in_time(s: Array, speed: Array, dt: float, ends: Ints, name: str) -> 
     dt : float s
     ends : (e,) int
         Nodes that are kept.
+    bends : (b,) int
+        Nodes that are kept unless they are too close to others, see `apart`.
     name : str
         Name of the contour, for messages.
     """
@@ -196,7 +200,7 @@ def sample_in_time(s: Array, speed: Array, dt: float, ends: Ints, name: str) -> 
     even = np.abs(log_ratio) < 1e-6
     slowness = np.where(even, 2.0 / (speed[1:] + speed[:-1]), log_ratio / np.where(even, 1, change))
     t = np.concatenate([[0.0], np.cumsum(np.diff(s) * slowness)])
-    at = divide_evenly(t, ends, dt, "ms", name)
+    at = divide_evenly(t, apart(t, ends, bends, dt), dt, "ms", name)
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
     # Within a segment s(t) solves ds/dt = v: exponential where the speed changes.
     rate = np.append(change, 0.0)[k] / np.diff(s)[k]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfpath.arrays import Array, counted
-from kerfpath.cad import GAP, Loop, Machine, Part
+from kerfpath.cad import EDGE_TURN, GAP, Loop, Machine, Part
 from kerfpath.cad.drawing_frame import ASK
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -170,6 +170,9 @@ def _reading(drawing: Drawing) -> str:
     given: dict[str, object] = {
         "unit": drawing.unit,
         "gap_mm": None if drawing.gap == GAP else round(drawing.gap * 1e3, 9),
+        "edge_turn_mm": None
+        if drawing.edge_turn == EDGE_TURN
+        else round(drawing.edge_turn * 1e3, 9),
         "outer_towards": drawing.outer_towards,
         "axis": drawing.axis,
         "columns": drawing.columns,

@@ -6,8 +6,10 @@ right (see `Side`).
 """
 
 from kerfpath.operations.corners import loop_corners as loop_corners
+from kerfpath.operations.corners import quick_turns as quick_turns
 from kerfpath.operations.corners import round_corners as round_corners
 from kerfpath.operations.corners import slow_corners as slow_corners
+from kerfpath.operations.corners import slow_turns as slow_turns
 from kerfpath.operations.kerf import LeadShape as LeadShape
 from kerfpath.operations.kerf import lead_in as lead_in
 from kerfpath.operations.kerf import lead_out as lead_out

@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
-from kerfpath.arrays import Array, not_negative, scalar
+from kerfpath.arrays import Array, Ints, floats, not_negative, scalar
 from kerfpath.contour import KINDS, Contour, angle_between, join, slerp, unit
 from kerfpath.errors import InputError
 from kerfpath.operations.kerf import is_plain, smoothest_start, start_at, with_nodes
@@ -134,15 +136,103 @@ def slow_corners(
     ends = np.concatenate(
         [at + d for d in (-distance - ramp, -distance, distance, distance + ramp)]
     )
-    if contour.closed:
-        ends = contour.s[0] + np.mod(ends - contour.s[0], contour.length)
-    inside = (ends > contour.s[0]) & (ends < contour.s[-1])
-    marked = with_nodes(contour, np.unique(ends[inside]))
+    marked = with_nodes(contour, _within(contour, ends))
     apart = np.abs(marked.s[:, None] - at)
     if contour.closed:
         apart = np.minimum(apart, contour.length - apart)
     slowed = share + (1 - share) * np.clip((apart.min(axis=1) - distance) / ramp, 0.0, 1.0)
     return replace(marked, speed_share=np.minimum(marked.speed_share, slowed))
+
+
+AT_ONCE = float(np.radians(9.0))
+"""rad: turn of the axis from node to node at the speed for sharp edges; with more, a head that also
+turns about the beam would not turn the axis evenly."""
+BESIDE = 1.5
+"""Distance from a sharp edge at which a turn still belongs to it, as a share of that within which
+the axis of the drawn loop turns: a path with kerf runs beside the loop."""
+
+
+def quick_turns(
+    contour: Contour, edges: ArrayLike, *, distance: float, step: float
+) -> tuple[Ints, Array]:
+    """Return where the axis turns about sharp edges, and the shares of the speed to use there.
+
+    Parameters
+    ----------
+    contour : Contour
+    edges : (E, 3) m
+        Where the loop crosses sharp edges (`at` of `Loop.edge_turns`).
+    distance : float m
+        Distance from them within which the axis turns (`Part.edge_turn`).
+    step : float m
+        Distance between nodes at the full speed.
+
+    Returns
+    -------
+    segments : (T,) int
+        Segments of the path near edges along which the axis turns by more than 9 deg per step.
+    shares : (T,)
+        Shares of the speed, below 1, at which it turns by 9 deg.
+    """
+    distance = scalar(distance, "distance", unit="m", above=0.0)
+    step = scalar(step, "step", unit="m", above=0.0)
+    places = floats(edges, "edges", (None, 3)) if len(np.asarray(edges)) else np.empty((0, 3))
+    if not len(places):
+        return np.empty(0, dtype=np.int64), np.empty(0)
+    middle = (contour.points[1:] + contour.points[:-1]) / 2
+    near = cKDTree(places).query(middle)[0] <= BESIDE * distance
+    turn = angle_between(contour.axes[1:], contour.axes[:-1])
+    allowed = AT_ONCE / step * np.diff(contour.s)
+    found = np.flatnonzero(near & (turn > allowed))
+    return found, allowed[found] / turn[found]
+
+
+def slow_turns(
+    contour: Contour, edges: ArrayLike, *, distance: float, step: float, ramp: float = 2e-3
+) -> Contour:
+    """Return the contour with a lower speed where its axis turns about sharp edges.
+
+    A robot is slow there in any case. At this speed nodes that are evenly spaced in time follow the
+    turn, by 9 deg each, and are far apart elsewhere.
+
+    Parameters
+    ----------
+    contour : Contour
+    edges : (E, 3) m
+        Where the loop crosses sharp edges (`at` of `Loop.edge_turns`).
+    distance : float m
+        Distance from them within which the axis turns (`Part.edge_turn`).
+    step : float m
+        Distance between nodes at the full speed.
+    ramp : float m
+        Length over which the speed changes, before and after a turn.
+
+    Raises
+    ------
+    InputError
+        A distance, step or ramp that is not positive.
+    """
+    ramp = scalar(ramp, "ramp", unit="m", above=0.0)
+    found, shares = quick_turns(contour, edges, distance=distance, step=step)
+    if not found.size:
+        return contour
+    start, end = contour.s[found], contour.s[found + 1]
+    marked = with_nodes(contour, _within(contour, np.concatenate([start - ramp, end + ramp])))
+    slowed = np.ones(len(marked))
+    shifts = (-contour.length, 0.0, contour.length) if contour.closed else (0.0,)
+    for a, b, share in zip(start, end, shares, strict=True):
+        for shift in shifts:
+            off = np.maximum(a + shift - marked.s, marked.s - b - shift)
+            slow = share + (1 - share) * np.clip(off / ramp, 0.0, 1.0)
+            slowed = np.minimum(slowed, slow)
+    return replace(marked, speed_share=np.minimum(marked.speed_share, slowed))
+
+
+def _within(contour: Contour, s: Array) -> Array:
+    """Return those of arc lengths (M,) m that lie inside a contour, around a closed one."""
+    if contour.closed:
+        s = contour.s[0] + np.mod(s - contour.s[0], contour.length)
+    return np.unique(s[(s > contour.s[0]) & (s < contour.s[-1])])
 
 
 def _begin_off_corners(contour: Contour) -> Contour:

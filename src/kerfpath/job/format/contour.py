@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfpath.arrays import short_repr
+from kerfpath.arrays import Array, short_repr
 from kerfpath.cad import Part
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -27,6 +27,7 @@ from kerfpath.operations import (
     reverse,
     round_corners,
     slow_corners,
+    slow_turns,
     smooth_axes,
     smoothest_start,
     start_at,
@@ -173,6 +174,8 @@ class ContourSpec:
         Largest angle between the tool axis along a chord and the contour's, with `tolerance`.
     bend_ends : bool
         Whether nodes are at the ends of bends, too, with `spacing` or `time_step`.
+    turn_step : float m, optional
+        Distance between nodes that the job asks for, by which the speed is reduced at sharp edges.
     table : ContourTable
         The table in the file, with the operations on the loop before it is sampled.
     """
@@ -186,6 +189,7 @@ class ContourSpec:
     tolerance: float | None = None
     axis_tolerance: float | None = None
     bend_ends: bool = False
+    turn_step: float | None = None
     table: ContourTable
 
     __repr__ = short_repr
@@ -220,12 +224,24 @@ class ContourSpec:
     def candidates(self, part: Part, drawn: Contour | None = None) -> list[Contour]:
         """Return the alternative contours that may be cut for the loop, see `shape_contour`.
 
+        They are slower where the beam turns about sharp edges, see `slow_turns`.
+
         `drawn` is the loop as drawn; by default it is taken from the part.
         """
         laid = self.table.lead_in or self.table.lead_out or self.table.corners
         surface = part.surface(self.pick) if laid else None
         drawn = self.drawn(part) if drawn is None else drawn
-        return shape_contour(self.table, drawn, surface)
+        cuts = shape_contour(self.table, drawn, surface)
+        if self.turn_step is None:
+            return cuts
+        edges = self.edges(part)
+        return [
+            slow_turns(cut, edges, distance=part.edge_turn, step=self.turn_step) for cut in cuts
+        ]
+
+    def edges(self, part: Part) -> list[Array]:
+        """Return where the loop crosses sharp edges, (3,) m each."""
+        return [turn.at for turn in part.loop(self.pick).edge_turns]
 
     @property
     def rounded(self) -> float | None:
@@ -281,7 +297,13 @@ class ContourSpec:
         count = None if self.count is None else int(np.ceil((self.count - 1) / share)) + 1
         table = self.table.model_copy(update={**update, "count": count})
         asked = contour_request(table)
-        return replace(asked, pick=self.pick, name=self.name, bend_ends=self.bend_ends)
+        return replace(
+            asked,
+            pick=self.pick,
+            name=self.name,
+            bend_ends=self.bend_ends,
+            turn_step=self.turn_step,
+        )
 
     def asked(self, options: PlanOptions) -> PlanOptions:
         """Return the options of the job with the windows of gamma of this contour."""
@@ -315,16 +337,17 @@ class ContourSpec:
 
 def contour_request(table: ContourTable) -> ContourSpec:
     """Return what a [[contour]] table asks for, in SI."""
-    angle, step = table.axis_tolerance_deg, table.time_step_ms
+    angle, step, speed = table.axis_tolerance_deg, table.time_step_ms, table.speed_m_min / 60
     return ContourSpec(
         pick=table.pick or "",
         name=table.name or table.pick or "",
-        speed=table.speed_m_min / 60,
+        speed=speed,
         spacing=_metres(table.spacing_mm),
         time_step=None if step is None else step / 1000,
         count=table.count,
         tolerance=_metres(table.tolerance_mm),
         axis_tolerance=None if angle is None else float(np.radians(angle)),
+        turn_step=_metres(table.spacing_mm) if step is None else step / 1000 * speed,
         table=table,
     )
 

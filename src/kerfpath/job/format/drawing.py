@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from kerfpath.arrays import Array, short_repr
-from kerfpath.cad import GAP, Machine, Part
+from kerfpath.cad import EDGE_TURN, GAP, Machine, Part
 from kerfpath.cad import read as read_drawing
 from kerfpath.progress import Progress, no_progress
 
@@ -25,6 +25,8 @@ class Drawing:
         Length unit that overrides the CAD file's own.
     gap : float m
         Largest gap between the ends of two curves that a loop bridges.
+    edge_turn : float m
+        Distance from sharp edges within which the beam turns, see `kerfpath.cad.read`.
     outer_towards : (3,) or None
         Direction that the outer sides of its sheets face, part frame, see `kerfpath.cad.read`.
     axis : (3,) or None
@@ -50,6 +52,7 @@ class Drawing:
     file: Path
     unit: str | None = None
     gap: float = GAP
+    edge_turn: float = EDGE_TURN
     outer_towards: Array | None = None
     axis: Array | None = None
     columns: Mapping[str, str] | Sequence[str] | None = None
@@ -77,6 +80,7 @@ class Drawing:
             self.file,
             unit=self.unit,
             gap=self.gap,
+            edge_turn=self.edge_turn,
             outer_towards=self.outer_towards,
             axis=self.axis,
             columns=self.columns,

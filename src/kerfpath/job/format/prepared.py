@@ -22,7 +22,7 @@ from kerfpath.job.format.contour import ContourSpec
 from kerfpath.job.format.faults import all_of
 from kerfpath.job.format.reading import Job
 from kerfpath.job.format.tolerances import Tolerances
-from kerfpath.operations import edge, nearest
+from kerfpath.operations import edge, nearest, quick_turns
 from kerfpath.options import PlanOptions
 from kerfpath.planner import node_interval
 from kerfpath.sequence import inner_first
@@ -312,6 +312,7 @@ def prepare(job: Job, part: Part | None = None, cell: Cell | None = None) -> Pre
 def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
     loop = task.drawn(part)
     paths = task.candidates(part, loop)
+    slow = _slow_at_edges(task, part, paths[0])
     task, closer = _within_tolerances(job, task, paths)
     candidates = tuple(Candidate.at(task.speed, path, task.sample(path)) for path in paths)
     if task.rounded is not None:
@@ -324,28 +325,52 @@ def _request(job: Job, task: ContourSpec, part: Part) -> CutRequest:
         loop=loop,
         candidates=candidates,
         options=task.asked(job.options),
-        closer=closer,
+        closer="; ".join(filter(None, (slow, closer))),
     )
 
 
 def _within_tolerances(
     job: Job, task: ContourSpec, paths: Sequence[Contour]
 ) -> tuple[ContourSpec, str]:
-    """Return the task with nodes close enough for the tolerances of the audit, and a note on it.
+    """Return the task with nodes close enough for the tolerances of the audit, and notes on it.
 
     A number of nodes (`count`) is kept, and so are nodes that are divided later (refine_parts).
     """
-    if task.count is not None or job.options.refine_parts > 1:
+    if job.options.refine_parts > 1:
         return task, ""
-    finer = closer_nodes(task, paths, job.tolerances)
-    if finer is None or finer is task:
-        return task, ""
+    notes: list[str] = []
+    finer = None if task.count is not None else closer_nodes(task, paths, job.tolerances)
+    finer = finer or task
     key = task.sampled_by
-    asked, used = (getattr(each.table, key) for each in (task, finer))
-    said = f"{key} = {used:.3g} is used in place of {asked:g}" if used != asked else ""
-    if finer.bend_ends:
-        said += f"{', with nodes' if said else 'nodes are'} at the ends of bends, too"
-    return finer, f"{said}, so that the path between its nodes keeps the tolerances of [audit]"
+    off, allowed = max(_between(path, finer.sample(path))[1] for path in paths), job.tolerances.axis
+    if finer is not task:
+        asked, used = (getattr(each.table, key) for each in (task, finer))
+        said = f"{key} = {used:.3g} is used in place of {asked:g}" if used != asked else ""
+        if finer.bend_ends:
+            said += f"{', with nodes' if said else 'nodes are'} at the ends of bends, too"
+        kept = "the tolerances" if off <= allowed else "path_tolerance_mm"
+        notes.append(f"{said}, so that the path between its nodes keeps {kept} of [audit]")
+    if off > allowed:
+        notes.append(
+            f"between its nodes the tool axis is up to {np.degrees(off):.1f} deg from that of the "
+            f"path, with axis_tolerance_deg = {np.degrees(allowed):g} in [audit]; change {key}, or "
+            "turn the beam more slowly (edge_turn_mm in [part], [contour.smooth_axes])"
+        )
+    return finer, "; ".join(notes)
+
+
+def _slow_at_edges(task: ContourSpec, part: Part, path: Contour) -> str:
+    """Return a note on the speed where the beam turns about sharp edges, "" if it is not lower."""
+    if task.turn_step is None:
+        return ""
+    share = quick_turns(path, task.edges(part), distance=part.edge_turn, step=task.turn_step)[1]
+    if not share.size:
+        return ""
+    return (
+        f"the speed falls to {share.min():.0%} where the beam turns about sharp edges, as nodes "
+        f"follow the turn; a smaller {task.sampled_by} or a larger edge_turn_mm in [part] keeps "
+        "more of it"
+    )
 
 
 def divide_nodes(path: Contour, nodes: Contour, parts: int) -> Contour:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kerfpath.cad import Machine
+from kerfpath.cad import Machine, Part
 from kerfpath.cell import Cell
 from kerfpath.contour import Contour
 from kerfpath.errors import InputError
@@ -204,7 +204,7 @@ def python_script(prepared: PreparedJob, folder: Path | None = None) -> str:
         lines += _program(job)
     lines.append(CUT.format(path=within.path, axis=within.axis, say=SAY, keep=keep, cell=cell))
     for request in prepared.contours:
-        lines += [*_contour(request), ""]
+        lines += [*_contour(request, prepared.part), ""]
     lines.append(REFUSE)
     if job.program.language != "none":
         lines += [WRITE.format(language=job.program.language, say=SAY)]
@@ -313,7 +313,7 @@ def _differs(one: object, two: object) -> bool:
     return one != two
 
 
-def _contour(request: CutRequest) -> Iterator[str]:
+def _contour(request: CutRequest, part: Part) -> Iterator[str]:
     """Yield the lines that cut a contour."""
     task, (candidate,) = request.task, request.candidates
     table = task.table
@@ -321,7 +321,7 @@ def _contour(request: CutRequest) -> Iterator[str]:
     yield f"path = part.contour({task.pick!r}, closed={request.loop.closed})"
     if table.lead_in or table.lead_out or table.corners:
         yield f"surface = part.surface({task.pick!r})"
-    for call in _operations(task):
+    for call in _operations(task, part):
         yield f"path = operations.{call}"
     yield f"path = replace(path, name={task.name!r})"
     speed = f"{task.table.speed_m_min:g} * M_MIN"
@@ -352,8 +352,8 @@ def _nodes(task: ContourSpec, path: Contour, speed: str) -> Iterator[str]:
     yield f"nodes = path.resample({said})"
 
 
-def _operations(task: ContourSpec) -> Iterator[str]:
-    """Yield the operations on a loop in their order, see `shape_contour`."""
+def _operations(task: ContourSpec, part: Part) -> Iterator[str]:
+    """Yield the operations on a loop in their order, see `ContourSpec.candidates`."""
     table = task.table
     back = table.direction == "reversed"
     scrap = OTHER[table.scrap] if back else table.scrap
@@ -392,6 +392,11 @@ def _operations(task: ContourSpec) -> Iterator[str]:
         yield (
             f"slow_corners(path, {corners.slow_share!r}, distance={corners.slow_mm!r} * MM, "
             f"ramp={corners.ramp_mm!r} * MM)"
+        )
+    if task.turn_step is not None and task.edges(part):
+        yield (
+            f"slow_turns(path, [turn.at for turn in part.loop({task.pick!r}).edge_turns], "
+            f"distance=part.edge_turn, step={_mm(task.turn_step)})"
         )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from kerfpath.arrays import Array, freeze
-from kerfpath.cad import GAP, UNITS_MM, Loop, Machine, Part
+from kerfpath.cad import EDGE_TURN, GAP, LEAST_EDGE_TURN, UNITS_MM, Loop, Machine, Part
 from kerfpath.errors import InputError
 from kerfpath.job.format.drawing import Drawing
 from kerfpath.job.format.tables.table import Table, given, require_one
@@ -214,6 +214,15 @@ class PartTable(Table):
     gap_mm: Annotated[
         Positive, key("the largest gap between two curve ends that a loop bridges, in mm", "0.05")
     ] = GAP * 1000
+    edge_turn_mm: Annotated[
+        Positive,
+        key(
+            "the distance from a sharp edge within which the beam turns, from "
+            f"{LEAST_EDGE_TURN * 1000:g} mm up",
+            "2",
+            ge=LEAST_EDGE_TURN * 1000,
+        ),
+    ] = EDGE_TURN * 1000
     outer_towards: Annotated[
         Three | None,
         key("3 numbers, the direction that its outer sides face, in the part", "[0, 0, 1]"),
@@ -293,6 +302,7 @@ class PartTable(Table):
             file=folder / self.file,
             unit=self.unit,
             gap=self.gap_mm / 1000,
+            edge_turn=self.edge_turn_mm / 1000,
             outer_towards=_direction(self.outer_towards),
             axis=_direction(self.axis),
             columns=self.columns,
