@@ -15,6 +15,7 @@ from tests.cad.test_bent_parts import square_tube
 from tests.cad.test_meshes import stl
 from tests.cad.test_part import cylinder, write_step
 
+from conftest import ROOT
 from kerfpath import Contour
 from kerfpath.cad import EDGE_TURN, Part, read
 from kerfpath.cad.sharp_edges import Sampled, turn_at_edges
@@ -233,3 +234,23 @@ def test_the_nodes_of_a_job_follow_the_turn_within_the_tolerance_of_its_audit(tm
     assert "between its nodes the tool axis is up to 34.2 deg from that of the path" in (
         request.closer
     )
+
+
+# --------------------------------------------------------------------------- what stays the same
+
+SHIPPED = sorted(
+    path
+    for folder in ("src/kerfpath/demo", "examples/parts")
+    for path in (ROOT / folder).glob("*.step")
+)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
+def test_loops_that_cross_no_sharp_edge_do_not_depend_on_the_distance(path: Path):
+    """Of the shipped parts only two trims, of the beam, cross sharp edges."""
+    short, long = (read(path, edge_turn=edge_turn) for edge_turn in (3e-4, 5e-3))
+    crossing = [loop.name for loop in short.loops if loop.edge_turns]
+    assert len(crossing) == (2 if path.name == "beam.step" else 0)
+    for loop in short.pick():
+        same = np.array_equal(short.contour(loop.name).axes, long.contour(loop.name).axes)
+        assert same == (loop.name not in crossing)
