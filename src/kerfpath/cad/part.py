@@ -533,7 +533,11 @@ def turning_at_edges(part: Part, edge_turn: float) -> Part:
     """Return the part with the beam turned within a distance (m) of sharp edges, and a note."""
     said = []
     for loop in part.loops:
-        if loop.is_main and (turns := loop.edge_turns):
+        try:
+            turns = loop.edge_turns if loop.is_main else ()
+        except InputError:  # the curve cannot be evaluated, and `contour` says why
+            continue
+        if turns:
             most = np.degrees(max(turn.angle for turn in turns))
             where = [" ".join(f"{x:.6g}" for x in (t.at / MM).round(2) + 0.0) for t in turns]
             said.append(f"{loop.name} by up to {most:.0f} deg at {listed(where, MOST_PLACES)} mm")
