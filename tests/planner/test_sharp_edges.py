@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from kerfpath import Contour, NoFeasiblePath, audit, plan, robot
+from kerfpath.operations import slow_turns
 from kerfpath.planner.straight_moves import follows, least_times
 
 STRAIGHT = {"tip-at-nodes", "axis-at-nodes", "straight-move", "joint-step", "velocity-between"}
@@ -44,4 +46,36 @@ def test_a_planned_cut_over_a_sharp_edge_passes_its_audit(feed):
         assert [issue for issue in audit(made, axis_tolerance=3.0) if issue.code in STRAIGHT] == []
         assert follows(made)
         assert (np.diff(made.time) >= least_times(made) * (1 - 1e-9)).all() or feed == "constant"
+    assert planned >= 4
+
+
+def test_a_cut_whose_nodes_follow_the_turn_passes_its_audit_between_them():
+    """As jobs sample a wall edge: the beam turns within 1 mm, at a speed that gives it nodes."""
+    arm = robot("abb_irb4600_60_205").with_limits(acceleration=[5.0, 5, 5, 20, 20, 20])
+    tool = np.eye(4)
+    tool[:3, :3] = Rotation.from_euler("y", 45, degrees=True).as_matrix()
+    tool[:3, 3] = 0.2, 0.0, 0.3
+    planned = 0
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        half = np.radians(rng.uniform(15, 45))
+        to = Rotation.from_euler("z", rng.uniform(-180, 180), degrees=True)
+        x = np.array([-0.015, -1e-3, 0.0, 1e-3, 0.015])
+        points = np.stack([x * np.cos(half), 0 * x, -np.abs(x) * np.sin(half)], axis=1)
+        lean = np.array([-half, -half, 0, half, half])
+        axes = np.stack([-np.sin(lean), 0 * x, -np.cos(lean)], axis=1)
+        drawn = Contour(to.apply(points), to.apply(axes), name="edge")
+        path = slow_turns(drawn, [[0, 0, 0]], distance=1e-3, step=2e-3)
+        nodes = path.resample(dt=0.04, speed=0.05, bend_ends=True)
+        placement = np.eye(4)
+        placement[:3, 3] = rng.uniform((0.9, -0.6, 0.3), (1.4, 0.6, 1.0))
+        where = {"tool": tool, "placement": placement, "gamma_step": np.radians(10)}
+        try:
+            made = plan(nodes, arm, feed="dip", certify=None, **where)
+        except NoFeasiblePath:
+            continue
+        planned += 1
+        issues = [issue for issue in audit(made, reference=path) if issue.level == "error"]
+        between = STRAIGHT | {"tip-between-nodes", "axis-between-nodes"}
+        assert [issue for issue in issues if issue.code in between] == [], seed
     assert planned >= 4
