@@ -10,6 +10,7 @@ from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.gp import gp_Pnt
 from OCP.TopoDS import TopoDS_Compound
+from scipy.stats import norm
 from tests.cad.sheets import Folded, folded
 from tests.cad.test_bent_parts import square_tube
 from tests.cad.test_meshes import stl
@@ -21,7 +22,7 @@ from kerfpath.cad import EDGE_TURN, Part, read
 from kerfpath.cad.sharp_edges import Sampled, turn_at_edges
 from kerfpath.contour import angle_between
 from kerfpath.errors import InputError
-from kerfpath.operations import quick_turns, slow_turns, start_at
+from kerfpath.operations import quick_turns, slow_turns, smooth_axes, start_at
 
 NORMAL = np.radians(0.1)
 """rad: what law and documentation promise."""
@@ -169,6 +170,21 @@ def test_the_distance_is_checked_and_belongs_to_drawings_of_faces(tmp_path: Path
     (tmp_path / "a.csv").write_text("x_mm,y_mm,z_mm,nx,ny,nz\n0,0,0,0,0,1\n5,0,0,0,0,1\n")
     with pytest.raises(InputError, match="edge_turn: expected a drawing of faces, got a table"):
         read(tmp_path / "a.csv", edge_turn=2e-3)
+
+
+def test_smoothed_axes_turn_over_the_distance_that_was_asked_for() -> None:
+    """Flats have few nodes: the averages of an axis that jumps by 90 deg are known in between."""
+    part = read(square_tube(), edge_turn=3e-4)
+    rim = part.pick(kind="outer", side="outer")[0]
+    drawn = part.contour(rim.name)
+    made = smooth_axes(drawn, 3e-3, limit=np.pi / 2)
+    corner = int(np.linalg.norm(drawn.points[1:-1], axis=1).argmin()) + 1
+    begun = start_at(made, drawn.s[corner])
+    s = np.linspace(-8e-3, 8e-3, 321)
+    _, axes = begun.at(begun.s[0] + np.mod(s, begun.length))
+    share = norm.cdf(s, scale=3e-3)  # of the second wall
+    lean = angle_between(axes, np.tile(drawn.at(drawn.s[corner] - 0.01)[1], (len(s), 1)))
+    assert np.degrees(lean) == pytest.approx(np.degrees(np.arctan2(share, 1 - share)), abs=1.0)
 
 
 # ------------------------------------------------------------------ nodes that follow the turn

@@ -141,6 +141,8 @@ def require_in_scrap(contour: Contour, points: Array, side: Side, what: str) -> 
 
 TAIL = 3.0
 """Neighbours farther away than this many standard deviations are ignored."""
+CLOSE = 0.25
+"""Largest distance between the nodes that are averaged, in standard deviations."""
 MOST_BEVEL = np.radians(60)
 
 
@@ -148,7 +150,8 @@ def smooth_axes(contour: Contour, distance: float, *, limit: float) -> Contour:
     """Return the contour with its axes averaged along the path, none turned by more than `limit`.
 
     At a bend between two faces, the axis then turns over about twice the distance instead of at
-    once; the noise of triangulated surfaces disappears.
+    once; the noise of triangulated surfaces disappears. Nodes that are farther apart than a quarter
+    of the distance get others between them, unless the contour carries times.
 
     Parameters
     ----------
@@ -165,6 +168,11 @@ def smooth_axes(contour: Contour, distance: float, *, limit: float) -> Contour:
     """
     sigma = scalar(distance, "smoothing distance", unit="m", above=0.0)
     limit = scalar(limit, "smoothing limit", unit="rad", above=0.0)
+    if contour.time is None:
+        parts = np.maximum(1, np.ceil(np.diff(contour.s) / (CLOSE * sigma))).astype(np.int64)
+        places = np.arange(parts.sum() + 1)
+        ends = np.concatenate([[0], np.cumsum(parts)])
+        contour = contour.at_nodes(np.interp(places, ends, contour.s))
     s, axes, length = contour.s - contour.s[0], contour.axes, contour.length
     # Each node is weighted by its length of path.
     stands_for = np.gradient(s)

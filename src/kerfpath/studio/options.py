@@ -66,6 +66,7 @@ def _groups() -> dict[str, tuple[OptionField, ...]]:
             _field("part.xyz_mm", "x, y, z"),
             _field("part.rpy_deg", "Roll, pitch, yaw"),
         ),
+        "Drawing": (_field("part.edge_turn_mm", "Turn at sharp edges, before and behind"),),
         **{title: tuple(_planning(title)) for title in SEARCH},
         "Margins": (
             *_band("limits", "Joint limits", "deg"),

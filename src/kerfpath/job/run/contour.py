@@ -263,7 +263,7 @@ def advised(prepared: PreparedJob, cut: CutResult, progress: Progress) -> CutRes
         graph, cell = run.graph(graph, job.robot.endless), run.cell(cell)
     plain = options.closure == "free" and options.rotation is None
     plain = plain and job.robot.dynamics.load is None and job.robot.limits.jerk is None
-    constant = options.feed == "constant" and cut.candidate.nodes.time is None
+    constant = options.feed == "constant"
     broken = cut.broken
     if broken is None:
         return cut

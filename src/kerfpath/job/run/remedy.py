@@ -49,6 +49,8 @@ class Remedy:
         Feasible speed below the requested one, m/min; None: the requested speed is feasible.
     fastest : bool
         Whether that is the fastest speed of the grid, and not just one with a plan.
+    even : bool
+        Whether the cut is as fast everywhere; `kerfpath speed` is about such cuts.
     binds : str
         The limit that binds at the higher of both speeds, and where; "" if that is not known.
     refined : str or None
@@ -69,6 +71,7 @@ class Remedy:
     other_method: bool
     speed: str | None = None
     fastest: bool = True
+    even: bool = True
     binds: str = ""
     refined: str | None = None
     shares: Mapping[str, str] = field(default_factory=dict)
@@ -91,7 +94,8 @@ class Remedy:
         if self.speed is None:
             return f"{ON_THIS_GRID} a path exists at the speed asked for{how}"
         if not self.fastest:
-            return f"{self.speed} m/min cuts it in one piece; `kerfpath speed` finds the fastest"
+            said = f"{self.speed} m/min cuts it in one piece"
+            return f"{said}; `kerfpath speed` finds the fastest" if self.even else said
         said = f"{ON_THIS_GRID} a path exists up to {self.speed} m/min{how}"
         if self.refined is not None:
             said += f", refined up to {self.refined} m/min"
@@ -131,9 +135,10 @@ class _Trial:
     def opens(self, options: PlanOptions, speed: float) -> bool:
         """Return whether there is a plan at a speed (m/s), with the nodes that a job has then."""
         nodes, graph, task = self.candidate.nodes, self.graph, self.request.task
-        if task.time_step is not None and speed != task.speed:
+        if speed != task.speed and (task.time_step is not None or nodes.time is not None):
             nodes = replace(task, speed=speed).sample(self.candidate.path)
-            graph = self.job.graph(nodes)
+            if task.time_step is not None:  # by spacing, nodes are at the same places
+                graph = self.job.graph(nodes)
         at = speed if nodes.time is None else None
         try:
             plan(
@@ -192,8 +197,9 @@ def find_remedy(
 ) -> tuple[Remedy, FastestSpeed | None] | None:
     """Return what makes a cut without a plan feasible, and its fastest speed; None if unknown.
 
-    The graph must have poses at every node, and the cut a constant speed. `relaxation` is what
-    `NoFeasiblePath` states about a motion off the grid, whose speed is the advice.
+    The graph must have poses at every node, and the feed be constant. `relaxation` is what
+    `NoFeasiblePath` states about a motion off the grid, whose speed is the advice; it is the only
+    one for a cut that is slower in places.
     """
     trial = _Trial(job=job, request=request, candidate=candidate, graph=graph, cell=cell)
     continuous = job.options.method == "continuous"
@@ -204,7 +210,10 @@ def find_remedy(
     if continuous and relaxation is not None:
         slow = _slower(trial, relaxation)
         if slow is not None:
-            return Remedy(other_method=False, speed=slow, fastest=False), None
+            even = candidate.nodes.time is None
+            return Remedy(other_method=False, speed=slow, fastest=False, even=even), None
+    if candidate.nodes.time is not None:
+        return None
     # With a time step, another speed has other nodes, about which nothing would be proved.
     ceiling = continuous and request.task.time_step is None
     # Every speed found with folded joints is tried with all their turns by `trial`.
