@@ -12,7 +12,7 @@ from kerfpath.auditor import certified_bound
 from kerfpath.certificate import BASE
 from kerfpath.certifier import bound, certify, stages
 from kerfpath.certifier.cells import CERTAIN_LEVEL, MORE_CELLS, CellMaker, foldable
-from kerfpath.certifier.division import between, turning_nodes
+from kerfpath.certifier.division import between, evenly, turning_nodes
 from kerfpath.certifier.stages import Steps
 from kerfpath.job import read_job
 from kerfpath.kernels.metric import rho
@@ -267,7 +267,10 @@ def test_a_cell_keeps_what_an_earlier_stage_has_proved(made):
 
 def test_nodes_where_a_plan_turns(made):
     one = made("manhattan")
-    nodes = turning_nodes(one, 1e-3, longest=8)
+    weight, last = one.settings.weights, len(one.q) - 1
+    nodes = turning_nodes(
+        one.increments, weight, bound.METRIC_CODES["manhattan"], 1e-3, evenly(last, 8)
+    )
     assert nodes[0] == 0
     assert nodes[-1] == len(one.q) - 1
     assert np.diff(nodes).max() <= 8

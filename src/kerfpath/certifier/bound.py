@@ -12,7 +12,8 @@ import numpy as np
 from kerfpath.arrays import Array, Ints, scalar, short_repr
 from kerfpath.certificate import ALLOWANCE, Certificate, Stage
 from kerfpath.certifier.cells import CellMaker, CellSet, foldable
-from kerfpath.certifier.division import between, cells_to_divide, turning_nodes
+from kerfpath.certifier.division import between, cells_to_divide, evenly, turning_nodes
+from kerfpath.certifier.first_order import FirstOrder
 from kerfpath.certifier.minimax import largest_step_bound
 from kerfpath.certifier.multipliers import limit_prices
 from kerfpath.certifier.parts import CARE, DEAREST, NARROW, SAME_COST, Parts
@@ -33,6 +34,13 @@ from kerfpath.search import METRIC_CODES
 TURNED = 3e-4
 """Share of its cost that the plan may lose with straight steps between the nodes of the first
 stage."""
+MUCH_LESS = 0.25
+"""Share of what the bound lacks for want of nodes below which finer cells gain too little."""
+LITTLE, DEAR = 0.1, 0.1
+"""Shares of what the bound lacks that are little to gain, and of the work that are much to take: a
+stage that may take much follows only one that gained more than little."""
+LEAST = 0.02
+"""Share that is little to gain, if a time is given."""
 DROPPED = 0.25
 """Share of its cells that a stage must rule out to be kept in the certificate."""
 STALLED = 0.5
@@ -130,9 +138,10 @@ def certify(
     """Return the plan with a proved lower bound on the cost of any motion along its contour.
 
     The bound holds for any motion that keeps (5) and (6) at the nodes, the ranges of the joints and
-    their couplings, at any gamma, in the postures that the plan may use, on any turn. Other
-    constraints of the plan (cell, comfort, periodic closure, rotation limits) can only raise the
-    cost of the best motion.
+    their couplings, at any gamma, in the postures that the plan may use, on any turn. Unless it is
+    checkable, it also counts on elbow, wrist and flange to stay above the floor of the plan, if
+    there is one. Other constraints of the plan (cell, comfort, periodic closure, rotation limits)
+    can only raise the cost of the best motion.
 
     Parameters
     ----------
@@ -141,7 +150,7 @@ def certify(
         Value of (cost - bound) / cost at which it stops.
     seconds : float s, optional
         Time after which no further stage is begun; default: a limit on the work, which does not
-        depend on the machine.
+        depend on the machine, and an end where more work gains little.
     checkable : bool
         Whether the plan gets a certificate that others can check with enclosures that may be wider.
         Then cells drop out only if their motions clearly cost too much, which is more work, and (6)
@@ -247,18 +256,23 @@ class _Certification:
         self.margin, width = (CLEARLY, WIDER) if checkable else (SAME_COST, 1.0)
         task = robot, plan.frames, plan.T_flange_tip, asked.postures, width
         folded = foldable(robot, steps.velocity)
-        self.maker = CellMaker(*task)
+        floor = None if checkable else asked.floor
+        self.maker = CellMaker(*task, floor=floor)
         self.unfolded: CellMaker | None = None
         if folded.any() and not checkable:
-            self.maker, self.unfolded = CellMaker(*task, folded), self.maker
+            self.maker, self.unfolded = CellMaker(*task, folded, floor), self.maker
         self.steps = replace(steps, endless=self.maker.endless)
         self.cost, self.until, self.progress = plan.cost, until, progress
         self.target = plan.cost * min(1.0, 1 - gap + ALLOWANCE)
         self.last = len(plan.q) - 1
         self.most_pairs = most
         longest = max(1, int(LONGEST / self.steps.velocity.max()))
-        self.nodes = turning_nodes(plan, TURNED, longest)
+        self.goal = self.target  # of the stages, which cannot pass the ceiling
+        self.nodes = self._turning(plan.increments, evenly(self.last, longest))
         self.best, self.pairs, self.count = 0.0, 0, 0
+        self.first_order = FirstOrder(self.maker, self.steps, self.last)
+        if len(np.unique(plan.posture)) == 1:
+            self.first_order.add(int(plan.posture[0]), plan.gamma, plan.increments)
         self.at_node = 0.0  # cells of level 0
         self.stages: list[Stage] = []
         self.plan, self.checkable = plan, checkable
@@ -282,16 +296,19 @@ class _Certification:
             live = result.through <= self.cost * (1 + clearly)
             if not self.checkable:
                 live = np.logical_or.reduce(distinct_groups(result, live, self.maker))
-            low = result.through < self.target
+            self._lower_goal(result)
+            low = result.through < self.goal
             which, singular = cells_to_divide(
-                cells, result.through, self.target, self.steps.weight, DEEPEST
+                cells, result.through, self.goal, self.steps.weight, DEEPEST
             )
             fine = not singular and low.any() and np.median(cells.level[low]) >= FINE
             slow = bool(fine) and gained < STALLED
             left = float(live.mean() + which.mean())
             ahead = self.pairs + result.pairs * left**2
             fits = self._fits(len(self._layers))
-            if fine and self._late(slow, ahead) and fits and self._priced:
+            late = fine and self._late(slow, ahead)
+            vain = gained < LITTLE and ahead - self.pairs > DEAR * self.most_pairs
+            if fits and self._priced and (late or vain or self._near_ceiling):
                 self._divide(cells.take(live))
                 return
             if not low.any() or len(cells) * left > MOST_CELLS or self._spent(ahead):
@@ -305,19 +322,64 @@ class _Certification:
                     self.loose = len(self.stages), result
                 kept = np.ones(len(live), np.bool_)
             which &= kept
-            more = between(self.nodes)
-            wanted = (slow and (self._priced or not coarse)) or not which.any()
-            if wanted and len(more) > len(self.nodes) and self._fits(len(more)):
+            more = self._more_nodes((slow and (self._priced or not coarse)) or not which.any())
+            if len(more) > len(self.nodes) and self._fits(len(more)):
                 self.nodes, self.by_fewer, fresh = more, self.best, True
                 cells = self._with_nodes(cells.take(kept))
-            elif not which.any():
+            elif not which.any() or (vain and not self._patient):
                 self._finish(result)
                 return
             elif fine and (lifted := self._unfold(cells.take(live), result.pairs)) is not None:
-                which = (lifted.floor < self.target) & (lifted.level < DEEPEST)
+                which = (lifted.floor < self.goal) & (lifted.level < DEEPEST)
                 cells = self.maker.divided(lifted, which)
             else:
                 cells = self.maker.divided(cells.take(kept), which[kept])
+
+    @property
+    def _patient(self) -> bool:
+        """Whether a time is given, which may be spent though little is to be gained."""
+        return self.until < np.inf
+
+    @property
+    def _near_ceiling(self) -> bool:
+        """Whether stages without (6) can gain little of what the bound lacks."""
+        ceiling = self.first_order.ceiling
+        return ceiling - self.best < LITTLE * (self.target - ceiling)
+
+    def _more_nodes(self, wanted: bool) -> Ints:
+        """Return the nodes of the next stage: more if wanted, or if cells can gain far less."""
+        near = self.first_order.cheapest(self.nodes)
+        if near is not None:
+            straight, motion = near
+            wanting = min(motion.cost, self.cost) - straight
+            if straight - self.best < MUCH_LESS * wanting:
+                turning = self._turning(motion.increments, self.nodes)
+                if len(turning) > len(self.nodes):
+                    return turning
+        return between(self.nodes) if wanted else self.nodes
+
+    def _turning(self, increments: Array, ends: Ints) -> Ints:
+        """Return nodes, with the ends among them, where a motion turns."""
+        return turning_nodes(increments, self.steps.weight, self.steps.metric, TURNED, ends)
+
+    def _lower_goal(self, result: StageResult) -> None:
+        """Look for cheap motions, and lower the goal of the stages if they cannot reach it.
+
+        A bound without (6) is at most the cost of any motion that keeps (5). With (6), the stages
+        only prepare the parts.
+        """
+        known = self.first_order
+        if self.count == 1:
+            alive = np.unique(result.cells.posture[np.isfinite(result.through)])
+            known.look_about(self.nodes, alive.astype(np.int64))
+        if np.isfinite(result.bound):
+            known.look_at(result.cells.take(result.cheapest()))
+        known.cheapest(self.nodes)
+        if self._priced:
+            return
+        little = LEAST if self._patient else LITTLE
+        rest = (known.ceiling - little * self.cost) / (1 - little)
+        self.goal = min(self.goal, rest)
 
     def _unfold(self, cells: CellSet, pairs: int) -> CellSet | None:
         """Return the cells on all turns, to be distinguished from here on; None if too many."""
@@ -355,10 +417,9 @@ class _Certification:
         """Return multipliers of (6) for the motion with gamma (M,) at nodes; None if none."""
         if self._spent(self.pairs):
             return None
-        motion = self.maker.motion(nodes, gamma, posture)
-        if motion is None:
+        q, slope, reached = self.maker.joints(nodes, gamma, posture)
+        if not reached.all():
             return None
-        q, slope = motion
         u = np.diff(q, axis=0)
         u -= 2 * np.pi * np.rint(u / (2 * np.pi))
         return limit_prices(u, slope, self.steps, np.diff(nodes), reach, most)

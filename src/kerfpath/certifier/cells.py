@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kerfpath.arrays import Array, Bools, Ints, freeze, short_repr
 from kerfpath.certificate import BASE, LIFTS, cell_bounds
-from kerfpath.robots import Robot
+from kerfpath.robots import Robot, chain_of, lowest_joint
 
 TURN = 2 * np.pi
 AT_ONCE = 50_000
@@ -133,6 +133,8 @@ class CellMaker:
     folded : (n,) bool, optional
         Joints with a range of at least a turn that count as endless; default none. Their couplings
         are left out.
+    floor : float m, optional
+        Height above which motions keep elbow, wrist and flange at the nodes.
 
     Attributes
     ----------
@@ -150,7 +152,11 @@ class CellMaker:
         postures: Iterable[int] | None = None,
         width: float = 1.0,
         folded: Bools | None = None,
+        floor: float | None = None,
     ) -> None:
+        self._floor, chain = floor, chain_of(robot)
+        lengths = np.linalg.norm([*chain.origins[1:, :3, 3], chain.end[:3, 3]], axis=1)
+        self._reach = np.cumsum(lengths[::-1])[::-1]  # from each axis to the end at most
         self._robot, self._frames, self._tool = robot, frames, T_flange_tip
         limits = robot.joint_limits()
         if folded is not None:
@@ -177,16 +183,30 @@ class CellMaker:
             sets.append(self.lifted(self._enclosed(node[part], level[part], index[part])))
         return CellSet.join(sets)
 
-    def motion(self, nodes: Ints, gamma: Array, posture: int) -> tuple[Array, Array] | None:
-        """Return the approximate joints with gamma (M,) at nodes, in a posture, and the slopes.
+    def joints(self, nodes: Ints, gamma: Array, posture: int) -> tuple[Array, Array, Bools]:
+        """Return the approximate joints at gamma (M,) at nodes, in a posture, and their slopes.
 
-        Both are (M, n), rad and rad/rad; None if the posture does not reach some node.
+        Both are (M, n), rad and rad/rad. Also returned is whether the posture reaches each (M,).
         """
         half = np.full(len(gamma), SLIGHT)
         found = self._robot.arm.enclose(self._frames, nodes, gamma, half, self._tool)
-        if not (found.status[:, posture] > 0).all():
-            return None
-        return found.center[:, posture], found.slope[:, posture]
+        return found.center[:, posture], found.slope[:, posture], found.status[:, posture] > 0
+
+    def fits(self, course: Array) -> bool:
+        """Return whether a course (K, n) rad is in the ranges on some turn, and above the floor.
+
+        Its increments are those of the motion. Folded joints have ranges here, too.
+        """
+        limits = self._robot.joint_limits()
+        low, high = course.min(axis=0), course.max(axis=0)
+        lower = np.where(limits.endless, low, limits.lower)
+        upper = np.where(limits.endless, high, limits.upper)
+        shift = TURN * np.rint((lower + upper - low - high) / (2 * TURN))
+        inside = (low + shift >= lower - EDGE) & (high + shift <= upper + EDGE)
+        value = (course + shift) @ limits.rows.T
+        held = (value >= limits.row_lower - EDGE) & (value <= limits.row_upper + EDGE)
+        above = self._floor is None or lowest_joint(self._robot, course).min() >= self._floor
+        return bool(inside.all() and held.all() and above)
 
     def divided(self, cells: CellSet, which: Bools) -> CellSet:
         """Return the cells with some of them (C,) halved."""
@@ -269,8 +289,6 @@ class CellMaker:
         wanted = np.zeros(found.status.shape[1], np.bool_)
         wanted[self._postures] = True
         cell, posture = np.nonzero((found.status > 0) & wanted)
-        place = np.full(found.status.shape, -1, np.int64)
-        place[cell, posture] = np.arange(len(cell))
         at, h = (cell, posture), half[cell, None]
         center = found.center[at]
         unsure = (found.high[at] - found.low[at]) * h**2 / 4
@@ -287,7 +305,20 @@ class CellMaker:
             spread=spread * (1 + ROUNDED) + ROUNDED * (1 + np.abs(found.slope[at]) * h),
             floor=np.full(len(cell), -np.inf),
         )
-        return made, place
+        above = self._above_floor(made)
+        place = np.full(found.status.shape, -1, np.int64)
+        place[cell[above], posture[above]] = np.arange(above.sum())
+        return made.take(above), place
+
+    def _above_floor(self, cells: CellSet) -> Bools:
+        """Return which cells may hold joints (C,) with elbow, wrist and flange above the floor.
+
+        A joint lifts what it moves by at most its rotation times the distance to its axis.
+        """
+        if self._floor is None:
+            return np.ones(len(cells), np.bool_)
+        highest = lowest_joint(self._robot, cells.center) + cells.box @ self._reach
+        return np.asarray(highest >= self._floor - EDGE)
 
     def lifted(self, cells: CellSet) -> CellSet:
         """Return the cells on all turns within the ranges."""

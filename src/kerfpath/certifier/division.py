@@ -10,8 +10,6 @@ import numpy as np
 from kerfpath.arrays import Array, Bools, Ints
 from kerfpath.certifier.cells import CellSet
 from kerfpath.kernels.metric import rho
-from kerfpath.plans import Plan, path_cost
-from kerfpath.search import METRIC_CODES
 
 DECIDES = 0.5
 """Uncertain cells decide if the joint uncertainty along the cheapest motion is worth more than this
@@ -25,29 +23,29 @@ BOX_WEIGHT = 0.02
 """Weight of the box of a cell, compared with the uncertainty of the joints on it."""
 
 
-def turning_nodes(plan: Plan, share: float, longest: int) -> Ints:
-    """Return nodes (M,) such that straight steps between them cost about as much as the plan.
+def turning_nodes(increments: Array, weight: Array, metric: int, share: float, ends: Ints) -> Ints:
+    """Return nodes (M,) such that straight steps between them cost about as much as a motion.
 
     Parameters
     ----------
-    plan : Plan
+    increments : (K - 1, n) rad
+        Of the motion, from node to node.
+    weight : (n,) 1/rad
+    metric : int
+        Code of the metric.
     share : float
-        Largest share of the plan's cost that the straight steps may lose.
-    longest : int
-        Most intervals that a step spans.
+        Largest share of the motion's cost that the straight steps may lose.
+    ends : (E,)
+        Nodes that are among them, the first and the last with them.
     """
-    asked, dq = plan.settings, plan.increments
-    metric, last = METRIC_CODES[asked.metric], len(dq)
-    q = np.vstack([np.zeros(dq.shape[1]), np.cumsum(dq, axis=0)])
-    each = [path_cost(step[None], asked.weights, asked.metric, "sum") for step in dq]
-    upto = np.concatenate([[0.0], np.cumsum(each)])
+    q = np.vstack([np.zeros_like(increments[:1]), np.cumsum(increments, axis=0)])
+    upto = np.append(0.0, np.cumsum([rho(step, weight, metric) for step in increments]))
 
     def lost(a: int, b: int) -> float:
         """Return the cost that a straight step from node a to b loses."""
-        return float(upto[b] - upto[a] - rho(q[b] - q[a], asked.weights, metric))
+        return float(upto[b] - upto[a] - rho(q[b] - q[a], weight, metric))
 
-    ends = np.unique(np.append(np.arange(0, last, longest), last)).tolist()
-    steps = [(-lost(a, b), a, b) for a, b in pairwise(ends)]
+    steps = [(-lost(a, b), a, b) for a, b in pairwise(ends.tolist())]
     heapify(steps)
     left = -sum(step[0] for step in steps)
     while left > share * upto[-1]:
@@ -59,6 +57,11 @@ def turning_nodes(plan: Plan, share: float, longest: int) -> Ints:
         heappush(steps, (-lost(middle, b), middle, b))
         left += loss + lost(a, middle) + lost(middle, b)
     return np.array(sorted({node for _, a, b in steps for node in (a, b)}))
+
+
+def evenly(last: int, longest: int) -> Ints:
+    """Return nodes from 0 to the last one that are at most so many intervals apart."""
+    return np.unique(np.append(np.arange(0, last, longest), last))
 
 
 def between(nodes: Ints) -> Ints:

@@ -23,6 +23,7 @@ from kerfpath.certificate import cell_bounds
 from kerfpath.certifier.cells import CellMaker, CellSet
 from kerfpath.certifier.division import cells_to_divide
 from kerfpath.certifier.stages import StageResult, Steps, distinct_groups, solve_stage
+from kerfpath.kernels.metric import increments
 
 SAME_COST = 1e-9
 """Share of the cost by which motions must cost more than the plan to drop out, for rounding."""
@@ -147,6 +148,8 @@ class Parts:
             nonlocal best, through
             if prices is None:
                 return False
+            if self._priced_cost(best, prices) <= best.bound:
+                return False
             priced = self._stage(part.cells, prices)
             through = np.maximum(through, priced.through)
             better = priced.bound > best.bound
@@ -169,6 +172,15 @@ class Parts:
                 if not tried(self._prices(gamma, posture, WIDE, most)):
                     break
         return through, result, best.multipliers
+
+    def _priced_cost(self, result: StageResult, prices: Array) -> float:
+        """Return the cost with prices of the motion that is cheapest by a result, about."""
+        motion = result.cells.take(result.cheapest())
+        spans = np.diff(motion.node)
+        if len(spans) + 1 != len(prices):
+            return np.inf
+        steps = self._steps
+        return steps.priced(increments(motion.center, steps.endless), prices, spans)
 
     def _stage(self, cells: CellSet, prices: Array | None) -> StageResult:
         most = self._cost * (1 + SAME_COST)

@@ -24,7 +24,7 @@ from kerfpath.effort import thread_count
 from kerfpath.kernels.bends import cross_back, cross_on
 from kerfpath.kernels.cell_elimination import Bend
 from kerfpath.kernels.limits import LIMIT_TOLERANCE
-from kerfpath.kernels.metric import MANHATTAN
+from kerfpath.kernels.metric import CHEBYCHEV, MANHATTAN
 from kerfpath.kernels.potentials import cross_cells, lay_potential, link_cells, reach_cells
 from kerfpath.kernels.reduced import Cells, Potential, Step, tangents
 
@@ -106,6 +106,21 @@ class Steps:
         size = np.abs(multipliers)
         most = apart @ (size[1:-1] @ self.acceleration)
         return float(most + ROUNDED * (most + (size @ self.velocity).sum()))
+
+    def distance(self, dq: Array) -> Array:
+        """Return the distances (...,) of increments (..., n)."""
+        each = self.weight * np.abs(dq)
+        if self.metric == MANHATTAN:
+            return np.asarray(each.sum(axis=-1))
+        if self.metric == CHEBYCHEV:
+            return np.asarray(each.max(axis=-1))
+        return np.asarray(np.sqrt((each**2).sum(axis=-1)))
+
+    def priced(self, dq: Array, multipliers: Array, spans: Ints) -> float:
+        """Return the cost of increments (M - 1, n) with the multipliers (M, n) of (6)."""
+        tilt = (multipliers[:-1] - multipliers[1:]) / spans[:, None]
+        moved = float(self.distance(dq).sum() + (tilt * dq).sum())
+        return moved - self.price(multipliers, spans)
 
     def bend(self, before: int, after: int) -> Bend:
         """Return limit (6) of a step over some intervals and the next one."""
