@@ -17,6 +17,7 @@ from OCP.gp import gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 
+import chart_files
 import foreign
 from kerfpath.cad import read, read_measured
 from kerfpath.cell import Hull, link_bodies
@@ -27,6 +28,7 @@ from kerfpath.errors import InputError, about
 from kerfpath.job import (
     cell_of_job,
     program_from_file,
+    read_chart,
     read_job,
     run_job,
     write_result,
@@ -437,6 +439,8 @@ READERS: dict[str, Reader] = {
     "path": Reader(paths, read_drawing),
     "urdf": Reader(urdfs, read_robot),
     "job": Reader(jobs, read_a_job),
+    "chart": Reader(chart_files.charts, read_chart),
+    "foreign chart": Reader(chart_files.foreign_charts, chart_files.read_foreign_chart),
     "plan": Reader(plans, read_plan),
     **{
         language: Reader(functools.partial(programs, language), read_a_program)

@@ -411,3 +411,73 @@ def robots(
         show_external(name)
     else:
         show_robot(name)
+
+
+@app.command()
+def charts(
+    action: Annotated[
+        Literal["list", "show", "check", "convert"],
+        typer.Argument(help="What to do with cut charts."),
+    ],
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[CHART]...", help="Charts by path or name; files to convert."),
+    ] = None,
+    job: Annotated[
+        Path | None,
+        typer.Option(metavar="JOB.toml", help="With show: where each value of the job comes from."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="With convert: the chart to write; default: print it."),
+    ] = None,
+    columns: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map",
+            metavar="COLUMN=KEY",
+            help="With convert: a column of a CSV and the key that it has, once for each.",
+        ),
+    ] = None,
+    unit: Annotated[
+        Literal["mm", "inch"] | None,
+        typer.Option(help="With convert: unit of a QtPlasmaC file, which does not say it."),
+    ] = None,
+    material: Annotated[
+        str | None, typer.Option(help="With convert: the material of rows that do not say it.")
+    ] = None,
+    thickness_mm: Annotated[
+        float | None, typer.Option(help="With convert: the thickness of rows that do not say it.")
+    ] = None,
+    gas: Annotated[
+        str | None, typer.Option(help="With convert: the gas of rows that do not say it.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List, show, check or convert cut charts: speed, kerf, pierce and power by material.
+
+    A job uses a chart with the table [process]. Files of QtPlasmaC (_material.cfg), CSV and
+    LightBurn (.clb) are converted; what they lack is listed.
+
+    Example: kerfpath charts show --job door.toml
+    """
+    from kerfpath.cli.charts_output import check_charts, convert, list_charts, show_charts, trace
+
+    if action == "list":
+        list_charts()
+    elif action == "check":
+        check_charts(names or ())
+    elif action == "show" and job is not None:
+        trace(job)
+    elif action == "show":
+        show_charts(names or ())
+    else:
+        if len(names or ()) != 1:
+            raise InputError(f"charts convert: expected one file, got {len(names or ())}")
+        convert(
+            Path((names or [""])[0]),
+            output,
+            columns=columns or (),
+            unit=unit,
+            said={"material": material, "thickness_mm": thickness_mm, "gas": gas},
+        )

@@ -12,6 +12,7 @@ import typer
 from rich.markup import escape
 
 from kerfpath.cad import Part
+from kerfpath.cli.charts_output import origin_entry
 from kerfpath.cli.drawing_output import drawing_entry, drawing_of, show_drawing
 from kerfpath.cli.show import (
     busy,
@@ -30,8 +31,11 @@ from kerfpath.job import (
     AsRun,
     ContourSpeed,
     CutResult,
+    Job,
     JobResult,
+    origins_of,
     prepare,
+    process_times,
     read_job,
     require_foreseen,
     require_language,
@@ -170,7 +174,8 @@ def finish_run(
             "passed": outcome.passed,
             "not_planned": list(outcome.not_planned),
             "drawing": drawing_entry(part),
-            "contours": [_cut_entry(cut) for cut in outcome.cuts],
+            "contours": [_cut_entry(cut) | _times_entry(outcome.job, cut) for cut in outcome.cuts],
+            "process": _process_entry(outcome.job),
             "sequence": None if outcome.part is None else sequence_entry(outcome.part),
             "files": [str(f) for f in written.files],
             "removed": [str(f) for f in written.removed],
@@ -259,6 +264,20 @@ def _cut_entry(cut: CutResult) -> dict[str, object]:
         "as_run": _as_run_entry(cut.as_run),
         "issues": [str(c.issue()) for c in (*cut.checks, *cut.as_run.checks) if not c.ok],
     }
+
+
+def _times_entry(job: Job, cut: CutResult) -> dict[str, object]:
+    if cut.plan is None:
+        return {}
+    _, pierced, gas = process_times(job, cut)
+    return {"piercing_s": pierced, "gas_s": gas}
+
+
+def _process_entry(job: Job) -> dict[str, object] | None:
+    origins = origins_of(job.text, job.source)
+    if not origins:
+        return None
+    return {"origins": [*map(origin_entry, origins)], "sheet": list(job.program.remarks)}
 
 
 def _as_run_entry(run: AsRun) -> dict[str, object]:

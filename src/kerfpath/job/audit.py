@@ -67,6 +67,7 @@ from kerfpath.job.plan_file import (
     plan_entry,
     read_plan_file,
 )
+from kerfpath.job.process_sheet import check_sheet
 from kerfpath.job.program_file import (
     ReadCut,
     add_tips,
@@ -579,7 +580,10 @@ class Audit:
             )
         job = in_language_of(file, job)
         audit = Audit(expected=replace(self.expected, job=job))
-        return audit.program(program_on_disk(file, job), file.name)
+        report = audit.program(program_on_disk(file, job), file.name)
+        rows, note = check_sheet(file, job.program.remarks)
+        tables = {name: table + rows * (name == file.name) for name, table in report.tables.items()}
+        return replace(report, tables=tables, note=f"{report.note} {note}".strip())
 
     def plan_file(self, path: Path) -> AuditReport:
         """Audit every contour of a plan.json."""

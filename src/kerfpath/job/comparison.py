@@ -98,7 +98,7 @@ DISTANCE = 1e-6
 """Accuracy of distances between convex solids, m; those of a record may differ by it."""
 SHOWN = 60
 """Most characters of a value that a message shows."""
-PROGRAM = ("program", "audit", "layout")
+PROGRAM = ("program", "audit", "layout", "process")
 """Tables of a job that do not define the motion."""
 
 

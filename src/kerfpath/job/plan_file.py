@@ -42,7 +42,7 @@ from kerfpath.comfort import MEASURES
 from kerfpath.contour import KINDS, Contour
 from kerfpath.dynamics import Load
 from kerfpath.errors import InputError, NoFeasiblePath
-from kerfpath.job.format import AuditTable, ProgramTable, Tolerances
+from kerfpath.job.format import AuditTable, ProgramTable, Tolerances, sheet_of
 from kerfpath.options import PlanOptions
 from kerfpath.planner import FastestSpeed
 from kerfpath.plans import Feed, Plan, Proof
@@ -830,7 +830,12 @@ class PlanFile:
     def program(self, stem: str, **changes: str) -> ProgramOptions:
         """Return the [program] of its job, with keys replaced; `stem` is the name by default."""
         allowed = self.tolerances.path
-        return self.table("program", ProgramTable, **changes).resolve(stem, allowed)
+        table = self.table("program", ProgramTable, **changes)
+        try:
+            return table.resolve(stem, allowed, sheet_of(self.job))
+        except (ValidationError, LookupError, TypeError, AttributeError) as error:
+            said = " ".join(str(error).split())
+            raise InputError(f"{self.path}: its [process] table is not valid ({said})") from None
 
     def table(self, name: str, model: type[_M], **changes: str) -> _M:
         """Return a table of its job, with keys replaced.

@@ -353,6 +353,7 @@ def build_program(
     if home:
         back = tuple(air.moves(home))
         sections[-1] = replace(sections[-1], steps=sections[-1].steps + back)
+    capsules = [CAPSULES] if any(UNPROVED in plan.proof.statement for plan in plans) else []
     program = Program(
         name=title,
         robot=first.robot,
@@ -360,7 +361,7 @@ def build_program(
         T_base_part=first.T_base_part,
         sections=tuple(sections),
         air_checked=len(moves) > 0 and all(move.clear for move in moves),
-        caveats=(CAPSULES,) if any(UNPROVED in plan.proof.statement for plan in plans) else (),
+        caveats=(*capsules, *options.remarks),
     )
     if options.arc_tolerance is not None:
         eta_v = min(plan.settings.eta_v for plan in plans)

@@ -8,7 +8,7 @@ from typing import TypedDict
 
 from kerfpath.arrays import not_negative, short_repr
 from kerfpath.post.arcs import Zone
-from kerfpath.post.languages import Language, LanguageSettings, Rules, language
+from kerfpath.post.languages import Language, LanguageSettings, Rules, language, plain
 from kerfpath.post.program import Handshake
 from kerfpath.setting import check, documented, setting
 
@@ -29,6 +29,7 @@ class ProgramKeywords(TypedDict, total=False):
     arc_tolerance: float | None
     thin_tolerance: float
     handshakes: Sequence[Handshake]
+    remarks: Sequence[str]
 
 
 @documented
@@ -159,6 +160,12 @@ class ProgramOptions:
         takes=None,
     )
 
+    remarks: Sequence[str] = setting(
+        (),
+        "lines for the comment at the head of the program, as the values that the operator sets",
+        takes=None,
+    )
+
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
@@ -166,6 +173,7 @@ class ProgramOptions:
         if self.zone != "auto":
             object.__setattr__(self, "zone", not_negative(self.zone, "zone", unit="m"))
         object.__setattr__(self, "handshakes", tuple(self.handshakes))
+        object.__setattr__(self, "remarks", tuple(map(plain, self.remarks)))
 
     @property
     def robot_language(self) -> Language:

@@ -34,6 +34,8 @@ def render(
     cell: Cell | None = None,
     moves: Sequence[ArrayLike] = (),
     faults: Sequence[str] = (),
+    process: Sequence[Sequence[str]] = (),
+    times: Sequence[Sequence[str]] = (),
     **page: Unpack[PageKeywords],
 ) -> str:
     """Return the report as one self-contained HTML page; the same input gives the same text.
@@ -52,6 +54,10 @@ def render(
         Paths of the tool tip on the transfer moves, in the part frame.
     faults : sequence of str
         Reasons not to cut the job although its contours are planned, and what to do.
+    process : sequence of (of, key, value, origin, who sets it)
+        Values of the process; empty without a chart.
+    times : sequence of (contour, s, s, s)
+        Times for cutting, piercing and gas.
     **page
         As in `PageKeywords`; facts such as ("Robot", "ABB IRB 4600-60/2.05").
     """
@@ -66,6 +72,8 @@ def render(
         first_steps=[(i, section, _remedy(section)) for i, section in failed[:MOST_STEPS]],
         other_failures=len(failed[MOST_STEPS:]),
         faults=faults,
+        process=process,
+        times=times,
         sections=sections,
         open_contour=failed[0][0] if failed else 1,
         scene=scene(sections, mesh, cell, moves),

@@ -80,7 +80,7 @@ def _run(
             table.smooth_axes.distance_mm * MM,
             limit=float(np.radians(table.smooth_axes.limit_deg)),
         )
-    if table.kerf_mm is not None:
+    if table.kerf_mm:
         sharp = table.corners is not None
         contour = offset(contour, table.kerf_mm * MM / 2, side=scrap, sharp=sharp)
     if table.corners is not None and table.corners.round_mm is not None:

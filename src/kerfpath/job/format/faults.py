@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date, datetime, time
 from pathlib import Path
 from typing import NamedTuple
 
 import tree_sitter_toml
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 from tree_sitter import Language, Node, Parser
 
@@ -173,11 +173,13 @@ def _keys(key: Node) -> list[str]:
 # -----------------------------------------------------------------------------
 # One-line messages about faults in a job file: place, key, expected, got, what to do.
 
+Tables = Mapping[str, type[BaseModel]]
+"""The model of each table of a file, by its dotted name; "" has the keys outside of tables."""
 _LONGEST = 60
 """Characters of a wrong value that a message shows."""
 
 
-def refusal(path: Path, text: str, error: ValidationError) -> InputError:
+def refusal(path: Path, text: str, error: ValidationError, tables: Tables = TABLES) -> InputError:
     """Return an error with one line for the first problem in the file and one for each other."""
     details = error.errors(include_url=False)
     locs, places = [d["loc"] for d in details], TomlPlaces(text)
@@ -191,7 +193,7 @@ def refusal(path: Path, text: str, error: ValidationError) -> InputError:
         # Missing keys come last: a misspelt key explains more.
         order = detail["type"] == "missing", *places.locate(where)
         key = ".".join(part for part in where if isinstance(part, str))
-        problems.append((order, f"{key}: {_problem(detail)}"))
+        problems.append((order, f"{key}: {_problem(detail, tables)}"))
     return all_of([error_at(path, place[1], said) for place, said in sorted(problems)])
 
 
@@ -202,7 +204,7 @@ def refusal_at(path: Path, where: Sequence[str | int], said: str) -> InputError:
     return error_at(path, line, f"{key}: {said}")
 
 
-def _problem(detail: ErrorDetails) -> str:
+def _problem(detail: ErrorDetails, tables: Tables) -> str:
     """Return the words about what was expected, what came and what to do."""
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
     if kind == FAULT:
@@ -210,10 +212,10 @@ def _problem(detail: ErrorDetails) -> str:
             return str(context["said"])
         got = context["got"] or _shown(value)
         return f"expected {context['expected']}, got {got}; {context['remedy']}"
-    table, keys = _table_of([part for part in detail["loc"] if isinstance(part, str)])
-    header = f"[[{table}]]" if table in REPEATED else f"[{table}]"
+    table, keys = _table_of([part for part in detail["loc"] if isinstance(part, str)], tables)
+    header = f"[[{table}]]" if table in REPEATED else f"[{table}]" if table else "the file"
     if kind == "extra_forbidden":
-        known = TABLES[table].model_fields if keys else [t for t in TABLES if "." not in t]
+        known = tables[table].model_fields if keys else [t for t in tables if "." not in t]
         holder = f"a key of {header}" if keys else "a known table"
         unknown = keys[0] if keys else table
         return f"expected {holder}, got an unknown name; {nearest(unknown, known)}"
@@ -222,7 +224,7 @@ def _problem(detail: ErrorDetails) -> str:
             return f"expected tables {header}, got a single one; write it as {header}"
         got = "none" if kind == "missing" else _shown(value)
         return f"expected a table {header}, got {got}; write its header and its keys"
-    field = TABLES[table].model_fields[keys[0]]
+    field = tables[table].model_fields[keys[0]]
     expected, example = field.description, f"{keys[0]} = {(field.examples or [''])[0]}"
     if kind == "missing":
         return f"expected {expected}, got nothing; add, for example, {example}"
@@ -236,12 +238,12 @@ def _problem(detail: ErrorDetails) -> str:
     return f"expected {expected}, got {_shown(value)}{number}; write, for example, {example}"
 
 
-def _table_of(names: list[str]) -> tuple[str, list[str]]:
+def _table_of(names: list[str], tables: Tables) -> tuple[str, list[str]]:
     """Return the innermost table that contains a place, and the remaining keys."""
     for n in range(len(names), 0, -1):
-        if (table := ".".join(names[:n])) in TABLES:
+        if (table := ".".join(names[:n])) in tables:
             return table, names[n:]
-    return names[0], names[1:]
+    return ("", names) if "" in tables else (names[0], names[1:])
 
 
 def _shown(value: object) -> str:

@@ -6,6 +6,7 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -45,19 +46,19 @@ def with_loops(job: Job, part: Part, names: Sequence[str]) -> str:
         written as [[contour]] tables.
     """
     cut = [{task.pick for task in spec.expanded(part)} for spec in job.contours]
-    tables: list[Mapping[str, object]] = list(job.source["contour"])
-    text = job.text
+    text, source = job.text, tomllib.loads(job.text)
+    tables: list[Mapping[str, object]] = list(source["contour"])
     outer = [i for i, picks in enumerate(cut) if any(_is_trim(part.loop(n)) for n in picks)]
     first_trim = outer[0] if outer else len(tables)
     for name in dict.fromkeys(names):
         loop = part.loop(name)
         _require_to_cut(loop, job, any(name in picks for picks in cut))
         at = first_trim if loop.kind == "inner" else len(tables)
-        table = _like(job, part, loop)
+        table = _like(job, source, part, loop)
         text = _inserted(text, at, _written(table))
         tables.insert(at, table)
         first_trim += loop.kind == "inner"
-    return _required(text, job.source, tables)
+    return _required(text, source, tables)
 
 
 def without_contour(job: Job, index: int) -> str:
@@ -69,7 +70,8 @@ def without_contour(job: Job, index: int) -> str:
         There is no such table, it is the only one, or the contours are not written as [[contour]]
         tables.
     """
-    tables = list(job.source["contour"])
+    source = tomllib.loads(job.text)
+    tables = list(source["contour"])
     if not 0 <= index < len(tables):
         raise InputError(f"job: expected a contour from 0 to {len(tables) - 1}, got {index}")
     if len(tables) == 1:
@@ -83,7 +85,7 @@ def without_contour(job: Job, index: int) -> str:
         begin -= 1
     del lines[begin:after]
     del tables[index]
-    return _required("".join(lines), job.source, tables)
+    return _required("".join(lines), source, tables)
 
 
 def _lines(text: str) -> list[str]:
@@ -105,7 +107,7 @@ def _require_to_cut(loop: Loop, job: Job, cut: bool) -> None:
         )
 
 
-def _like(job: Job, part: Part, loop: Loop) -> Mapping[str, object]:
+def _like(job: Job, source: Mapping[str, Any], part: Part, loop: Loop) -> Mapping[str, object]:
     """Return the [[contour]] table of a loop, copied from the most similar contour."""
 
     def unlike(index: int) -> tuple[bool, float]:
@@ -117,7 +119,7 @@ def _like(job: Job, part: Part, loop: Loop) -> Mapping[str, object]:
     barred = set(OWN)
     if loop.kind == "open":
         barred |= set(keys_of_closed_loops(job.contours[nearest].table))
-    model: Mapping[str, object] = job.source["contour"][nearest]
+    model: Mapping[str, object] = source["contour"][nearest]
     table = {key: value for key, value in model.items() if key not in barred}
     spacing = job.contours[nearest].spacing
     if spacing is not None:

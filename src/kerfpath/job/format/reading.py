@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +11,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from kerfpath.arrays import Array, Ints, freeze, short_repr
-from kerfpath.cad import SUFFIXES, Machine, Part, unit_question
+from kerfpath.cad import Machine, Part, unit_question
 from kerfpath.cell import Cell
 from kerfpath.comfort import Comfort
 from kerfpath.contour import Contour
@@ -23,7 +21,8 @@ from kerfpath.execution import IDEAL, Correction, Response, read_correction
 from kerfpath.graph import LayeredGraph
 from kerfpath.job.format.contour import ContourSpec, contour_request, keys_of_closed_loops
 from kerfpath.job.format.drawing import Drawing
-from kerfpath.job.format.faults import all_of, error_at, refusal, refusal_at
+from kerfpath.job.format.faults import all_of, refusal, refusal_at
+from kerfpath.job.format.process import sheet_of, with_process
 from kerfpath.job.format.tables import (
     LIMITS_MARGIN,
     CellTable,
@@ -36,18 +35,16 @@ from kerfpath.job.format.tables import (
 from kerfpath.job.format.tables.plan import said_in_keys
 from kerfpath.job.format.tables.table import Table
 from kerfpath.job.format.tolerances import Tolerances
+from kerfpath.job.format.toml_file import read_tables, read_text
 from kerfpath.job.format.values import nearest
 from kerfpath.options import OptionConflict, PlanOptions
 from kerfpath.planner import coarse_places, external_course, folds, layered_graph
 from kerfpath.post import ProgramOptions, languages
 from kerfpath.robots import Robot
 from kerfpath.setup import Setup
-from kerfpath.text import NOT_TEXT, named
 
-MOST_TEXT = 10_000_000
-"""Largest job file, in characters; enough for many thousand contours."""
-NOT_IN_STRINGS = re.compile(rf"{NOT_TEXT.pattern}|[\t\r\n]")
-_DOTTED = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){33}")
+NEEDED = "[robot], [tool], [part] and [[contour]]"
+"""The tables that every job has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -83,7 +80,8 @@ class Job:
     program : ProgramOptions
         Options of the robot program.
     source : mapping
-        The parsed file: its tables and keys, with values that JSON can hold.
+        The parsed file: its tables and keys, with values that JSON can hold, and those that a
+        chart fills in, see `kerfpath.job.format.process`.
     response : Response
         How the joints of the robot follow what its controller commands.
     path_tolerance : float m, optional
@@ -248,8 +246,8 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         came and what to do, for the first problem, and how many more there are.
     """
     path = Path(path)
-    text = _text(path)
-    source = _tables(path, text)
+    text = read_text(path, "a job file")
+    source = with_process(path, text, read_tables(path, text, "a job file", NEEDED))
     try:
         file = JobFile.model_validate(source, context={"folder": path.parent})
     except ValidationError as error:
@@ -292,7 +290,9 @@ def read_job(path: str | Path, *, copy_of: Path | None = None) -> Job:
         path_tolerance=file.plan.executed_tolerance,
         compensation=_compensation(path, file),
         most_moved=file.program.compensate_most_mm / 1000,
-        program=file.program.resolve((copy_of or path).stem, file.audit.resolve().path),
+        program=file.program.resolve(
+            (copy_of or path).stem, file.audit.resolve().path, sheet_of(source)
+        ),
         source=source,
         text=text,
         accepts_incomplete=file.program.incomplete == "accept",
@@ -403,59 +403,6 @@ def _comfort(file: JobFile, robot: Robot) -> Comfort | None:
     return file.comfort.resolve({"limits": LIMITS_MARGIN} if wide else None)
 
 
-def _text(path: Path) -> str:
-    kind = SUFFIXES.get(path.suffix.lower())
-    if kind is not None and path.is_file():
-        said = f"expected a job file, got a drawing ({kind}); write a first job for it: "
-        raise error_at(path, None, f"{said}kerfpath new {path}")
-    try:
-        endless = path.exists() and not (path.is_file() or path.is_dir())  # a device
-        raw = b"" if endless else path.read_bytes()
-    except IsADirectoryError:
-        raise error_at(path, None, "expected a job file, got a folder; name a file in it") from None
-    except FileNotFoundError:
-        raise error_at(path, None, "no such file; give the path of a job file") from None
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or str(error)
-        raise error_at(path, None, f"cannot be read ({why}); give the path of a job file") from None
-    if endless:
-        raise error_at(path, None, "is not a file; give the path of a job file")
-    try:
-        return raw.decode("utf-8-sig")  # some editors begin a UTF-8 file with a byte order mark
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        raise error_at(
-            path,
-            line,
-            f"expected UTF-8 text, got the byte 0x{raw[error.start]:02x}; save the file as UTF-8",
-        ) from None
-
-
-def _require_text(path: Path, text: str, tables: Mapping[str, Any]) -> None:
-    """Raise InputError for a character without a glyph in the file, or in a string of it."""
-    if (found := NOT_TEXT.search(text)) is not None:
-        line = text.count("\n", 0, found.start()) + 1
-        raise error_at(path, line, f"expected text, got {named(found[0])}; remove it")
-
-    def look(value: Any, key: tuple[str | int, ...]) -> None:
-        if isinstance(value, dict | list):
-            inner = value.items() if isinstance(value, dict) else enumerate(value)
-            for each, its in inner:
-                look(its, (*key, each))
-                if isinstance(each, str):
-                    look_at(each, (*key, each))
-        elif isinstance(value, str):
-            look_at(value, key)
-
-    def look_at(value: str, key: tuple[str | int, ...]) -> None:
-        if (found := NOT_IN_STRINGS.search(value)) is not None:
-            raise refusal_at(
-                path, key, f"expected one line of text, got {named(found[0])}; remove it"
-            )
-
-    look(tables, ())
-
-
 class _OnlyPart(Table):
     class _OnlyMachine(Table):
         machine: MachineTable
@@ -473,40 +420,7 @@ def machine_of(text: str, name: str) -> Machine:
     """
     source = f"part.machine = {text}"
     try:
-        file = _OnlyPart.model_validate(_tables(Path(name), source))
+        file = _OnlyPart.model_validate(read_tables(Path(name), source, "a job file", NEEDED))
     except ValidationError as error:
         raise refusal(Path(name), source, error) from None
     return file.part.machine.machine()
-
-
-def _tables(path: Path, text: str) -> dict[str, Any]:
-    if len(text) > MOST_TEXT:
-        raise error_at(
-            path,
-            None,
-            f"expected a job file of at most {MOST_TEXT / 1e6:.0f} MB, got "
-            f"{len(text) / 1e6:.0f} MB; give the path of a job file",
-        )
-    # The time that the TOML parser takes grows with the square of the number of parts.
-    if (dotted := _DOTTED.search(text)) is not None:
-        line = text.count("\n", 0, dotted.start()) + 1
-        raise error_at(path, line, "expected a key of a job, got one with too many dotted parts")
-    try:
-        tables = tomllib.loads(text)
-        _require_text(path, text, tables)
-    except RecursionError:
-        raise error_at(path, None, "arrays or tables are nested too deeply; flatten them") from None
-    except tomllib.TOMLDecodeError as error:
-        said = str(error)
-        at = re.search(r" \(at line (\d+), column \d+\)$", said)
-        line = int(at[1]) if at else text.rstrip("\n").count("\n") + 1
-        raise error_at(path, line, f"not valid TOML: {said}; correct it there") from None
-    except InputError:
-        raise
-    except ValueError:  # what Python's int() refuses
-        raise error_at(path, None, "not valid TOML: an integer is too long; shorten it") from None
-    if not tables:
-        raise error_at(
-            path, 1, "expected [robot], [tool], [part] and [[contour]], got an empty file; add them"
-        )
-    return tables

@@ -18,7 +18,7 @@ from kerfpath.files import require_replaceable
 from kerfpath.job.as_run import allowed_off
 from kerfpath.job.audit_report import collision_note
 from kerfpath.job.compensated import compensation_notes
-from kerfpath.job.format import Job, refusal_at
+from kerfpath.job.format import DIFFER, TITLE, Job, origins_of, refusal_at
 from kerfpath.job.plan_file import (
     ContourData,
     broken_entry,
@@ -37,6 +37,7 @@ from kerfpath.post import (
     TimedLine,
     build_program,
     issue_lines,
+    laser_start,
     preflight,
     read_program,
     replace_program,
@@ -154,9 +155,64 @@ def report_text(outcome: JobResult, notes: Sequence[str], faults: Sequence[str] 
         moves=[_tips(job, move) for move in between],
         facts=facts,
         faults=faults,
+        process=_process_rows(job),
+        times=_process_times(outcome),
         notes=notes,
         job_text=job.text,
     )
+
+
+def _process_rows(job: Job) -> list[tuple[str, str, str, str, str]]:
+    """Return a row for each value of the process, and where it comes from."""
+    return [
+        (
+            each.of,
+            each.key,
+            "-" if each.value is None else f"{each.value}",
+            each.origin,
+            "hand" if each.by_hand else "program",
+        )
+        for each in origins_of(job.text, job.source)
+    ]
+
+
+def _process_times(outcome: JobResult) -> list[tuple[str, str, str, str]]:
+    """Return the times of each contour of a job with [process]: cutting, piercing, gas."""
+    if "process" not in outcome.job.source:
+        return []
+    found = []
+    for cut in outcome.cuts:
+        if cut.plan is not None:
+            took, pierced, gas = process_times(outcome.job, cut)
+            shown = "-" if gas is None else f"{gas:.2f}"
+            found.append((cut.name, f"{took:.2f}", f"{pierced:.2f}", shown))
+    return found
+
+
+def process_times(job: Job, cut: CutResult) -> tuple[float, float, float | None]:
+    """Return how long (s) a planned contour is cut, pierced, and how long its gas flows.
+
+    The last is None if the program does not switch the gas.
+    """
+    assert cut.plan is not None
+    took = float(cut.plan.time[-1] - cut.plan.time[0])
+    wait, gas = laser_start(job.program)[1], job.program.gas_lead
+    return took, job.program.pierce_time, None if gas is None else gas + wait + took
+
+
+def process_notes(job: Job) -> list[str]:
+    """Return the notes on what the operator has to set."""
+    lines = job.program.remarks
+    if not lines:
+        return []
+    said = "; ".join(line[2:] for line in lines if line[2:] not in (TITLE, DIFFER))
+    notes = [f"Set by hand, as no program sets it: {said}."]
+    if any(line[2:] == DIFFER for line in lines):
+        notes.append(
+            "The rows of the techniques differ in what is set by hand: cut one technique at a time "
+            "(switched_off in [part]), or stop between them."
+        )
+    return notes
 
 
 def _executed(job: Job, cut: CutResult) -> ExecutedPath | None:
@@ -368,7 +424,7 @@ def program_texts(outcome: JobResult, *, strict: bool = False) -> FileTexts:
     notes += [] if part is None else [order_note(part)]
     contours = {cut.contour: cut.candidate.nodes for cut in outcome.cuts}
     notes += sides_in_doubt(job, contours.items(), outcome.mesh)
-    notes += closer_sampling(outcome) + short_pieces(outcome)
+    notes += process_notes(job) + closer_sampling(outcome) + short_pieces(outcome)
     notes += compensation_notes(job, [(cut.name, cut.as_run) for cut in outcome.cuts])
     faults = [] if outcome.stuck is None else [f"The moves between contours: {outcome.stuck}"]
     faults += [f"The moves between contours: {c.issue()}" for c in outcome.air if not c.ok]

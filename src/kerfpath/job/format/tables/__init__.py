@@ -18,8 +18,14 @@ from kerfpath.job.format.tables.job import JobFile as JobFile
 from kerfpath.job.format.tables.job import LayoutTable as LayoutTable
 from kerfpath.job.format.tables.job import ProgramTable as ProgramTable
 from kerfpath.job.format.tables.job import SequenceTable as SequenceTable
+from kerfpath.job.format.tables.job import tables_in as tables_in
 from kerfpath.job.format.tables.part import ContourTable as ContourTable
 from kerfpath.job.format.tables.part import MachineTable as MachineTable
 from kerfpath.job.format.tables.plan import PlanTable as PlanTable
+from kerfpath.job.format.tables.process import ChartFile as ChartFile
+from kerfpath.job.format.tables.process import JobRowTable as JobRowTable
+from kerfpath.job.format.tables.process import ProcessTable as ProcessTable
+from kerfpath.job.format.tables.process import RowTable as RowTable
+from kerfpath.job.format.tables.process import StageTable as StageTable
 from kerfpath.job.format.tables.robot import ExternalTable as ExternalTable
 from kerfpath.job.format.tables.table import given as given

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
@@ -27,6 +27,7 @@ from kerfpath.job.format.tables.part import (
     PartTable,
 )
 from kerfpath.job.format.tables.plan import PlanTable
+from kerfpath.job.format.tables.process import ProcessTable
 from kerfpath.job.format.tables.robot import RobotTable
 from kerfpath.job.format.tables.table import Table, fields_of, given, require_distinct
 from kerfpath.job.format.tolerances import Tolerances
@@ -269,7 +270,9 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
             return None
         return _settings(self.language, (self.model_extra or {}).get(self.language, {}))
 
-    def resolve(self, stem: str, path_tolerance: float) -> ProgramOptions:
+    def resolve(
+        self, stem: str, path_tolerance: float, remarks: Sequence[str] = ()
+    ) -> ProgramOptions:
         """Return the options of the program, in SI.
 
         Parameters
@@ -278,6 +281,8 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
             Name of the job file, for a program without a name.
         path_tolerance : float m
             By which corners may be rounded without zone_error_mm.
+        remarks : sequence of str
+            Lines for the comment at the head of the program.
         """
         stem = re.sub(r"[^A-Za-z0-9_]", "_", stem)
         stem = stem if stem[:1].isascii() and stem[:1].isalpha() else f"job_{stem}"
@@ -288,7 +293,12 @@ class ProgramTable(create_model("ProgramKeys", __base__=Table, **fields_of(Progr
         values["name"] = self.name or stem[:LONGEST_NAME]
         if self.zone_error_mm is None:
             values["zone_error"] = path_tolerance
-        return ProgramOptions(settings=self.settings(), handshakes=(*requests, *waits), **values)
+        return ProgramOptions(
+            settings=self.settings(),
+            handshakes=(*requests, *waits),
+            remarks=tuple(remarks),
+            **values,
+        )
 
 
 def _settings(name: str, table: Any) -> LanguageSettings:
@@ -345,6 +355,7 @@ class JobFile(Table):
     robot: RobotTable
     tool: ToolTable
     part: PartTable
+    process: ProcessTable | None = None
     contour: Annotated[tuple[ContourTable, ...], Field(strict=False, min_length=1)]
     plan: PlanTable = PlanTable()
     cell: CellTable | None = None
@@ -359,6 +370,14 @@ class JobFile(Table):
         names = [table.name or table.pick for table in self.contour]
         keys = ["name" if table.name else "pick" for table in self.contour]
         require_distinct(names, "contour", "contour", keys)
+        return self
+
+    @model_validator(mode="after")
+    def _technique_of_process(self) -> JobFile:
+        for i, table in enumerate(self.contour):
+            if table.technique is not None and self.process is None:
+                expected, remedy = "[process] with technique", "add [process], or remove technique"
+                raise fault(expected, "none", remedy, ("contour", i, "technique"))
         return self
 
     @model_validator(mode="after")
@@ -456,17 +475,26 @@ class JobFile(Table):
         return self
 
 
-def _tables(kind: Any, name: str = "") -> Iterator[tuple[str, type[BaseModel]]]:
+def tables_in(kind: Any, name: str = "") -> Iterator[tuple[str, type[BaseModel]]]:
     """Yield the tables in the type of a key, and those in them, with their dotted names."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         yield name, kind
         for key, field in kind.model_fields.items():
-            yield from _tables(field.annotation, f"{name}.{key}".strip("."))
+            yield from tables_in(field.annotation, f"{name}.{key}".strip("."))
     for part in get_args(kind):
-        yield from _tables(part, name)
+        yield from tables_in(part, name)
 
 
-TABLES = {name: table for name, table in _tables(JobFile) if name}
+TABLES = {name: table for name, table in tables_in(JobFile) if name}
 """The model of each table of the file."""
-REPEATED = ("contour", "cell.fixture", "cell.pair", "robot.external")
-"""Tables that a file may have several of."""
+REPEATED = (
+    "contour",
+    "cell.fixture",
+    "cell.pair",
+    "robot.external",
+    "process.row",
+    "process.row.pierce",
+    "row",
+    "row.pierce",
+)
+"""Tables that a job or a chart may have several of."""

@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from kerfpath.arrays import Array, freeze
 from kerfpath.cad import EDGE_TURN, GAP, LEAST_EDGE_TURN, UNITS_MM, Loop, Machine, Part
 from kerfpath.errors import InputError
 from kerfpath.job.format.drawing import Drawing
+from kerfpath.job.format.tables.process import Word
 from kerfpath.job.format.tables.table import Table, given, require_one
 from kerfpath.job.format.values import (
     MOST_NODES,
@@ -81,7 +82,7 @@ def _metres(mm: tuple[float, ...] | None) -> tuple[float, float] | None:
 class LeadTable(Table):
     """[contour.lead_in], [contour.lead_out]: a line or an arc on the scrap side."""
 
-    length_mm: Annotated[Positive, key("a number above 0, in mm", "4")]
+    length_mm: Annotated[NotNegative, key("a number not below 0, in mm; 0: no lead", "4")]
     shape: LeadShape = "line"
     angle_deg: Annotated[NotNegative, key("a number from 0 to 180, in deg", "45", le=180)] = 45.0
     fan_mm: Annotated[Positive | None, key("a number above 0, in mm", "3")] = None
@@ -355,6 +356,9 @@ class ContourTable(Table):
     pick: Annotated[Text | None, key("the name of a loop in the part", '"trim"')] = None
     pick_all: PickTable | None = None
     name: Annotated[Text | None, key("a name that no other contour has", '"trim 2"')] = None
+    technique: Annotated[
+        Word | None, key("a technique of the chart that [process] names", '"small-hole"')
+    ] = None
     speed_m_min: Annotated[Positive, key("a number above 0, in m/min", "9")]
     spacing_mm: Annotated[Positive | None, key("a number above 0, in mm", "2")] = None
     time_step_ms: Annotated[Positive | None, key("a number above 0, in ms", "20")] = None
@@ -372,7 +376,7 @@ class ContourTable(Table):
         int, key('a whole number of starts from 2 to 100, for start = "best"', "4", ge=2, le=100)
     ] = 4
     scrap: Side = "right"
-    kerf_mm: Annotated[Positive | None, key("a number above 0, in mm", "0.2")] = None
+    kerf_mm: Annotated[NotNegative | None, key("a number not below 0, in mm", "0.2")] = None
     bevel_deg: Annotated[Number, key("a number from -60 to 60, in deg", "20", ge=-60, le=60)] = 0.0
     overlap_mm: Annotated[Positive | None, key("a number above 0, in mm", "2")] = None
     lead_in: LeadTable | None = None
@@ -390,6 +394,11 @@ class ContourTable(Table):
         """Whether points or tool axes of the cut differ from the drawn loop."""
         rounded = self.corners is not None and self.corners.round_mm is not None
         return bool(self.kerf_mm or self.bevel_deg or self.smooth_axes or rounded)
+
+    @field_validator("lead_in", "lead_out")
+    @classmethod
+    def _none_of_no_length(cls, lead: LeadTable | None) -> LeadTable | None:
+        return None if lead is None or lead.length_mm == 0 else lead
 
     @model_validator(mode="after")
     def _one_pick(self) -> ContourTable:

@@ -1,0 +1,339 @@
+"""The process of a job: a chart fills in what its tables leave out; the rest is for the operator.
+
+The values of the chart are in the tables of the job from here on, so whatever reads a job, or a
+plan.json, has them as if they were written there. A key of the job is never changed.
+"""
+
+from __future__ import annotations
+
+import textwrap
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from kerfpath.arrays import short_repr
+from kerfpath.errors import InputError
+from kerfpath.job.format.charts import choose
+from kerfpath.job.format.faults import all_of, refusal, refusal_at
+from kerfpath.job.format.tables import (
+    TABLES,
+    ContourTable,
+    JobRowTable,
+    ProcessTable,
+    RowTable,
+    StageTable,
+)
+from kerfpath.post import ProgramOptions
+
+LEADS = {"lead_in": "lead_in_mm", "lead_out": "lead_out_mm"}
+"""The key of a chart that has the length of each lead of a contour."""
+SHEET_WIDTH = 30
+"""Most characters of a line of the process sheet: as many as a remark of INFORM has."""
+TITLE = "PROCESS SHEET, set by hand:"
+"""First line of the process sheet."""
+EXAMPLE = "EXAMPLE VALUES, NOT MEASURED"
+"""Line of the process sheet under a row that is only an example."""
+DIFFER = "ROWS DIFFER: stop in between"
+"""Line of the process sheet if its rows differ in what no program switches."""
+SHEET = {
+    "stand_off_mm": "stand-off {:g} mm",
+    "power_w": "power {:g} W",
+    "frequency_hz": "frequency {:g} Hz",
+    "duty_percent": "duty {:g} %",
+    "pressure_bar": "gas pressure {:g} bar",
+    "gas_lead_s": "gas ahead {:g} s",
+    "nozzle_mm": "nozzle {:g} mm",
+    "focus_mm": "focus {:g} mm",
+    "current_a": "current {:g} A",
+    "voltage_v": "voltage {:g} V",
+    "pause_at_end_s": "pause at end {:g} s",
+    "note": "{}",
+}
+"""Values of a row that the operator sets, and their words."""
+STAGE = {
+    "time_s": "{:g} s",
+    "power_w": "{:g} W",
+    "frequency_hz": "{:g} Hz",
+    "duty_percent": "{:g} %",
+    "height_mm": "{:g} mm high",
+    "gas": "{}",
+    "pressure_bar": "{:g} bar",
+    "focus_mm": "focus {:g} mm",
+}
+"""Values of a stage of the pierce, and their words."""
+
+# -----------------------------------------------------------------------------
+# Fill in the tables of a job.
+
+
+class _OnlyProcess(BaseModel):
+    process: ProcessTable
+
+
+def with_process(path: Path, text: str, source: dict[str, Any]) -> dict[str, Any]:
+    """Return the tables of a job with the values of its chart where the job has none.
+
+    [process] then has the rows in use. What is wrong with other tables is left to their checks.
+
+    Raises
+    ------
+    InputError
+        [process] is not valid, there is no row for it or for a contour, or the rows of two
+        contours differ in what a program has once.
+    """
+    if "process" not in source:
+        return source
+    try:
+        process = _OnlyProcess.model_validate(source).process
+    except ValidationError as error:
+        raise refusal(path, text, error) from None
+    contours = source.get("contour")
+    if not isinstance(contours, list) or not all(isinstance(one, dict) for one in contours):
+        return source
+    chosen: dict[str, JobRowTable] = {}
+    faults: list[InputError] = []
+    filled: list[dict[str, Any]] = []
+    for number, contour in enumerate(contours):
+        technique = contour.get("technique", process.technique)
+        if not isinstance(technique, str):
+            return source
+        try:
+            row = chosen.get(technique) or choose(process, technique, path.parent)
+        except InputError as error:
+            own = "technique" in contour
+            at = ("contour", number, "technique") if own else ("process", "material")
+            fault = refusal_at(path, at, f"{error}")
+            faults += [] if any(one.message == fault.message for one in faults) else [fault]
+            continue
+        chosen[technique] = row
+        filled.append(_filled(contour, row))
+    if faults:
+        raise all_of(faults)
+    rows = list(chosen.values())
+    once = {"pierce_time_s": [row.pierce_time for row in rows]}
+    if _switches_gas(source):
+        once["gas_lead_s"] = [row.gas_lead_s for row in rows]
+    program = _once(path, source, "program", once)
+    cell = source.get("cell")
+    if isinstance(cell, dict):
+        cell = _once(path, source, "cell", {"stand_off_mm": [row.stand_off_mm for row in rows]})
+    kept = [row.model_dump(mode="json", exclude_none=True, exclude_defaults=True) for row in rows]
+    return {
+        **source,
+        "process": {**source["process"], "row": kept},
+        "contour": filled,
+        **({"program": program} if program else {}),
+        **({} if cell is None else {"cell": cell}),
+    }
+
+
+def _filled(contour: Mapping[str, Any], row: RowTable) -> dict[str, Any]:
+    """Return the table of a contour with what a row knows and the table does not say."""
+    table = {"speed_m_min": row.speed_m_min, **contour}
+    if row.kerf_mm:
+        table.setdefault("kerf_mm", row.kerf_mm)
+    for name, key in LEADS.items():
+        lead = table.get(name, {})
+        if (length := getattr(row, key)) and isinstance(lead, dict):
+            table[name] = {"length_mm": length, **lead}
+    joints = table.get("micro_joints")
+    if row.micro_joint_mm and isinstance(joints, dict):
+        table["micro_joints"] = {"width_mm": row.micro_joint_mm, **joints}
+    return table
+
+
+def _switches_gas(source: Mapping[str, Any]) -> bool:
+    """Return whether the job names an output for the gas in the language of its program."""
+    program = source.get("program")
+    if not isinstance(program, dict):
+        return False
+    table = program.get(str(program.get("language", ProgramOptions().language)))
+    return isinstance(table, dict) and "gas_output" in table
+
+
+def _once(
+    path: Path, source: Mapping[str, Any], name: str, values: Mapping[str, Sequence[float | None]]
+) -> Any:
+    """Return a table of the job with values that all rows in use have alike."""
+    table = source.get(name, {})
+    if not isinstance(table, dict):
+        return table
+    found = {}
+    for key, each in values.items():
+        if key in table or all(value is None for value in each):
+            continue
+        if len(set(each)) > 1:
+            got = " and ".join(f"{value or 0:g}" for value in dict.fromkeys(each))
+            unit = key.rpartition("_")[2]
+            said = (
+                f"expected one {key} of [{name}] for all contours, got {got} {unit} from the rows "
+                f"of their techniques; write {key} in [{name}]"
+            )
+            raise refusal_at(path, ("process", "technique"), said)
+        found[key] = each[0]
+    return {**table, **found}
+
+
+# -----------------------------------------------------------------------------
+# The process sheet: what the operator sets.
+
+
+def sheet_of(source: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the lines of the process sheet of a job, from its tables as `with_process` fills them.
+
+    Each line begins with a sign that no robot language gives a meaning, and fits one remark.
+    """
+    if "process" not in source:
+        return ()
+    process = ProcessTable.model_validate(source["process"])
+    lines = [TITLE]
+    several = len(process.row) > 1
+    for row in process.row:
+        words = (row.material, f"{row.thickness_mm:g} mm", row.gas, row.quality, row.technique)
+        lines.append(" ".join(word for word in words if word))
+        lines += [EXAMPLE] if row.example else []
+        lines += [f"for {', '.join(_cut_by(source, process, row))}"] if several else []
+        lines += [f"machine: {row.machine}"] if row.machine else []
+        lines += [words for _, _, words in by_hand(source, process, row)]
+    if several and any(len(each) > 1 for each in _alone(source, process)):
+        lines.append(DIFFER)
+    return tuple(
+        row
+        for line in lines
+        for row in textwrap.wrap(line, SHEET_WIDTH, initial_indent="- ", subsequent_indent="+ ")
+    )
+
+
+def by_hand(
+    source: Mapping[str, Any], process: ProcessTable, row: JobRowTable
+) -> Iterator[tuple[str, Any, str]]:
+    """Yield key, value and words of what the operator sets for a row."""
+    said = {"stand_off_mm": (source.get("cell") or {}).get("stand_off_mm", row.stand_off_mm)}
+    if "gas_lead_s" in source.get("program", {}):
+        said["gas_lead_s"] = None  # the program switches the gas
+    for key, words in SHEET.items():
+        value = said.get(key, getattr(row, key))
+        if value is not None:
+            yield key, value, words.format(value)
+    joined = any(
+        "micro_joints" in contour
+        for contour in source["contour"]
+        if contour.get("technique", process.technique) == row.technique
+    )
+    if row.micro_joint_mm and not joined:
+        yield "micro_joint_mm", row.micro_joint_mm, f"micro joints {row.micro_joint_mm:g} mm"
+    for number, stage in enumerate(row.pierce, 1):
+        yield f"pierce {number}", stage.time_s, f"pierce {number}: {stage_words(stage)}"
+
+
+def row_words(row: RowTable) -> str:
+    """Return the values of a row beside speed and kerf in words."""
+    more = {"lead_in_mm": "lead-in {:g} mm", "lead_out_mm": "lead-out {:g} mm"}
+    more |= {"micro_joint_mm": "micro joints {:g} mm"} | SHEET
+    said = [words.format(getattr(row, key)) for key, words in more.items() if getattr(row, key)]
+    return ", ".join([*said, *(f"pierce {stage_words(stage)}" for stage in row.pierce)])
+
+
+def stage_words(stage: StageTable) -> str:
+    """Return the values of a stage of the pierce in words."""
+    given = {key: getattr(stage, key) for key in STAGE}
+    return " ".join(STAGE[key].format(each) for key, each in given.items() if each is not None)
+
+
+def _alone(source: Mapping[str, Any], process: ProcessTable) -> list[set[str]]:
+    """Return the words of each value to set by hand, over the rows."""
+    rows = [{k: words for k, _, words in by_hand(source, process, row)} for row in process.row]
+    keys = {key for row in rows for key in row if key not in ("note", "micro_joint_mm")}
+    found = [{row.get(key, "") for row in rows} for key in sorted(keys)]
+    return [*found, {row.gas or "" for row in process.row}]
+
+
+def _cut_by(source: Mapping[str, Any], process: ProcessTable, row: JobRowTable) -> list[str]:
+    """Return the names of the contours that a row is for."""
+    return [
+        str(contour.get("name") or contour.get("pick") or "several loops")
+        for contour in source["contour"]
+        if contour.get("technique", process.technique) == row.technique
+    ]
+
+
+# -----------------------------------------------------------------------------
+# Where each value comes from.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """A value of the process, and where it comes from.
+
+    Parameters
+    ----------
+    of : str
+        The contour, "program" or "cell" that it is a value of; a technique if set by hand.
+    key : str
+    value : number or str
+        None: nothing sets it.
+    origin : str
+        "job", "default", or the chart and its row.
+    by_hand : bool
+        Whether the operator sets it.
+    """
+
+    of: str
+    key: str
+    value: Any
+    origin: str
+    by_hand: bool = False
+
+    __repr__ = short_repr
+
+
+def origins_of(text: str, source: Mapping[str, Any]) -> tuple[Origin, ...]:
+    """Return the values of the process of a job, with the text of its file and its tables."""
+    if "process" not in source:
+        return ()
+    written, process = tomllib.loads(text), ProcessTable.model_validate(source["process"])
+    rows = {row.technique: row for row in process.row}
+    found = []
+    for own, table in zip(written["contour"], source["contour"], strict=True):
+        row = rows[table.get("technique", process.technique)]
+        name = str(table.get("name") or table.get("pick") or "several loops")
+        plain = {key: ContourTable.model_fields[key].default for key in ("speed_m_min", "kerf_mm")}
+        for key, default in plain.items():
+            found.append(_origin(name, key, own, table, row.place, default))
+        for lead in LEADS:
+            inner = (own.get(lead, {}), table.get(lead, {}))
+            found.append(_origin(name, "length_mm", *inner, row.place, None, under=lead))
+        if "micro_joints" in table:
+            inner = (own["micro_joints"], table["micro_joints"])
+            found.append(_origin(name, "width_mm", *inner, row.place, None, under="micro_joints"))
+    place = ", ".join(row.place for row in process.row)
+    for name, keys in (("program", ("pierce_time_s", "gas_lead_s")), ("cell", ("stand_off_mm",))):
+        if name == "cell" and name not in source:
+            continue
+        for key in keys:
+            default = TABLES[name].model_fields[key].default
+            inner = (written.get(name, {}), source.get(name, {}))
+            found.append(_origin(name, key, *inner, place, default))
+    for row in process.row:
+        for key, value, words in by_hand(source, process, row):
+            said = words if key.startswith("pierce") else value
+            own = "cell" in source and key == "stand_off_mm" and key in written["cell"]
+            origin = "job" if own else row.place
+            found.append(Origin(of=row.technique, key=key, value=said, origin=origin, by_hand=True))
+    return tuple(found)
+
+
+def _origin(
+    of: str, key: str, written: Mapping[str, Any], table: Mapping[str, Any], place: str,
+    default: Any, *, under: str = "",
+) -> Origin:  # fmt: skip
+    name = f"{under}.{key}" if under else key
+    if key in written:
+        return Origin(of=of, key=name, value=written[key], origin="job")
+    if key in table:
+        return Origin(of=of, key=name, value=table[key], origin=place)
+    return Origin(of=of, key=name, value=default, origin="default")

@@ -1,0 +1,163 @@
+"""The [process] table, and cut charts: rows of values by material, thickness, gas and technique."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from kerfpath.job.format.tables.table import Table
+from kerfpath.job.format.values import NotNegative, Number, Positive, Text, fault, key
+
+NORMAL = "normal"
+"""The technique of a row, or of a job, that names none."""
+LONGEST_WORD = 40
+"""Most characters of a word that rows are chosen by: it stands in comments of programs."""
+MOST_ROWS = 10_000
+"""Most rows of a chart."""
+
+Word = Annotated[Text, Field(max_length=LONGEST_WORD)]
+Power = Annotated[Positive | None, key("a number above 0, at most 100000, in W", "2500", le=1e5)]
+Frequency = Annotated[Positive | None, key("a number above 0, in Hz", "5000")]
+Duty = Annotated[
+    Positive | None, key("a number above 0, at most 100, in per cent", "80", le=100)
+]  # fmt: skip
+Pressure = Annotated[NotNegative | None, key("a number from 0 to 100, in bar", "14", le=100)]
+Height = Annotated[Positive | None, key("a number above 0, at most 100, in mm", "1", le=100)]
+Length = Annotated[NotNegative | None, key("a number from 0 to 1000, in mm", "3", le=1000)]
+Seconds = Annotated[NotNegative | None, key("a number from 0 to 60, in s", "0.3", le=60)]
+Focus = Annotated[
+    Number | None,
+    key("a number from -100 to 100, in mm, negative below the surface", "-1.5", ge=-100, le=100),
+]
+Technique = Annotated[
+    Word, key('"normal", "small-hole", "engraving", "thin-web" or another word', '"normal"')
+]
+Material = Annotated[Word, key("a material, as charts call it", '"mild steel"')]
+Gas = Annotated[Word | None, key("a gas, as charts call it", '"N2"')]
+Quality = Annotated[Word | None, key("a quality, as charts call it", '"fine"')]
+Thickness = Annotated[Positive, key("a number above 0, at most 500, in mm", "3", le=500)]
+
+
+class StageTable(Table):
+    """[[row.pierce]]: a stage of the pierce."""
+
+    time_s: Annotated[NotNegative, key("a number from 0 to 60, in s", "0.2", le=60)]
+    power_w: Power = None
+    frequency_hz: Frequency = None
+    duty_percent: Duty = None
+    height_mm: Height = None
+    gas: Gas = None
+    pressure_bar: Pressure = None
+    focus_mm: Focus = None
+
+
+class RowTable(Table):
+    """[[row]]: the values of one material, thickness, gas, quality and technique."""
+
+    material: Material
+    thickness_mm: Thickness
+    gas: Gas = None
+    quality: Quality = None
+    technique: Technique = NORMAL
+    speed_m_min: Annotated[
+        Positive, key("a number above 0, at most 500, in m/min", "4.2", le=500)
+    ]  # fmt: skip
+    kerf_mm: Annotated[NotNegative | None, key("a number from 0 to 20, in mm", "0.2", le=20)] = None
+    lead_in_mm: Length = None
+    lead_out_mm: Length = None
+    micro_joint_mm: Length = None
+    gas_lead_s: Seconds = None
+    stand_off_mm: Height = None
+    power_w: Power = None
+    frequency_hz: Frequency = None
+    duty_percent: Duty = None
+    pressure_bar: Pressure = None
+    nozzle_mm: Annotated[
+        Positive | None, key("a number above 0, at most 20, in mm", "1.5", le=20)
+    ] = None
+    focus_mm: Focus = None
+    current_a: Annotated[Positive | None, key("a number above 0, in A", "45")] = None
+    voltage_v: Annotated[Positive | None, key("a number above 0, in V", "128")] = None
+    pause_at_end_s: Seconds = None
+    note: Annotated[Text | None, key("a remark", '"mirror side up"')] = None
+    pierce: Annotated[
+        tuple[StageTable, ...],
+        Field(strict=False, max_length=20),
+        key("a list of stages", "[{ time_s = 0.2, power_w = 1500 }]"),
+    ] = ()
+
+    @property
+    def chosen_by(self) -> tuple[str, float, str, str, str]:
+        """What the row is chosen by."""
+        words = self.gas or "", self.quality or "", self.technique
+        return (self.material, self.thickness_mm, *words)
+
+    @property
+    def pierce_time(self) -> float | None:
+        """The time of all stages of the pierce, s; None without stages."""
+        return round(sum(stage.time_s for stage in self.pierce), 6) if self.pierce else None
+
+
+class ChartFile(Table):
+    """A cut chart: where its values come from, and its rows."""
+
+    source: Annotated[Text, key("where the values come from", '"cut trials of May 2026"')]
+    example: Annotated[bool, key("whether the values are only an example", "true")] = False
+    machine: Annotated[Text | None, key("the source that the rows hold for", '"3 kW fibre"')] = None
+    row: Annotated[
+        tuple[RowTable, ...],
+        Field(strict=False, min_length=1, max_length=MOST_ROWS),
+    ]
+
+    @model_validator(mode="after")
+    def _rows_differ(self) -> ChartFile:
+        seen: dict[tuple[str, float, str, str, str], int] = {}
+        for number, row in enumerate(self.row):
+            first = seen.setdefault(row.chosen_by, number)
+            if first != number:
+                raise fault(
+                    "rows that differ in material, thickness_mm, gas, quality or technique",
+                    f"those of row {first + 1} again",
+                    "remove one, or name another technique or quality",
+                    ("row", number, "material"),
+                )
+        return self
+
+
+class JobRowTable(RowTable):
+    """[[process.row]]: a row of a chart in the job itself; a plan.json has the rows in use."""
+
+    chart: Annotated[Text | None, key("the chart that the row is from", '"charts/steel.toml"')] = (
+        None
+    )
+    number: Annotated[
+        int | None, key("the number of the row in its chart, from 1", "3", ge=1, le=MOST_ROWS)
+    ] = None
+    source: Annotated[Text | None, key("where the values come from", '"cut trials"')] = None
+    example: Annotated[bool, key("whether the values are only an example", "true")] = False
+    machine: Annotated[Text | None, key("the source that the row holds for", '"3 kW fibre"')] = None
+
+    @property
+    def place(self) -> str:
+        """Where the row is, in words."""
+        number = "" if self.number is None else f" row {self.number}"
+        return f"{self.chart}{number}" if self.chart else "[[process.row]]"
+
+
+class ProcessTable(Table):
+    """[process]: what is cut, and the chart that has the values for it."""
+
+    material: Material
+    thickness_mm: Thickness
+    gas: Gas = None
+    quality: Quality = None
+    technique: Technique = NORMAL
+    chart: Annotated[
+        Text | None, key("the path of a chart, or the name of one", '"charts/steel.toml"')
+    ] = None
+    between: Annotated[
+        Literal["refuse", "linear"],
+        key("what to do with a thickness between two rows", '"linear"'),
+    ] = "refuse"
+    row: Annotated[tuple[JobRowTable, ...], Field(strict=False, max_length=MOST_ROWS)] = ()
