@@ -250,6 +250,14 @@ def test_an_axis_that_passes_360_is_asked_for(tmp_path: Path) -> None:
         assert swept(axes_along(tmp_path, "-10", rollover)) == pytest.approx(360, abs=1e-6)
 
 
+@pytest.mark.parametrize("rollover", [None, True, False])
+def test_dc_is_the_shorter_way_round_whatever_the_machine(
+    tmp_path: Path, rollover: bool | None
+) -> None:
+    assert swept(axes_along(tmp_path, "=DC(10)", rollover)) == pytest.approx(20, abs=1e-6)
+    assert swept(axes_along(tmp_path, "=AC(370)", rollover)) == pytest.approx(20, abs=1e-6)
+
+
 def test_a_tool_axis_that_the_control_turns_evenly(tmp_path: Path) -> None:
     """ORIVECT and PATHCTRL VECTOR turn it in the plane of both axes, without points between."""
     blocks = "G0 X0 Y0 Z0 B40 C0\nG1 X50 C90\nM30\n"

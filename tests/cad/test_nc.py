@@ -198,6 +198,16 @@ def test_a_vector_of_iso_programs_is_the_tool_axis(tmp_path: Path) -> None:
     assert contour.axes == pytest.approx(np.array([[0, 0, -1], [0, 0, -1], [-0.6, 0, -0.8]]))
 
 
+def test_places_in_brackets_are_absolute(tmp_path: Path) -> None:
+    plain = S + "G1 X15 Y30\nM30\n"
+    words = plain.replace("X15", "X=AC(15)").replace("Y30", "Y = AC( 30. )")
+    assert words != plain
+    found, asked = (
+        program(tmp_path, text).contour("cut1", closed=False) for text in (words, plain)
+    )
+    np.testing.assert_array_equal(found.points, asked.points)
+
+
 S = "G710\nTRAORI\nG0 X0 Y0 Z0 A3=0 B3=0 C3=1\nG1 X10\nY20\n"
 H = "BEGIN PGM A MM\nLN X0 Y0 Z0 TX0 TY0 TZ1 FMAX M128\nL X10 F9\nL Y20\n"
 REFUSED = {
@@ -220,7 +230,10 @@ REFUSED = {
     ),
     "another arc": (S + "CIP X20 I1=5\n", "line 6: 'CIP': a curve"),
     "increments": (S + "G91 X5\n", "line 6: 'G91': increments; write absolute"),
-    "an increment": (S + "X=IC(5)\n", "line 6: X=: expected a number"),
+    "an increment": (S + "X=IC(5)\n", r"line 6: X=: expected a number, or AC\( \) or DC\( \)"),
+    "a way round of a slide": (S + "X=DC(5)\n", r"line 6: X=DC\( \): expected a rotary axis"),
+    "an open bracket": (S + "X=AC(5\n", "line 6: X=: expected a number"),
+    "a factor of a place": (S + "X=AC(5)*2\n", "line 6: X=: expected a number"),
     "a parameter": (S + "X=R1\n", "line 6: X=: expected a number"),
     "a sum": (S + "X=5+R1\n", "line 6: X=: expected a number"),
     "compensation": (S + "G41\n", "line 6: 'G41': the controller would offset the path"),

@@ -29,7 +29,8 @@ from kerfpath.text import upper
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 WORD = re.compile(
-    rf"\s*(?:(?P<named>CR|[A-Z]\d*)\s*=\s*(?P<value>{NUMBER})?"
+    rf"\s*(?:(?P<named>CR|[A-Z]\d*)\s*=\s*"
+    rf"(?:(?P<way>[AD]C)\s*\(\s*(?P<there>{NUMBER})\s*\)|(?P<value>{NUMBER}))?"
     rf"|(?P<keyword>[A-Z_][A-Z_][A-Z0-9_]*)\s*(?P<arguments>\([^)]*\))?"
     rf"|(?P<letter>[A-Z])\s*(?P<number>{NUMBER})"
     rf"|(?P<comment>\([^)]*\)))",
@@ -105,16 +106,19 @@ def _siemens_path(lines: Sequence[str], machine: Machine | None) -> ToolPath:
         if text.startswith("/"):
             raise InputError(f"line {number}: a block that the machine may skip (/)")
         block = _Block(number)
-        for name, value in _words(number, text):
-            block.add(name, value)
+        for name, value, shorter in _words(number, text):
+            block.add(name, value, shorter)
         program.take(block)
     return ToolPath(
         moves=program.tip.moves, unit=program.unit, notes=program.tip.notes, unused=program.unused
     )
 
 
-def _words(line: int, text: str) -> Iterator[tuple[str, str]]:
-    """Yield the words of a block: an address and its number, or a keyword and its arguments."""
+def _words(line: int, text: str) -> Iterator[tuple[str, str, bool]]:
+    """Yield the words of a block: an address and its number, or a keyword and its arguments.
+
+    The last value says whether a rotary axis goes there the shorter way round (`DC`).
+    """
     place = 0
     while place < len(text):
         found = WORD.match(text, place)
@@ -123,14 +127,19 @@ def _words(line: int, text: str) -> Iterator[tuple[str, str]]:
                 f"line {line}: expected words such as X1.5 or A3=0.5, got {text[place:][:30]!r}"
             )
         place = found.end()
-        if found["named"]:
-            if found["value"] is None or text[place : place + 1] in tuple("*/+-(.["):
-                raise InputError(f"line {line}: {found['named']}=: expected a number")
-            yield found["named"], found["value"]
+        if name := found["named"]:
+            value, shorter = found["there"] or found["value"], found["way"] == "DC"
+            if value is None or text[place : place + 1] in tuple("*/+-(.["):
+                raise InputError(
+                    f"line {line}: {name}=: expected a number, or AC( ) or DC( ) of it"
+                )
+            if shorter and name not in ROTARY:
+                raise InputError(f"line {line}: {name}=DC( ): expected a rotary axis, A, B or C")
+            yield name, value, shorter
         elif found["keyword"]:
-            yield found["keyword"], found["arguments"] or ""
+            yield found["keyword"], found["arguments"] or "", False
         elif found["letter"]:
-            yield found["letter"], found["number"]
+            yield found["letter"], found["number"], False
 
 
 class _Block:
@@ -143,9 +152,10 @@ class _Block:
         self.m: list[float] = []
         self.words: dict[str, float] = {}
         self.keywords: dict[str, str] = {}
+        self.shorter: set[str] = set()
 
-    def add(self, name: str, value: str) -> None:
-        """Take one word.
+    def add(self, name: str, value: str, shorter: bool) -> None:
+        """Take one word; a rotary axis may go there the shorter way round.
 
         Raises
         ------
@@ -160,6 +170,7 @@ class _Block:
             raise InputError(f"{self.where}: {name} twice in one block")
         else:
             self.words[name] = finite(value, f"{self.where}: {name}")
+            self.shorter |= {name} if shorter else set()
 
 
 class _Program:
@@ -195,6 +206,7 @@ class _Program:
         names = CENTRE if self._by_ijk else AXIS
         vector = [words.pop(name, 0.0) if name in words else None for name in names]
         angles = {name: words.pop(name) for name in ROTARY if name in words}
+        angles |= {name: self.tip.nearest(name, angles[name]) for name in block.shorter}
         words.pop("N", None)
         if angles and self.tip.machine is None:
             raise InputError(f"{where}: {next(iter(angles))}: a rotary axis; {GIVE_MACHINE}")

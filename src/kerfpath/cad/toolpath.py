@@ -219,6 +219,11 @@ class Tip:
             Move(line=line, kind=kind, point=point, axis=self._axis, arc=along, rotary=rotary)
         )
 
+    def nearest(self, name: str, angle: float) -> float:
+        """Return an angle (deg) plus the turns that bring it nearest to where a rotary axis is."""
+        before = self._angles.get(name, angle)
+        return angle + 360 * round((before - angle) / 360)
+
     def _turned(
         self, line: int, angles: Mapping[str, float], *, feed: bool, has_axis: bool
     ) -> Rotary | None:
