@@ -12,7 +12,7 @@ from jobs import DEMO, SMALL
 from kerfpath import InputError, Response
 from kerfpath.execution import CommandedRun
 from kerfpath.execution.path_error import STEP
-from kerfpath.job import programmed_plans, read_job, read_plan_file, runs_of
+from kerfpath.job import cell_of_job, programmed_plans, read_job, read_plan_file, runs_of
 
 QUICK = SMALL.replace("[plan]", "[plan]\ncertify = false\npath_tolerance_mm = 0.06").replace(
     "spacing_mm = 1\n", "spacing_mm = 1.25\n"
@@ -150,6 +150,27 @@ def test_a_cut_that_is_too_fast_is_refused_with_a_speed_that_holds(folder):
     (folder / "fast.toml").write_text(fast.replace("speed_m_min = 3", f"speed_m_min = {speed}", 1))
     result = run("plan", "fast.toml", "--out", "fast", "--json", cwd=folder)
     assert json.loads(result.stdout)["contours"][0]["passed"]
+
+
+@pytest.mark.slow
+def test_in_a_cell_the_moved_motion_keeps_its_distances_and_passes_its_audit(folder):
+    table = 'name = "table"\nsize_mm = [800, 1500, 50]\nxyz_mm = [1250, 0, 275]\n'
+    cell = f"\n[cell]\nnear_miss_mm = 10\nstand_off_mm = 1\n\n[[cell.fixture]]\n{table}"
+    (folder / "cell.toml").write_text(MODEL + cell)
+    result = run("plan", "cell.toml", "--out", "cell", "--json", cwd=folder)
+    assert result.returncode == 0, result.stdout
+    job = read_job(folder / "cell.toml")
+    bodies = cell_of_job(job, job.read_part())
+    drawn = read_plan_file(folder / "cell" / "plan.json")
+    moved = programmed_plans(job, drawn)
+    for each, as_drawn in zip(moved, drawn.plans, strict=True):
+        assert np.abs(each.q - as_drawn.q).max() > 1e-5
+        # The distances are computed to a micrometre.
+        assert (bodies.distances(each.q) - bodies.required).min() > -1e-6
+    assert audited(folder, "cell/cell.mod", "cell.toml") == set()
+    text = (folder / "cell" / "cell.mod").read_text()
+    (folder / "moved_in_cell.mod").write_text(shifted(text, 0.5))
+    assert audited(folder, "moved_in_cell.mod", "cell.toml")
 
 
 # -----------------------------------------------------------------------------
